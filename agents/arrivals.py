@@ -1,0 +1,153 @@
+"""What has reached an agent: decoded once, held until due, sorted for its next step."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any, Final
+
+from agents.agent import Inputs
+from agents.pilot import Awaited
+from shared.barrier import PLANNER
+from shared.codec import decode
+from shared.config import CENTRAL, Config
+from shared.errors import MessageError
+from shared.messages import EStop, Event, Message, Plan, State
+from shared.topics import ESTOP, EVENT, MEASUREMENT, PLAN, REFERENCE, STATE, TRUTH, Topic
+
+OPERATOR: Final = "operator"
+WORLD: Final = "sim"
+Source = tuple[str, str]  # name of a topic, name of who sends it
+Order = tuple[int, int]  # a tick, or the step and exchange of a plan
+_NEVER: Final = (-1, 0)
+_HELD: Final = 256  # messages of one topic; more can only be a flood
+
+
+class Arrivals:
+    """The messages that an agent subscribes to, between the bus and its next step.
+
+    In lock-step a message is handed over at the tick that awaits it, never earlier: then what an
+    agent knew at each tick does not depend on who was faster. In real time all that has come is
+    handed over.
+
+    Args:
+        config: the team's configuration.
+        robot: the agent's robot.
+        peers: robots whose plans and measurements matter to it.
+
+    Attributes:
+        keys: what to subscribe to.
+        counters: refused messages, states passed over and waits given up, by name.
+        heard: valid messages by topic and sender.
+        ended: whether the world has said that the walk is over.
+    """
+
+    def __init__(self, config: Config, robot: str, peers: Sequence[str]) -> None:
+        team, central = config.team.name, config.planner.kind in CENTRAL
+        self._lockstep = config.world.mode == "lockstep"
+        self._peers, self._planners = tuple(peers), (PLANNER,) if central else tuple(peers)
+        self._topics: dict[str, tuple[Topic, str]] = {
+            STATE.key(team, robot): (STATE, robot),
+            REFERENCE.key(team): (REFERENCE, OPERATOR),
+            ESTOP.key(team): (ESTOP, ""),
+            EVENT.key(team): (EVENT, WORLD),
+        }
+        if config.estimator.kind == "truth":
+            self._topics[TRUTH.key(team)] = (TRUTH, WORLD)
+        if central:
+            self._topics[PLAN.key(team, robot)] = (PLAN, PLANNER)
+        for peer in self._peers:
+            self._topics[PLAN.key(team, peer)] = (PLAN, peer)
+            self._topics[MEASUREMENT.key(team, peer)] = (MEASUREMENT, peer)
+        self.keys = tuple(self._topics)
+        self.counters: Counter[str] = Counter()
+        self.heard: Counter[Source] = Counter()
+        self.ended = False
+        self._newest: dict[Source, Order] = {}
+        self._held: dict[str, list[tuple[str, Any]]] = {}  # sender and message by topic
+        self._state: State | None = None
+        self._estop: EStop | None = None
+
+    def take(self, key: str, payload: bytes) -> None:
+        """Take in a packet; one that is not a valid message is dropped and counted."""
+        row = self._topics.get(key)
+        if row is None:
+            self.counters["dropped_foreign"] += 1
+            return
+        topic, sender = row
+        try:
+            message = decode(payload, topic.type)
+        except MessageError:
+            self.counters[f"dropped_{topic.name}"] += 1
+            return
+        self.heard[topic.name, sender] += 1
+        self._keep(topic, sender, message)
+
+    def _keep(self, topic: Topic, sender: str, message: Message) -> None:
+        if isinstance(message, State):
+            if self._state is not None:
+                self.counters["states_passed_over"] += 1
+            self._state = message
+        elif isinstance(message, EStop):
+            self._estop = message
+        elif isinstance(message, Event):
+            self.ended = self.ended or message.kind == "stop"
+        else:
+            held = self._held.setdefault(topic.name, [])
+            if len(held) >= _HELD:
+                self.counters[f"flooded_{topic.name}"] += 1
+                return
+            held.append((sender, message))
+            source = (topic.name, sender)
+            self._newest[source] = max(self._newest.get(source, _NEVER), _order(message))
+
+    def state(self) -> State | None:
+        """The newest state, once."""
+        state, self._state = self._state, None
+        return state
+
+    def owing(self, tick: int, awaited: Awaited) -> frozenset[Source]:
+        """Whose message, of which topic, for the step of `tick` has not come yet."""
+        wanted: list[tuple[Topic, str, Order | None]] = [
+            *((PLAN, name, awaited.plan) for name in self._planners),
+            *((MEASUREMENT, name, _tick(awaited.measurement_tick)) for name in self._peers),
+            (REFERENCE, OPERATOR, _tick(awaited.reference_tick)),
+            (TRUTH, WORLD, _tick(tick if awaited.truth else None)),
+        ]
+        return frozenset(
+            (topic.name, sender)
+            for topic, sender, due in wanted
+            if due is not None and self._newest.get((topic.name, sender), _NEVER) < due
+        )
+
+    def inputs(self, state: State, awaited: Awaited) -> Inputs:
+        """All that is due at the step of `state`, sorted by robot, then tick."""
+        plans = self._due(PLAN, awaited.plan)
+        measurements = self._due(MEASUREMENT, _tick(awaited.measurement_tick))
+        references = self._due(REFERENCE, _tick(awaited.reference_tick))
+        truths = self._due(TRUTH, _tick(state.tick if awaited.truth else None))
+        estop, self._estop = self._estop, None
+        return Inputs(
+            state, tuple(measurements), tuple(plans), tuple(ref for _, ref in references),
+            estop, truths[-1][1] if truths else None,
+        )  # fmt: skip
+
+    def _due(self, topic: Topic, limit: Order | None) -> list[tuple[str, Any]]:
+        """Take out the held messages of a topic up to `limit`."""
+        if (self._lockstep and limit is None) or not (held := self._held.get(topic.name)):
+            return []
+        due: list[tuple[str, Any]] = []
+        later: list[tuple[str, Any]] = []
+        for item in held:
+            on_time = not self._lockstep or limit is None or _order(item[1]) <= limit
+            (due if on_time else later).append(item)
+        self._held[topic.name] = later
+        return sorted(due, key=lambda item: (item[0], _order(item[1])))
+
+
+def _order(message: Message) -> Order:
+    return message.serial if isinstance(message, Plan) else (message.tick, 0)
+
+
+def _tick(tick: int | None) -> Order | None:
+    return None if tick is None else (tick, 0)

@@ -1,0 +1,132 @@
+"""SHELL of the central planner: receive all measurements, plan, publish every robot's plan."""
+
+from __future__ import annotations
+
+import gc
+from collections import Counter
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from agents.agent import REFERENCE_EPOCH_MS as EPOCH_MS
+from agents.central import Central, CentralOutputs, CentralState
+from agents.planner.central import TeamPlanner
+from agents.planner.horizon import step_ms
+from shared.barrier import PLANNER, SIM, meet
+from shared.blas import one_blas_thread
+from shared.bus import HERE, POLL, READY, Bus
+from shared.clock import monotonic, monotonic_ns
+from shared.codec import decode, encode
+from shared.config import Config
+from shared.errors import MessageError
+from shared.messages import Event, Measurement, Reference, Status
+from shared.robot import robot_names
+from shared.signals import stop_on_signals
+from shared.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS
+
+_WORKING: Final = "plan"
+
+
+def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None = None) -> None:
+    """Plan for the whole team until the world ends, the sim server leaves, or it is stopped.
+
+    Args:
+        config: the team's configuration.
+        planner: the team's planner.
+        stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
+
+    Raises:
+        BusError: the bus cannot be opened, or the team is not complete in time.
+    """
+    stopped = stopped or stop_on_signals()
+    one_blas_thread()
+    team, names = config.team.name, robot_names(config.team.robots)
+    with Bus.open(config.bus, team, PLANNER, stopped) as bus:
+        shell = _Shell(config, Central(config, planner, monotonic_ns), bus)
+        for name in names:
+            bus.subscribe(MEASUREMENT.key(team, name))
+        bus.subscribe(REFERENCE.key(team))
+        bus.subscribe(EVENT.key(team))
+        if not meet(bus, config, stopped):
+            return
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        bus.declare(READY)
+        shell.work(stopped)
+
+
+class _Shell:
+    """The loop around `Central.step`."""
+
+    def __init__(self, config: Config, central: Central, bus: Bus) -> None:
+        team, realtime = config.team.name, config.world.mode == "realtime"
+        self._config, self._central, self._bus = config, central, bus
+        self._robots = {MEASUREMENT.key(team, n): n for n in robot_names(config.team.robots)}
+        self._put = {
+            name: bus.publisher(PLAN.key(team, name), droppable=realtime)
+            for name in self._robots.values()
+        }
+        self._tell = bus.publisher(STATUS.key(team, PLANNER), droppable=realtime)
+        self._lockstep = not realtime
+        self._references: list[Reference] = []
+        self._newest_reference = -1
+        self._measurements: list[tuple[str, Measurement]] = []
+        self._counters: Counter[str] = Counter()
+        self._ended = False
+
+    def work(self, stopped: Callable[[], bool]) -> None:
+        """Plan whenever a step is due until the walk is over."""
+        state, since = CentralState(), monotonic()
+        while not (stopped() or self._ended):
+            packet = self._bus.get(POLL)
+            if packet is None and SIM not in self._bus.present(HERE):
+                return
+            for key, payload in (packet, *self._bus.drain()) if packet else ():
+                self._take(key, payload)
+            state = self._central.remember(state, self._measurements, self._references)
+            self._measurements, self._references = [], []
+            due = self._central.due(state)
+            if due is None:
+                since = monotonic()
+            elif self._reference_known(due) or monotonic() - since > self._patience:
+                state, outputs = self._central.step(state)
+                self._publish(outputs)
+
+    @property
+    def _patience(self) -> float:
+        return self._config.planner.peer_timeout if self._lockstep else 0.0
+
+    def _reference_known(self, step: int) -> bool:
+        """Whether the operator's word for the time of `step` is there."""
+        tick = step * step_ms(self._config)
+        return self._newest_reference >= tick - tick % EPOCH_MS
+
+    def _take(self, key: str, payload: bytes) -> None:
+        robot = self._robots.get(key)
+        try:
+            if robot is not None:
+                self._measurements.append((robot, decode(payload, Measurement)))
+            elif key.endswith(EVENT.name):
+                self._ended = self._ended or decode(payload, Event).kind == "stop"
+            else:
+                reference = decode(payload, Reference)
+                self._references.append(reference)
+                self._newest_reference = max(self._newest_reference, reference.tick)
+        except MessageError:
+            self._counters[f"dropped_{key.rpartition('/')[2]}"] += 1
+
+    def _publish(self, outputs: CentralOutputs) -> None:
+        for name, plan in outputs.plans:
+            self._put[name](encode(plan))
+        if not outputs.plans or outputs.planner_ns is None:
+            return
+        plan = outputs.plans[0][1]
+        if plan.status != "solved":
+            self._counters[f"plan_{plan.status.partition(':')[0]}"] += 1
+        took = np.array([1e-6 * outputs.planner_ns])
+        self._tell(encode(Status(
+            plan.tick, plan.stamp_ns, _WORKING, "", "", {}, dict(self._counters), took,
+            np.zeros(0),
+        )))  # fmt: skip

@@ -1,0 +1,142 @@
+"""Output dynamics of the trunk: desired accelerations from speed, height and heading errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from agents.controller.estimator import Estimate
+from agents.controller.model import RigidBody
+from agents.controller.rotation import cross, roll_pitch_yaw, wrap_angle
+from shared.config import ControllerConfig
+from shared.jit import compiled
+from shared.robot import Array
+
+if TYPE_CHECKING:
+    from agents.controller.controller import Task
+
+_Z_LIMIT = 0.05  # m·s, height integrator
+_SPEED_LIMIT = 0.15  # m, speed integrator
+
+
+@dataclass(frozen=True, slots=True)
+class Integrators:
+    """Slow states of the trunk's references.
+
+    Attributes:
+        height: integral of the height error, m·s.
+        speed: integral of the speed error, slowly forgotten, yaw frame, (2,), m.
+        lead: lead of the position reference over the trunk, yaw frame, (2,), m.
+        yaw: desired heading, rad.
+    """
+
+    height: float
+    speed: Array
+    lead: Array
+    yaw: float
+
+
+def initial_integrators(yaw: float) -> Integrators:
+    """All at rest, heading kept."""
+    return Integrators(0.0, np.zeros(2), np.zeros(2), yaw)
+
+
+def trunk_gains(config: ControllerConfig) -> Array:
+    """The gains as the compiled feedback takes them. Shape (12,)."""
+    return np.array(
+        [
+            config.kp_z, config.kd_z, config.ki_z, config.kp_xy, config.kd_xy, config.ki_xy,
+            config.kp_tilt, config.kd_tilt, config.kp_yaw, config.kd_yaw, config.leash,
+            config.leak_xy,
+        ]
+    )  # fmt: skip
+
+
+def trunk_acceleration(
+    previous: Integrators, gains: Array, body: RigidBody, estimate: Estimate,
+    task: Task, level: float, stance: Array, dt: float,
+) -> tuple[Integrators, Array, Array]:  # fmt: skip
+    """Desired trunk acceleration: feedback on the outputs plus the planner's feed-forward.
+
+    Returns:
+        The new integrators, the linear and angular acceleration (6,) and the desired velocity
+        (3,), all in the odometry frame.
+    """
+    height, speed, lead, yaw, trunk, v_des = _feedback(
+        previous.height, previous.speed, previous.lead, previous.yaw, gains, estimate.position,
+        estimate.velocity, estimate.R, estimate.omega, task.velocity, task.wz,
+        level + task.height, dt,
+    )  # fmt: skip
+    if task.feedforward:
+        trunk += single_rigid_body(
+            task.deviation, stance, estimate.R, estimate.position, estimate.p_foot, body.mass,
+            body.com, body.inertia_inverse,
+        )  # fmt: skip
+    return Integrators(height, speed, lead, yaw), trunk, v_des
+
+
+@compiled
+def single_rigid_body(
+    deviation: Array, stance: Array, R: Array, position: Array, p_foot: Array, mass: float,
+    com: Array, inertia_inverse: Array,
+) -> Array:  # fmt: skip
+    """Accelerations that force deviations at the scheduled stance feet give a rigid body, (6,).
+
+    Schedule, not contact, decides which legs count: a contact that comes early or late must
+    not put a jump into the feed-forward.
+    """
+    norm = np.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2)
+    c, s = R[0, 0] / norm, R[1, 0] / norm
+    centre = position + R @ com
+    force, torque = np.zeros(3), np.zeros(3)
+    for leg in range(4):
+        if stance[leg] > 0.5:
+            d = deviation[3 * leg : 3 * leg + 3]
+            f = np.array([c * d[0] - s * d[1], s * d[0] + c * d[1], d[2]])
+            force += f
+            torque += cross(p_foot[leg] - centre, f)
+    out = np.empty(6)
+    out[:3] = force / mass
+    out[3:] = R @ (inertia_inverse @ (R.T @ torque))
+    return out
+
+
+@compiled
+def _feedback(
+    height0: float, speed0: Array, lead0: Array, yaw0: float, gains: Array, position: Array,
+    velocity: Array, R: Array, omega_trunk: Array, v_yaw_frame: Array, wz: float, z_des: float,
+    dt: float,
+) -> tuple[float, Array, Array, float, Array, Array]:  # fmt: skip
+    kp_z, kd_z, ki_z, kp_xy, kd_xy, ki_xy, kp_tilt, kd_tilt, kp_yaw, kd_yaw, leash, leak = gains
+    rpy = roll_pitch_yaw(R)
+    c, s = np.cos(rpy[2]), np.sin(rpy[2])
+    omega = R @ omega_trunk
+    trunk = np.empty(6)
+    forward, left = v_yaw_frame
+    v_des = np.array([c * forward - s * left, s * forward + c * left, 0.0])
+
+    height = min(_Z_LIMIT, max(-_Z_LIMIT, height0 + dt * (z_des - position[2])))
+    trunk[2] = kp_z * (z_des - position[2]) - kd_z * velocity[2] + ki_z * height
+
+    error = v_yaw_frame - np.array(
+        [c * velocity[0] + s * velocity[1], -s * velocity[0] + c * velocity[1]]
+    )
+    speed, lead, push = np.empty(2), np.empty(2), np.empty(2)
+    for axis in range(2):
+        kept = (1.0 - dt / leak) * speed0[axis]
+        speed[axis] = min(_SPEED_LIMIT, max(-_SPEED_LIMIT, kept + dt * error[axis]))
+        lead[axis] = min(leash, max(-leash, lead0[axis] + dt * error[axis]))
+        push[axis] = kd_xy * error[axis] + ki_xy * speed[axis] + kp_xy * lead[axis]
+    trunk[0], trunk[1] = c * push[0] - s * push[1], s * push[0] + c * push[1]
+
+    yaw = wrap_angle(yaw0 + dt * wz)
+    yaw_error = min(0.3, max(-0.3, wrap_angle(yaw - rpy[2])))
+    # Tilt error about the horizontal axes of the yaw frame, taken to the odometry frame.
+    roll_push = -kp_tilt * rpy[0] - kd_tilt * (c * omega[0] + s * omega[1])
+    pitch_push = -kp_tilt * rpy[1] - kd_tilt * (-s * omega[0] + c * omega[1])
+    trunk[3] = c * roll_push - s * pitch_push
+    trunk[4] = s * roll_push + c * pitch_push
+    trunk[5] = kp_yaw * yaw_error + kd_yaw * (wz - omega[2])
+    return height, speed, lead, yaw, trunk, v_des

@@ -1,0 +1,76 @@
+"""Swing feet: Raibert footholds, minimum jerk in the plane, a Bézier curve in height."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from agents.controller.kinematics import hip_neutral
+from shared.jit import compiled
+from shared.robot import FOOT_RADIUS, Array
+
+_PLANE_DONE = 0.9  # of swing: the foot comes down vertically
+_PENETRATION = 0.005  # m below the expected ground, so that touchdown is felt
+
+
+@compiled
+def foothold(
+    leg: int, position: Array, velocity: Array, R: Array, v_des: Array, wz: float,
+    remaining: float, stance_time: float, gain: float,
+) -> Array:  # fmt: skip
+    """Raibert foothold p = p_hip + v·t_remaining + v·T_stance/2 + k (v − v_des). Shape (2,), m.
+
+    `velocity`, `v_des` are the trunk's in the odometry frame; the hip's own velocity from the
+    yaw rate `wz` [rad/s] is added. `remaining` is the time to touchdown [s].
+    """
+    hip = hip_neutral()[leg]
+    norm = np.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2)
+    c, s = R[0, 0] / norm, R[1, 0] / norm
+    rx, ry = c * hip[0] - s * hip[1], s * hip[0] + c * hip[1]
+    ahead = remaining + 0.5 * stance_time
+    out = np.empty(2)
+    out[0] = position[0] + rx + (velocity[0] - wz * ry) * ahead
+    out[1] = position[1] + ry + (velocity[1] + wz * rx) * ahead
+    out[0] += gain * (velocity[0] - v_des[0])
+    out[1] += gain * (velocity[1] - v_des[1])
+    return out
+
+
+@compiled
+def swing_reference(
+    start: Array, target: Array, ground: float, apex: float, progress: float, duration: float
+) -> Array:
+    """Reference of one swing foot's centre. Shape (3, 3): rows position, velocity, acceleration.
+
+    Args:
+        start: where the foot left the ground, (3,), m.
+        target: foothold, (2,), m.
+        ground: expected ground height at the foothold, m.
+        apex: height of the foot's centre at mid-swing, m.
+        progress: progress of swing in [0, 1).
+        duration: swing time, s.
+    """
+    out = np.zeros((3, 3))
+    s = min(1.0, progress / _PLANE_DONE)
+    rate = 1.0 / (_PLANE_DONE * duration)
+    jerk = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+    slope = 30.0 * s * s * (1.0 - s) ** 2 * rate
+    bend = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) * rate * rate
+    for axis in range(2):
+        step = target[axis] - start[axis]
+        out[0, axis] = start[axis] + step * jerk
+        out[1, axis] = step * slope
+        out[2, axis] = step * bend
+    # Bézier of degree five with doubled end points: zero vertical speed at both ends.
+    end = ground + FOOT_RADIUS - _PENETRATION
+    middle = (32.0 * apex - 6.0 * start[2] - 6.0 * end) / 20.0
+    points = np.array([start[2], start[2], middle, middle, end, end])
+    for order in range(3):
+        degree = 5 - order
+        value, binomial = 0.0, 1.0
+        for i in range(degree + 1):
+            value += points[i] * binomial * progress**i * (1.0 - progress) ** (degree - i)
+            binomial = binomial * (degree - i) / (i + 1)
+        out[order, 2] = value
+        for i in range(degree):
+            points[i] = degree * (points[i + 1] - points[i]) / duration
+    return out

@@ -1,0 +1,74 @@
+"""Plans in force: what is applied at a tick, from when on, and how it fades out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from agents.planner.horizon import SAMPLE_MS
+from shared.config import PlannerConfig
+from shared.robot import Array
+
+_NO_FORCE = np.zeros(12)
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """One plan on its way: N samples from `plan_tick` on, in force from `start` on.
+
+    Attributes:
+        start: tick from which it is applied.
+        plan_tick: tick of its first sample.
+        deviation: force deviations from nominal, (N, 12), N.
+        outputs: planned outputs, (N, 6).
+    """
+
+    start: int
+    plan_tick: int
+    deviation: Array
+    outputs: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Present:
+    """What is applied at one tick.
+
+    Attributes:
+        deviation: force deviation, (12,), N, yaw frame.
+        velocity: planned vx, vy to track, (2,), m/s; None: the operator's.
+    """
+
+    deviation: Array = field(default_factory=_NO_FORCE.copy)
+    velocity: Array | None = None
+
+
+def launched(flights: tuple[Flight, ...], new: Flight) -> tuple[Flight, ...]:
+    """Add a plan; of those before it only what is still needed stays."""
+    current = [flight for flight in flights if flight.start <= new.plan_tick][-1:]
+    waiting = [flight for flight in flights if new.plan_tick < flight.start < new.start]
+    return (*current, *waiting, new)
+
+
+def present(flights: tuple[Flight, ...], tick: int, *, track_velocity: bool) -> Present:
+    """What the newest plan in force says for this tick; nothing once it has run out."""
+    for flight in reversed(flights):
+        if flight.start <= tick:
+            sample = (tick - flight.plan_tick) // SAMPLE_MS
+            if sample >= len(flight.deviation):
+                break
+            # Planned roll and pitch are not tracked: the reference would follow the error.
+            velocity = flight.outputs[sample, 1:3] if track_velocity else None
+            return Present(flight.deviation[sample], velocity)
+    return Present()
+
+
+def fading(config: PlannerConfig, error: Array) -> float:
+    """Share of a plan to apply: 1 inside the range of the data, falling to 0 at twice that range.
+
+    Args:
+        config: the range.
+        error: present outputs less the desired ones, shape (6,).
+    """
+    ranges = np.array(config.fade)[[0, 1, 1, 2, 2, 3]]
+    return float(np.clip(2.0 - np.max(np.abs(error) / ranges), 0.0, 1.0))

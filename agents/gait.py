@@ -1,0 +1,64 @@
+"""The trot as a pure function of world time: which feet are scheduled to stand when."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.config import Config
+from shared.robot import GRAVITY, N_LEGS, TOTAL_MASS, Array
+
+# Diagonal pairs in the leg order FL FR RL RR: row 0 stands in the first half of the period.
+_BITS = np.array([8, 4, 2, 1])
+_PAIRS = np.array([[True, False, False, True], [False, True, True, False]])
+
+
+def phase_offset_ms(config: Config, index: int) -> int:
+    """Shift of robot `index`'s gait: every second robot trots half a period later."""
+    return config.gait.stance_ms if config.team.alternate_phase and index % 2 else 0
+
+
+def scheduled_stance(config: Config, index: int, ticks: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Scheduled stance of robot `index` (0-based) at each tick. Shape (len(ticks), 4)."""
+    since = ticks - config.gait.stand_ms
+    half = ((since + phase_offset_ms(config, index)) // config.gait.stance_ms) % 2
+    return np.where((since < 0)[:, None], True, _PAIRS[half])
+
+
+def stance_progress(config: Config, index: int, tick: int) -> tuple[float, int]:
+    """Progress of the present half period in [0, 1) and its number, 0 or 1.
+
+    Both halves last `stance_ms`: one diagonal pair stands while the other swings.
+    """
+    since = tick - config.gait.stand_ms + phase_offset_ms(config, index)
+    half, within = divmod(since, config.gait.stance_ms)
+    return within / config.gait.stance_ms, half % 2
+
+
+def stance_of_half(half: int) -> NDArray[np.bool_]:
+    """Scheduled stance during a half period; half −1 stands on all four legs. Shape (4,)."""
+    return np.ones(N_LEGS, dtype=np.bool_) if half < 0 else _PAIRS[half]
+
+
+def nominal_forces(stance: NDArray[np.bool_]) -> Array:
+    """Forces that carry the robot's weight evenly on its stance feet (the paper's u_des).
+
+    Args:
+        stance: scheduled stance, shape (..., 4).
+
+    Returns:
+        Shape (..., 12): per leg (0, 0, m g / N_c) for stance legs and zero for swing legs, N.
+    """
+    forces: Array = _NOMINAL[stance @ _BITS]
+    return forces
+
+
+def _nominal_table() -> Array:
+    """Nominal forces of all 16 stance patterns. Shape (16, 12), N."""
+    stance = np.arange(16)[:, None] & _BITS > 0
+    forces = np.zeros((16, N_LEGS, 3))
+    forces[..., 2] = stance * TOTAL_MASS * GRAVITY / np.maximum(stance.sum(axis=1), 1)[:, None]
+    return forces.reshape(16, 3 * N_LEGS)
+
+
+_NOMINAL = _nominal_table()

@@ -1,0 +1,64 @@
+"""What the robot is doing and why: the modes, their order, and the named reasons to leave them.
+
+stand → walk → stopping → stand (for good); damping and estop are latched from anywhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+STAND: Final = "stand"
+WALK: Final = "walk"
+STOPPING: Final = "stopping"
+DAMPING: Final = "damping"
+ESTOP: Final = "estop"
+
+SLOW_DOWN_MS: Final = 500  # of a safe stop: speed goes to zero while the trot goes on
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """The present mode, since when, and the reason if it is not the normal course."""
+
+    name: str
+    since: int
+    reason: str = ""
+
+    @property
+    def limp(self) -> bool:
+        """Whether the joints are only damped."""
+        return self.name in (DAMPING, ESTOP)
+
+    def speed_factor(self, tick: int) -> float:
+        """Share of the commanded speed that is still followed."""
+        if self.name == WALK:
+            return 1.0
+        if self.name == STOPPING:
+            return max(0.0, 1.0 - (tick - self.since) / SLOW_DOWN_MS)
+        return 0.0
+
+
+def step_mode(mode: Mode, tick: int, stand_ms: int, half_boundary: bool) -> Mode:
+    """The mode's normal course: start walking, finish a safe stop at the end of a stance."""
+    if mode.name == STAND and not mode.reason and tick >= stand_ms:
+        return Mode(WALK, tick)
+    if mode.name == STOPPING and half_boundary and tick - mode.since >= SLOW_DOWN_MS:
+        return replace(mode, name=STAND)
+    return mode
+
+
+def stop_safely(mode: Mode, tick: int, reason: str) -> Mode:
+    """Slow down and stand, unless something graver is in force already."""
+    if mode.name == WALK:
+        return Mode(STOPPING, tick, reason)
+    if mode.name == STAND and not mode.reason:
+        return Mode(STAND, tick, reason)
+    return mode
+
+
+def go_limp(mode: Mode, tick: int, name: str, reason: str) -> Mode:
+    """Damp the joints for good; an emergency stop outranks a fault, the first reason stays."""
+    if mode.name == ESTOP or (mode.limp and name == DAMPING):
+        return mode
+    return Mode(name, tick, reason)

@@ -1,0 +1,56 @@
+"""Whether the agents' best responses to each other's last plans converge: a map and its radius."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import linalg
+
+from agents.planner.horizon import horizon_stance, phase_of, walking_steps
+from agents.planner.planner_qp import build_problem
+from agents.planner.predictor import Predictor
+from shared.config import Config
+from shared.robot import Array
+
+
+def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
+    """How all agents' next plans follow from all present ones, without inequality constraints.
+
+    U_i ← −H_ii⁻¹ G_iiᵀ Q̄ Σ_{j≠i} G_ij U_j over the stance legs of planning step `step`, with
+    the G of its phase.
+    Square, of the number of stance forces of the whole team (150 per robot at N = 25).
+    """
+    n, phase = predictor.meta.robots, phase_of(config, step, predictor.phases)
+    problems = [
+        build_problem(
+            config.planner, predictor.forced(i, i, phase), horizon_stance(config, i, step)
+        )
+        for i in range(n)
+    ]
+    rows = []
+    for i, problem in enumerate(problems):
+        coupling = [
+            np.zeros_like(problem.H) if i == j
+            else problem.gradient @ predictor.forced(i, j, phase)[:, problems[j].columns]
+            for j in range(n)
+        ]  # fmt: skip
+        factor = linalg.cho_factor(problem.H)
+        rows.append(-linalg.cho_solve(factor, np.concatenate(coupling, axis=1)))
+    return np.concatenate(rows)
+
+
+def best_response_radius(config: Config, predictor: Predictor) -> float:
+    """Spectral radius of the best-response map, the largest over stance patterns and phases.
+
+    Below 1 the one-step-delay iteration of the agents' plans converges; 0 for a single robot.
+    """
+    n = predictor.meta.robots
+    if n == 1:
+        return 0.0
+    distinct: dict[tuple[int, bytes], int] = {}
+    for step in walking_steps(config):
+        patterns = b"".join(horizon_stance(config, i, step).tobytes() for i in range(n))
+        distinct.setdefault((phase_of(config, step, predictor.phases), patterns), step)
+    return max(
+        float(np.abs(linalg.eigvals(best_response_map(config, predictor, step))).max())
+        for step in distinct.values()
+    )

@@ -1,0 +1,251 @@
+"""What a predictor must show before a team may walk on it, and what else is said about it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy import linalg
+
+from agents.planner.best_response import best_response_radius
+from agents.planner.episode import Y_SCALE, Episode
+from agents.planner.horizon import (
+    SAMPLE_MS,
+    gait_phase,
+    horizon_stance,
+    phase_of,
+    walking_steps,
+)
+from agents.planner.predictor import Predictor
+from agents.planner.regression import scaled_blocks
+from shared.config import Config, ControllerConfig
+from shared.errors import PredictorError
+from shared.robot import N_LEGS, N_OUTPUTS, OUTPUTS, TOTAL_MASS, Array
+
+_GAIN_FORCE = 10.0  # N, on the robot looked at
+_GAIN_TIMES = (0.1, 0.25)  # s
+
+
+@dataclass(frozen=True, slots=True)
+class GateReport:
+    """Figures of a predictor and the limits they were held against.
+
+    Attributes:
+        windows: held-out windows predicted.
+        rmse: held-out error per output over the horizon, all robots [m, m/s, rad, rad/s].
+        rmse_persistence: the same for holding the last measured output.
+        error: scaled error of all outputs together over that of persistence; must be < 1.
+        gain_times: when the height response is looked at [s].
+        gains: predicted over physical height response, per robot and time, of the worst phase.
+        gain_limits: every gain must lie between these.
+        radius: spectral radius of the best-response map, the worst of all stance patterns
+            and phases.
+        radius_limit: must be below this.
+        Q, R: planner weights the radius belongs to.
+        condition: number of the regression, penalty included; None if it is not known.
+        coupling: norm of the scaled G_ij, the largest of all phases, per robot i and j.
+        size: of G, bytes.
+    """
+
+    windows: int
+    rmse: dict[str, float]
+    rmse_persistence: dict[str, float]
+    error: float
+    gain_times: tuple[float, ...]
+    gains: tuple[tuple[float, ...], ...]
+    gain_limits: tuple[float, ...]
+    radius: float
+    radius_limit: float
+    Q: tuple[float, ...]
+    R: tuple[float, ...]
+    condition: float | None = None
+    coupling: tuple[tuple[float, ...], ...] = ()
+    size: int = 0
+
+    def to_dict(self) -> dict[str, Any]:
+        """A form that JSON can carry."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, body: dict[str, Any]) -> GateReport:
+        """The inverse of `to_dict`, also after JSON has made lists of tuples.
+
+        Raises:
+            TypeError: fields are missing or unknown.
+        """
+        frozen: dict[str, Any] = {
+            k: tuple(v) if isinstance(v, list) else v for k, v in body.items()
+        }
+        for table in ("gains", "coupling"):
+            frozen[table] = tuple(tuple(row) for row in frozen.get(table, ()))
+        return cls(**frozen)
+
+    def check(self, kind: str = "distributed") -> None:
+        """Refuse the predictor if a figure is beyond its limit.
+
+        Args:
+            kind: of planner that will use it; only where agents answer each other's plans does
+                the radius matter.
+
+        Raises:
+            PredictorError: with the figure and the limit.
+        """
+        if not self.error < 1.0:
+            raise PredictorError(
+                "predictor: held-out error", f"{self.error:.3f} of persistence", "below 1",
+                "too little data, or a plant that the data do not show; collect more",
+            )  # fmt: skip
+        low, high = self.gain_limits
+        for robot, row in enumerate(self.gains, start=1):
+            for time, gain in zip(self.gain_times, row, strict=True):
+                if not low <= gain <= high:
+                    raise PredictorError(
+                        f"predictor: height gain of r{robot} at {time:g} s", f"{gain:.2f}",
+                        f"{low:g} … {high:g} of the physical response",
+                        "forces in the data that follow the outputs (feedback bias), "
+                        "or a controller stiffer than the interface assumes",
+                    )  # fmt: skip
+        if kind == "distributed" and not self.radius < self.radius_limit:
+            raise PredictorError(
+                "predictor: radius of the best-response map", f"{self.radius:.3f}",
+                f"below {self.radius_limit:g}",
+                "the agents' plans would diverge; raise identification.block_weight",
+            )  # fmt: skip
+
+
+def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode]) -> GateReport:
+    """Measure a predictor; `GateReport.check` then decides.
+
+    Args:
+        config: team, gait, controller and limits.
+        predictor: to be judged.
+        held_out: episodes that the fit has not seen.
+
+    Raises:
+        PredictorError: no held-out episode is long enough.
+    """
+    windows, rmse, persistence, error = held_out_error(predictor, held_out)
+    return GateReport(
+        windows=windows,
+        rmse=dict(zip(OUTPUTS, rmse, strict=True)),
+        rmse_persistence=dict(zip(OUTPUTS, persistence, strict=True)),
+        error=error,
+        gain_times=_GAIN_TIMES,
+        gains=tuple(tuple(row) for row in height_gains(config, predictor).tolist()),
+        gain_limits=tuple(config.identification.gain_range),
+        radius=best_response_radius(config, predictor),
+        radius_limit=config.identification.max_radius,
+        Q=tuple(config.planner.Q),
+        R=tuple(config.planner.R),
+        condition=predictor.condition,
+        coupling=tuple(tuple(row) for row in coupling_table(predictor).tolist()),
+        size=predictor.G.nbytes,
+    )
+
+
+def held_out_error(
+    predictor: Predictor, held_out: Sequence[Episode]
+) -> tuple[int, list[float], list[float], float]:
+    """Windows, RMSE per output, that of persistence, and the ratio of the scaled errors.
+
+    Persistence holds the last measured output y, not its deviation.
+    """
+    T_ini, N = predictor.meta.T_ini, predictor.meta.N
+    length = T_ini + N
+    squares, naive, count = np.zeros(N_OUTPUTS), np.zeros(N_OUTPUTS), 0
+    for episode in held_out:
+        if episode.samples < length:
+            continue
+        z, dy = episode.windows(T_ini, N)
+        n, _, windows = dy.shape
+        error = (_predicted(predictor, episode, z) - dy).reshape(n, N, N_OUTPUTS, windows)
+        squares += (error**2).sum(axis=(0, 1, 3))
+        for start in range(windows):
+            future = episode.y[start + T_ini : start + length]
+            naive += ((future - episode.y[start + T_ini - 1]) ** 2).sum(axis=(0, 1))
+        count += windows
+    if count == 0:
+        raise PredictorError(
+            "held-out data", "no episode that long", f"at least {length} samples",
+            "did every held-out walk end in a fall?",
+        )  # fmt: skip
+    total = count * N * predictor.meta.robots
+    rmse, persistence = np.sqrt(squares / total), np.sqrt(naive / total)
+    ratio = np.linalg.norm(rmse / Y_SCALE) / np.linalg.norm(persistence / Y_SCALE)
+    return count, rmse.tolist(), persistence.tolist(), float(ratio)
+
+
+def _predicted(predictor: Predictor, episode: Episode, z: Array) -> Array:
+    """Predictions for all windows of an episode, each by the G of its phase. Shape (n, 6 N, C)."""
+    meta = predictor.meta
+    ends = episode.first_tick + SAMPLE_MS * (meta.T_ini - 1 + np.arange(z.shape[2]))
+    phase = np.array(
+        [gait_phase(int(end), meta.stand_ms, meta.stance_ms, predictor.phases) for end in ends]
+    )
+    y = np.empty((meta.robots, N_OUTPUTS * meta.N, z.shape[2]))
+    for p in np.unique(phase):
+        y[:, :, phase == p] = predictor.predict(z[:, :, phase == p], int(p))
+    return y
+
+
+def coupling_table(predictor: Predictor) -> Array:
+    """Frobenius norms of the blocks G_ij of the scaled predictor, largest phase. Shape (n, n)."""
+    blocks = scaled_blocks(predictor.G, predictor.meta)
+    table: Array = np.linalg.norm(blocks, axis=(-2, -1)).max(axis=0)
+    return table
+
+
+def height_gains(config: Config, predictor: Predictor) -> Array:
+    """Predicted over physical height response to a vertical force on one robot's stance feet.
+
+    Averaged over the gait's stance patterns in a phase; of all phases the gain farthest from 1.
+    Shape (n, 2): robot, time of `_GAIN_TIMES`.
+    """
+    N, n = predictor.meta.N, predictor.meta.robots
+    physical = physical_height(config.controller, predictor.meta.interface, N)
+    rows = [min(round(1000 * time / SAMPLE_MS), N) - 1 for time in _GAIN_TIMES]
+    by_phase: dict[int, list[int]] = {}
+    for step in walking_steps(config):
+        by_phase.setdefault(phase_of(config, step, predictor.phases), []).append(step)
+    gains = np.empty((len(by_phase), n, len(rows)))
+    for k, (phase, steps) in enumerate(by_phase.items()):
+        for robot in range(n):
+            patterns = np.array([horizon_stance(config, robot, step) for step in steps])
+            share = (patterns / patterns.sum(axis=2, keepdims=True)).mean(axis=0)
+            du = np.zeros((N, N_LEGS, 3))
+            du[:, :, 2] = _GAIN_FORCE * share
+            z = (predictor.forced(robot, robot, phase) @ du.ravel()).reshape(N, N_OUTPUTS)[:, 0]
+            gains[k, robot] = z[rows] / physical[rows]
+    worst = np.abs(gains - 1.0).argmax(axis=0)
+    found: Array = np.take_along_axis(gains, worst[None], axis=0)[0]
+    return found
+
+
+def physical_height(controller: ControllerConfig, interface: str, N: int) -> Array:
+    """Height response to the test force at the ends of N samples. Shape (N,), m.
+
+    The low level closes its loop on the height, a = −kp z − kd z' − ki ∫z. "feedforward" adds
+    the force to it, z'' = F/m + a. With "force" the whole-body QP weighs the force it is asked
+    for against a: on two stance legs γ₂/2·|f − f_des|² + γ₃/2·(z'' − a)² is least at
+    z'' = α F/m + (1 − α) a with α = 1/(1 + 2 γ₃/(γ₂ m²)).
+    """
+    passed = 1.0
+    share = 1.0
+    if interface == "force":
+        stiffness = 2.0 * controller.gamma_defect / (controller.gamma_force * TOTAL_MASS**2)
+        passed = 1.0 / (1.0 + stiffness)
+        share = 1.0 - passed
+    gains = (controller.ki_z, controller.kp_z, controller.kd_z)
+    A = np.zeros((4, 4))  # ∫z, z, z', 1
+    A[0, 1] = A[1, 2] = 1.0
+    A[2, 3] = passed * _GAIN_FORCE / TOTAL_MASS
+    A[2, :3] = -share * np.array(gains)
+    step = linalg.expm(A * SAMPLE_MS / 1000.0)
+    state = np.array([0.0, 0.0, 0.0, 1.0])
+    z = np.empty(N)
+    for k in range(N):
+        state = step @ state
+        z[k] = state[1]
+    return z

@@ -1,0 +1,274 @@
+"""One agent's planner: peers' terms, free response, local QP, plan (eq. 11, 12)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.gait import nominal_forces
+from agents.planner.horizon import horizon_stance, phase_of, walking_steps
+from agents.planner.neighbours import PeerData, Selection
+from agents.planner.planner_qp import Problem, build_problem, unpack
+from agents.planner.predictor import Predictor
+from agents.planner.qp_solver import SOLVED, SOLVERS, Residuals, Solver, no_solution
+from shared.config import Config
+from shared.errors import PredictorError
+from shared.robot import Array
+
+PEER_LOST: Final = "peer-lost"
+
+
+@dataclass(frozen=True, slots=True)
+class PeerTerms:
+    """What the peers will do to an agent's outputs at one planning step (eq. 11).
+
+    Attributes:
+        effect: Σ G_ij [u_ini; y_ini; u] over the peers, (6 N,).
+        deviations: each peer's [u_ini; y_ini; u], held while it is silent, (18 T_ini + 12 N,).
+        used: for each peer the step of the plan consumed.
+        lost: peers given up; not empty means: stop.
+        ages: how many steps older than allowed each peer's plan is.
+    """
+
+    effect: Array | float = 0.0
+    deviations: Mapping[str, Array] = field(default_factory=dict)
+    used: Mapping[str, int] = field(default_factory=dict)
+    lost: tuple[str, ...] = ()
+    ages: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class PlannerInputs:
+    """What one planning step k consumes of the agent itself; its time is t_k = step · step_ms.
+
+    Attributes:
+        step: k.
+        u_ini: own forces of the last T_ini samples, the last one ending at t_k, (T_ini, 12), N.
+        y_ini: own outputs at the ends of these samples, (T_ini, 6).
+        stance_ini: the stance that the nominal forces of these samples belong to, (T_ini, 4).
+        y_base_ini: base of the outputs (`output_base`) at the ends of these samples, (T_ini, 6).
+        y_base: base over the horizon, at the ends of its N samples, (N, 6).
+        y_des: desired outputs over the horizon, (N, 6).
+    """
+
+    step: int
+    u_ini: Array
+    y_ini: Array
+    stance_ini: NDArray[np.bool_]
+    y_base_ini: Array
+    y_base: Array
+    y_des: Array
+
+    def past(self) -> Array:
+        """Deviations [u_ini; y_ini]. Shape (18 T_ini,)."""
+        du = self.u_ini - nominal_forces(self.stance_ini)
+        return np.concatenate([du.ravel(), (self.y_ini - self.y_base_ini).ravel()])
+
+
+@dataclass(frozen=True, slots=True)
+class PlannerState:
+    """The agent's own last plan.
+
+    Attributes:
+        step: its planning step; −1 before the first one.
+        du: its force deviations, (N, 12), N.
+        solves: QPs solved so far.
+    """
+
+    step: int = -1
+    du: Array | None = None
+    solves: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class PlanResult:
+    """A plan of N samples from t_k on, always usable.
+
+    Attributes:
+        status: "solved", or "nominal:<reason>": nominal forces because the QP has no solution
+            or a peer is lost.
+        u: forces, swing legs exactly zero, (N, 12), N.
+        du: their deviation from nominal, (N, 12), N.
+        y: predicted outputs under u, (N, 6).
+        y_nominal: predicted outputs under nominal forces, for a plan that is faded, (N, 6).
+        used: for each peer the step of the plan consumed.
+        lost: peers given up; not empty means: stop.
+        residuals: optimality of the QP's solution.
+        iterations: of the QP solver.
+    """
+
+    status: str
+    u: Array
+    du: Array
+    y: Array
+    y_nominal: Array
+    used: Mapping[str, int]
+    lost: tuple[str, ...]
+    residuals: Residuals
+    iterations: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Setup:
+    """What one step of the gait's cycle needs; nominal forces of the horizon, (N, 12), N."""
+
+    problem: Problem
+    solver: Solver
+    nominal: Array
+
+
+class Planner:
+    """Immutable set-up of one agent's planner; its functions depend on their arguments alone.
+
+    Args:
+        config: the team's configuration.
+        index: this agent's place in the team, 0-based.
+        predictor: fitted for this team (see `agents.planner.store.load`).
+
+    Raises:
+        PredictorError: the predictor's sizes are not the configuration's.
+    """
+
+    def __init__(self, config: Config, index: int, predictor: Predictor) -> None:
+        check_sizes(config, predictor)
+        self._config, self._index, self._predictor = config, index, predictor
+        self._silent = np.zeros(predictor.meta.width)
+        self._cycle = walking_steps(config)
+        # Single precision is off by 3e-7 of an effect, and half as much memory to go through.
+        self._rows = [
+            np.concatenate([*predictor.G[phase, index]], axis=1, dtype=np.float32)
+            for phase in range(predictor.phases)
+        ]
+        # One factorised problem per step of the gait's cycle: a memo, it changes no result.
+        self._setups: dict[int, _Setup] = {}
+        for step in self._cycle:
+            self._setup(step)
+
+    def initial(self) -> PlannerState:
+        """No plan made yet."""
+        return PlannerState()
+
+    def peer_terms(
+        self, before: PeerTerms, selection: Selection, step: int, y_base: Array
+    ) -> PeerTerms:
+        """The peers' terms of eq. 11 for planning step `step`; what was last known of the silent.
+
+        Args:
+            before: terms of the step before.
+            selection: the peers' windows and plans.
+            step: k, whose contact phase chooses the transition matrix.
+            y_base: base of the outputs at the ends of the windows' samples, (T_ini, 6).
+        """
+        width = len(self._silent)
+        z = np.zeros(self._config.team.robots * width, dtype=np.float32)
+        deviations = {}
+        for peer in selection.peers:
+            if peer.usable:
+                found = _deviations(peer, y_base)
+            else:
+                found = before.deviations.get(peer.robot, self._silent)
+            deviations[peer.robot] = found
+            z[peer.index * width : (peer.index + 1) * width] = found
+        effect = (self._rows[self.phase(step)] @ z).astype(np.float64)
+        ages = {peer.robot: peer.age for peer in selection.peers}
+        return PeerTerms(effect, deviations, selection.used, selection.lost, ages)
+
+    def step(
+        self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms,
+        G_ii: Array | None = None,
+    ) -> tuple[PlannerState, PlanResult]:  # fmt: skip
+        """Plan the horizon of one planning step, or plan it again with the peers' newer terms.
+
+        Args:
+            state: what was planned last.
+            inputs: of the agent itself.
+            peers: what the others will do to it.
+            G_ii: instead of the predictor's own block, which costs a new set-up.
+        """
+        setup = self._setup(inputs.step) if G_ii is None else self._set_up(inputs.step, G_ii)
+        problem = setup.problem
+        past, y_des = inputs.past(), (inputs.y_des - inputs.y_base).ravel()
+        y_free = problem.condensed.Y_past @ past + peers.effect
+        if peers.lost:
+            solution, solves = no_solution(problem, PEER_LOST), 0
+        else:
+            error = y_free - y_des
+            f = problem.padded(problem.gradient @ error)
+            solution, solves = setup.solver.solve(f, *problem.bounds(error)), 1
+        x = solution.x
+        if self._config.planner.damping and solution.status == SOLVED:
+            x = self._damped(problem, x, state, inputs.step)
+        du, dy = unpack(problem, x, y_free)
+        result = PlanResult(
+            status=SOLVED if solution.status == SOLVED else f"nominal:{solution.status}",
+            u=setup.nominal + du,
+            du=du,
+            y=inputs.y_base + dy,
+            y_nominal=inputs.y_base + y_free.reshape(dy.shape),
+            used=peers.used,
+            lost=peers.lost,
+            residuals=solution.residuals,
+            iterations=solution.iterations,
+        )
+        return PlannerState(inputs.step, du, state.solves + solves), result
+
+    def _damped(self, problem: Problem, x: Array, state: PlannerState, step: int) -> Array:
+        """A solution with a share of the last plan, whose forces past its end are nominal.
+
+        Both satisfy the constraints on forces, which are convex, so their mixture does.
+        """
+        skipped = self._config.planner.applied * (step - state.step)
+        last = np.zeros((self._config.planner.N, 12))
+        if state.du is not None and 0 <= skipped < len(last):
+            last[: len(last) - skipped] = state.du[skipped:]
+        share, nv = self._config.planner.damping, len(problem.columns)
+        mixed = x.copy()
+        mixed[:nv] = (1.0 - share) * x[:nv] + share * last.ravel()[problem.columns]
+        return mixed
+
+    def phase(self, step: int) -> int:
+        """The contact phase of a planning step, which chooses the transition matrix."""
+        return phase_of(self._config, step, self._predictor.phases)
+
+    def _setup(self, step: int) -> _Setup:
+        begin = self._cycle.start
+        place = begin + (step - begin) % len(self._cycle) if step >= begin else step
+        found = self._setups.get(place)
+        if found is None:
+            G_ii = self._predictor.block(self._index, self._index, self.phase(place))
+            found = self._setups[place] = self._set_up(place, G_ii)
+        return found
+
+    def _set_up(self, step: int, G_ii: Array) -> _Setup:
+        past = self._predictor.meta.past
+        stance = horizon_stance(self._config, self._index, step)
+        problem = build_problem(self._config.planner, G_ii[:, past:], stance, G_ii[:, :past])
+        solver = SOLVERS[self._config.planner.solver](problem)
+        return _Setup(problem, solver, nominal_forces(stance))
+
+
+def check_sizes(config: Config, predictor: Predictor) -> None:
+    """Refuse a predictor whose sizes are not the configuration's.
+
+    Raises:
+        PredictorError: it is of another team or horizon.
+    """
+    meta, planner = predictor.meta, config.planner
+    got, expected = (
+        (meta.robots, meta.N, meta.T_ini),
+        (config.team.robots, planner.N, planner.T_ini),
+    )
+    if got != expected:
+        raise PredictorError(
+            "predictor", f"(robots, N, T_ini) = {got}", f"{expected}", "of another team?"
+        )
+
+
+def _deviations(peer: PeerData, y_base: Array) -> Array:
+    """A peer's [u_ini; y_ini; u], unknown samples as no deviation. Shape (18 T_ini + 12 N,)."""
+    dy = np.where(peer.known[:, None], peer.y_ini - y_base, 0.0)
+    return np.concatenate([peer.du_ini.ravel(), dy.ravel(), peer.du.ravel()])

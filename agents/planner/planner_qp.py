@@ -1,0 +1,214 @@
+"""The planner's QP, condensed to the force deviations of stance legs, for one agent or a team.
+
+    min_v ½ vᵀ H v + fᵀ v,   f = F_past past + F_des y_des,   y = Y_past past + Y_v v + Y_des y_des
+
+The outputs are eliminated; swing legs carry no force and are left out, which is exact. Every
+formulation (local eq. 12, centralised eq. 7, DeePC eq. 5) is such a `Condensed` problem, and only
+`past` and `y_des` change from tick to tick, so everything else is built once per stance pattern.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.gait import nominal_forces
+from shared.config import PlannerConfig
+from shared.robot import N_FORCES, N_OUTPUTS, Array
+
+NO_BOUNDS = "none"
+HARD = "hard"
+SOFT = "soft"
+
+
+@dataclass(frozen=True, slots=True)
+class Condensed:
+    """Cost and prediction as functions of v, the past and the desired output deviations.
+
+    P is the length of the past [u_ini; y_ini] (of all robots in a team's problem), p N that of
+    the outputs over the horizon, nv = 3 · (stance legs over the horizon).
+
+    Attributes:
+        H: shape (nv, nv).
+        F_past: shape (nv, P).
+        F_des: shape (nv, p N).
+        Y_v: shape (p N, nv).
+        Y_past: shape (p N, P).
+        Y_des: what wishing does to the prediction, shape (p N, p N); None stands for nothing,
+            which is so for every formulation with a transition matrix.
+        gradient: of those, G_uᵀ Q̄ = −F_des, shape (nv, p N).
+    """
+
+    H: Array
+    F_past: Array
+    F_des: Array
+    Y_v: Array
+    Y_past: Array
+    Y_des: Array | None = None
+    gradient: Array | None = None
+
+    def free(self, past: Array, y_des: Array) -> Array:
+        """Predicted output deviations with v = 0. Shape (p N,)."""
+        y: Array = self.Y_past @ past
+        return y if self.Y_des is None else y + self.Y_des @ y_des
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """The QP of one stance pattern; its unknowns are v and, with soft output bounds, slacks.
+
+    Attributes:
+        condensed: cost and prediction.
+        H: the cost's Hessian with that of the slacks, shape (nx, nx).
+        columns: place of each v in the stacked forces, shape (nv,).
+        A: rows of the friction cone, then of the output bounds, shape (m, nx).
+        lower, upper: bounds of [x; A x], shape (nx + m,); those of the output rows are for a free
+            response as desired.
+        bounded: places of the outputs that the output rows speak of, shape (mo,).
+        slope: c of the friction pyramid |fx|, |fy| ≤ c fz.
+    """
+
+    condensed: Condensed
+    H: Array
+    columns: NDArray[np.int64]
+    A: Array
+    lower: Array
+    upper: Array
+    bounded: NDArray[np.int64]
+    slope: float
+
+    @property
+    def gradient(self) -> Array:
+        """Of a problem with a transition matrix: G_uᵀ Q̄, so that f = G_uᵀ Q̄ (y_free − y_des)."""
+        if self.condensed.gradient is None:
+            raise ValueError("only a problem with a transition matrix has this gradient")
+        return self.condensed.gradient
+
+    def linear(self, past: Array, y_des: Array) -> Array:
+        """The linear term f of the cost, zero for slacks. Shape (nx,)."""
+        return self.padded(self.condensed.F_past @ past + self.condensed.F_des @ y_des)
+
+    def padded(self, f: Array) -> Array:
+        """A linear term in v with zeros for the slacks. Shape (nx,)."""
+        slacks = len(self.H) - len(f)
+        return np.concatenate([f, np.zeros(slacks)]) if slacks else f
+
+    def bounds(self, error: Array) -> tuple[Array | None, Array | None]:
+        """Bounds of [x; A x] with the free response y_free, shape (p N,), `error` from y_des.
+
+        None where they do not depend on it.
+        """
+        rows = len(self.bounded)
+        if not rows:
+            return None, None
+        lower, upper = self.lower.copy(), self.upper.copy()
+        lower[-rows:] -= error[self.bounded]
+        upper[-rows:] -= error[self.bounded]
+        return lower, upper
+
+
+def condense(
+    config: PlannerConfig, G_past: Array, G_u: Array, stance: NDArray[np.bool_]
+) -> Condensed:
+    """The problem of a transition matrix: H = G_uᵀ Q̄ G_u + R̄, f = G_uᵀ Q̄ (G_past past − y_des).
+
+    Args:
+        config: weights.
+        G_past: columns that multiply the past, shape (6 N n, P), robots stacked; one agent: n = 1.
+        G_u: columns that multiply the future forces, shape (6 N n, 12 N n).
+        stance: scheduled stance over the horizon, robots stacked, shape (N n, 4).
+    """
+    columns = stance_columns(stance)
+    G = np.ascontiguousarray(G_u[:, columns])
+    gradient = np.ascontiguousarray(G.T * np.tile(config.Q, len(stance)))
+    H = gradient @ G
+    H = 0.5 * (H + H.T)
+    H.flat[:: len(H) + 1] += np.tile(config.R, len(columns) // 3)
+    return Condensed(
+        H, gradient @ G_past, -gradient, G, np.ascontiguousarray(G_past), gradient=gradient
+    )
+
+
+def build_problem(
+    config: PlannerConfig, G_u: Array, stance: NDArray[np.bool_], G_past: Array | None = None
+) -> Problem:
+    """The QP of eq. 12 (one agent) or eq. 7 (a team) for one stance pattern of the horizon.
+
+    Args:
+        config: weights, friction, bounds.
+        G_u: columns that multiply the future forces, shape (6 N n, 12 N n).
+        stance: scheduled stance over the horizon, shape (N n, 4).
+        G_past: columns that multiply the past, shape (6 N n, P); None: the past is none.
+    """
+    past = np.zeros((len(G_u), 0)) if G_past is None else G_past
+    return constrain(config, condense(config, past, G_u, stance), stance)
+
+
+def constrain(config: PlannerConfig, condensed: Condensed, stance: NDArray[np.bool_]) -> Problem:
+    """Add friction cone, force bounds and output bounds to a cost.
+
+    The cone is a pyramid inside it: |fx|, |fy| ≤ c fz with c = mu/√2 and f = nominal + v, so
+    ±v_x − c v_z ≤ c nominal_z. Outputs are bounded in their deviation from the desired ones.
+    """
+    columns = stance_columns(stance)
+    feet = len(columns) // 3
+    c = config.mu / np.sqrt(2.0)
+    pyramid = np.array([[1.0, 0.0, -c], [-1.0, 0.0, -c], [0.0, 1.0, -c], [0.0, -1.0, -c]])
+    nominal = nominal_forces(stance).reshape(-1)[columns].reshape(feet, 3)
+    box = np.tile(config.deviation_max, (feet, 1))
+    low = -box
+    low[:, 2] = np.maximum(low[:, 2], config.force_min - nominal[:, 2])
+    A = np.kron(np.eye(feet), pyramid)
+    lower = [low.ravel(), np.full(4 * feet, -np.inf)]
+    upper = [box.ravel(), np.repeat(c * nominal[:, 2], 4)]
+    H, bounded = condensed.H, np.zeros(0, dtype=np.int64)
+    if config.output_bounds != NO_BOUNDS:
+        limit = np.tile(config.output_max, len(stance))
+        bounded = np.flatnonzero(np.isfinite(limit))
+        rows = condensed.Y_v[bounded]
+        if config.output_bounds == HARD:
+            A = np.concatenate([A, rows])
+            lower.append(-limit[bounded])
+            upper.append(limit[bounded])
+        else:
+            H, A, bounded = _softened(config, H, A, rows, bounded)
+            slacks = len(rows)
+            lower.insert(1, np.zeros(slacks))
+            upper.insert(1, np.full(slacks, np.inf))
+            nothing = np.full(slacks, np.inf)
+            lower += [-nothing, -limit[bounded[:slacks]]]
+            upper += [limit[bounded[:slacks]], nothing]
+    return Problem(
+        condensed, H, columns, A, np.concatenate(lower), np.concatenate(upper), bounded, c
+    )
+
+
+def _softened(
+    config: PlannerConfig, H: Array, A: Array, rows: Array, bounded: NDArray[np.int64]
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """One slack s ≥ 0 per bounded output: rows v − s ≤ max, rows v + s ≥ −max, cost w s²."""
+    nv, slacks = len(H), len(rows)
+    weighted = np.zeros((nv + slacks, nv + slacks))
+    weighted[:nv, :nv] = H
+    weighted.flat[nv * (nv + slacks + 1) :: nv + slacks + 1] = (
+        config.output_weight * np.array(config.Q)[bounded % N_OUTPUTS]
+    )
+    eye = np.eye(slacks)
+    A = np.block([[A, np.zeros((len(A), slacks))], [rows, -eye], [rows, eye]])
+    return weighted, A, np.concatenate([bounded, bounded])
+
+
+def stance_columns(stance: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Places of the stance legs' forces in the stacked forces (time, leg, axis)."""
+    return np.flatnonzero(np.repeat(stance, 3, axis=1))
+
+
+def unpack(problem: Problem, x: Array, y_free: Array) -> tuple[Array, Array]:
+    """Force deviations (N n, 12), swing legs zero, and output deviations (N n, 6) of a solution."""
+    v = x[: len(problem.columns)]
+    dy = y_free + problem.condensed.Y_v @ v
+    du = np.zeros(len(dy) // N_OUTPUTS * N_FORCES)
+    du[problem.columns] = v
+    return du.reshape(-1, N_FORCES), dy.reshape(-1, N_OUTPUTS)

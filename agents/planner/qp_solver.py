@@ -1,0 +1,209 @@
+"""Solvers of the local QP by name; each answer carries its status and its own residuals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Final, Protocol
+
+import daqp
+import numpy as np
+import osqp
+from scipy import linalg, sparse
+
+from agents.planner.planner_qp import Problem
+from shared.jit import compiled
+from shared.robot import Array
+
+SOLVED: Final = "solved"
+_FAR: Final = 1e30  # DAQP's infinity
+_DAQP_STATUS: Final = MappingProxyType({
+    1: SOLVED, -1: "infeasible", -2: "cycling", -3: "unbounded", -4: "iteration-limit",
+    -5: "not-convex", -6: "overdetermined",
+})  # fmt: skip
+# Beyond these the answer is not used, whatever the solver says of itself.
+_MAX_VIOLATION: Final = 1e-5  # N
+_MAX_STATIONARITY: Final = 1e-5  # relative to the terms of the gradient
+
+
+@dataclass(frozen=True, slots=True)
+class Residuals:
+    """How well the Karush-Kuhn-Tucker conditions hold.
+
+    Attributes:
+        stationarity: ‖H v + f + λ_box + Aᵀ λ_A‖∞ over the largest of its terms (at least 1).
+        primal: largest violation of a bound [N].
+        complementarity: largest |λ · distance to its bound|, over the same terms [N].
+    """
+
+    stationarity: float
+    primal: float
+    complementarity: float
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """What a solver answered; with any status but "solved" `v` is zero: no deviation."""
+
+    status: str
+    x: Array
+    multipliers: Array
+    residuals: Residuals
+    iterations: int
+
+
+class Solver(Protocol):
+    """Solves one `Problem` for any f and bounds; the answer does not depend on earlier solves."""
+
+    def __init__(self, problem: Problem) -> None: ...
+
+    def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> Solution:
+        """The minimiser, or the reason why there is none. Never raises for a bad f.
+
+        Args:
+            f: linear term, shape (nx,).
+            lower: bounds of [x; A x] from below, shape (nx + m,); None: those of the problem.
+            upper: bounds from above.
+        """
+        ...
+
+
+class DaqpSolver:
+    """The closed form while no bound is active, else a dense dual active set: exact.
+
+    Every solve starts from the empty active set, so that equal data give equal bits.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._inverse = -linalg.inv(problem.H)
+        self._H = np.ascontiguousarray(problem.H)
+        self._free = np.zeros(len(problem.upper))
+        self._free.setflags(write=False)
+        self._cold = np.zeros(len(problem.upper), dtype=np.int32)
+        self._model = daqp.Model()
+        self._model.settings = {"primal_tol": 1e-8}
+        self._ready, _ = self._model.setup(
+            problem.H, np.zeros(len(problem.H)), problem.A,
+            np.minimum(problem.upper, _FAR), np.maximum(problem.lower, -_FAR), self._cold,
+        )  # fmt: skip
+
+    def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> Solution:
+        """See `Solver`."""
+        if self._ready < 0:  # bounds that contradict each other are found at set-up
+            return no_solution(self._problem, _DAQP_STATUS.get(self._ready, "failed"))
+        if not math.isfinite(f @ f):
+            return no_solution(self._problem, "not-finite")
+        low = self._problem.lower if lower is None else lower
+        high = self._problem.upper if upper is None else upper
+        if not len(self._problem.bounded):
+            x, inside, stationarity = closed_form(
+                self._inverse, self._H, f, low, high, self._problem.slope
+            )
+            if inside and stationarity <= _MAX_STATIONARITY:
+                return Solution(SOLVED, x, self._free, Residuals(stationarity, 0.0, 0.0), 0)
+        if upper is None:
+            self._model.update(f=f, sense=self._cold)
+        else:
+            self._model.update(
+                f=f, sense=self._cold,
+                bupper=np.minimum(high, _FAR), blower=np.maximum(low, -_FAR),
+            )  # fmt: skip
+        x, _, flag, info = self._model.solve()
+        status = _DAQP_STATUS.get(flag, "failed")
+        return judge(self._problem, f, x, info["lam"], status, int(info["iterations"]), low, high)
+
+
+class OsqpSolver:
+    """Operator splitting, as in the paper; set up anew for each f so that nothing is carried."""
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._P = sparse.csc_matrix(np.triu(problem.H))
+        self._A = sparse.csc_matrix(np.vstack([np.eye(len(problem.H)), problem.A]))
+
+    def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> Solution:
+        """See `Solver`."""
+        if not np.isfinite(f).all():
+            return no_solution(self._problem, "not-finite")
+        low = self._problem.lower if lower is None else lower
+        high = self._problem.upper if upper is None else upper
+        if (low > high).any():
+            return no_solution(self._problem, "infeasible")
+        solver = osqp.OSQP()
+        solver.setup(
+            self._P, f, self._A, low, high,
+            verbose=False, eps_abs=1e-8, eps_rel=1e-9, max_iter=20000,
+            adaptive_rho=1, adaptive_rho_interval=50,  # by iterations, never by time
+        )  # fmt: skip
+        result = solver.solve(raise_error=False)
+        status = result.info.status.replace(" ", "-")
+        status = "infeasible" if status.startswith("primal-infeasible") else status
+        return judge(self._problem, f, result.x, result.y, status, int(result.info.iter), low, high)
+
+
+@compiled
+def closed_form(
+    minus_inverse: Array, H: Array, f: Array, lower: Array, upper: Array, slope: float
+) -> tuple[Array, bool, float]:
+    """The unconstrained minimiser x, whether box and pyramid hold at it, and its stationarity."""
+    x = minus_inverse @ f
+    inside = True
+    for i in range(len(x)):
+        inside = inside and lower[i] <= x[i] <= upper[i]
+    for foot in range(len(x) // 3):
+        limit = upper[len(x) + 4 * foot] + slope * x[3 * foot + 2]
+        inside = inside and abs(x[3 * foot]) <= limit and abs(x[3 * foot + 1]) <= limit
+    left, scale = H @ x + f, 1.0
+    worst = 0.0
+    for i in range(len(x)):
+        scale = max(scale, abs(f[i]))
+        worst = max(worst, abs(left[i]))
+    return x, inside, worst / scale
+
+
+SOLVERS: Final[Mapping[str, type[Solver]]] = MappingProxyType(
+    {"daqp": DaqpSolver, "osqp": OsqpSolver}
+)
+
+
+def no_solution(problem: Problem, status: str) -> Solution:
+    """The typed answer "no solution" with its reason."""
+    worst = Residuals(np.inf, np.inf, np.inf)
+    return Solution(status, np.zeros(len(problem.H)), np.zeros(len(problem.upper)), worst, 0)
+
+
+def judge(
+    problem: Problem, f: Array, v: Array, multipliers: Array, status: str, iterations: int,
+    lower: Array | None = None, upper: Array | None = None,
+) -> Solution:  # fmt: skip
+    """Hold a solver's claim against the conditions of optimality; what fails is "inaccurate"."""
+    if status != SOLVED:
+        return no_solution(problem, status)
+    found = residuals(problem, f, v, multipliers, lower, upper)
+    if not (found.primal <= _MAX_VIOLATION and found.stationarity <= _MAX_STATIONARITY):
+        return replace(no_solution(problem, "inaccurate"), residuals=found)
+    return Solution(SOLVED, v, multipliers, found, iterations)
+
+
+def residuals(
+    problem: Problem, f: Array, v: Array, multipliers: Array,
+    lower: Array | None = None, upper: Array | None = None,
+) -> Residuals:  # fmt: skip
+    """Karush-Kuhn-Tucker residuals; positive multipliers belong to upper bounds."""
+    low = problem.lower if lower is None else lower
+    high = problem.upper if upper is None else upper
+    nv = len(v)
+    Hv, pull = problem.H @ v, multipliers[:nv] + problem.A.T @ multipliers[nv:]
+    scale = max(1.0, *(float(np.abs(term).max()) for term in (Hv, f, pull)))
+    values = np.concatenate([v, problem.A @ v])
+    violation = np.maximum(values - high, low - values)
+    bound = np.where(multipliers > 0, high, low)
+    slack = np.where(multipliers != 0, values - bound, 0.0)
+    return Residuals(
+        float(np.abs(Hv + f + pull).max()) / scale,
+        float(np.maximum(violation, 0.0).max()),
+        float(np.abs(multipliers * slack).max()) / scale,
+    )

@@ -1,0 +1,141 @@
+"""SHELL of one robot's agent: receive, step, publish."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from typing import Final
+
+from agents.agent import Agent, AgentState, Inputs, Outputs
+from agents.arrivals import Arrivals, Source
+from agents.pilot import Awaited
+from agents.planner.predictor import Predictor
+from agents.rehearsal import rehearse
+from agents.telemetry import Telemetry
+from shared.barrier import SIM, meet
+from shared.blas import one_blas_thread
+from shared.bus import HERE, POLL, READY, Bus
+from shared.clock import monotonic, monotonic_ns
+from shared.codec import encode
+from shared.config import Config
+from shared.messages import State
+from shared.signals import stop_on_signals
+from shared.topics import COMMAND, MEASUREMENT, PLAN, STATUS
+
+NOTHING: Final = Awaited()
+
+
+def run(
+    config: Config,
+    robot: str,
+    predictor: Predictor | None,
+    stopped: Callable[[], bool] | None = None,
+) -> None:
+    """Walk one robot until the world ends, the sim server leaves, or it is stopped.
+
+    Args:
+        config: the team's configuration.
+        robot: the robot's name, r1 … rn.
+        predictor: the fitted predictor; None walks on nominal forces.
+        stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
+
+    Raises:
+        BusError: the bus cannot be opened, or the team is not complete in time.
+    """
+    stopped = stopped or stop_on_signals()
+    one_blas_thread()
+    agent = Agent(config, robot, predictor, monotonic_ns)
+    arrivals = Arrivals(config, robot, agent.peers)
+    with Bus.open(config.bus, config.team.name, robot, stopped) as bus:
+        for key in arrivals.keys:
+            bus.subscribe(key)
+        if not meet(bus, config, stopped):
+            return
+        rehearse(config, Agent(config, robot, predictor))
+        shell = _Shell(config, agent, arrivals, bus)
+        gc.collect()
+        gc.freeze()
+        gc.disable()  # a collection in mid-step costs more than the step
+        bus.declare(READY)
+        shell.walk(stopped)
+
+
+class _Shell:
+    """The loop around `Agent.step`."""
+
+    def __init__(self, config: Config, agent: Agent, arrivals: Arrivals, bus: Bus) -> None:
+        team, realtime = config.team.name, config.world.mode == "realtime"
+        self._config, self._agent, self._arrivals, self._bus = config, agent, arrivals, bus
+        self._lockstep = not realtime
+        self._put = {
+            topic: bus.publisher(topic.key(team, agent.robot), droppable=realtime)
+            for topic in (COMMAND, MEASUREMENT, PLAN, STATUS)
+        }
+        self._telemetry = Telemetry(config.estimator.kind)
+        self._given_up: dict[Source, int] = {}  # what had been heard of whom when given up
+
+    def walk(self, stopped: Callable[[], bool]) -> None:
+        """Answer every state until the walk is over."""
+        memory = self._agent.initial()
+        while not (stopped() or self._arrivals.ended):
+            self._receive(POLL)
+            state = self._arrivals.state()
+            if state is None:
+                if SIM not in self._bus.present(HERE):
+                    return
+            elif state.tick > memory.tick:
+                memory = self._answer(memory, state)
+
+    def _receive(self, timeout: float) -> bool:
+        """Take in all that has come; False if nothing came within `timeout` seconds."""
+        first = self._bus.get(timeout)
+        if first is None:
+            return False
+        self._arrivals.take(*first)
+        for packet in self._bus.drain():
+            self._arrivals.take(*packet)
+        return True
+
+    def _answer(self, memory: AgentState, state: State) -> AgentState:
+        begun = monotonic_ns()
+        inputs = self._complete(state)
+        memory, outputs = self._agent.step(memory, inputs)
+        self._put[COMMAND](encode(outputs.command))
+        self._telemetry.note(outputs, monotonic_ns() - begun)
+        self._publish_rest(state.tick, outputs)
+        return memory
+
+    def _publish_rest(self, tick: int, outputs: Outputs) -> None:
+        if outputs.measurement is not None:
+            self._put[MEASUREMENT](encode(outputs.measurement))
+        if outputs.plan is not None:
+            self._put[PLAN](encode(outputs.plan))
+        status = self._telemetry.status(tick, outputs, self._arrivals.counters)
+        if status is not None:
+            self._put[STATUS](encode(status))
+
+    def _complete(self, state: State) -> Inputs:
+        """The inputs of a step; in lock-step once those who owe a message have sent it.
+
+        Who did not within the time-out is not waited for again until he has sent such a message.
+        """
+        awaited = self._agent.awaited(state.tick)
+        if self._lockstep and awaited != NOTHING:
+            deadline = monotonic() + self._config.planner.peer_timeout
+            while owing := self._owing(state.tick, awaited):
+                left = deadline - monotonic()
+                if left <= 0.0:
+                    self._given_up |= {source: self._arrivals.heard[source] for source in owing}
+                    self._arrivals.counters["waits_given_up"] += 1
+                    break
+                self._receive(min(left, POLL))
+        return self._arrivals.inputs(state, awaited)
+
+    def _owing(self, tick: int, awaited: Awaited) -> set[Source]:
+        """Who still owes a message and is worth waiting for."""
+        heard, present = self._arrivals.heard, self._bus.present(HERE)
+        return {
+            source
+            for source in self._arrivals.owing(tick, awaited)
+            if source[1] in present and self._given_up.get(source) != heard[source]
+        }

@@ -1,0 +1,51 @@
+"""An agent's account of itself: wall-clock times gathered between two status messages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from agents.agent import Outputs
+from shared.messages import Status
+
+PERIOD_MS: Final = 100
+
+
+class Telemetry:
+    """Collects what the next status message says; one is due at 10 Hz and on change of mode."""
+
+    def __init__(self, estimator: str) -> None:
+        self._estimator = estimator
+        self._mode = ("", "")
+        self._planner_ms: list[float] = []
+        self._tick_us: list[float] = []
+        self._last = -PERIOD_MS
+        self._ages_ms: dict[str, float] = {}  # each as it was when last told
+
+    def note(self, outputs: Outputs, tick_ns: int) -> None:
+        """Add one tick.
+
+        Args:
+            outputs: what the agent's step gave.
+            tick_ns: wall-clock time from taking the state to having sent the command.
+        """
+        self._tick_us.append(1e-3 * tick_ns)
+        self._ages_ms.update(outputs.ages_ms)
+        if outputs.planner_ns is not None:
+            self._planner_ms.append(1e-6 * outputs.planner_ns)
+
+    def status(self, tick: int, outputs: Outputs, counters: Mapping[str, int]) -> Status | None:
+        """The status message if one is due, with the agent's own counters and `counters`."""
+        mode = (outputs.mode, outputs.reason)
+        if mode == self._mode and tick < self._last + PERIOD_MS:
+            return None
+        self._mode, self._last = mode, tick - tick % PERIOD_MS
+        status = Status(
+            tick, tick * 1_000_000, *mode, self._estimator, dict(self._ages_ms),
+            {**outputs.counters, **counters},
+            np.array(self._planner_ms), np.array(self._tick_us),
+        )  # fmt: skip
+        self._planner_ms, self._tick_us = [], []
+        return status

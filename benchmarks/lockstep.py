@@ -1,0 +1,109 @@
+"""Cost of a lock-step tick over the bus: real world, real Zenoh, agents that merely stand.
+
+Run: python benchmarks/lockstep.py [--robots 1 3 5] [--seconds 4]
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import resource
+from multiprocessing.synchronize import Event
+from typing import Any
+
+import numpy as np
+
+from quadriga.endpoint import free_endpoint
+from shared.barrier import SIM, meet, start_together
+from shared.bus import READY, Bus
+from shared.clock import monotonic
+from shared.codec import decode, encode
+from shared.config import Config
+from shared.config_file import load
+from shared.messages import Command, State
+from shared.robot import N_JOINTS, q_stand, robot_names
+from shared.topics import COMMAND, STATE
+from sim_server.lockstep import run_lockstep
+from sim_server.stage import Stage
+from sim_server.world import World
+
+
+def processor_time() -> float:
+    """Seconds of processor time of this process, all its threads, user and system."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    return used.ru_utime + used.ru_stime
+
+
+def stand(config: Config, robot: str, ended: Event, spent: Any) -> None:
+    """An agent that answers every state with PD around the standing pose."""
+    zero, kp, kd = np.zeros(N_JOINTS), np.full(N_JOINTS, 80.0), np.full(N_JOINTS, 3.0)
+    with Bus.open(config.bus, config.team.name, robot) as bus:
+        bus.subscribe(STATE.key(config.team.name, robot))
+        put = bus.publisher(COMMAND.key(config.team.name, robot))
+        meet(bus, config, ended.is_set)
+        bus.declare(READY)
+        begun = processor_time()
+        while not ended.is_set():
+            packet = bus.get(0.1)
+            if packet is not None:
+                state = decode(packet[1], State)
+                put(encode(Command(state.tick, state.stamp_ns, zero, q_stand(), zero, kp, kd)))
+        spent.value = processor_time() - begun
+
+
+def idle(config: Config, name: str, ended: Event) -> None:
+    """A member that subscribes to nothing."""
+    with Bus.open(config.bus, config.team.name, name) as bus:
+        meet(bus, config, ended.is_set)
+        bus.declare(READY)
+        ended.wait()
+
+
+def measure(robots: int, seconds: float) -> None:
+    """Print the cost of one tick for a team of this size."""
+    config = load(None, {
+        "team.robots": robots, "world.seconds": seconds, "bus.endpoint": free_endpoint(),
+        "recorder.enabled": False,
+    })  # fmt: skip
+    spawn = multiprocessing.get_context("spawn")
+    ended = spawn.Event()
+    spent = {name: spawn.Value("d", 0.0) for name in robot_names(robots)}
+    others = [
+        spawn.Process(target=stand, args=(config, name, ended, value))
+        for name, value in spent.items()
+    ]
+    others.append(spawn.Process(target=idle, args=(config, "operator", ended)))
+    world = World(config)
+    begun = monotonic()
+    for _ in range(1000):
+        world.step({})
+    physics = monotonic() - begun
+    world = World(config)
+    with Bus.open(config.bus, config.team.name, SIM) as bus:
+        bus.subscribe(COMMAND.key(config.team.name, "*"))
+        stage = Stage(config, world, bus)
+        for process in others:
+            process.start()
+        meet(bus, config, ended.is_set)
+        start_together(bus, config, ended.is_set)
+        begun, used = monotonic(), processor_time()
+        run_lockstep(stage, ended.is_set)
+        took, used = monotonic() - begun, processor_time() - used
+        ended.set()
+    for process in others:
+        process.join()
+    agents = sum(value.value for value in spent.values()) / robots
+    print(
+        f"n = {robots}: {1e3 * took / seconds:.0f} µs a tick, physics {1e3 * physics:.0f}; "
+        f"processor time {1e3 * used / seconds:.0f} µs of the sim server, "
+        f"{1e3 * agents / seconds:.0f} µs of each agent"
+    )
+
+
+if __name__ == "__main__":
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--robots", type=int, nargs="+", default=[1, 3, 5])
+    arguments.add_argument("--seconds", type=float, default=4.0)
+    options = arguments.parse_args()
+    for count in options.robots:
+        measure(count, options.seconds)

@@ -1,0 +1,18 @@
+"""Where a process begins: `quadriga`, or `python -m quadriga`."""
+
+from __future__ import annotations
+
+import signal
+import sys
+
+
+def main() -> int:
+    """Run the command line; a signal that comes while it is being imported waits until then."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    from quadriga.cli import main as command_line
+
+    return command_line()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,131 @@
+"""Where data and predictors are kept between runs, and the keys they are kept under."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+import os
+from collections.abc import Iterable
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import agents
+import quadriga
+import shared
+import sim_server
+from shared.clock import monotonic, sleep
+from shared.config import Config
+from shared.errors import PredictorError
+
+_LOOK = 0.2  # s, between two looks for a file that another process writes
+# What a recorded walk depends on: the code of the world and of the agent, and what they rest on.
+_LIBRARIES = ("mujoco", "pin", "numpy", "numba", "daqp", "example-robot-data")
+_CODE = (
+    (shared, ("robot.py", "yokes.py", "a1_model.py", "jit.py")),
+    (
+        agents,
+        (
+            "agent.py",
+            "gait.py",
+            "modes.py",
+            "sampling.py",
+            "references.py",
+            "controller/*",
+            "planner/episode.py",
+        ),
+    ),
+    (
+        sim_server,
+        ("team_model.py", "a1_body.py", "sensors.py", "world.py", "scenario.py", "terrain.py"),
+    ),
+    (quadriga, ("collect.py", "rollout.py")),
+)
+_FIT_CODE = ((agents, ("planner/*",)),)
+# Keys of the identification that the walks do not depend on, only what is made of them.
+_FITTED = (
+    "predictor", "neighbours", "phases", "phase_ridge", "ridge", "block_weight", "max_radius",
+    "gain_range",
+)  # fmt: skip
+
+
+def cache_dir() -> Path:
+    """The user's cache folder: $XDG_CACHE_HOME/quadriga, or ~/.cache/quadriga."""
+    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(base) / "quadriga"
+
+
+def data_key(config: Config) -> str:
+    """Key of the collected data: everything a collected walk depends on."""
+    ident = asdict(config.identification)
+    for fitted in _FITTED:
+        del ident[fitted]
+    parts: dict[str, Any] = {
+        "robots": config.team.robots, "yokes": config.team.yokes, "spacing": config.team.spacing,
+        "alternate_phase": config.team.alternate_phase, "friction": config.world.friction,
+        "sensors": asdict(config.sensors), "estimator": asdict(config.estimator),
+        "gait": asdict(config.gait), "controller": asdict(config.controller),
+        "height": config.reference.height, "interface": config.planner.interface,
+        "horizon": [config.planner.T_ini, config.planner.N] if ident["seconds"] == 0 else [],
+        "identification": ident, "code": _code_digest(_CODE),
+        "libraries": {name: version(name) for name in _LIBRARIES},
+    }  # fmt: skip
+    return _digest(parts)
+
+
+def predictor_key(config: Config) -> str:
+    """Key of the fitted predictor: its data, the fit's settings and the fit's code."""
+    planner = asdict(config.planner)
+    return _digest(
+        {
+            "data": data_key(config), "identification": asdict(config.identification),
+            "planner": {k: planner[k] for k in ("N", "T_ini", "applied", "Q", "R", "interface")},
+            "code": _code_digest(_FIT_CODE),
+        }
+    )  # fmt: skip
+
+
+def predictor_path(config: Config) -> Path:
+    """Where the predictor of this configuration is kept."""
+    return cache_dir() / f"predictor-{predictor_key(config)}.npz"
+
+
+def data_path(config: Config) -> Path:
+    """Where the collected data of this configuration are kept."""
+    return cache_dir() / f"data-{data_key(config)}.npz"
+
+
+def await_predictor(path: Path, timeout: float) -> None:
+    """Wait until another process has written the predictor file `path`.
+
+    Raises:
+        PredictorError: there was none after `timeout` seconds.
+    """
+    deadline = monotonic() + timeout
+    while not path.is_file():
+        if monotonic() > deadline:
+            raise PredictorError(
+                f"predictor {path}", f"no such file after {timeout:g} s", "a file",
+                "`quadriga prepare` makes it; from another configuration or version of the code "
+                "it has another name",
+            )  # fmt: skip
+        sleep(_LOOK)
+
+
+def _digest(parts: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _code_digest(packages: Iterable[tuple[Any, tuple[str, ...]]]) -> str:
+    """Digest of the syntax trees: a changed comment or layout does not cost a new collection."""
+    digest = hashlib.sha256()
+    for package, patterns in packages:
+        root = Path(package.__file__).parent
+        for pattern in patterns:
+            for path in sorted(root.glob(pattern)):
+                if path.suffix == ".py":
+                    tree = ast.parse(path.read_text(encoding="utf-8"))
+                    digest.update(f"{path.name}{ast.dump(tree)}".encode())
+    return digest.hexdigest()

@@ -1,0 +1,164 @@
+"""What an operator types: the command line, its options and its exit statuses."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from quadriga import verbs
+from shared.config import Config
+from shared.config_file import build, layers, parse_assignment
+from shared.errors import ProcessError, QuadrigaError
+from shared.signals import die_with_parent, interrupt_on_sigterm
+
+FAILED: Final = 1  # a robot fell or a process failed
+WRONG: Final = 2  # the command, the configuration or a file is wrong
+INTERRUPTED: Final = 130
+
+# Options that set one key of the configuration each; the key's own documentation is their help.
+KEYS: Final = {
+    "robots": "team.robots", "yokes": "team.yokes", "team": "team.name",
+    "seconds": "world.seconds", "mode": "world.mode", "seed": "world.seed",
+    "terrain": "world.terrain", "terrain-height": "world.terrain_height",
+    "payload": "world.payload", "payload-on": "world.payload_on", "push": "world.push",
+    "vx": "reference.vx", "vy": "reference.vy", "wz": "reference.wz",
+    "planner": "planner.kind", "interface": "planner.interface", "estimator": "estimator.kind",
+    "preset": "controller.preset", "endpoint": "bus.endpoint",
+}  # fmt: skip
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; its exit status. A user's mistake costs one line, not a traceback."""
+    arguments = parser().parse_args(argv)
+    try:
+        interrupt_on_sigterm()
+        if arguments.parent:
+            die_with_parent(arguments.parent)
+        status: int = arguments.verb(arguments, *_configuration(arguments))
+    except ProcessError as error:
+        return _complain(error, FAILED)
+    except QuadrigaError as error:
+        return _complain(error, WRONG)
+    except KeyboardInterrupt:
+        print("quadriga: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # of `quadriga config | head`
+        sys.stdout = None
+        return 0
+    return status
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line."""
+    top = argparse.ArgumentParser(
+        prog="quadriga", description="A team of yoked quadrupeds that walk as one.",
+        epilog="Every command reads one configuration: defaults, then --config, then options.",
+    )  # fmt: skip
+    commands = top.add_subparsers(metavar="command", required=True)
+    shared_options = _config_options()
+
+    def add(name: str, verb: Any, doc: str) -> argparse.ArgumentParser:
+        command = commands.add_parser(
+            name, help=doc, description=doc, parents=[shared_options], allow_abbrev=False
+        )
+        command.set_defaults(verb=verb)
+        return command
+
+    walk = add("walk", verbs.walk, "start all processes, walk, and show what came of it")
+    walk.add_argument("--out", type=Path, metavar="DIR", help="run folder (runs/<date>-<time>)")
+    walk.add_argument("--no-render", action="store_true", help="no pictures of the walk")
+    add("sim", verbs.sim, "the sim server alone")
+    agent = add("agent", verbs.agent, "the agent of one robot")
+    agent.add_argument("--robot", required=True, metavar="NAME", help="r1 … rn")
+    agent.add_argument("--predictor", type=Path, metavar="FILE", help="instead of the cached one")
+    plan = add(
+        "plan", verbs.plan, "the planner of the whole team (planner.kind centralised, deepc)"
+    )
+    plan.add_argument("--predictor", type=Path, metavar="FILE", help="instead of the cached one")
+    record = add("record", verbs.record, "record all traffic to an MCAP file")
+    record.add_argument("-o", "--output", type=Path, metavar="FILE",
+                        help="a new file (runs/<date>-<time>/run.mcap)")  # fmt: skip
+    record.add_argument("--predictor-sha256", default="", help="stored with the recording")
+    record.add_argument("--report", action="store_true", help="after the walk show what came of it")
+    record.add_argument("--no-render", action="store_true", help="no pictures of the walk")
+    for waiting in (agent, plan, record):
+        waiting.add_argument("--wait", type=float, default=0.0, metavar="S",
+                             help="wait so long for the predictor to be made (0)")  # fmt: skip
+    report = add("report", verbs.report, "show what came of a recorded walk")
+    report.add_argument("run_dir", type=Path, metavar="DIR", help="the folder of a run.mcap")
+    report.add_argument("--no-render", action="store_true", help="no pictures of the walk")
+    router = add("router", verbs.router, "the router between processes in client mode")
+    router.add_argument("--listen", metavar="ENDPOINT", help="where (bus.endpoint)")
+    router.add_argument("--once", action="store_true", help="leave when the team has walked")
+    add("prepare", verbs.prepare, "collect, fit and compile what a walk needs, beforehand")
+    add("operate", verbs.operate, "publish the velocity reference of the configuration")
+    add("collect", verbs.collect, "collect the data a predictor is fitted to")
+    fit = add("fit", verbs.fit, "fit the predictor, hold it against its gates and report on it")
+    fit.add_argument("--all", action="store_true",
+                     help="every predictor there is, on the same data, in one table")  # fmt: skip
+    _add_comparison(add("compare", verbs.compare,
+                        "compare planners and predictors in the same worlds"))  # fmt: skip
+    estop = add("estop", verbs.estop, "stop the team at once: every joint is damped")
+    estop.add_argument("--reason", default="operator", help="told to every agent")
+    config = add("config", verbs.show_config, "print the configuration in force as TOML")
+    config.add_argument("--markdown", action="store_true", help="as documentation instead")
+    add("version", verbs.version, "print the version")
+    return top
+
+
+def _add_comparison(compare: argparse.ArgumentParser) -> None:
+    for option, default, doc in (
+        ("planners", "none,decentralised,distributed,centralised", "planners"),
+        ("predictors", "ridge,pinv,causal,arx", "predictors"),
+        ("scenarios", "flat", "worlds"),
+        ("seeds", "0:3", "seeds of the worlds: 0:3 is 0, 1, 2; 1,5 is both"),
+    ):
+        named = "" if option == "seeds" else "; '?' lists the names"
+        compare.add_argument(f"--{option}", default=default, metavar="LIST",
+                             help=f"{doc}, separated by commas{named} ({default})")  # fmt: skip
+    compare.add_argument("--product", action="store_true",
+                         help="every planner with every predictor")  # fmt: skip
+    compare.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N",
+                         help="walks side by side (%(default)s)")  # fmt: skip
+    compare.add_argument("--bus", action="store_true",
+                         help="each walk as processes of its own, one after the other")  # fmt: skip
+    compare.add_argument("--out", type=Path, metavar="DIR", help="folder (runs/<date>-<time>)")
+
+
+def _config_options() -> argparse.ArgumentParser:
+    options = argparse.ArgumentParser(add_help=False)
+    options.add_argument("--parent", type=int, default=0, help=argparse.SUPPRESS)
+    group = options.add_argument_group("configuration")
+    group.add_argument("--config", type=Path, metavar="FILE", help="TOML; see `quadriga config`")
+    group.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE",
+                       dest="assignments", help="set any key; may be repeated")  # fmt: skip
+    for option, name in KEYS.items():
+        section, _, key = name.partition(".")
+        values = getattr(Config(), section)
+        meta = type(values).__dataclass_fields__[key].metadata
+        unit = "" if meta["unit"] in ("-", "1") else f" [{meta['unit']}]"
+        kind = type(getattr(values, key))
+        group.add_argument(
+            f"--{option}", type=kind, dest=name, metavar="|".join(meta["choices"]) or "X",
+            help=f"{meta['doc']}{unit} ({getattr(values, key)})".replace("%", "%%"),
+        )  # fmt: skip
+    return options
+
+
+def _configuration(arguments: argparse.Namespace) -> tuple[Config, dict[str, Any]]:
+    """The configuration in force, and what of it is given explicitly."""
+    overrides = dict(parse_assignment(text) for text in arguments.assignments)
+    for name in KEYS.values():
+        if (value := getattr(arguments, name)) is not None:
+            overrides[name] = value
+    given = layers(arguments.config, overrides)
+    return build(given), given
+
+
+def _complain(error: QuadrigaError, status: int) -> int:
+    print(f"quadriga: {error}", file=sys.stderr)
+    return status

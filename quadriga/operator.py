@@ -1,0 +1,95 @@
+"""SHELL of the operator: the team's velocity reference ahead of time, and the emergency stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from shared.barrier import OPERATOR, SIM, meet
+from shared.bus import HERE, POLL, READY, Bus
+from shared.codec import decode, encode
+from shared.config import Config
+from shared.envelope import envelope
+from shared.errors import MessageError
+from shared.messages import EStop, Event, Reference, Truth
+from shared.robot import robot_names
+from shared.signals import stop_on_signals
+from shared.topics import ESTOP, EVENT, REFERENCE, TRUTH
+
+EPOCH_MS: Final = 100  # a reference is published for every epoch
+_AHEAD: Final = 4  # epochs; agents in lock-step wait for the one in force
+_ESTOP_WAIT: Final = 5.0  # s, longest search for the team
+
+
+def reference_at(config: Config, tick: int) -> Reference:
+    """The reference for `tick`: nothing while the team stands, then a linear ramp to full speed."""
+    asked = config.reference
+    walked = tick - config.gait.stand_ms
+    ramp_ms = 1000 * asked.ramp
+    factor = min(1.0, max(0, walked) / ramp_ms) if ramp_ms else float(walked >= 0)
+    return Reference(
+        tick, tick * 1_000_000, factor * asked.vx, factor * asked.vy, factor * asked.wz,
+        asked.height,
+    )  # fmt: skip
+
+
+def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
+    """Publish the reference, following the world's time, until the walk ends or it is stopped.
+
+    Args:
+        config: the team's configuration.
+        stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
+
+    Raises:
+        BusError: the bus cannot be opened, or the team is not complete in time.
+    """
+    stopped = stopped or stop_on_signals()
+    team = config.team.name
+    with Bus.open(config.bus, team, OPERATOR, stopped) as bus:
+        bus.subscribe(TRUTH.key(team))
+        bus.subscribe(EVENT.key(team))
+        put = bus.publisher(REFERENCE.key(team))
+        if not meet(bus, config, stopped):
+            return
+        tick: int | None = 0
+        epoch = 0
+        while tick is not None and not stopped():
+            while EPOCH_MS * epoch <= tick + EPOCH_MS * _AHEAD:
+                put(encode(reference_at(config, EPOCH_MS * epoch)))
+                epoch += 1
+            bus.declare(READY)
+            tick = _next_tick(bus, tick)
+
+
+def _next_tick(bus: Bus, tick: int) -> int | None:
+    """The world's time as far as it has come; None when the walk is over."""
+    packet = bus.get(POLL)
+    if packet is None:
+        return tick if SIM in bus.present(HERE) else None
+    for key, payload in (packet, *bus.drain()):
+        try:
+            if key == TRUTH.key(bus.team):
+                tick = max(tick, decode(payload, Truth).tick)
+            elif decode(payload, Event).kind == "stop":
+                return None
+        except MessageError:
+            continue  # not for the operator to count: the recorder keeps it
+    return tick
+
+
+def stop_team(config: Config, reason: str) -> None:
+    """Send one emergency stop to every robot of the team.
+
+    Raises:
+        BusError: the bus cannot be opened, or some robots were not reached.
+    """
+    team = config.team.name
+    with Bus.open(config.bus, team, "estop") as bus:
+        put = bus.publisher(ESTOP.key(team))
+        bus.subscribe(TRUTH.key(team))
+        try:
+            bus.wait_for(HERE, robot_names(config.team.robots), _ESTOP_WAIT, lambda: False)
+        finally:  # those who are there must hear it, whoever is absent
+            truth = bus.get(POLL)
+            tick, stamp_ns = (truth and envelope(truth[1])) or (0, 0)
+            put(encode(EStop(tick, stamp_ns, reason)))

@@ -1,0 +1,128 @@
+"""Where every body of the team was at some instants of a recorded run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from quadriga.traces import recorded_config
+from quadriga.truth_trace import Ticks
+from shared.codec import decode
+from shared.config import Config
+from shared.errors import RecordingError
+from shared.messages import State, Truth
+from shared.recording import Recording
+from shared.robot import Array, q_stand, robot_names
+from shared.topics import STATE, TRUTH
+from sim_server.team_model import NQ, TeamModel, build_team_model
+
+_HALF_LENGTH: Final = 0.4  # m, of a robot with its legs
+
+
+@dataclass(frozen=True, slots=True)
+class Poses:
+    """Poses of the team at F instants.
+
+    Attributes:
+        config: the configuration of the run.
+        tick: shape (F,), ms.
+        qpos: MuJoCo positions of the whole team, shape (F, 19 n).
+        grf: ground on foot, world frame, shape (F, n, 4, 3), N.
+    """
+
+    config: Config
+    tick: Ticks
+    qpos: Array
+    grf: Array
+
+    def centre(self) -> Array:
+        """Mean position of the trunks, shape (F, 3), m."""
+        centre: Array = self.qpos.reshape(len(self.tick), -1, NQ)[:, :, :3].mean(axis=1)
+        return centre
+
+    def radius(self) -> float:
+        """Radius of a circle around the centre that holds the team at all instants, m."""
+        places = self.qpos.reshape(len(self.tick), -1, NQ)[:, :, :3]
+        return (
+            float(np.linalg.norm(places - self.centre()[:, None], axis=-1).max(initial=0.0)) + 0.4
+        )
+
+
+def truth_ticks(recording: Recording) -> Ticks:
+    """Ticks at which the truth was recorded, in ascending order, ms.
+
+    Raises:
+        RecordingError: there are none.
+    """
+    ticks = {entry.tick for entry in recording.entries({TRUTH.name}) if entry.tick >= 0}
+    if not ticks:
+        raise RecordingError(
+            str(recording.path), "a recording without sim/truth", "one of a simulated walk",
+            "nobody else knows where the trunks were",
+        )  # fmt: skip
+    return np.array(sorted(ticks), dtype=np.int64)
+
+
+def read_poses(recording: Recording, ticks: Ticks) -> Poses:
+    """Poses at `ticks`, which must be some of `truth_ticks`.
+
+    Raises:
+        RecordingError: truth or joint angles are missing at one of them.
+    """
+    config = recorded_config(recording)
+    names = robot_names(config.team.robots)
+    row = {tick: i for i, tick in enumerate(ticks.tolist())}
+    qpos = np.full((len(ticks), len(names), NQ), np.nan)
+    grf = np.zeros((len(ticks), len(names), 4, 3))
+    robot_of = {STATE.key(config.team.name, name): i for i, name in enumerate(names)}
+    for key, tick, _, payload in recording.entries({STATE.name, TRUTH.name}):
+        at = row.get(tick)
+        if at is None:
+            continue
+        if key in robot_of:
+            qpos[at, robot_of[key], 7:] = decode(payload, State).q_joint
+        else:
+            truth = decode(payload, Truth)
+            qpos[at, :, :3], qpos[at, :, 3:7] = truth.base_pos, truth.base_quat_wxyz
+            grf[at] = truth.grf
+    if np.isnan(qpos[..., :7]).any():
+        raise RecordingError(str(recording.path), "instants without sim/truth", "truth every 10 ms")
+    # A robot whose state was lost at an instant is shown standing.
+    qpos[..., 7:] = np.where(np.isnan(qpos[..., 7:]), q_stand(), qpos[..., 7:])
+    return Poses(config, ticks, qpos.reshape(len(ticks), -1), grf)
+
+
+class PosedTeam:
+    """The team's model, to be put into recorded poses."""
+
+    def __init__(self, config: Config) -> None:
+        self.team: TeamModel = build_team_model(config)
+        self.model = self.team.model
+        self.physics = mujoco.MjData(self.model)
+        self.names = robot_names(config.team.robots)
+
+    def set(self, qpos: Array) -> None:
+        """Put all bodies where positions (19 n,) have them."""
+        self.physics.qpos[:] = qpos
+        mujoco.mj_forward(self.model, self.physics)
+
+    def feet(self) -> Array:
+        """Positions of all feet, shape (n, 4, 3), m, world frame."""
+        return self._places("{leg}_foot")
+
+    def legs(self) -> Array:
+        """Hip, thigh, calf and foot of all legs, shape (n, 4, 4, 3), m, world frame."""
+        parts = ("hip", "thigh", "calf", "foot")
+        return np.stack([self._places(f"{{leg}}_{part}") for part in parts], axis=2)
+
+    def _places(self, body: str) -> Array:
+        legs: Sequence[str] = ("FL", "FR", "RL", "RR")
+        found = [
+            [self.physics.body(f"{name}/{body.format(leg=leg)}").xpos for leg in legs]
+            for name in self.names
+        ]
+        return np.array(found)

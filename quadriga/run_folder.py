@@ -1,0 +1,68 @@
+"""The run folder: made before the walk, filled with figures and pictures after it."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from quadriga.figures import draw
+from quadriga.render import render
+from quadriga.summary import RECORDING, print_table, summarise
+from shared.clock import wall_ns
+from shared.errors import ConfigError, ProcessError
+
+
+def make_run_dir(out: Path | None) -> Path:
+    """A new run folder, or an existing one without a recording.
+
+    Args:
+        out: the folder; None takes `runs/<date>-<time>`.
+
+    Raises:
+        ConfigError: it holds a recording already, or cannot be made.
+    """
+    now = datetime.fromtimestamp(1e-9 * wall_ns(), UTC).astimezone()
+    run_dir = out or Path("runs") / f"{now:%Y%m%d-%H%M%S}"
+    if (run_dir / RECORDING).exists():
+        raise ConfigError(f"--out {run_dir}", "a folder with a recording", "a new folder")
+    try:
+        run_dir.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ConfigError(f"--out {run_dir}", reason, "a folder that can be made") from None
+    return run_dir
+
+
+def report(run_dir: Path, *, pictures: bool, console: Console) -> dict[str, Any]:
+    """Sum up the recording in `run_dir`, draw its figures, show its table; the summary.
+
+    Raises:
+        RecordingError: there is no recording, or it is empty or foreign.
+        ProcessError: the walk did not come to its end.
+    """
+    summary = summarise(run_dir)
+    draw(run_dir)
+    if pictures:
+        with console.status("rendering"):
+            render(run_dir)
+    print_table(summary, console)
+    console.print(f"run folder: {run_dir}", markup=False, highlight=False)
+    _check_end(summary)
+    return summary
+
+
+def went_wrong(summary: dict[str, Any]) -> bool:
+    """Whether a robot fell, or stopped for a reason of its own before the end."""
+    return bool(summary["fell"] or summary["stop_reasons"])
+
+
+def _check_end(summary: dict[str, Any]) -> None:
+    end = summary["end"]
+    if not end or end.startswith("signal"):
+        raise ProcessError(
+            "the walk", f"an end at {summary['duration']:.1f} s", "world.seconds or a fall",
+            "the sim server was told to stop" if end else "the sim server or its link failed",
+        )  # fmt: skip

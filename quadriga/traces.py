@@ -1,0 +1,187 @@
+"""A recording as arrays over world time: what summary and figures are computed from."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter, defaultdict
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from quadriga.truth_trace import Ticks, TruthTrace, build_truth_trace, stack, ticks_of
+from shared.barrier import PLANNER
+from shared.codec import decode
+from shared.config import Config
+from shared.config_file import build
+from shared.errors import MessageError, RecordingError
+from shared.messages import Event, Measurement, Message, Plan, Reference, Status, Truth
+from shared.recording import Recording
+from shared.robot import Array, robot_names
+from shared.topics import COMMAND, STATE, topic_of
+from shared.yokes import yoke_pairs
+
+_TIMED_ONLY: Final = (STATE.name, COMMAND.name)  # 1 kHz each: only their ticks are read
+
+
+@dataclass(frozen=True, slots=True)
+class MeasurementTrace:
+    """What one agent measured: ticks (M,), outputs (M, 6)."""
+
+    tick: Ticks
+    y: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Traces:
+    """Everything a recording tells, by world time.
+
+    Attributes:
+        config: the configuration of the run.
+        metadata: the recording's metadata.
+        robots: names r1 … rn.
+        cut: where the recording was cut; empty if it is whole.
+        messages: number of messages by key.
+        invalid: number of messages by key that do not decode; of states and commands only the
+            tick is looked at.
+        ticks: ticks by key, in the order of the recording.
+        log_times: log times of the first and the last state, ns, and None without states.
+        references: ticks (R,) and values vx, vy, wz, height (R, 4), sorted.
+    """
+
+    config: Config
+    metadata: Mapping[str, str]
+    robots: tuple[str, ...]
+    cut: str
+    messages: Mapping[str, int]
+    invalid: Mapping[str, int]
+    ticks: Mapping[str, Ticks]
+    log_times: tuple[int, int] | None
+    truth: TruthTrace
+    references: tuple[Ticks, Array]
+    measurements: Mapping[str, MeasurementTrace]
+    plans: Mapping[str, tuple[Plan, ...]]
+    statuses: Mapping[str, tuple[Status, ...]]
+    events: tuple[Event, ...]
+
+
+def recorded_config(recording: Recording) -> Config:
+    """The configuration of a recorded run.
+
+    Raises:
+        RecordingError: the recording holds none.
+        ConfigError: it has keys or values that this version does not know.
+    """
+    try:
+        sections = json.loads(recording.metadata.get("config_json", ""))
+    except ValueError:
+        sections = None
+    if not isinstance(sections, dict):
+        raise RecordingError(
+            str(recording.path), "metadata without a configuration", "config_json in the metadata"
+        )
+    return build(sections)
+
+
+def read_traces(recording: Recording, names: Container[str] | None = None) -> Traces:
+    """Read a recording once.
+
+    Args:
+        recording: what to read.
+        names: topics to look at, None for all.
+
+    Raises:
+        RecordingError: the recording holds no message.
+        ConfigError: its configuration is another version's.
+    """
+    config = recorded_config(recording)
+    robots = robot_names(config.team.robots)
+    counts: Counter[str] = Counter()
+    invalid: Counter[str] = Counter()
+    ticks: defaultdict[str, list[int]] = defaultdict(list)
+    decoded: defaultdict[tuple[type[Message], str], list[Any]] = defaultdict(list)
+    rows: dict[str, Any] = {}
+    log_times: tuple[int, int] | None = None
+    for key, tick, log_time, payload in recording.entries(names):
+        counts[key] += 1
+        row = rows.get(key)
+        if row is None:
+            row = rows[key] = _row(key)
+        topic, robot = row
+        if topic is None or tick < 0:
+            invalid[key] += 1
+            continue
+        if topic.name not in _TIMED_ONLY:
+            try:
+                message = decode(payload, topic.type)
+            except MessageError:
+                invalid[key] += 1
+                continue
+            if isinstance(message, Truth) and not _fits(message, config):
+                invalid[key] += 1
+                continue
+            decoded[topic.type, robot].append(message)
+        elif topic is STATE:
+            log_times = (log_time if log_times is None else log_times[0], log_time)
+        ticks[key].append(tick)
+    if not counts:
+        raise RecordingError(
+            str(recording.path), "a recording without messages", "a walk", recording.cut
+        )
+    return Traces(
+        config=config,
+        metadata=recording.metadata,
+        robots=robots,
+        cut=recording.cut,
+        messages=dict(sorted(counts.items())),
+        invalid=dict(sorted(invalid.items())),
+        ticks={key: np.array(found, dtype=np.int64) for key, found in sorted(ticks.items())},
+        log_times=log_times,
+        truth=build_truth_trace(decoded[Truth, ""], config),
+        references=_references(decoded[Reference, ""]),
+        measurements={robot: _measurements(decoded[Measurement, robot]) for robot in robots},
+        plans={robot: tuple(decoded[Plan, robot]) for robot in robots},
+        statuses={name: tuple(decoded[Status, name]) for name in (*robots, PLANNER)},
+        events=tuple(decoded[Event, ""]),
+    )
+
+
+def in_force(references: tuple[Ticks, Array], tick: Ticks) -> Array:
+    """The reference in force at each tick: the newest that starts no later.
+
+    Returns:
+        vx, vy, wz, height; shape (len(tick), 4), NaN where none was in force yet.
+    """
+    starts, values = references
+    found = np.searchsorted(starts, tick, side="right") - 1
+    padded = np.vstack([values.reshape(-1, 4), np.full((1, 4), np.nan)])
+    return padded[found]
+
+
+def _row(key: str) -> tuple[Any, str]:
+    try:
+        return topic_of(key)
+    except MessageError:
+        return None, ""
+
+
+def _fits(truth: Truth, config: Config) -> bool:
+    """Whether a truth message is about the team of the configuration."""
+    team = config.team
+    return (
+        truth.robots == robot_names(team.robots)
+        and len(truth.base_pos) == team.robots
+        and len(truth.yoke_error) == len(yoke_pairs(team.robots, team.yokes))
+    )
+
+
+def _references(messages: Sequence[Reference]) -> tuple[Ticks, Array]:
+    latest = {message.tick: message for message in messages}
+    ordered = [latest[tick] for tick in sorted(latest)]
+    values = [[r.vx, r.vy, r.wz, r.height] for r in ordered]
+    return ticks_of(ordered), np.array(values, dtype=np.float64).reshape(-1, 4)
+
+
+def _measurements(messages: Sequence[Measurement]) -> MeasurementTrace:
+    return MeasurementTrace(ticks_of(messages), stack(messages, "y", 6))

@@ -1,0 +1,162 @@
+"""The figures of merit of one closed-loop trial, from what was seen of the walk."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.gait import nominal_forces
+from quadriga.summary import FALL_HEIGHT, FALL_TILT, steady_from
+from quadriga.traces import Traces, in_force
+from quadriga.trials import Trial
+from shared.messages import Measurement
+from shared.robot import N_LEGS, OUTPUTS, Array
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """What was seen of a walk.
+
+    Attributes:
+        traces: truth, references, statuses and events.
+        samples: what each robot measured, with the forces it applied.
+        plans: how many plans had which status, all robots together.
+    """
+
+    traces: Traces
+    samples: Mapping[str, tuple[Measurement, ...]]
+    plans: Mapping[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """Figures of merit; None where the walk was too short for a steady part.
+
+    The steady part is from `quadriga.summary.steady_from` to the end, or to the first fall.
+
+    Attributes:
+        seconds: world time of the last sample seen, or of the first fall, s.
+        fallen: when each robot that fell did so, s.
+        stopped: why each robot that stopped for another reason did so.
+        mean, rmse: of each output over the steady part, all robots; m, m/s, rad, rad/s.
+        cost: mean of ‖y − y_des‖²_Q + ‖u − u_nominal‖²_R over samples of 10 ms and robots.
+        cost_outputs, cost_forces: its two parts.
+        planner_ms_median, planner_ms_p99: time of one planning step, ms.
+        solves: planning steps timed.
+        plans: how many plans had which status.
+    """
+
+    seconds: float
+    fallen: Mapping[str, float]
+    stopped: Mapping[str, str]
+    mean: Mapping[str, float | None]
+    rmse: Mapping[str, float | None]
+    cost: float | None
+    cost_outputs: float | None
+    cost_forces: float | None
+    planner_ms_median: float | None
+    planner_ms_p99: float | None
+    solves: int
+    plans: Mapping[str, int]
+
+    def to_dict(self) -> dict[str, Any]:
+        """A form that JSON can carry."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A trial with what came of it: figures, or why it was refused."""
+
+    trial: Trial
+    figures: Figures | None = None
+    refused: str = ""
+
+    @property
+    def walked(self) -> Figures | None:
+        """The figures if every robot walked to the end."""
+        found = self.figures
+        return None if found is None or found.fallen or found.stopped else found
+
+    def to_dict(self) -> dict[str, Any]:
+        """A form that JSON can carry."""
+        return asdict(self)
+
+
+def figures(walk: Walk) -> Figures:
+    """The figures of merit of a walk."""
+    traces, truth = walk.traces, walk.traces.truth
+    planner, fallen = traces.config.planner, _fallen(traces)
+    end = round(1000 * min(fallen.values())) if fallen else int(truth.tick.max(initial=0))
+    begin = steady_from(traces)
+    reference = in_force(traces.references, truth.tick)
+    steady = _within(truth.tick, begin, end) & np.isfinite(reference).all(axis=1)
+    wanted = np.zeros((len(truth.tick), 1, len(OUTPUTS)))
+    wanted[:, 0, [1, 2, 5, 0]] = reference
+    y, error = truth.y[steady], (truth.y - wanted)[steady]
+    outputs = _mean((error**2 @ np.array(planner.Q)).ravel())
+    forces = _mean(_force_cost(walk, begin, end, np.tile(planner.R, N_LEGS)))
+    squares = [_mean(error[..., i] ** 2) for i in range(len(OUTPUTS))]
+    every = [status for found in traces.statuses.values() for status in found]
+    planner_ms = np.concatenate([np.zeros(0), *(status.planner_ms for status in every)])
+    return Figures(
+        seconds=end / 1000.0,
+        fallen=fallen,
+        stopped=_stopped(traces, fallen),
+        mean={name: _mean(y[..., i]) for i, name in enumerate(OUTPUTS)},
+        rmse={
+            name: None if square is None else square**0.5
+            for name, square in zip(OUTPUTS, squares, strict=True)
+        },
+        cost=None if outputs is None or forces is None else outputs + forces,
+        cost_outputs=outputs,
+        cost_forces=forces,
+        planner_ms_median=_quantile(planner_ms, 0.5),
+        planner_ms_p99=_quantile(planner_ms, 0.99),
+        solves=len(planner_ms),
+        plans=dict(sorted(walk.plans.items())),
+    )
+
+
+def _fallen(traces: Traces) -> dict[str, float]:
+    """When each robot fell: what the world says, and what its truth shows, whichever is first."""
+    truth = traces.truth
+    told = {e.robot: e.tick / 1000.0 for e in reversed(traces.events) if e.kind == "fall"}
+    down = (truth.tilt > FALL_TILT) | (truth.y[..., 0] < FALL_HEIGHT)
+    for i in np.flatnonzero(down.any(axis=0)):
+        robot, seen = traces.robots[i], float(truth.tick[down[:, i].argmax()]) / 1000.0
+        told[robot] = min(seen, told.get(robot, seen))
+    return dict(sorted(told.items()))
+
+
+def _stopped(traces: Traces, fallen: Mapping[str, float]) -> dict[str, str]:
+    last = {robot: found[-1] for robot, found in traces.statuses.items() if found}
+    return {r: s.reason for r, s in last.items() if s.reason and r not in fallen}
+
+
+def _force_cost(walk: Walk, begin: int, end: int, R: Array) -> Array:
+    """‖u − u_nominal‖²_R of every sample of every robot within the steady part."""
+    parts = [np.zeros(0)]
+    for samples in walk.samples.values():
+        kept = [sample for sample in samples if begin <= sample.tick <= end]
+        if kept:
+            u = np.array([sample.u for sample in kept])
+            stance = np.array([sample.stance for sample in kept]) > 0.5
+            parts.append((u - nominal_forces(stance)) ** 2 @ R)
+    return np.concatenate(parts)
+
+
+def _within(tick: NDArray[np.int64], begin: int, end: int) -> NDArray[np.bool_]:
+    return (tick >= begin) & (tick <= end)
+
+
+def _mean(values: Array) -> float | None:
+    return float(values.mean()) if values.size else None
+
+
+def _quantile(values: Array, q: float) -> float | None:
+    return float(np.quantile(values, q)) if values.size else None

@@ -1,0 +1,207 @@
+"""One function per command. Each imports what it needs: a process should start fast."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as installed_version
+from typing import Any
+
+from rich.console import Console
+
+from shared.config import CENTRAL, Config
+from shared.config_text import to_markdown, to_toml
+from shared.errors import ConfigError
+from shared.robot import robot_names
+from shared.signals import stop_flag
+
+Given = dict[str, Any]
+
+
+def walk(arguments: argparse.Namespace, config: Config, given: Given) -> int:
+    """The main job."""
+    from quadriga.endpoint import free_endpoint
+    from quadriga.walk import walk
+
+    # Several walks on one machine are the rule; only who names an endpoint wants that one.
+    if config.bus.mode == "peer" and "endpoint" not in given.get("bus", {}):
+        config = replace(config, bus=replace(config.bus, endpoint=free_endpoint()))
+    return walk(config, arguments.out, pictures=not arguments.no_render, console=Console())
+
+
+def sim(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """The sim server's process."""
+    from sim_server.process import run
+
+    run(config)
+    return 0
+
+
+def agent(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """One agent's process."""
+    from agents.planner.store import load
+    from agents.process import run
+    from quadriga.cache import await_predictor, predictor_path
+
+    names = robot_names(config.team.robots)
+    if arguments.robot not in names:
+        raise ConfigError("--robot", repr(arguments.robot), f"one of {', '.join(names)}")
+    predictor = None
+    if config.planner.kind not in ("none", *CENTRAL):
+        path = arguments.predictor or predictor_path(config)
+        if arguments.wait:
+            await_predictor(path, arguments.wait)
+        predictor, _ = load(path, config)
+    run(config, arguments.robot, predictor)
+    return 0
+
+
+def plan(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """The process of a planner that plans for the whole team."""
+    from agents.central_process import run
+    from agents.planner.store import load
+    from quadriga.cache import await_predictor, predictor_path
+    from quadriga.identify import team_planner
+
+    if config.planner.kind not in CENTRAL:
+        raise ConfigError("planner.kind", repr(config.planner.kind), f"one of {', '.join(CENTRAL)}",
+                          "in all other kinds each agent plans for itself")  # fmt: skip
+    path = arguments.predictor or predictor_path(config)
+    if arguments.wait:
+        await_predictor(path, arguments.wait)
+    run(config, team_planner(config, load(path, config)[0]))
+    return 0
+
+
+def record(arguments: argparse.Namespace, config: Config, given: Given) -> int:
+    """The recorder's process."""
+    from quadriga.recorder import run
+    from quadriga.summary import RECORDING
+
+    path = arguments.output
+    if path is None:
+        from quadriga.run_folder import make_run_dir
+
+        path = make_run_dir(None) / RECORDING
+    elif arguments.report and path.name != RECORDING:
+        raise ConfigError("--output", str(path), f"DIR/{RECORDING}", "--report fills its folder")
+    sha256 = arguments.predictor_sha256 or _fitted_sha256(config, arguments.wait)
+    with stop_flag() as stopped:
+        run(config, path, predictor_sha256=sha256, stopped=stopped)
+        if stopped() or not arguments.report:
+            print(f"recorded to {path}")
+            return 0
+    arguments.run_dir = path.parent
+    return report(arguments, config, given)
+
+
+def _fitted_sha256(config: Config, wait: float) -> str:
+    """Digest of this machine's predictor for `config`, "" if there is none."""
+    if config.planner.kind == "none":
+        return ""
+    from agents.planner.store import load, predictor_sha256
+    from quadriga.cache import await_predictor, predictor_path
+
+    path = predictor_path(config)
+    if wait:
+        await_predictor(path, wait)
+    return predictor_sha256(load(path, config)[0]) if path.is_file() else ""
+
+
+def report(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
+    """What came of a recorded walk."""
+    from quadriga.run_folder import report, went_wrong
+
+    summary = report(arguments.run_dir, pictures=not arguments.no_render, console=Console())
+    return int(went_wrong(summary))
+
+
+def operate(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """The operator's process."""
+    from quadriga.operator import run
+
+    run(config)
+    return 0
+
+
+def estop(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """One emergency stop."""
+    from quadriga.operator import stop_team
+
+    stop_team(config, arguments.reason)
+    return 0
+
+
+def collect(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """Collect data unless there are some."""
+    from quadriga.cache import data_path
+    from quadriga.identify import ensure_data
+
+    dataset = ensure_data(config, Console(stderr=True))
+    seconds = sum(episode.samples for episode in dataset.training) / 100
+    print(f"{data_path(config)}\n{len(dataset.training)} episodes, {seconds:.0f} s for the fit")
+    return 0
+
+
+def fit(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """Fit a predictor unless there is one, and report on it; collect data unless there are some."""
+    from quadriga.fit import run
+
+    print(run(config, Console(stderr=True), every=arguments.all))
+    return 0
+
+
+def compare(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """Planners and predictors in the same worlds, on the same data."""
+    from quadriga.compare import run
+    from quadriga.run_folder import make_run_dir
+    from quadriga.trials import Choice
+    from quadriga.variants import PLANNERS, PREDICTORS, SCENARIOS, chosen, seeds_of
+
+    if arguments.jobs < 1:
+        raise ConfigError("--jobs", str(arguments.jobs), "at least 1")
+    choice = Choice(
+        chosen("--planners", arguments.planners, PLANNERS),
+        chosen("--predictors", arguments.predictors, PREDICTORS),
+        chosen("--scenarios", arguments.scenarios, SCENARIOS),
+        seeds_of("--seeds", arguments.seeds), arguments.product,
+    )  # fmt: skip
+    out = arguments.out or make_run_dir(None)
+    run(config, choice, out, jobs=arguments.jobs, bus=arguments.bus, console=Console(stderr=True))
+    return 0
+
+
+def prepare(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """Do beforehand what the first walk would have to wait for."""
+    from quadriga.identify import ensure_predictor
+    from quadriga.warm_up import warm_up
+
+    console = Console(stderr=True)
+    warm_up(config, console)
+    if config.planner.kind != "none":
+        print(ensure_predictor(config, console))
+    return 0
+
+
+def router(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """The router's process."""
+    from quadriga.router import run
+
+    run(config, arguments.listen or config.bus.endpoint, once=arguments.once)
+    return 0
+
+
+def show_config(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """The configuration as TOML or Markdown."""
+    print(to_markdown(config) if arguments.markdown else to_toml(config), end="")
+    return 0
+
+
+def version(_arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
+    """The installed version."""
+    try:
+        print(f"quadriga {installed_version('quadriga')}")
+    except PackageNotFoundError:
+        print("quadriga, from a source folder that is not installed")
+    return 0

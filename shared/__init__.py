@@ -1,0 +1,1 @@
+"""What both sides of the bus agree on: messages, topics, configuration, the robot."""

@@ -1,0 +1,43 @@
+"""Zenoh's settings by role: only the endpoints of the configuration are opened, nothing else."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from shared.config import BusConfig
+
+_CLOSED: Final = {  # nobody is found by multicast, nothing goes through shared memory
+    "scouting/multicast/enabled": False,
+    "transport/shared_memory/enabled": False,
+}
+
+
+def member_settings(bus: BusConfig, name: str) -> dict[str, Any]:
+    """Settings of a process of the team; in peer mode the one named `sim` is who they all find."""
+    peer = bus.mode == "peer"
+    hub = peer and name == "sim"
+    listen = [bus.endpoint] if hub else [bus.listen] if peer else []
+    return {
+        "mode": bus.mode,
+        "connect/endpoints": [] if hub else [bus.endpoint],
+        "listen/endpoints": listen,
+        # The others may start before the sim server or the router: keep trying in the background.
+        "connect/exit_on_failure": False,
+        "connect/timeout_ms": -1 if peer else 0,
+        "connect/retry": {
+            "period_init_ms": 20, "period_max_ms": 200, "period_increase_factor": 1.5,
+        },
+        "scouting/gossip/enabled": peer,
+        **_CLOSED,
+    }  # fmt: skip
+
+
+def router_settings(listen: str) -> dict[str, Any]:
+    """Settings of the router that clients connect to at endpoint `listen`."""
+    return {
+        "mode": "router",
+        "connect/endpoints": [],
+        "listen/endpoints": [listen],
+        "scouting/gossip/enabled": False,
+        **_CLOSED,
+    }

@@ -1,0 +1,76 @@
+"""Time: the only module that reads the clock. Everything else is given time or waits here."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+
+def monotonic() -> float:
+    """Seconds of a clock that never goes back; only differences mean anything."""
+    return time.monotonic()
+
+
+def monotonic_ns() -> int:
+    """Nanoseconds of the clock of `monotonic`."""
+    return time.monotonic_ns()
+
+
+def wall_ns() -> int:
+    """Nanoseconds since 1970: for log times and names of run folders, never for control."""
+    return time.time_ns()
+
+
+def sleep(seconds: float) -> None:
+    """Sleep; a signal handler may run meanwhile."""
+    time.sleep(max(seconds, 0.0))
+
+
+class ManualClock:
+    """A clock for tests: it moves when it is told to, and when somebody sleeps on it."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def monotonic(self) -> float:
+        """The present reading in seconds."""
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        """Move on by `seconds`."""
+        self.now += max(seconds, 0.0)
+
+
+class Rate:
+    """Paces a loop: turn k starts at `start + k · period`, and late turns are counted.
+
+    A turn that is more than `slack` periods late moves the schedule instead of being caught up,
+    so that a loop that was frozen does not race afterwards.
+
+    Attributes:
+        overruns: turns that began late by more than one period.
+    """
+
+    def __init__(
+        self,
+        period: float,
+        now: Callable[[], float] = monotonic,
+        pause: Callable[[float], None] = sleep,
+        slack: float = 20.0,
+    ) -> None:
+        self._period, self._now, self._pause, self._slack = period, now, pause, slack
+        self._next = now()
+        self.overruns = 0
+
+    def wait(self) -> float:
+        """Wait for the next turn and return how late it begins, in seconds."""
+        self._next += self._period
+        ahead = self._next - self._now()
+        if ahead > 0.0:
+            self._pause(ahead)
+        late = max(self._now() - self._next, 0.0)
+        if late > self._period:
+            self.overruns += 1
+        if late > self._slack * self._period:
+            self._next = self._now()
+        return late

@@ -1,0 +1,201 @@
+"""TOML → `Config`, checked once. The only reader of TOML."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import Field, fields
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Final
+
+from shared.config import Config
+from shared.errors import ConfigError
+from shared.presets import CONTROLLER
+from shared.robot import robot_names
+
+_SAMPLE_MS: Final = 10  # of measurements and plans; gait times must be whole samples
+_TEAM_NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
+_PAIRS: Final = ("identification.vx", "identification.vy", "identification.wz",
+                 "identification.gain_range")  # fmt: skip
+
+
+def load(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
+    """The configuration in a TOML file, or the default one, with some keys replaced.
+
+    Args:
+        path: the file; None takes every default.
+        overrides: values by `section.key`; they win over the file.
+
+    Raises:
+        ConfigError: the file cannot be read or parsed; a section or key is unknown; a value has
+            the wrong type, length or range; or two keys contradict each other.
+    """
+    return build(layers(path, overrides or {}))
+
+
+def layers(path: Path | None, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """What is given explicitly, by section and key: the file, then `overrides` on top.
+
+    A preset that comes with the overrides also replaces what the file says of the keys that
+    presets set, so that a file with every key written out can still be walked with another one.
+
+    Raises:
+        ConfigError: the file cannot be read or parsed, or an override names no key.
+    """
+    given = _read(path) if path else {}
+    if "controller.preset" in overrides and isinstance(given.get("controller"), dict):
+        preset_keys = {key for preset in CONTROLLER.values() for key in preset}
+        given["controller"] = {k: v for k, v in given["controller"].items() if k not in preset_keys}
+    for name, value in overrides.items():
+        section, dot, key = name.partition(".")
+        if not dot or not isinstance(given.setdefault(section, {}), dict):
+            raise ConfigError(name, "a value", "section.key")
+        given[section][key] = value
+    return given
+
+
+def build(given: Mapping[str, Any]) -> Config:
+    """The configuration with these values; the preset's, then the defaults, for the rest.
+
+    Raises:
+        ConfigError: see `load`.
+    """
+    controller = given.get("controller", {})
+    if isinstance(controller, dict):
+        preset = CONTROLLER.get(str(controller.get("preset")), {})
+        given = {**given, "controller": {**preset, **controller}}
+    known = {item.name: item for item in fields(Config)}
+    for section in given.keys() - known.keys():
+        raise _unknown(section, list(known), "a section")
+    config = Config(**{name: _section(item, given.get(name, {})) for name, item in known.items()})
+    _check_together(config)
+    return config
+
+
+def parse_assignment(text: str) -> tuple[str, Any]:
+    """`section.key=value` with a TOML value; a bare word counts as text.
+
+    Raises:
+        ConfigError: there is no `=`.
+    """
+    name, found, value = text.partition("=")
+    if not found:
+        raise ConfigError("--set", repr(text), "section.key=value")
+    try:
+        return name.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return name.strip(), value.strip()
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ConfigError(str(path), reason, "a readable TOML file") from None
+    except UnicodeDecodeError:
+        raise ConfigError(str(path), "bytes that are not UTF-8", "a TOML file") from None
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(str(path), str(error), "TOML") from None
+
+
+def _section(item: Field[Any], given: Any) -> Any:
+    kind = item.default_factory
+    if not isinstance(given, dict):
+        raise ConfigError(item.name, repr(given), f"a section, written [{item.name}]")
+    known = {key.name: key for key in fields(kind)}  # type: ignore[arg-type]
+    for name in given.keys() - known.keys():
+        raise _unknown(f"{item.name}.{name}", [f"{item.name}.{key}" for key in known], "a key")
+    values = {name: _value(f"{item.name}.{name}", known[name], v) for name, v in given.items()}
+    return kind(**values)  # type: ignore[operator]
+
+
+def _value(name: str, key: Field[Any], value: Any) -> Any:
+    """The value of a key in the type of its default, or one error about it."""
+    default, meta = key.default, key.metadata
+    if isinstance(default, tuple):
+        if not isinstance(value, (list, tuple)) or len(value) != len(default):
+            raise ConfigError(name, repr(value), f"{len(default)} numbers{_unit(meta)}")
+        return tuple(_number(f"{name}[{i}]", meta, float, v) for i, v in enumerate(value))
+    if isinstance(default, bool):
+        if not isinstance(value, bool):
+            raise ConfigError(name, repr(value), "true or false")
+        return value
+    if isinstance(default, str):
+        return _text(name, meta["choices"], value)
+    return _number(name, meta, type(default), value)
+
+
+def _text(name: str, choices: tuple[str, ...], value: Any) -> str:
+    if choices and value not in choices:
+        close = get_close_matches(str(value), choices, 1)
+        hint = f"did you mean {close[0]!r}?" if close else ""
+        raise ConfigError(name, repr(value), f"one of {', '.join(choices)}", hint)
+    if not isinstance(value, str) or not value.isprintable():
+        raise ConfigError(name, repr(value), "text without control characters")
+    return value
+
+
+def _number(name: str, meta: Mapping[str, Any], kind: type, value: Any) -> Any:
+    low, high = meta["low"], meta["high"]
+    what = "an integer" if kind is int else "a finite number"
+    if low is not None and high is not None:
+        what += f" in [{low:.10g}, {high:.10g}]"
+    elif low is not None:
+        what += f" ≥ {low:g}"
+    what += _unit(meta)
+    right_type = type(value) is int or (kind is float and type(value) is float)
+    if not right_type or not math.isfinite(value):
+        raise ConfigError(name, repr(value), what)
+    if (low is not None and value < low) or (high is not None and value > high):
+        raise ConfigError(name, f"{value!r}", what, "out of range")
+    return kind(value)
+
+
+def _unit(meta: Mapping[str, Any]) -> str:
+    return "" if meta["unit"] in ("-", "1") else f" [{meta['unit']}]"
+
+
+def _unknown(name: str, known: list[str], what: str) -> ConfigError:
+    close = get_close_matches(name, known, 1)
+    hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
+    return ConfigError(name, "an unknown name", f"{what} of the configuration", hint)
+
+
+def _check_together(config: Config) -> None:
+    """Rules that need more than one key, or more than a range."""
+    if not _TEAM_NAME.fullmatch(config.team.name):
+        raise ConfigError("team.name", repr(config.team.name), "1 to 64 letters, digits, . _ or -",
+                          "it is the first part of every key")  # fmt: skip
+    for name, value in (("stance_ms", config.gait.stance_ms), ("stand_ms", config.gait.stand_ms)):
+        if value % _SAMPLE_MS:
+            raise ConfigError(f"gait.{name}", str(value), f"a multiple of {_SAMPLE_MS} ms",
+                              "the planner's samples")  # fmt: skip
+    names = robot_names(config.team.robots)
+    if config.world.payload_on not in ("team", *names):
+        raise ConfigError(
+            "world.payload_on", repr(config.world.payload_on), f"team or one of {', '.join(names)}"
+        )
+    for push in filter(None, config.world.push.split(",")):
+        robot = push.partition(":")[0].strip()
+        if robot not in ("all", *names):
+            raise ConfigError(
+                "world.push", f"a push on {robot!r}", f"all or one of {', '.join(names)}"
+            )
+    if config.world.command_damp_ms < config.world.command_hold_ms:
+        raise ConfigError("world.command_damp_ms", str(config.world.command_damp_ms),
+                          f"at least world.command_hold_ms = {config.world.command_hold_ms}",
+                          "a late command is held first, then damped")  # fmt: skip
+    if config.planner.applied > config.planner.N:
+        raise ConfigError("planner.applied", str(config.planner.applied),
+                          f"at most planner.N = {config.planner.N}")  # fmt: skip
+    for pair in _PAIRS:
+        section, _, key = pair.partition(".")
+        first, last = getattr(getattr(config, section), key)
+        if first > last:
+            raise ConfigError(pair, f"[{first}, {last}]", "[least, greatest]")

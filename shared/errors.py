@@ -1,0 +1,43 @@
+"""The error tree: every error a user can cause names the thing, what was got and expected."""
+
+from __future__ import annotations
+
+
+class QuadrigaError(Exception):
+    """Base of every error that is shown to a user as one line, without a traceback.
+
+    Args:
+        name: the thing that is wrong (a configuration key, a file, a message field).
+        got: what was found.
+        expected: what would have been right.
+        cause: the likely cause or the remedy; may be empty.
+    """
+
+    def __init__(self, name: str, got: str, expected: str, cause: str = "") -> None:
+        self.name, self.got, self.expected, self.cause = name, got, expected, cause
+        tail = f" ({cause})" if cause else ""
+        super().__init__(f"{name}: got {got}, expected {expected}{tail}")
+
+
+class ConfigError(QuadrigaError):
+    """A configuration key, a command-line argument or a TOML file is wrong."""
+
+
+class MessageError(QuadrigaError):
+    """Bytes from the wire are not a valid message of the type their key promises."""
+
+
+class BusError(QuadrigaError):
+    """The bus cannot be opened or a process that must be on it is absent."""
+
+
+class PredictorError(QuadrigaError):
+    """A predictor file is missing, foreign, or fails one of its gates."""
+
+
+class RecordingError(QuadrigaError):
+    """A recording cannot be read or written."""
+
+
+class ProcessError(QuadrigaError):
+    """A process of the team failed or did not start."""

@@ -1,0 +1,19 @@
+"""Compilation of the 1 kHz arithmetic; the same functions run uncompiled when numba is told so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar, cast
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def compiled(function: F) -> F:
+    """Compile `function` with numba and keep the machine code on disk for the next process.
+
+    NUMBA_DISABLE_JIT=1 leaves it plain Python. `fastmath` stays off: results must not depend
+    on how the compiler reorders sums.
+    """
+    return cast(F, numba.njit(cache=True)(function))

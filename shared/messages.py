@@ -1,0 +1,138 @@
+"""Wire types: one frozen dataclass per message, shape, unit and frame stated per field.
+
+Arrays are float64; a shape entry that is a string is a length shared by all fields of one
+message that use the same letter (`N` horizon samples, `n` robots, `k` yokes).
+Every message carries `tick` (1 ms of world time) and `stamp_ns` (the world's time of that tick).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from shared.robot import Array
+
+Dim = int | str
+
+
+def array(*shape: Dim, unit: str, frame: str = "-") -> Any:
+    """Declare an array field of the wire: its shape, unit and frame."""
+    return field(metadata={"shape": shape, "unit": unit, "frame": frame})
+
+
+def plain(kind: type, doc: str) -> Any:
+    """Declare a scalar, text, list or map field of the wire."""
+    return field(metadata={"kind": kind, "doc": doc})
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """Base of all wire messages."""
+
+    SCHEMA: ClassVar[int] = 1
+    tick: int = plain(int, "world time of the content [ms]")
+    stamp_ns: int = plain(int, "world time of the content [ns]")
+
+
+@dataclass(frozen=True, slots=True)
+class State(Message):
+    """What one real robot measures at `tick`; nothing else may enter here."""
+
+    q_joint: Array = array(12, unit="rad", frame="joint")
+    v_joint: Array = array(12, unit="rad/s", frame="joint")
+    tau_joint: Array = array(12, unit="N·m", frame="joint")
+    imu_quat_wxyz: Array = array(4, unit="1", frame="trunk to world")
+    imu_gyro: Array = array(3, unit="rad/s", frame="trunk")
+    imu_accel: Array = array(3, unit="m/s²", frame="trunk (specific force)")
+    foot_force: Array = array(4, unit="N", frame="ground normal")
+
+
+@dataclass(frozen=True, slots=True)
+class Command(Message):
+    """Motor command; the motor applies `tau + kp (q_des − q) + kd (v_des − v)`, limited."""
+
+    tau: Array = array(12, unit="N·m", frame="joint")
+    q_des: Array = array(12, unit="rad", frame="joint")
+    v_des: Array = array(12, unit="rad/s", frame="joint")
+    kp: Array = array(12, unit="N·m/rad", frame="joint")
+    kd: Array = array(12, unit="N·m·s/rad", frame="joint")
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement(Message):
+    """One 100 Hz sample: mean foot forces over the 10 ms that end at `tick`, outputs at `tick`."""
+
+    u: Array = array(12, unit="N", frame="yaw frame, legs FL FR RL RR")
+    y: Array = array(6, unit="m, m/s, m/s, rad, rad, rad/s", frame="yaw frame")
+    stance: Array = array(4, unit="1 stance, 0 swing", frame="legs FL FR RL RR")
+
+
+@dataclass(frozen=True, slots=True)
+class Plan(Message):
+    """The planner's solution of planning step `step`: N samples of 10 ms from `tick` on."""
+
+    step: int = plain(int, "planning step, tick / (10 · applied samples)")
+    u: Array = array("N", 12, unit="N", frame="yaw frame, legs FL FR RL RR")
+    y: Array = array("N", 6, unit="m, m/s, m/s, rad, rad, rad/s", frame="yaw frame")
+    status: str = plain(str, "solved, or the name of the fallback in force")
+    used: Mapping[str, int] = plain(dict, "for each peer the step of the plan consumed")
+    exchange: int = plain(int, "0: made with peers' plans of the step before; k: k-th answer since")
+
+    @property
+    def serial(self) -> tuple[int, int]:
+        """Order of the plans of one robot: by step, then by exchange."""
+        return self.step, self.exchange
+
+
+@dataclass(frozen=True, slots=True)
+class Status(Message):
+    """An agent's account of itself; wall-clock figures live here and nowhere else."""
+
+    mode: str = plain(str, "stand, walk, stopping, damping or estop")
+    reason: str = plain(str, "why the mode is not walk; empty while walking")
+    estimator: str = plain(str, "kalman or truth")
+    ages_ms: Mapping[str, float] = plain(dict, "age of each input [ms of world time]")
+    counters: Mapping[str, int] = plain(dict, "events counted since the start, by name")
+    planner_ms: Array = array("P", unit="ms wall clock per planner step since the last status")
+    tick_us: Array = array("K", unit="µs wall clock per control tick since the last status")
+
+
+@dataclass(frozen=True, slots=True)
+class Reference(Message):
+    """What the operator asks of the team; in force from `tick` on."""
+
+    vx: float = plain(float, "forward speed in the robot's yaw frame [m/s]")
+    vy: float = plain(float, "leftward speed in the robot's yaw frame [m/s]")
+    wz: float = plain(float, "yaw rate [rad/s]")
+    height: float = plain(float, "trunk height above the ground [m]")
+
+
+@dataclass(frozen=True, slots=True)
+class EStop(Message):
+    """Latched stop for everyone who hears it."""
+
+    reason: str = plain(str, "who stopped the team and why")
+
+
+@dataclass(frozen=True, slots=True)
+class Truth(Message):
+    """The world as the simulator knows it; no agent may use it outside `--estimator truth`."""
+
+    robots: tuple[str, ...] = plain(list, "robot names, the order of the first axis")
+    base_pos: Array = array("n", 3, unit="m", frame="world")
+    base_quat_wxyz: Array = array("n", 4, unit="1", frame="trunk to world")
+    base_vel: Array = array("n", 3, unit="m/s", frame="world")
+    base_omega: Array = array("n", 3, unit="rad/s", frame="world")
+    grf: Array = array("n", 4, 3, unit="N", frame="world")
+    yoke_error: Array = array("k", unit="m")
+    yoke_force: Array = array("k", unit="N")
+
+
+@dataclass(frozen=True, slots=True)
+class Event(Message):
+    """Something happened in the world."""
+
+    kind: str = plain(str, "push, payload, terrain, fault, fall, start or stop")
+    robot: str = plain(str, "the robot concerned, or empty")
+    detail: str = plain(str, "free text")

@@ -1,0 +1,28 @@
+"""Named settings of the low level: each replaces defaults of the section `controller`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+# The plain setting of the paper: scheduled contacts, flat ground, a leashed position reference,
+# moderate gains. Walks on flat ground; see `robust` for what keeps a team up elsewhere.
+_PAPER: Final = MappingProxyType(
+    {
+        "ki_z": 0.0, "kp_xy": 100.0, "kd_xy": 20.0, "ki_xy": 0.0, "leash": 0.05,
+        "kp_tilt": 400.0, "kd_tilt": 40.0, "contact_detection": False, "swing_height": 0.07,
+    }
+)  # fmt: skip
+
+# Soft enough for planned forces to reach the robot through f_des, and for data that show it.
+_SOFT: Final = MappingProxyType(
+    {
+        "gamma_defect": 1e5, "kp_z": 100.0, "kd_z": 20.0, "ki_z": 0.0, "kp_tilt": 400.0,
+        "kd_tilt": 40.0, "kp_yaw": 50.0, "kd_yaw": 10.0,
+    }
+)  # fmt: skip
+
+CONTROLLER: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType(
+    {"robust": MappingProxyType({}), "soft": _SOFT, "paper": _PAPER}
+)

@@ -1,0 +1,88 @@
+"""Signals: SIGINT and SIGTERM raise a flag that loops check; no process outlives its parent."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Final
+
+_STOPS: Final = (signal.SIGINT, signal.SIGTERM)
+_PR_SET_PDEATHSIG: Final = 1  # linux/prctl.h
+
+
+class StopFlag:
+    """False until the process is asked to stop. Call it to read it."""
+
+    def __init__(self) -> None:
+        self._raised = False
+
+    def __call__(self) -> bool:
+        """Whether the process has been asked to stop."""
+        return self._raised
+
+    def set(self) -> None:
+        """Ask the process to stop."""
+        self._raised = True
+
+
+def stop_on_signals() -> StopFlag:
+    """A flag that SIGINT and SIGTERM set from now on, instead of ending the process at once."""
+    flag = StopFlag()
+
+    def handle(_number: int, _frame: FrameType | None) -> None:
+        flag.set()
+
+    for number in _STOPS:
+        signal.signal(number, handle)
+    return flag
+
+
+@contextmanager
+def stop_flag() -> Iterator[StopFlag]:
+    """`stop_on_signals` for the time of a `with` block."""
+    before = {number: signal.getsignal(number) for number in _STOPS}
+    try:
+        yield stop_on_signals()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def interrupt_on_sigterm() -> None:
+    """Have SIGTERM raise KeyboardInterrupt, as SIGINT does, so that `with` blocks clean up.
+
+    Both are let through from now on; one that was held back raises here.
+    """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
+
+
+def die_with_parent(parent: int) -> None:
+    """Have the kernel send SIGTERM to this process when process `parent` dies, however it dies.
+
+    Args:
+        parent: the process that started this one, as it said. If it has died before this call,
+            the signal is raised here, since the kernel will not send it any more.
+    """
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+@contextmanager
+def interrupts_held() -> Iterator[None]:
+    """Deliver SIGINT only after the block; processes started in it are never interrupted.
+
+    For workers: Ctrl-C, which the terminal sends to all, is their parent's to handle. A worker
+    inherits the blocked signal, so there is no moment, not even among its first imports, at which
+    it would be hit.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

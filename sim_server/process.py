@@ -1,0 +1,41 @@
+"""SHELL of the sim server: one world, its robots' commands in, their sensors out."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+
+from shared.barrier import SIM, meet, start_together
+from shared.bus import Bus
+from shared.config import Config
+from shared.signals import stop_on_signals
+from shared.topics import COMMAND
+from sim_server.lockstep import run_lockstep
+from sim_server.realtime import run_realtime
+from sim_server.stage import Stage
+from sim_server.world import World
+
+
+def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
+    """Simulate the team until `world.seconds` are over, a robot has fallen, or it is stopped.
+
+    The others learn of the end from the event `stop`, and from the absence of this process.
+
+    Args:
+        config: the team's configuration.
+        stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
+
+    Raises:
+        ConfigError: the world cannot be built from the configuration.
+        BusError: the bus cannot be opened, or the team is not complete in time.
+    """
+    stopped = stopped or stop_on_signals()
+    world = World(config)
+    with Bus.open(config.bus, config.team.name, SIM, stopped) as bus:
+        bus.subscribe(COMMAND.key(config.team.name, "*"))
+        stage = Stage(config, world, bus)
+        if not (meet(bus, config, stopped) and start_together(bus, config, stopped)):
+            return
+        gc.freeze()
+        loop = run_realtime if config.world.mode == "realtime" else run_lockstep
+        stage.announce("stop", "", loop(stage, stopped))

@@ -1,0 +1,64 @@
+"""Real time: a tick every millisecond of the clock, with the latest commands, aged."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Final
+
+from shared.clock import Rate
+from shared.messages import Command
+from sim_server.late import FRESH, HOLD, grade, hold
+from sim_server.stage import Stage
+
+TICK: Final = 1e-3  # s
+_SLACK: Final = 3.0  # ticks that are made up for
+
+
+def run_realtime(stage: Stage, stopped: Callable[[], bool]) -> str:
+    """Step until the walk is over; the reason why it is, with what came late."""
+    # A world that fell behind slows down: in ticks made up for at once nobody could answer.
+    rate, motors = Rate(TICK, slack=_SLACK), _Motors(stage)
+    reason = ""
+    while not reason and not stopped():
+        stage.publish()
+        rate.wait()  # the agents' time to answer
+        for packet in stage.bus.drain():
+            stage.commands.take(*packet, tick=stage.world.tick, oldest=0)
+        reason = stage.step(motors.commands())
+    late = ", ".join(f"{name} {count}" for name, count in sorted(motors.late.items())) or "none"
+    return f"{reason or 'signal'}; late ticks: {late}; overruns of the world: {rate.overruns}"
+
+
+class _Motors:
+    """The command each motor follows now.
+
+    Attributes:
+        late: ticks of each robot without a command of that tick, held and damped ones by name.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+        self._held: dict[str, Command] = {}
+        self.late: Counter[str] = Counter()
+
+    def commands(self) -> dict[str, Command]:
+        """By robot; a damped robot is left out."""
+        stage, tick = self._stage, self._stage.world.tick
+        chosen = {}
+        for name in stage.world.names:
+            command = stage.commands.latest.get(name)
+            age = tick - stage.commands.tick_of(name)
+            state = grade(age, stage.config.world)
+            self.late[name] += age > 0
+            if command is not None and state == FRESH:
+                chosen[name] = command
+                self._held.pop(name, None)
+            elif command is None or state == HOLD:
+                self.late[f"{name} held"] += 1
+                if name not in self._held:
+                    self._held[name] = hold(stage.world.states()[name])
+                chosen[name] = self._held[name]
+            else:
+                self.late[f"{name} damped"] += 1
+        return chosen

@@ -1,0 +1,90 @@
+"""What is under the feet: flat ground, wooden blocks, gravel or a smooth height field."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from shared.config import Config
+from shared.robot import Array
+from sim_server.a1_body import TERRAIN_CONTACT
+from sim_server.blocks import Blocks, build_blocks
+from sim_server.course import Course, build_course
+from sim_server.height_field import HeightField, build_gravel, build_smooth_field
+
+_STREAM: Final = 1  # of the seed: the sensors draw from another one
+_PLANE: Final = "plane"  # materials
+_EARTH: Final = "earth"
+_Colour = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Terrain:
+    """The ground of a world: a plane at z = 0 and what lies on it; it never moves.
+
+    Attributes:
+        relief: the blocks or the height field on the plane, or None.
+    """
+
+    relief: Blocks | HeightField | None
+
+    @property
+    def top(self) -> float:
+        """Height of the highest point, m."""
+        return 0.0 if self.relief is None else self.relief.top
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Height of the ground at world positions x, y of any equal shape, m."""
+        return np.zeros(np.shape(x)) if self.relief is None else self.relief.height(x, y)
+
+    def add_to(self, spec: mujoco.MjSpec) -> None:
+        """Add the ground to a world under construction.
+
+        The geoms' friction does not matter: that of feet and trunks takes priority.
+        """
+        _add_checker(spec, _PLANE, (0.80, 0.82, 0.80), (0.70, 0.73, 0.71), 0.5)
+        spec.worldbody.add_geom(
+            name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0],
+            material=_PLANE, **TERRAIN_CONTACT,
+        )  # fmt: skip
+        if isinstance(self.relief, Blocks):
+            self.relief.add_to(spec, TERRAIN_CONTACT)
+        elif self.relief is not None:
+            _add_checker(spec, _EARTH, (0.60, 0.54, 0.42), (0.53, 0.47, 0.36), 0.2)
+            self.relief.add_to(spec, TERRAIN_CONTACT, _EARTH)
+
+
+def build_terrain(config: Config, places: Array) -> Terrain:
+    """The terrain of a configuration, drawn from `world.seed`; flat under the spawned team.
+
+    Args:
+        config: the configuration.
+        places: spawn positions of the trunks, shape (n, 2), m.
+    """
+    world = config.world
+    if world.terrain == "flat" or world.terrain_height == 0.0:
+        return Terrain(None)
+    build: Mapping[str, Callable[[Course, float, np.random.Generator], Blocks | HeightField]]
+    build = {"boxes": build_blocks, "gravel": build_gravel, "heightfield": build_smooth_field}
+    random = np.random.default_rng((world.seed, _STREAM))
+    course = build_course(config, places)
+    return Terrain(build[world.terrain](course, world.terrain_height, random))
+
+
+def _add_checker(
+    spec: mujoco.MjSpec, name: str, light: _Colour, dark: _Colour, square: float
+) -> None:
+    """A material of squares of the given edge length, m."""
+    spec.add_texture(
+        name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, width=256, height=256,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER, rgb1=light, rgb2=dark,
+    )  # fmt: skip
+    repeat = 0.5 / square  # the texture is two squares wide
+    spec.add_material(
+        name=name, texrepeat=[repeat, repeat], texuniform=True, textures=["", name],
+        specular=0.1, shininess=0.1,
+    )  # fmt: skip

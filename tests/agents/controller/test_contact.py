@@ -1,0 +1,148 @@
+"""Contacts and ground heights from schedule and foot force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from agents.controller.contact import ContactState, initial_contact, step_contact
+from shared.config import ControllerConfig
+from shared.robot import FOOT_RADIUS, Array
+
+DETECTING = ControllerConfig()
+SCHEDULED = replace(DETECTING, contact_detection=False)
+DT = 1e-3
+LOAD = 50.0
+PAIR, OTHER = np.array([1.0, 0.0, 0.0, 1.0]), np.array([0.0, 1.0, 1.0, 0.0])
+
+
+@dataclass
+class Feet:
+    """Four feet, each on ground of height zero with its load, stepped through the detector."""
+
+    config: ControllerConfig = DETECTING
+    state: ContactState = field(default_factory=initial_contact)
+    force: Array = field(default_factory=lambda: np.full(4, LOAD))
+    z: Array = field(default_factory=lambda: np.full(4, FOOT_RADIUS))
+
+    def run(self, ticks: int, stance: Array, progress: float, half: int) -> ContactState:
+        for _ in range(ticks):
+            self.state = step_contact(
+                self.state, self.config, stance, progress, half, self.force, self.z, DT
+            )
+        return self.state
+
+
+def test_standing_feet_are_contacts_on_level_ground() -> None:
+    state = Feet().run(100, np.ones(4), 0.5, -1)
+    np.testing.assert_array_equal(state.contact, np.ones(4))
+    np.testing.assert_allclose(state.ground, 0.0, atol=1e-15)
+    assert abs(state.level) < 1e-15
+
+
+@pytest.mark.parametrize("patience_ms", [1, 5, 20])
+def test_a_stance_foot_without_load_is_taken_out_after_its_patience(patience_ms: int) -> None:
+    feet = Feet(replace(DETECTING, lost_contact_ms=patience_ms))
+    feet.run(50, PAIR, 0.2, 0)
+    feet.force[0] = 0.0
+    assert feet.run(patience_ms - 1, PAIR, 0.3, 0).contact[0] == 1.0
+    state = feet.run(3, PAIR, 0.3, 0)
+    np.testing.assert_array_equal(state.contact, [0.0, 0.0, 0.0, 1.0])
+    feet.force[0] = DETECTING.contact_force
+    assert feet.run(1, PAIR, 0.4, 0).contact[0] == 1.0  # back at the first loaded tick
+
+
+def test_a_single_tick_of_load_starts_the_patience_anew() -> None:
+    feet = Feet()
+    for _ in range(5):
+        feet.force[0] = 0.0
+        feet.run(4, PAIR, 0.3, 0)
+        feet.force[0] = LOAD
+        assert feet.run(1, PAIR, 0.3, 0).contact[0] == 1.0
+
+
+def test_a_foot_that_lands_early_is_a_contact_until_the_switch() -> None:
+    feet = Feet()
+    feet.force[1:3] = 0.0
+    feet.run(50, PAIR, 0.3, 0)
+    feet.force[1], feet.z[1] = LOAD, FOOT_RADIUS + 0.03
+    assert feet.run(5, PAIR, 0.45, 0).contact[1] == 0.0  # the foot is still leaving the ground
+    state = feet.run(1, PAIR, 0.6, 0)
+    np.testing.assert_array_equal(state.contact, [1.0, 1.0, 0.0, 1.0])
+    assert state.ground[1] == pytest.approx(0.03)
+    assert state.level == pytest.approx(0.0, abs=1e-12)  # only scheduled feet carry the level
+    feet.force[1] = 0.0
+    assert feet.run(20, PAIR, 0.7, 0).contact[1] == 1.0  # a bounce is not a second swing
+    feet.force[:] = LOAD
+    state = feet.run(1, OTHER, 0.0, 1)
+    np.testing.assert_array_equal(state.contact, OTHER)
+    assert state.ground[1] == pytest.approx(0.03)
+
+
+def test_a_late_foot_latches_the_ground_where_it_first_bears_load() -> None:
+    feet = Feet()
+    feet.force[1:3] = 0.0
+    feet.run(200, PAIR, 0.3, 0)
+    feet.force[:] = [0.0, 0.0, LOAD, 0.0]  # FR is late: it hangs in the air, then sinks
+    for height in np.linspace(0.04, -0.02, 31):
+        feet.z[1] = FOOT_RADIUS + height
+        before = feet.run(1, OTHER, 0.1, 1)
+        assert before.ground[1] == 0.0  # what was felt last, two steps ago
+    assert before.contact[1] == 0.0
+    feet.force[1] = LOAD
+    state = feet.run(1, OTHER, 0.2, 1)
+    assert state.contact[1] == 1.0
+    assert state.ground[1] == pytest.approx(-0.02)
+
+
+@pytest.mark.parametrize("late_ms", [3, 12])
+def test_the_ground_does_not_ratchet_upward_while_walking(late_ms: int) -> None:
+    """Every foot is 1 cm in the air at its scheduled touchdown and lands some ticks later."""
+    feet = Feet()
+    for half in range(60):
+        stance, swing = (PAIR, OTHER) if half % 2 == 0 else (OTHER, PAIR)
+        for tick in range(100):
+            in_air = late_ms > tick
+            feet.force = np.where(swing > 0.5, 0.0, 0.0 if in_air else LOAD)
+            feet.z = FOOT_RADIUS + np.where(swing > 0.5, 0.05, 0.01 if in_air else 0.0)
+            state = feet.run(1, stance, tick / 100, half)
+    assert np.abs(state.ground).max() < 1e-9
+    assert abs(state.level) < 1e-9
+
+
+def test_the_level_follows_the_estimators_drift_smoothly() -> None:
+    """A rise of all feet reaches the level monotonically, at the filter's time scale."""
+    feet = Feet()
+    feet.z += 0.01
+    levels = np.array([feet.run(1, np.ones(4), 0.5, -1).level for _ in range(500)])
+    assert (np.diff(levels) > 0.0).all()
+    assert levels[-1] == pytest.approx(0.01, rel=1e-2)
+    reached = int(np.argmax(levels > 0.632 * 0.01))
+    assert 40 < reached < 150  # ms, of a filter of 50 ms behind another
+
+
+def test_the_plain_setting_believes_the_schedule() -> None:
+    feet = Feet(SCHEDULED)
+    feet.force[:] = [0.0, LOAD, LOAD, 0.0]
+    state = feet.run(50, PAIR, 0.9, 0)
+    np.testing.assert_array_equal(state.contact, PAIR)
+    np.testing.assert_array_equal(feet.run(1, OTHER, 0.0, 1).contact, OTHER)
+
+
+def test_the_plain_settings_level_is_a_first_order_filter() -> None:
+    feet, rise = Feet(SCHEDULED), 0.02
+    feet.z[[0, 3]] += rise
+    feet.z[[1, 2]] += 1.0  # swing feet do not count
+    rate = DT / (1e-3 * SCHEDULED.ground_filter_ms + DT)
+    for k in (1, 10, 50):
+        feet.state = initial_contact()
+        level = feet.run(k, PAIR, 0.5, 0).level
+        assert level == pytest.approx(rise * (1.0 - (1.0 - rate) ** k), rel=1e-9)
+
+
+def test_a_filter_of_no_time_follows_at_once() -> None:
+    feet = Feet(replace(DETECTING, ground_filter_ms=0.0))
+    feet.z += 0.01
+    assert feet.run(1, np.ones(4), 0.5, -1).level == pytest.approx(0.01)

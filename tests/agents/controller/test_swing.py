@@ -1,0 +1,88 @@
+"""Swing trajectories and footholds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from agents.controller.kinematics import hip_neutral
+from agents.controller.swing import foothold, swing_reference
+from shared.robot import FOOT_RADIUS, Array
+
+START, TARGET = np.array([0.1, -0.2, 0.03]), np.array([0.25, -0.15])
+GROUND, APEX, DURATION = 0.01, 0.12, 0.2
+
+
+def reference(progress: float) -> Array:
+    return swing_reference(START, TARGET, GROUND, APEX, progress, DURATION)
+
+
+def test_a_swing_starts_where_the_foot_is_and_at_rest() -> None:
+    position, velocity, _ = reference(0.0)
+    np.testing.assert_allclose(position, START, atol=1e-15)
+    np.testing.assert_allclose(velocity, 0.0, atol=1e-15)
+
+
+def test_a_swing_ends_in_the_foothold_and_at_rest() -> None:
+    """A little below the expected ground, so that the foot surely touches it."""
+    position, velocity, _ = reference(1.0)
+    np.testing.assert_allclose(position[:2], TARGET, atol=1e-15)
+    assert GROUND + FOOT_RADIUS - 0.01 < position[2] < GROUND + FOOT_RADIUS
+    np.testing.assert_allclose(velocity, 0.0, atol=1e-12)
+
+
+def test_the_foot_comes_down_vertically() -> None:
+    for progress in (0.9, 0.95, 0.99):
+        position, velocity, _ = reference(progress)
+        np.testing.assert_allclose(position[:2], TARGET, atol=1e-12)
+        np.testing.assert_allclose(velocity[:2], 0.0, atol=1e-12)
+
+
+def test_at_half_time_the_foot_is_at_its_apex() -> None:
+    assert reference(0.5)[0, 2] == pytest.approx(APEX, abs=1e-15)
+    heights = [reference(progress)[0, 2] for progress in np.linspace(0.0, 1.0, 101)]
+    assert max(heights) == pytest.approx(APEX, abs=2e-3)
+
+
+@given(
+    arrays(np.float64, 3, elements=st.floats(-0.3, 0.3)),
+    arrays(np.float64, 2, elements=st.floats(-0.3, 0.3)),
+    st.floats(-0.1, 0.1), st.floats(0.05, 0.2), st.floats(0.01, 0.99), st.floats(0.1, 0.5),
+)  # fmt: skip
+@settings(deadline=None, max_examples=50)
+def test_velocity_and_acceleration_are_the_derivatives(
+    start: Array, target: Array, ground: float, apex: float, progress: float, duration: float
+) -> None:
+    if abs(progress - 0.9) < 1e-3:  # the plane's jerk jumps where it is done
+        progress = 0.5
+    h = 1e-4
+    before, now, after = (
+        swing_reference(start, target, ground, apex, progress + step, duration)
+        for step in (-h, 0.0, h)
+    )
+    dt = h * duration
+    np.testing.assert_allclose(
+        now[1], (after[0] - before[0]) / (2 * dt), atol=1e-5 + 1e-6 / duration
+    )
+    np.testing.assert_allclose(now[2], (after[1] - before[1]) / (2 * dt), atol=1e-3, rtol=1e-4)
+
+
+@given(st.integers(0, 3), st.integers(0, 2**31))
+@settings(deadline=None, max_examples=50)
+def test_the_foothold_is_raiberts(leg: int, seed: int) -> None:
+    """p_hip + v t_remaining + v T/2 + k (v − v_des), v the hip's: the yaw rate moves it too."""
+    random = np.random.default_rng(seed)
+    roll, pitch, yaw = random.uniform([-0.4, -0.4, -3.0], [0.4, 0.4, 3.0])
+    R = pin.rpy.rpyToMatrix(roll, pitch, yaw)
+    position, velocity, v_des = random.uniform(-1.0, 1.0, (3, 3))
+    wz, remaining, stance_time, gain = random.uniform(0.0, [0.5, 0.2, 0.3, 0.1])
+    arm = pin.utils.rotate("z", yaw) @ np.array([*hip_neutral()[leg], 0.0])
+    hip_velocity = velocity + np.cross([0.0, 0.0, wz], arm)
+    expected = position + arm + hip_velocity * (remaining + stance_time / 2)
+    expected += gain * (velocity - v_des)
+    found = foothold(leg, position, velocity, R, v_des, wz, remaining, stance_time, gain)
+    np.testing.assert_allclose(found, expected[:2], atol=1e-12)

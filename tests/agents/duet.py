@@ -1,0 +1,101 @@
+"""Two robots walking with a planner whose predictor is known, and all that passed at each tick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from agents.agent import Agent, AgentState, Inputs, Outputs
+from agents.planner.predictor import Predictor, PredictorMeta
+from quadriga.rollout import Rollout
+from shared.codec import decode, encode
+from shared.config import Config, TeamConfig
+from shared.messages import Reference, State
+from shared.robot import N_FORCES, N_OUTPUTS, Array
+
+CONFIG = Config(team=TeamConfig(robots=2))
+FIRST_PLAN = 320  # ms: the first multiple of 40 ms after the stand of 300 ms
+
+
+def simple_predictor(config: Config) -> Predictor:
+    """Every robot for itself: outputs fade within 50 ms and are driven by the forces till then."""
+    meta, N, T_ini = PredictorMeta.of(config), config.planner.N, config.planner.T_ini
+    effect = np.zeros((N_OUTPUTS, N_FORCES))
+    for leg in range(4):
+        effect[0, 3 * leg + 2] = 2e-5  # m per N and sample
+        effect[1, 3 * leg] = effect[2, 3 * leg + 1] = 8e-4  # m/s per N and sample
+    forget = np.exp(-0.2)
+    fading = np.array([[forget ** (k - j) if k >= j else 0.0 for j in range(N)] for k in range(N)])
+    G = np.zeros((meta.robots, meta.robots, N_OUTPUTS * N, meta.width))
+    last = meta.past - N_OUTPUTS  # column of the newest output in [u_ini; y_ini]
+    assert last == N_FORCES * T_ini + N_OUTPUTS * (T_ini - 1)
+    for robot in range(meta.robots):
+        fade = forget ** np.arange(1.0, N + 1.0)
+        G[robot, robot, :, last : meta.past] = np.kron(fade[:, None], np.eye(N_OUTPUTS))
+        G[robot, robot, :, meta.past :] = np.kron(fading, effect)
+    return Predictor(meta, G[None])
+
+
+def asked(vx: float = 0.3) -> Reference:
+    return Reference(0, 0, vx, 0.0, 0.0, 0.26)
+
+
+def every_100_ms(tick: int) -> Reference | None:
+    """From standing to 0.3 m/s within half a second after the stand."""
+    if tick % 100:
+        return None
+    return replace(
+        asked(0.3 * min(1.0, max(0.0, (tick - 300) / 500))), tick=tick, stamp_ns=tick * 1_000_000
+    )
+
+
+def over_the_bus(state: State) -> State:
+    """The same message as it arrives; the compiler tells its arrays from writable ones."""
+    return decode(encode(state), State)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of an agent: what it was given, what it remembered before, what it gave."""
+
+    before: AgentState
+    inputs: Inputs
+    outputs: Outputs
+
+
+@dataclass
+class Listener:
+    """Stands before an agent and notes every step."""
+
+    agent: Agent
+    steps: list[Step] = field(default_factory=list)
+
+    def step(self, state: AgentState, inputs: Inputs) -> tuple[AgentState, Outputs]:
+        after, outputs = self.agent.step(state, inputs)
+        self.steps.append(Step(state, inputs, outputs))
+        return after, outputs
+
+
+def record(rollout: Rollout, ticks: int) -> dict[str, list[Step]]:
+    """Advance a rollout and return every agent's steps."""
+    listeners = {name: Listener(agent) for name, agent in rollout.agents.items()}
+    rollout.agents.update(listeners)  # type: ignore[arg-type]
+    for _ in rollout.ticks(ticks):
+        pass
+    return {name: listener.steps for name, listener in listeners.items()}
+
+
+def fingerprint(value: Any) -> Any:
+    """Everything a value consists of, arrays as bytes: equal if and only if nothing changed."""
+    if isinstance(value, np.ndarray):
+        array: Array = value
+        return (array.shape, array.tobytes())
+    if is_dataclass(value):
+        return tuple(fingerprint(getattr(value, item.name)) for item in fields(value))
+    if isinstance(value, tuple | list):
+        return tuple(fingerprint(item) for item in value)
+    if hasattr(value, "items"):
+        return tuple(sorted((key, fingerprint(item)) for key, item in value.items()))
+    return value

@@ -1,0 +1,261 @@
+"""The one-step-delay protocol under loss, repetition, reordering and foreign messages."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from agents.gait import nominal_forces, scheduled_stance
+from agents.planner.horizon import horizon_stance
+from agents.planner.neighbours import FRESH, HELD, LOST, SHIFTED, Neighbours, PeerData, PeerMemory
+from shared.config import Config
+from shared.messages import Measurement, Plan
+from shared.robot import Array
+
+CONFIG = Config()
+CONFIG = replace(
+    CONFIG, planner=replace(CONFIG.planner, N=16, T_ini=6, max_peer_age=2, hold_steps=3)
+)
+PLANNER = CONFIG.planner
+NEIGHBOURS = Neighbours(CONFIG, 0)
+FIRST = 10
+INDEX = {"r2": 1, "r3": 2}
+
+
+def mark(robot: str, tick: int) -> float:
+    """A deviation that tells whose sample it is and when."""
+    return 1e-3 * tick + 100.0 * INDEX[robot]
+
+
+def measurement(robot: str, tick: int) -> Measurement:
+    start = np.array([tick - 10])
+    stance = scheduled_stance(CONFIG, INDEX[robot], start)[0]
+    u = nominal_forces(stance) + mark(robot, tick)
+    return Measurement(tick, 0, u=u, y=np.full(6, mark(robot, tick)), stance=stance.astype(float))
+
+
+def plan(robot: str, step: int, exchange: int = 0) -> Plan:
+    """Sample k of the plan of step s deviates by 1000 s + k."""
+    nominal = nominal_forces(horizon_stance(CONFIG, INDEX[robot], step))
+    k = np.arange(PLANNER.N)[:, None]
+    return Plan(
+        40 * step, 0, step=step, u=nominal + 1000.0 * step + k,
+        y=np.tile(1000.0 * step + k, (1, 6)), status="solved", used={},
+        exchange=exchange,
+    )  # fmt: skip
+
+
+def remember(step: int, plans: list[int], ticks: list[int], robot: str = "r2") -> PeerMemory:
+    return NEIGHBOURS.remember(
+        NEIGHBOURS.initial(), 40 * step,
+        [(robot, measurement(robot, tick)) for tick in ticks],
+        [(robot, plan(robot, s)) for s in plans],
+    )  # fmt: skip
+
+
+def of(memory: PeerMemory, step: int, robot: str = "r2") -> PeerData:
+    selection = NEIGHBOURS.select(memory, step - 1, FIRST)
+    return next(peer for peer in selection.peers if peer.robot == robot)
+
+
+def window_ticks(step: int) -> list[int]:
+    """Ticks of the T_ini samples that end at step k−1."""
+    return [40 * (step - 1) - 10 * back for back in range(PLANNER.T_ini - 1, -1, -1)]
+
+
+def expected_du(step: int, age: int) -> Array:
+    """The plan of step − 1 − age, shifted: its first 4 samples per step of age are gone."""
+    deviation = 1000.0 * (step - 1 - age) + np.arange(PLANNER.N)
+    shifted = np.zeros(PLANNER.N)
+    shifted[: PLANNER.N - 4 * age] = deviation[4 * age :]
+    return np.tile(shifted[:, None], (1, 12))
+
+
+def test_at_step_k_the_plan_and_the_window_of_step_k_minus_1_are_used() -> None:
+    ticks = list(range(10, 810, 10))
+    peer = of(remember(20, list(range(FIRST, 21)), ticks), 20)
+    assert (peer.status, peer.step, peer.age) == (FRESH, 19, 0)
+    np.testing.assert_allclose(peer.du, expected_du(20, 0), atol=1e-9)
+    marks = np.array([mark("r2", tick) for tick in window_ticks(20)])
+    assert window_ticks(20)[-1] == 40 * 19
+    np.testing.assert_allclose(peer.du_ini, np.tile(marks[:, None], (1, 12)), atol=1e-9)
+    np.testing.assert_allclose(peer.y_ini, np.tile(marks[:, None], (1, 6)), atol=1e-9)
+    assert peer.known.all()
+
+
+@pytest.mark.parametrize(("age", "status"), [(0, FRESH), (1, SHIFTED), (2, SHIFTED)])
+def test_a_missing_plan_is_replaced_by_the_newest_one_shifted_by_its_age(
+    age: int, status: str
+) -> None:
+    newest = 19 - age
+    peer = of(remember(20, [newest - 1, newest, 20], window_ticks(20)), 20)
+    assert (peer.status, peer.step, peer.age) == (status, newest, age)
+    np.testing.assert_allclose(peer.du, expected_du(20, age), atol=1e-9)
+
+
+@pytest.mark.parametrize(("age", "status"), [(3, HELD), (4, HELD), (5, HELD), (6, LOST), (9, LOST)])
+def test_past_the_maximum_age_a_peer_is_held_then_lost(age: int, status: str) -> None:
+    memory = remember(19 - age, [19 - age], [])
+    memory = NEIGHBOURS.remember(memory, 40 * 20, [("r2", measurement("r2", 760))], [])
+    peer = of(memory, 20)
+    assert (peer.status, peer.age) == (status, age)
+    assert not peer.usable
+    selection = NEIGHBOURS.select(memory, 19, 20)  # r3 has no first plan to be late with
+    assert selection.lost == (("r2",) if status == LOST else ())
+
+
+def test_the_first_planning_step_needs_nobodys_plan() -> None:
+    memory = remember(FIRST, [], window_ticks(FIRST))
+    selection = NEIGHBOURS.select(memory, FIRST - 1, FIRST)
+    assert selection.used == {}
+    assert [peer.status for peer in selection.peers] == [FRESH, FRESH]
+    assert all((peer.du == 0).all() for peer in selection.peers)
+    assert selection.peers[0].known.all()
+    assert not selection.peers[1].known.any()
+
+
+def test_a_peer_that_never_plans_is_lost_in_the_end() -> None:
+    memory = NEIGHBOURS.initial()
+    seen = [of(memory, step).status for step in range(FIRST, FIRST + 7)]
+    assert seen == [FRESH, SHIFTED, SHIFTED, HELD, HELD, HELD, LOST]
+
+
+def test_lost_samples_are_taken_from_the_peers_own_prediction() -> None:
+    """With the newest plan that covers a sample; a measured one always has precedence."""
+    ticks = window_ticks(20)
+    peer = of(remember(20, [17, 18], ticks[:1] + ticks[2:3]), 20)
+    assert peer.known.all()
+    # Window ends at 760; plan 17 covers samples that end at 690 … 840, plan 18 from 730.
+    expected = [mark("r2", 710), 17003.0, mark("r2", 730), 18001.0, 18002.0, 18003.0]
+    np.testing.assert_allclose(peer.y_ini[:, 0], expected)
+    np.testing.assert_allclose(peer.du_ini[:, 0], expected, atol=1e-9)
+
+
+def test_samples_nobody_knows_are_marked() -> None:
+    peer = of(remember(20, [19], [730, 760]), 20)
+    assert peer.known.tolist() == [False, False, True, False, False, True]
+    assert (peer.du_ini[~peer.known] == 0).all()
+
+
+def test_foreign_messages_are_refused_and_counted() -> None:
+    now = 40 * 20
+    good = plan("r2", 20)
+    bad_plans = [
+        ("r1", good), ("r9", good),
+        ("r2", replace(good, tick=good.tick + 40)),
+        ("r2", replace(good, u=good.u[:-1], y=good.y[:-1])),
+        ("r2", replace(good, step=2000, tick=80000)),
+        ("r2", replace(good, step=1, tick=40)),
+    ]  # fmt: skip
+    bad_samples = [
+        ("r1", measurement("r2", now)),
+        ("r2", measurement("r2", now - 5)),
+        ("r2", measurement("r2", now + 10**6)),
+        ("r2", measurement("r2", 0)),
+    ]
+    memory = NEIGHBOURS.remember(NEIGHBOURS.initial(), now, bad_samples, bad_plans)
+    assert memory.refused == len(bad_plans) + len(bad_samples)
+    assert memory.peers == NEIGHBOURS.initial().peers
+
+
+def test_memory_stays_small() -> None:
+    memory = NEIGHBOURS.initial()
+    for tick in range(0, 8000, 10):
+        plans = [("r2", plan("r2", tick // 40))] if tick % 40 == 0 else []
+        memory = NEIGHBOURS.remember(memory, tick, [("r2", measurement("r2", tick))], plans)
+    assert len(memory.peers["r2"].measurements) <= 6 + 4 * 7 + 1
+    assert len(memory.peers["r2"].plans) <= 10
+    assert memory.refused == 0
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    lost_plans=st.sets(st.integers(FIRST, 24)),
+    lost_samples=st.sets(st.integers(30, 100)),
+    order=st.randoms(use_true_random=False),
+    copies=st.integers(1, 2),
+)
+def test_loss_repetition_and_reordering(
+    lost_plans: set[int], lost_samples: set[int], order: object, copies: int
+) -> None:
+    """What is selected depends only on the set of messages up to k−1, and follows the rule."""
+    step = 22
+    steps = [s for s in range(FIRST, step + 1) if s not in lost_plans]
+    ticks = [10 * i for i in range(40, 4 * step + 1) if i not in lost_samples]
+    arrivals = [("plan", s) for s in steps] * copies + [("sample", t) for t in ticks] * copies
+    order.shuffle(arrivals)  # type: ignore[attr-defined]
+    memory = NEIGHBOURS.initial()
+    for kind, value in arrivals:
+        memory = NEIGHBOURS.remember(
+            memory, 40 * step,
+            [("r2", measurement("r2", value))] if kind == "sample" else [],
+            [("r2", plan("r2", value))] if kind == "plan" else [],
+        )  # fmt: skip
+    peer = of(memory, step)
+
+    usable = [s for s in steps if s < step]
+    newest = max(usable, default=FIRST - 1)
+    age = step - 1 - newest
+    limits = (0, PLANNER.max_peer_age, PLANNER.max_peer_age + PLANNER.hold_steps)
+    status = (FRESH, SHIFTED, HELD, LOST)[sum(age > limit for limit in limits)]
+    assert peer.status == status
+    if not peer.usable:
+        return
+    assert peer.step == (newest if usable else None)
+    np.testing.assert_allclose(
+        peer.du, expected_du(step, age) if usable else np.zeros((PLANNER.N, 12)), atol=1e-9
+    )
+    for place, tick in enumerate(window_ticks(step)):
+        planned = [s for s in usable if 40 * s < tick <= 40 * s + 10 * PLANNER.N]
+        if tick in ticks:
+            expected = mark("r2", tick)
+        elif planned:
+            expected = 1000.0 * max(planned) + (tick - 40 * max(planned)) // 10 - 1
+        else:
+            assert not peer.known[place]
+            continue
+        assert peer.known[place]
+        assert peer.y_ini[place, 0] == pytest.approx(expected)
+        np.testing.assert_allclose(peer.du_ini[place], expected, atol=1e-9)
+
+
+def test_brought_forward_the_window_ends_now_and_its_end_is_what_the_peer_planned() -> None:
+    memory = remember(20, [18, 19, 20], list(range(10, 810, 10)))
+    selection = NEIGHBOURS.select(memory, 19, FIRST, window_step=20)
+    peer = selection.peers[0]
+    assert (peer.status, peer.step, peer.age, selection.window_step) == (FRESH, 19, 0, 20)
+    # Samples after the step that may be looked at come from its plan, measured or not.
+    expected = [mark("r2", 750), mark("r2", 760), 19000.0, 19001.0, 19002.0, 19003.0]
+    np.testing.assert_allclose(peer.y_ini[:, 0], expected)
+    np.testing.assert_allclose(peer.du_ini[:, 0], expected, atol=1e-9)
+    ahead = np.zeros(PLANNER.N)
+    ahead[: PLANNER.N - 4] = 19000.0 + np.arange(4, PLANNER.N)
+    np.testing.assert_allclose(peer.du[:, 0], ahead, atol=1e-9)
+
+
+def test_of_one_step_the_last_exchange_counts_whatever_the_order() -> None:
+    first, second = plan("r2", 19), plan("r2", 19, exchange=1)
+    second = replace(second, u=second.u + 7.0)
+    for order in ([first, second], [second, first]):
+        memory = remember(19, [18], window_ticks(20))
+        memory = NEIGHBOURS.remember(memory, 800, [], [("r2", item) for item in order])
+        peer = of(memory, 20)
+        np.testing.assert_allclose(peer.du, expected_du(20, 0) + 7.0, atol=1e-9)
+    again = NEIGHBOURS.remember(memory, 800, [], [("r2", second)])
+    assert again.refused == memory.refused + 1
+
+
+def test_complete_means_every_peer_s_plan_and_the_samples_before_it() -> None:
+    memory = remember(19, [19], window_ticks(20))
+    assert not NEIGHBOURS.complete(memory, (19, 0)), "r3 has said nothing"
+    r3 = [("r3", measurement("r3", tick)) for tick in window_ticks(20)]
+    both = NEIGHBOURS.remember(memory, 780, r3, [("r3", plan("r3", 19))])
+    assert NEIGHBOURS.complete(both, (19, 0))
+    assert not NEIGHBOURS.complete(both, (19, 1))
+    assert not NEIGHBOURS.complete(both, (20, 0))
+    without = NEIGHBOURS.remember(memory, 780, r3[:-1], [("r3", plan("r3", 19))])
+    assert not NEIGHBOURS.complete(without, (19, 0))

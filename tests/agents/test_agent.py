@@ -1,0 +1,418 @@
+"""The agent as a function: what it sends when, that it is pure, and when it stops."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from agents.agent import Agent, AgentState, Inputs, Outputs
+from agents.controller import whole_body_qp
+from agents.controller.whole_body_qp import Problem
+from agents.gait import nominal_forces, scheduled_stance
+from agents.pilot import Awaited
+from agents.rehearsal import standing
+from quadriga.rollout import Rollout
+from shared.codec import decode, encode
+from shared.config import Config, TeamConfig
+from shared.messages import EStop, Reference, State
+from shared.robot import TORQUE_LIMIT, Array
+from tests.agents.duet import (
+    CONFIG,
+    FIRST_PLAN,
+    Step,
+    asked,
+    every_100_ms,
+    fingerprint,
+    over_the_bus,
+    record,
+    simple_predictor,
+)
+
+ALONE = Config(team=TeamConfig(robots=1))
+Recorded = dict[str, list[Step]]
+
+
+@pytest.fixture(scope="module")
+def duet() -> Recorded:
+    """Two robots, planner on, 0.7 s."""
+    return record(Rollout(CONFIG, simple_predictor(CONFIG), every_100_ms), 700)
+
+
+class Robot:
+    """One agent that stands on imaginary ground whatever it does; a reference every 100 ms."""
+
+    def __init__(self, config: Config = ALONE, *, planner: bool = False) -> None:
+        self.agent = Agent(config, "r1", simple_predictor(config) if planner else None)
+        self.state: AgentState = self.agent.initial()
+        self.tick = 0
+        self.references = True
+
+    def step(self, state: State | None = None, **inputs: Any) -> Outputs:
+        heard: tuple[Reference, ...] = ()
+        if self.references and self.tick % 100 == 0:
+            heard = (replace(asked(0.2), tick=self.tick),)
+        self.state, outputs = self.agent.step(
+            self.state, Inputs(state or standing(self.tick), references=heard, **inputs)
+        )
+        self.tick += 1
+        return outputs
+
+    def run(self, until: int) -> Outputs:
+        while self.tick < until:
+            outputs = self.step()
+        return outputs
+
+
+def tilted(tick: int, roll: float) -> State:
+    quat = np.array([np.cos(roll / 2), np.sin(roll / 2), 0.0, 0.0])
+    return over_the_bus(replace(standing(tick), imu_quat_wxyz=quat))
+
+
+def is_damping(outputs: Outputs, config: Config = ALONE) -> bool:
+    command = outputs.command
+    still = (command.tau, command.kp, command.q_des, command.v_des)
+    return not any(array.any() for array in still) and bool(
+        (command.kd == config.controller.damping).all()
+    )
+
+
+def sent(outputs: Outputs) -> list[bytes]:
+    """What goes onto the bus."""
+    messages = (outputs.command, outputs.measurement, outputs.plan)
+    return [encode(message) for message in messages if message is not None]
+
+
+# ---- purity
+
+
+@pytest.mark.parametrize("name", ["r1", "r2"])
+def test_equal_inputs_give_equal_bytes(duet: Recorded, name: str) -> None:
+    """A recorded agent, run again from its inputs, sends the same bytes."""
+    agent = Agent(CONFIG, name, simple_predictor(CONFIG))
+    state = agent.initial()
+    for step in duet[name]:
+        state, outputs = agent.step(state, step.inputs)
+        assert sent(outputs) == sent(step.outputs)
+        assert (outputs.mode, outputs.counters) == (step.outputs.mode, step.outputs.counters)
+
+
+def test_a_step_depends_on_nothing_but_its_arguments(duet: Recorded) -> None:
+    """Steps taken in any order, by an agent that has lived another life, change nothing."""
+    agent = Agent(CONFIG, "r1", simple_predictor(CONFIG))
+    steps = duet["r1"]
+    for place in (690, 400, 360, 680, 0, 320, 299):
+        _, outputs = agent.step(steps[place].before, steps[place].inputs)
+        assert sent(outputs) == sent(steps[place].outputs)
+
+
+def test_the_state_and_the_inputs_are_left_as_they_were(duet: Recorded) -> None:
+    agent = Agent(CONFIG, "r2", simple_predictor(CONFIG))
+    for step in duet["r2"][280::20]:
+        before = fingerprint(step.before), fingerprint(step.inputs)
+        agent.step(step.before, step.inputs)
+        assert (fingerprint(step.before), fingerprint(step.inputs)) == before
+
+
+# ---- what is sent when
+
+
+def test_commands_are_torques_of_this_tick_alone(duet: Recorded) -> None:
+    for step in duet["r1"]:
+        command = step.outputs.command
+        assert command.tick == step.inputs.state.tick
+        assert command.stamp_ns == command.tick * 1_000_000
+        assert 0.0 < np.abs(command.tau).max() <= TORQUE_LIMIT
+        for array in (command.kp, command.kd, command.q_des, command.v_des):
+            assert not array.any()
+
+
+def test_a_measurement_is_sent_every_ten_ticks(duet: Recorded) -> None:
+    for step in duet["r1"]:
+        tick, measurement = step.inputs.state.tick, step.outputs.measurement
+        assert (measurement is not None) == (tick % 10 == 0 and tick > 0)
+        if measurement is not None:
+            assert (measurement.tick, measurement.stamp_ns) == (tick, tick * 1_000_000)
+
+
+@pytest.mark.parametrize("name", ["r1", "r2"])
+def test_measured_forces_are_those_planned_for_the_sample(duet: Recorded, name: str) -> None:
+    """Nominal forces before the first plan; then the samples of the newest plan."""
+    index, plan = int(name[1]) - 1, None
+    deviates = False
+    for step in duet[name]:
+        tick, measurement = step.inputs.state.tick, step.outputs.measurement
+        if measurement is not None:
+            stance = scheduled_stance(CONFIG, index, np.array([tick - 10]))[0]
+            expected = nominal_forces(stance)
+            if plan is not None:
+                expected = plan.u[(tick - 10 - plan.tick) // 10]
+                deviates |= bool(np.abs(expected - nominal_forces(stance)).max() > 1.0)
+            np.testing.assert_allclose(measurement.u, expected, atol=1e-9)
+            np.testing.assert_array_equal(measurement.stance, stance)
+        plan = step.outputs.plan or plan
+    assert deviates
+
+
+def test_measured_outputs_are_close_to_the_truth() -> None:
+    rollout = Rollout(CONFIG, None, every_100_ms)
+    for tick in rollout.ticks(600):
+        truth = rollout.world.truth()  # of the tick after
+        for i, name in enumerate(rollout.world.names):
+            measurement = tick.outputs[name].measurement
+            if measurement is None:
+                continue
+            w, *xyz = truth.base_quat_wxyz[i]
+            roll, pitch, yaw = pin.rpy.matrixToRpy(pin.Quaternion(w, *xyz).matrix())
+            velocity = pin.utils.rotate("z", yaw).T @ truth.base_vel[i]
+            expected = [truth.base_pos[i, 2], *velocity[:2], roll, pitch, truth.base_omega[i, 2]]
+            error = np.abs(measurement.y - expected)
+            assert (error < [0.004, 0.06, 0.06, 0.01, 0.01, 0.15]).all(), tick.tick
+
+
+def test_a_plan_is_sent_every_forty_ticks_and_uses_the_peers_last_one(duet: Recorded) -> None:
+    for name, peer in (("r1", "r2"), ("r2", "r1")):
+        for step in duet[name]:
+            tick, plan = step.inputs.state.tick, step.outputs.plan
+            assert (plan is not None) == (tick >= FIRST_PLAN and tick % 40 == 0)
+            assert (step.outputs.planner_ns is None) == (plan is None)
+            if plan is None:
+                continue
+            assert plan.tick == 40 * plan.step == tick
+            assert plan.used == ({} if tick == FIRST_PLAN else {peer: plan.step - 1})
+            assert plan.status == "solved"
+            assert plan.u.shape == (CONFIG.planner.N, 12)
+            assert step.outputs.ages_ms[f"plan.{peer}"] == 40.0
+
+
+def test_awaited_names_what_lock_step_must_have_received() -> None:
+    agent = Agent(CONFIG, "r1", simple_predictor(CONFIG))
+    assert agent.awaited(0) == Awaited(reference_tick=0)
+    assert agent.awaited(301) == Awaited()
+    # Half a step after each planning step its plans, and the samples they were made of.
+    assert agent.awaited(FIRST_PLAN - 20) == Awaited(None, FIRST_PLAN - 40, 300)
+    assert agent.awaited(FIRST_PLAN) == Awaited()
+    assert agent.awaited(340) == Awaited((8, 0), 320)
+    assert agent.awaited(380) == Awaited((9, 0), 360)
+    assert agent.awaited(400) == Awaited(reference_tick=400)
+    assert Agent(CONFIG, "r1", None).awaited(400) == Awaited(reference_tick=400)
+    truthful = replace(CONFIG, estimator=replace(CONFIG.estimator, kind="truth"))
+    assert Agent(truthful, "r1", None).awaited(401) == Awaited(truth=True)
+
+
+def test_excitation_is_added_on_the_stance_feet_while_walking() -> None:
+    robot, noise = Robot(), np.arange(1.0, 13.0)
+    for _ in range(521):
+        outputs = robot.step(excitation=noise)
+        if outputs.measurement is None:
+            continue
+        tick = outputs.measurement.tick
+        stance = scheduled_stance(ALONE, 0, np.array([tick - 10]))[0]
+        felt = noise * np.repeat(stance, 3) if tick > 300 else 0.0
+        np.testing.assert_allclose(outputs.measurement.u, nominal_forces(stance) + felt)
+
+
+def test_gaps_in_the_ticks_are_bridged() -> None:
+    """Real time: states get lost now and then; what falls on a lost tick is not sent later."""
+    robot, random = Robot(planner=True), np.random.default_rng(0)
+    ticks = [t for t in range(1500) if random.random() > 0.3 or t % 40 == 0]
+    ticks = [t for t in ticks if not 800 < t < 1100]
+    for tick in ticks:
+        robot.tick = tick
+        outputs = robot.step()
+        assert np.abs(outputs.command.tau).max() <= TORQUE_LIMIT
+        assert (outputs.measurement is not None) == (tick % 10 == 0 and tick > 0)
+        assert outputs.plan is None or outputs.plan.tick == tick
+    assert outputs.mode == "walk"
+    assert np.abs(outputs.command.tau).max() > 1.0
+
+
+# ---- stops
+
+
+@pytest.mark.parametrize("at", [100, 400])
+def test_an_emergency_stop_damps_the_joints_for_good(at: int) -> None:
+    robot = Robot()
+    robot.run(at)
+    outputs = robot.step(estop=EStop(at, at, "operator: key"))
+    for _ in range(50):
+        assert is_damping(outputs)
+        assert (outputs.mode, outputs.reason) == ("estop", "estop:operator: key")
+        outputs = robot.step(estop=EStop(at, at, "another"))
+
+
+def test_an_emergency_stop_outranks_a_fall() -> None:
+    robot = Robot()
+    robot.run(400)
+    assert robot.step(tilted(400, 1.2)).mode == "damping"
+    outputs = robot.step(tilted(401, 1.2), estop=EStop(401, 401, "operator"))
+    assert (outputs.mode, outputs.reason) == ("estop", "estop:operator")
+    outputs = robot.step(tilted(402, 1.2))
+    assert (outputs.mode, outputs.reason) == ("estop", "estop:operator")
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_tilt_beyond_the_limit_is_a_fall(sign: float) -> None:
+    robot, limit = Robot(), ALONE.controller.fall_tilt
+    robot.run(400)
+    assert robot.step(tilted(400, sign * (limit - 0.01))).mode == "walk"
+    outputs = robot.step(tilted(401, sign * (limit + 0.01)))
+    for _ in range(20):  # also once it is upright again
+        assert is_damping(outputs)
+        assert (outputs.mode, outputs.reason) == ("damping", "fall")
+        outputs = robot.step()
+
+
+def fail(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_solution(problem: Problem) -> tuple[Array, str]:
+        return np.zeros(12), "infeasible:-1"
+
+    monkeypatch.setattr(whole_body_qp, "solve", no_solution)
+
+
+def test_without_a_solution_the_last_torques_hold_and_then_the_joints_are_damped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot, limit = Robot(), ALONE.controller.max_failures
+    last = robot.run(400).command.tau
+    fail(monkeypatch)
+    for failures in range(1, limit):
+        outputs = robot.step()
+        np.testing.assert_array_equal(outputs.command.tau, last)
+        assert (outputs.command.kd == ALONE.controller.damping).all()
+        assert (outputs.mode, outputs.counters["qp_failed"]) == ("walk", failures)
+    outputs = robot.step()
+    assert is_damping(outputs)
+    assert (outputs.mode, outputs.reason) == ("damping", "qp-infeasible:-1")
+    monkeypatch.undo()
+    assert is_damping(robot.step())
+
+
+def test_a_few_failures_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = Robot()
+    robot.run(400)
+    for _ in range(3):
+        fail(monkeypatch)
+        for _ in range(ALONE.controller.max_failures - 1):
+            robot.step()
+        monkeypatch.undo()
+        outputs = robot.step()
+    assert outputs.mode == "walk"
+    assert not outputs.command.kd.any()
+
+
+@pytest.mark.parametrize(
+    "absurd",
+    [
+        replace(standing(400), v_joint=np.full(12, 1e200)),
+        replace(standing(400), imu_accel=np.full(3, 1e300)),
+        replace(standing(400), imu_gyro=np.full(3, 1e160)),
+    ],
+    ids=["rates", "acceleration", "turning"],
+)
+def test_finite_but_absurd_sensors_end_in_damping_and_not_in_a_crash(absurd: State) -> None:
+    robot = Robot()
+    last = robot.run(400).command.tau
+    outputs = robot.step(over_the_bus(absurd))
+    np.testing.assert_array_equal(outputs.command.tau, last)
+    for _ in range(ALONE.controller.max_failures):
+        outputs = robot.step()
+        assert np.isfinite(outputs.command.tau).all()
+    assert is_damping(outputs)
+    assert outputs.reason == "qp-infeasible:singular"
+
+
+def test_a_lost_reference_makes_the_robot_slow_down_and_stand() -> None:
+    robot = Robot()
+    robot.run(650)  # the last reference is of tick 600
+    robot.references = False
+    assert robot.run(1101).mode == "walk"
+    outputs = robot.step()
+    assert (outputs.mode, outputs.reason) == ("stopping", "reference-lost")
+    assert outputs.ages_ms["reference"] == 501.0
+    # Half a second later, at the next end of a stance: 300 + k · 200.
+    assert robot.run(1700).mode == "stopping"
+    outputs = robot.step()
+    assert (outputs.mode, outputs.reason) == ("stand", "reference-lost")
+    robot.references = True
+    outputs = robot.run(2200)
+    assert (outputs.mode, outputs.reason) == ("stand", "reference-lost")
+    assert np.abs(outputs.command.tau).max() > 1.0  # it holds itself up
+
+
+def test_a_peer_that_never_answers_makes_the_robot_stop() -> None:
+    robot, planner = Robot(CONFIG, planner=True), CONFIG.planner
+    lost = FIRST_PLAN + 40 * (planner.max_peer_age + planner.hold_steps + 1)
+    assert robot.run(lost).mode == "walk"
+    outputs = robot.step()
+    assert (outputs.mode, outputs.reason) == ("stopping", "peer-lost:r2")
+    assert outputs.plan is not None
+    assert outputs.plan.status == "nominal:peer-lost"
+    assert outputs.counters["plan_nominal"] == 1
+    assert robot.run(lost + 701).mode == "stand"
+    assert robot.step().plan is None
+
+
+# ---- estimators
+
+
+def test_with_the_truth_the_outputs_are_the_truth_and_a_lost_one_is_bridged() -> None:
+    config = replace(ALONE, estimator=replace(ALONE.estimator, kind="truth"))
+    steps = record(Rollout(config, None, every_100_ms), 520)["r1"]
+    agent = Agent(config, "r1", None)
+    for step in steps[500:]:
+        truth, measurement = step.inputs.truth, step.outputs.measurement
+        assert truth is not None
+        if measurement is None:
+            continue
+        w, *xyz = truth.base_quat_wxyz[0]
+        yaw = pin.rpy.matrixToRpy(pin.Quaternion(w, *xyz).matrix())[2]
+        velocity = pin.utils.rotate("z", yaw).T @ truth.base_vel[0]
+        np.testing.assert_allclose(measurement.y[1:3], velocity[:2], atol=1e-9)
+        assert measurement.y[5] == pytest.approx(truth.base_omega[0, 2], abs=1e-9)
+        _, without = agent.step(step.before, replace(step.inputs, truth=None))
+        assert without.measurement is not None
+        np.testing.assert_allclose(without.measurement.y[:3], measurement.y[:3], atol=0.02)
+
+
+# ---- limits
+
+
+@cache
+def observer() -> Agent:
+    return Agent(CONFIG, "r1", simple_predictor(CONFIG))
+
+
+@given(
+    st.integers(0, 699),
+    arrays(np.float64, 12, elements=st.floats(-3.0, 3.0)),
+    arrays(np.float64, 12, elements=st.floats(-30.0, 30.0)),
+    arrays(np.float64, 4, elements=st.floats(0.05, 1.0)),
+    arrays(np.float64, 6, elements=st.floats(-50.0, 50.0)),
+    arrays(np.float64, 4, elements=st.floats(0.0, 500.0)),
+)
+@settings(deadline=None, max_examples=60)
+def test_whatever_is_sensed_the_command_is_finite_and_within_the_limit(
+    duet: Recorded, place: int, dq: Array, v: Array, quat: Array, imu: Array, force: Array
+) -> None:
+    """A wild state in the middle of a walk, and the tick after it."""
+    step = duet["r1"][place]
+    wild = replace(
+        step.inputs.state, q_joint=step.inputs.state.q_joint + dq, v_joint=v, imu_quat_wxyz=quat,
+        imu_gyro=imu[:3], imu_accel=imu[3:], foot_force=force,
+    )  # fmt: skip
+    agent, state = observer(), step.before
+    for tick in range(2):
+        now = replace(wild, tick=wild.tick + tick)
+        state, outputs = agent.step(state, replace(step.inputs, state=now))
+        assert np.abs(outputs.command.tau).max() <= TORQUE_LIMIT
+        for payload in sent(outputs):
+            assert payload
+        decode(encode(outputs.command), type(outputs.command))

@@ -1,0 +1,157 @@
+"""Between bus and agent: dropped and counted, held until due, sorted."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from agents.arrivals import Arrivals
+from agents.pilot import Awaited
+from agents.rehearsal import standing
+from shared.codec import encode
+from shared.config_file import load
+from shared.messages import EStop, Event, Measurement, Message, Plan, Reference
+from shared.topics import TABLE, Topic
+
+NOTHING = Awaited()
+
+
+def arrivals(
+    mode: str = "lockstep", estimator: str = "kalman", planner: str = "distributed"
+) -> Arrivals:
+    config = load(
+        None,
+        {
+            "team.robots": 3,
+            "world.mode": mode,
+            "estimator.kind": estimator,
+            "planner.kind": planner,
+        },
+    )
+    return Arrivals(config, "r2", ("r1", "r3") if planner == "distributed" else ())
+
+
+def measurement(tick: int) -> Measurement:
+    return Measurement(tick, tick, np.zeros(12), np.zeros(6), np.ones(4))
+
+
+def plan(step: int) -> Plan:
+    return Plan(40 * step, 0, step, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 0)
+
+
+def reference(tick: int) -> Reference:
+    return Reference(tick, tick, 0.5, 0.0, 0.0, 0.26)
+
+
+def feed(box: Arrivals, *messages: tuple[str, Message]) -> None:
+    for key, message in messages:
+        box.take(f"team/{key}", encode(message))
+
+
+def test_subscribes_to_what_it_needs_and_no_more() -> None:
+    alone = {"team/r2/state", "team/reference", "team/estop", "team/sim/event"}
+    peers = {f"team/{r}/{t}" for r in ("r1", "r3") for t in ("plan", "measurement")}
+    assert {*arrivals(planner="none").keys} == alone
+    assert {*arrivals(planner="centralised").keys} == alone | {"team/r2/plan"}
+    assert {*arrivals().keys} == alone | peers
+    assert {*arrivals(estimator="truth").keys} == alone | peers | {"team/sim/truth"}
+
+
+@pytest.mark.parametrize("topic", TABLE, ids=lambda topic: topic.name)
+@pytest.mark.parametrize("payload", [b"", b"\x81\xa1x\x01", bytes(2_000_000)], ids=len)
+def test_malformed_messages_on_any_key_are_dropped_and_counted(
+    topic: Topic, payload: bytes
+) -> None:
+    box = arrivals(estimator="truth")
+    for robot in ("r1", "r2", "r3") if topic.per_robot else ("",):
+        box.take(topic.key("team", robot), payload)
+    assert sum(box.counters.values()) == (3 if topic.per_robot else 1)
+    assert all(name in (f"dropped_{topic.name}", "dropped_foreign") for name in box.counters)
+    assert box.state() is None
+    inputs = box.inputs(standing(0), Awaited((0, 0), 0, 0, True))
+    assert (inputs.plans, inputs.measurements, inputs.references) == ((), (), ())
+    assert inputs.estop is None
+    assert inputs.truth is None
+
+
+def test_the_newest_state_counts_and_the_others_are_counted() -> None:
+    box = arrivals()
+    feed(box, *(("r2/state", standing(tick)) for tick in (1, 2, 3)))
+    state = box.state()
+    assert state is not None
+    assert state.tick == 3
+    assert box.counters["states_passed_over"] == 2
+    assert box.state() is None
+
+
+def test_the_order_of_arrival_does_not_matter() -> None:
+    messages: list[tuple[str, Message]] = [
+        ("r1/measurement", measurement(10)), ("r3/measurement", measurement(10)),
+        ("r3/plan", plan(1)), ("r1/plan", plan(1)),
+    ]  # fmt: skip
+    seen = []
+    for order in permutations(messages):
+        box = arrivals()
+        feed(box, *order, ("r1/measurement", measurement(20)))
+        inputs = box.inputs(standing(80), Awaited(plan=(1, 0), measurement_tick=40))
+        seen.append([(name, message.tick) for name, message in inputs.measurements])
+        assert [name for name, _ in inputs.plans] == ["r1", "r3"]
+    assert seen == [[("r1", 10), ("r1", 20), ("r3", 10)]] * len(seen)
+
+
+def test_lock_step_hands_over_at_the_tick_that_awaits_and_never_earlier() -> None:
+    box = arrivals()
+    feed(box, ("r1/plan", plan(1)), ("r1/plan", plan(2)), ("r1/measurement", measurement(80)),
+         ("reference", reference(0)), ("reference", reference(100)))  # fmt: skip
+    assert box.inputs(standing(41), NOTHING).plans == ()
+    inputs = box.inputs(standing(80), Awaited((1, 0), 40, 0))
+    assert [p.step for _, p in inputs.plans] == [1]
+    assert inputs.measurements == ()
+    assert [r.tick for r in inputs.references] == [0]
+    inputs = box.inputs(standing(120), Awaited((2, 0), 80, 100))
+    assert [p.step for _, p in inputs.plans] == [2]
+    assert [m.tick for _, m in inputs.measurements] == [80]
+    assert [r.tick for r in inputs.references] == [100]
+
+
+def test_real_time_hands_over_all_that_has_come_once() -> None:
+    box = arrivals("realtime")
+    feed(box, ("r1/plan", plan(9)), ("r3/measurement", measurement(990)))
+    inputs = box.inputs(standing(7), NOTHING)
+    assert (len(inputs.plans), len(inputs.measurements)) == (1, 1)
+    assert box.inputs(standing(8), NOTHING).plans == ()
+
+
+def test_who_owes_what() -> None:
+    box = arrivals(estimator="truth")
+    awaited = Awaited(plan=(1, 0), measurement_tick=40, reference_tick=0, truth=True)
+    everyone = {("plan", "r1"), ("plan", "r3"), ("measurement", "r1"), ("measurement", "r3"),
+                ("reference", "operator"), ("sim/truth", "sim")}  # fmt: skip
+    assert box.owing(80, awaited) == everyone
+    assert box.owing(80, NOTHING) == frozenset()
+    feed(box, ("r1/plan", plan(1)), ("r3/plan", plan(0)), ("r1/measurement", measurement(40)),
+         ("r3/measurement", measurement(30)), ("reference", reference(0)))  # fmt: skip
+    assert box.owing(80, awaited) == {
+        ("plan", "r3"), ("measurement", "r3"), ("sim/truth", "sim")
+    }  # fmt: skip
+
+
+def test_an_emergency_stop_and_the_end_are_never_held_back() -> None:
+    box = arrivals()
+    feed(box, ("estop", EStop(5, 5, "tripped")), ("sim/event", Event(5, 5, "push", "r1", "")))
+    assert not box.ended
+    estop = box.inputs(standing(6), NOTHING).estop
+    assert estop is not None
+    assert estop.reason == "tripped"
+    feed(
+        box, ("sim/event", Event(7, 7, "stop", "", "")), ("sim/event", Event(8, 8, "fall", "", ""))
+    )
+    assert box.ended
+
+
+def test_a_flood_is_bounded_and_counted() -> None:
+    box = arrivals()
+    feed(box, *(("r1/measurement", measurement(10 * k)) for k in range(1000)))
+    assert box.counters["flooded_measurement"] == 1000 - 256

@@ -1,0 +1,99 @@
+"""An agent that follows a central planner: takes its plans into force, fades them, misses them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from agents.following import Follower
+from agents.gait import nominal_forces
+from agents.modes import STAND, WALK, Mode
+from agents.pilot import Awaited, Heard, PilotState, Planned
+from agents.planner.horizon import horizon_stance
+from shared.config import Config, PlannerConfig, TeamConfig
+from shared.messages import Measurement, Plan
+from shared.robot import Array
+from tests.agents.duet import asked
+
+CONFIG = Config(team=TeamConfig(robots=2), planner=PlannerConfig(kind="centralised"))
+WALKING, REFERENCE = Mode(WALK, 300), asked(0.3)
+ON_COURSE = np.array([0.26, 0.3, 0.0, 0.0, 0.0, 0.0])
+N = CONFIG.planner.N
+
+
+def plan_of(step: int, *, exchange: int = 0) -> Plan:
+    """Sample k of the plan of step s deviates by s + k/100 N."""
+    stance = horizon_stance(CONFIG, 1, step)
+    du = (step + 0.01 * np.arange(N))[:, None] * np.repeat(stance, 3, axis=1)
+    u = nominal_forces(stance) + du
+    return Plan(40 * step, 0, step, u, np.tile(ON_COURSE, (N, 1)), "solved", {}, exchange)
+
+
+def measured(tick: int, y: Array = ON_COURSE) -> Measurement:
+    return Measurement(tick, 0, np.zeros(12), y, np.ones(4))
+
+
+def follow(
+    follower: Follower, state: PilotState, tick: int, *plans: Plan, y: Array = ON_COURSE,
+    mode: Mode = WALKING,
+) -> tuple[PilotState, Planned]:  # fmt: skip
+    heard = Heard(
+        tick, mode, (REFERENCE,), measured(tick, y), (), tuple(("planner", p) for p in plans)
+    )
+    return follower.step(state, heard)
+
+
+def test_a_plan_is_in_force_from_its_arrival_on_and_aligned_with_its_own_time() -> None:
+    follower = Follower(CONFIG, 1)
+    state, before = follow(follower, PilotState(), 320)
+    assert not before.present.deviation.any()
+    state, at = follow(follower, state, 323, plan_of(8))
+    assert at.present.deviation.max() == pytest.approx(8.0)
+    state, later = follow(follower, state, 320 + 35)
+    assert later.present.deviation.max() == pytest.approx(8.03)
+    assert later.plan is None
+    assert later.planner_ns is None
+
+
+def test_lock_step_awaits_a_plan_its_latency_after_its_data() -> None:
+    assert Follower(CONFIG, 1).awaited(321) == Awaited(plan=(8, 0))
+    assert Follower(CONFIG, 1).awaited(320) == Awaited()
+    late = replace(CONFIG, planner=replace(CONFIG.planner, latency_ms=16))
+    assert [t for t in range(300, 420) if Follower(late, 1).awaited(t).plan] == [336, 376, 416]
+
+
+def test_older_and_repeated_plans_and_those_of_another_horizon_are_passed_over() -> None:
+    follower = Follower(CONFIG, 1)
+    state, _ = follow(follower, PilotState(), 361, plan_of(9))
+    short = replace(plan_of(10), u=np.zeros((5, 12)))
+    for stale in (plan_of(8), plan_of(9), short):
+        state, planned = follow(follower, state, 362, stale)
+        assert planned.present.deviation.max() == pytest.approx(9.0)
+
+
+def test_a_plan_fades_out_beyond_the_range_of_the_data() -> None:
+    far = ON_COURSE + np.array([0.0, 1.5 * CONFIG.planner.fade[1], 0.0, 0.0, 0.0, 0.0])
+    _, planned = follow(Follower(CONFIG, 1), PilotState(), 321, plan_of(8), y=far)
+    assert planned.present.deviation.max() == pytest.approx(4.0)
+
+
+def test_without_plans_the_robot_stops_with_a_name_for_it() -> None:
+    follower, planner = Follower(CONFIG, 1), CONFIG.planner
+    state, planned = follow(follower, PilotState(), 321, plan_of(8))
+    assert planned.stop_reason == ""
+    reasons = {}
+    for step in range(9, 25):
+        state, planned = follow(follower, state, 40 * step + 1)
+        reasons[step] = planned.stop_reason
+        if step - 8 >= planner.N // planner.applied + 1:
+            assert not planned.present.deviation.any(), "a plan that has run out says nothing"
+    patience = planner.max_peer_age + planner.hold_steps
+    assert next(step for step, why in reasons.items() if why) == 8 + patience + 1
+    assert set(reasons.values()) == {"", "planner-lost"}
+
+
+def test_nothing_is_applied_unless_walking() -> None:
+    _, planned = follow(Follower(CONFIG, 1), PilotState(), 321, plan_of(8), mode=Mode(STAND, 0))
+    assert not planned.present.deviation.any()

@@ -1,0 +1,96 @@
+"""The trot's schedule and the nominal forces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from agents.gait import (
+    nominal_forces,
+    phase_offset_ms,
+    scheduled_stance,
+    stance_of_half,
+    stance_progress,
+)
+from shared.config import Config, GaitConfig
+from shared.robot import GRAVITY, TOTAL_MASS, Leg
+
+GAITS = st.builds(
+    GaitConfig,
+    stance_ms=st.integers(5, 50).map(lambda x: 10 * x),
+    stand_ms=st.integers(10, 80).map(lambda x: 10 * x),
+)
+
+
+def of(gait: GaitConfig, *, alternate: bool = True) -> Config:
+    config = Config()
+    return replace(config, gait=gait, team=replace(config.team, alternate_phase=alternate))
+
+
+@given(GAITS, st.integers(0, 9), st.booleans())
+@settings(deadline=None, max_examples=40)
+def test_diagonal_pairs_stand_in_turn_for_the_stance_time(
+    gait: GaitConfig, index: int, alternate: bool
+) -> None:
+    """Duty one half: after the stand, of any period every leg stands exactly half."""
+    config = of(gait, alternate=alternate)
+    ticks = np.arange(gait.stand_ms + 4 * gait.stance_ms)
+    stance = scheduled_stance(config, index, ticks)
+    assert stance[: gait.stand_ms].all()
+    walking = stance[gait.stand_ms :]
+    assert (walking.sum(axis=1) == 2).all()
+    np.testing.assert_array_equal(walking[:, Leg.FL], walking[:, Leg.RR])
+    np.testing.assert_array_equal(walking[:, Leg.FR], walking[:, Leg.RL])
+    half = gait.stance_ms
+    np.testing.assert_array_equal(walking[half:], ~walking[:-half])
+    assert (walking[:half] == walking[0]).all()
+
+
+@given(GAITS)
+@settings(deadline=None, max_examples=20)
+def test_every_second_robot_trots_half_a_period_later(gait: GaitConfig) -> None:
+    ticks = gait.stand_ms + np.arange(2 * gait.stance_ms)
+    first, second, third = (scheduled_stance(of(gait), index, ticks) for index in range(3))
+    np.testing.assert_array_equal(first, ~second)
+    np.testing.assert_array_equal(first, third)
+    together = scheduled_stance(of(gait, alternate=False), 1, ticks)
+    np.testing.assert_array_equal(first, together)
+    assert phase_offset_ms(of(gait), 1) == gait.stance_ms
+
+
+@given(GAITS, st.integers(0, 1), st.integers(0, 5000))
+@settings(deadline=None, max_examples=60)
+def test_progress_and_half_say_the_same_as_the_schedule(
+    gait: GaitConfig, index: int, since: int
+) -> None:
+    config, tick = of(gait), gait.stand_ms + since
+    progress, half = stance_progress(config, index, tick)
+    assert progress == (since % gait.stance_ms) / gait.stance_ms
+    expected = scheduled_stance(config, index, np.array([tick]))[0]
+    np.testing.assert_array_equal(stance_of_half(half), expected)
+
+
+def test_standing_is_half_minus_one() -> None:
+    assert stance_of_half(-1).all()
+
+
+@pytest.mark.parametrize("legs", range(1, 16))
+def test_nominal_forces_carry_the_weight_on_the_stance_feet(legs: int) -> None:
+    stance = np.array([bool(legs >> leg & 1) for leg in range(4)])
+    forces = nominal_forces(stance).reshape(4, 3)
+    assert forces[:, 2].sum() == pytest.approx(TOTAL_MASS * GRAVITY, rel=1e-12)
+    assert not forces[:, :2].any()
+    assert not forces[~stance].any()
+    assert np.ptp(forces[stance, 2]) == 0.0
+
+
+def test_nominal_forces_of_many_instants_and_of_no_stance_at_all() -> None:
+    stance = np.array([[True] * 4, [True, False, False, True], [False] * 4])
+    forces = nominal_forces(stance)
+    assert forces.shape == (3, 12)
+    assert not forces[2].any()
+    np.testing.assert_array_equal(forces[1], nominal_forces(stance[1]))

@@ -1,0 +1,152 @@
+"""When the pilot plans, what it hands on at each tick, and how a plan fades out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from agents.gait import nominal_forces, scheduled_stance
+from agents.modes import STAND, STOPPING, WALK, Mode
+from agents.pilot import Heard, PilotState, Planned
+from agents.planning import LocalPilot
+from shared.config import Config, TeamConfig
+from shared.messages import Measurement
+from shared.robot import Array
+from tests.agents.duet import asked, simple_predictor
+
+ALONE = Config(team=TeamConfig(robots=1))
+REFERENCE = asked(0.3)
+WALKING = Mode(WALK, 300)
+ON_COURSE = np.array([0.26, 0.3, 0.0, 0.0, 0.0, 0.0])
+FIRST = 320
+
+
+@cache
+def pilot_of(config: Config) -> LocalPilot:
+    return LocalPilot(config, 0, simple_predictor(config), lambda: 0)
+
+
+class Flight:
+    """One robot's pilot with samples of our own making."""
+
+    def __init__(self, config: Config = ALONE) -> None:
+        self.config = config
+        self.pilot = pilot_of(config)
+        self.state = PilotState()
+
+    def step(self, tick: int, y: Array = ON_COURSE, mode: Mode = WALKING) -> Planned:
+        measurement = None
+        if tick % 10 == 0:
+            stance = scheduled_stance(self.config, 0, np.array([tick - 10]))[0]
+            u = nominal_forces(stance)
+            measurement = Measurement(tick, tick * 1_000_000, u, y, stance.astype(float))
+        heard = Heard(tick, mode, (REFERENCE,), measurement)
+        self.state, planned = self.pilot.step(self.state, heard)
+        return planned
+
+    def fly(self, until: int, y: Array = ON_COURSE) -> Planned:
+        """All samples up to and including the tick `until`."""
+        for tick in range(10, until + 1, 10):
+            planned = self.step(tick, y, WALKING if tick >= 300 else Mode(STAND, 0))
+        return planned
+
+
+def test_on_course_the_plan_is_nominal() -> None:
+    planned = Flight().fly(FIRST)
+    assert planned.plan is not None
+    assert planned.plan.status == "solved"
+    np.testing.assert_allclose(planned.present.deviation, 0.0, atol=1e-6)
+
+
+def test_off_course_the_plan_pushes_back_and_is_handed_on_sample_by_sample() -> None:
+    slow = ON_COURSE - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
+    flight = Flight()
+    plan = flight.fly(FIRST, slow).plan
+    assert plan is not None
+    nominal = nominal_forces(scheduled_stance(ALONE, 0, FIRST + 10 * np.arange(25)))
+    assert (plan.u - nominal)[:4, 0].min() > 1.0
+    for tick in range(FIRST + 1, FIRST + 40):
+        planned = flight.step(tick, slow)
+        assert planned.plan is None
+        sample = (tick - FIRST) // 10
+        np.testing.assert_allclose(planned.present.deviation, (plan.u - nominal)[sample], atol=1e-9)
+
+
+def test_a_plan_that_is_not_renewed_runs_out() -> None:
+    """Samples stop coming: the horizon is used up to its end and nothing after it."""
+    slow = ON_COURSE - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
+    flight = Flight()
+    flight.fly(FIRST, slow)
+    state, end = flight.state, FIRST + 10 * ALONE.planner.N
+    for tick, expected in ((end - 1, True), (end + 1, False), (end + 1001, False)):
+        _, planned = flight.pilot.step(state, Heard(tick, WALKING, (REFERENCE,)))
+        assert planned.plan is None
+        assert bool(planned.present.deviation.any()) == expected
+
+
+@pytest.mark.parametrize("missing", [FIRST - 30, FIRST - 80, FIRST])
+def test_without_a_whole_window_of_own_samples_nothing_is_planned(missing: int) -> None:
+    flight = Flight()
+    for tick in range(10, FIRST + 1, 10):
+        if tick != missing:
+            planned = flight.step(tick)
+    if missing == FIRST:
+        _, planned = flight.pilot.step(flight.state, Heard(FIRST, WALKING, (REFERENCE,)))
+    assert planned.plan is None
+    assert planned.planner_ns is None
+
+
+@pytest.mark.parametrize("mode", [Mode(STAND, 0), Mode(STOPPING, 300, "why")])
+def test_nothing_is_planned_and_nothing_handed_on_unless_walking(mode: Mode) -> None:
+    slow = ON_COURSE - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
+    flight = Flight()
+    flight.fly(FIRST, slow)
+    planned = flight.step(FIRST + 40, slow, mode)
+    assert planned.plan is None
+    assert not planned.present.deviation.any()
+
+
+@pytest.mark.parametrize(
+    ("excess", "share"), [(0.5, 1.0), (1.0, 1.0), (1.25, 0.75), (1.5, 0.5), (2.0, 0.0), (3.0, 0.0)]
+)
+@pytest.mark.parametrize("output", range(6))
+def test_a_plan_fades_out_beyond_the_range_of_the_data(
+    output: int, excess: float, share: float
+) -> None:
+    """In proportion between once and twice the range, in every output, and so it is published."""
+    limits = np.array(ALONE.planner.fade)[[0, 1, 1, 2, 2, 3]]
+    y = ON_COURSE.copy()
+    y[output] += excess * limits[output]
+    y[1] -= 0.1 if output != 1 else 0.0  # something to correct in any case
+    wide = replace(ALONE, planner=replace(ALONE.planner, fade=(1e3, 1e3, 1e3, 1e3)))
+    full, faded = Flight(wide).fly(FIRST, y), Flight().fly(FIRST, y)
+    assert full.plan is not None
+    assert faded.plan is not None
+    assert np.abs(full.present.deviation).max() > 1.0
+    np.testing.assert_allclose(faded.present.deviation, share * full.present.deviation, atol=1e-6)
+    assert faded.plan.status == ("solved" if share == 1.0 else "faded")
+    nominal = nominal_forces(scheduled_stance(ALONE, 0, FIRST + 10 * np.arange(25)))
+    np.testing.assert_allclose(faded.plan.u - nominal, share * (full.plan.u - nominal), atol=1e-6)
+    # The predictor is linear: what a share of the forces does is that share of what they do.
+    G = simple_predictor(ALONE).forced(0, 0)
+    effect = (G @ (full.plan.u - nominal).ravel()).reshape(25, 6)
+    np.testing.assert_allclose(full.plan.y - faded.plan.y, (1.0 - share) * effect, atol=1e-6)
+
+
+def test_planned_speeds_are_tracked_only_with_the_interface_force() -> None:
+    slow = ON_COURSE - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
+    assert Flight().fly(FIRST, slow).present.velocity is None
+    paper = replace(ALONE, planner=replace(ALONE.planner, interface="force"))
+    planned = Flight(paper).fly(FIRST, slow)
+    assert planned.plan is not None
+    np.testing.assert_array_equal(planned.present.velocity, planned.plan.y[0, 1:3])
+
+
+def test_the_first_plan_waits_for_the_window_when_the_stand_is_short() -> None:
+    config = replace(ALONE, gait=replace(ALONE.gait, stand_ms=100))
+    flight = Flight(config)
+    planned = [tick for tick in range(10, 400, 10) if flight.step(tick).plan is not None]
+    assert planned[0] == 160  # (10 + 4 samples) up to the next 40 ms

@@ -1,0 +1,115 @@
+"""Teams of real processes on a real bus, started by the launcher as `quadriga walk` does."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from quadriga.endpoint import free_endpoint
+from quadriga.launch import Launch, Row, table
+from quadriga.warm_up import warm_up
+from shared.bus import Bus
+from shared.clock import monotonic, sleep
+from shared.config import Config
+from shared.config_file import load
+from shared.config_text import to_toml
+from shared.recording import Recording
+from shared.robot import robot_names
+
+WAIT = 30.0  # s, more than anything here takes on a busy machine
+
+
+@dataclass(frozen=True)
+class Team:
+    """A configuration, its folder and its processes."""
+
+    config: Config
+    folder: Path
+
+    def rows(self, *, standing: bool) -> tuple[Row, ...]:
+        """The launcher's table, with agents that merely stand if asked for."""
+        (self.folder / "config.toml").write_text(to_toml(self.config), encoding="utf-8")
+        rows = table(self.config, self.folder, None, "")
+        return tuple(self._standing(row) if standing else row for row in rows)
+
+    def _standing(self, row: Row) -> Row:
+        if row.name not in robot_names(self.config.team.robots):
+            return row
+        module = (sys.executable, "-m", "tests.runtime.standing_agent")
+        file = str(self.folder / "config.toml")
+        return replace(row, command=(*module, "--config", file, "--robot", row.name))
+
+    def launch(self, *, standing: bool = True) -> Launch:
+        """Start the processes."""
+        return Launch(self.rows(standing=standing), self.folder / "logs")
+
+    def log(self, name: str) -> str:
+        """What a process has said."""
+        return (self.folder / "logs" / f"{name}.log").read_text(encoding="utf-8")
+
+    def await_log(self, name: str, text: str) -> None:
+        """Wait until a process has said something."""
+        deadline = monotonic() + WAIT
+        while text not in self.log(name):
+            assert monotonic() < deadline, f"{name} never said {text!r}: {self.log(name)}"
+            sleep(0.02)
+
+    def run(self, *, standing: bool = True) -> Recording:
+        """Walk to the end; the recording, if there is a recorder."""
+        with self.launch(standing=standing) as running:
+            running.watch(lambda: False)
+        return self.recording()
+
+    def recording(self) -> Recording:
+        """What was recorded."""
+        return Recording(self.folder / "run.mcap")
+
+
+Make = Callable[..., Team]
+
+
+@pytest.fixture
+def make_team(tmp_path: Path) -> Make:
+    """A function that makes a team of a test's own; keyword `section__key` sets a key."""
+
+    def make(**keys: object) -> Team:
+        given = {"team.robots": 2, "planner.kind": "none", "bus.endpoint": free_endpoint(),
+                 "bus.barrier_timeout": WAIT, "recorder.enabled": False}  # fmt: skip
+        given |= {name.replace("__", "."): value for name, value in keys.items()}
+        return Team(load(None, given), tmp_path)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def _compiled() -> None:
+    """Agents that walk are compiled once, before several processes would all do it."""
+    warm_up(Config(), Console(stderr=True))
+
+
+@pytest.fixture
+def watcher() -> Iterator[Callable[[Team], Bus]]:
+    """A function that puts a bus on a team's network that hears everything."""
+    buses = []
+
+    def join(team: Team, name: str = "watcher") -> Bus:
+        bus = Bus.open(team.config.bus, team.config.team.name, name)
+        buses.append(bus)
+        bus.subscribe(f"{team.config.team.name}/**")
+        return bus
+
+    yield join
+    for bus in buses:
+        bus.close()
+
+
+def run_alone(row: Row) -> tuple[int, str]:
+    """Run one row's command to its end: exit status and what it said on stderr."""
+    done = subprocess.run(row.command, capture_output=True, text=True, timeout=WAIT, check=False)
+    return done.returncode, done.stderr

@@ -1,0 +1,59 @@
+"""A legitimate agent of the contract that merely stands: PD around the standing pose.
+
+Run: python -m tests.runtime.standing_agent --config FILE --robot NAME [--parent PID]
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from shared.barrier import SIM, meet
+from shared.bus import HERE, POLL, READY, Bus
+from shared.codec import decode, encode
+from shared.config import Config
+from shared.config_file import load
+from shared.errors import MessageError
+from shared.messages import Command, Event, State
+from shared.robot import N_JOINTS, q_stand
+from shared.signals import die_with_parent, stop_on_signals
+from shared.topics import COMMAND, EVENT, STATE
+
+
+def run(config: Config, robot: str) -> None:
+    """Answer every state until the walk is over."""
+    stopped = stop_on_signals()
+    team, ended = config.team.name, False
+    zero, kp, kd = np.zeros(N_JOINTS), np.full(N_JOINTS, 80.0), np.full(N_JOINTS, 3.0)
+    with Bus.open(config.bus, team, robot, stopped) as bus:
+        bus.subscribe(STATE.key(team, robot))
+        bus.subscribe(EVENT.key(team))
+        put = bus.publisher(COMMAND.key(team, robot))
+        meet(bus, config, stopped)
+        bus.declare(READY)
+        while not (stopped() or ended):
+            packet = bus.get(POLL)
+            if packet is None:
+                ended = SIM not in bus.present(HERE)
+                continue
+            try:
+                if packet[0] == EVENT.key(team):
+                    ended = decode(packet[1], Event).kind == "stop"
+                else:
+                    tick = decode(packet[1], State).tick
+                    put(encode(Command(tick, 10**6 * tick, zero, q_stand(), zero, kp, kd)))
+            except MessageError as error:
+                print(error, flush=True)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--config", type=Path, required=True)
+    parser.add_argument("--robot", required=True)
+    parser.add_argument("--parent", type=int)
+    arguments = parser.parse_args()
+    if arguments.parent:
+        die_with_parent(arguments.parent)
+    run(load(arguments.config), arguments.robot)

@@ -1,0 +1,112 @@
+"""The main job with everything real: predictor, planners, estimator, bus, recording."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from agents.gait import nominal_forces
+from agents.planner.horizon import horizon_stance
+from quadriga.identify import ensure_predictor
+from shared.config import Config
+from shared.config_file import load
+from shared.messages import Plan
+from shared.recording import Recording
+from shared.robot import robot_names
+
+pytestmark = pytest.mark.usefixtures("_compiled")
+
+ROBOTS, SECONDS = 2, 5.0
+STEP_MS = 40
+
+
+@pytest.fixture(scope="module")
+def walks(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Run folders of one scenario walked twice, as a user would."""
+    config = load(None, {"team.robots": ROBOTS})
+    ensure_predictor(config, Console(stderr=True))
+    folders = [tmp_path_factory.mktemp("walk") / "run" for _ in range(2)]
+    for folder in folders:
+        command = [sys.executable, "-m", "quadriga", "walk", "--robots", str(ROBOTS), "--seconds",
+                   str(SECONDS), "--seed", "3", "--no-render", "--out", str(folder)]  # fmt: skip
+        done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
+    return folders
+
+
+def summary(folder: Path) -> dict[str, float | dict[str, float]]:
+    """The figures of a walk."""
+    figures: dict[str, float | dict[str, float]] = json.loads(
+        (folder / "summary.json").read_text(encoding="utf-8")
+    )
+    return figures
+
+
+def plans(folder: Path) -> dict[str, list[Plan]]:
+    """All plans of a walk by robot, in the order in which they were sent."""
+    recording = Recording(folder / "run.mcap")
+    return {name: list(recording.messages(Plan, name)) for name in robot_names(ROBOTS)}
+
+
+def test_the_team_walks_within_its_tolerances(walks: list[Path]) -> None:
+    figures = summary(walks[0])
+    rmse = figures["rmse"]
+    assert isinstance(rmse, dict)
+    assert not figures["fell"]
+    assert figures["gaps"] == 0
+    assert figures["mean_vx"] == pytest.approx(0.5, abs=0.02)
+    assert rmse["vx"] <= 0.03
+    assert rmse["z"] <= 0.010
+    assert max(rmse["roll"], rmse["pitch"]) <= 0.04
+    assert figures["yoke_drift_max"] <= 0.002  # type: ignore[operator]
+
+
+def test_two_runs_send_the_same_bytes(walks: list[Path]) -> None:
+    sent: list[dict[str, list[bytes]]] = []
+    for folder in walks:
+        by_key: dict[str, list[bytes]] = defaultdict(list)
+        for entry in Recording(folder / "run.mcap").entries():
+            if entry.key.endswith(("/command", "/plan", "/measurement", "/state")):
+                by_key[entry.key].append(entry.payload)
+        sent.append(by_key)
+    assert sent[0].keys() == sent[1].keys()
+    assert len(sent[0]["team/r1/command"]) == 1000 * SECONDS
+    for key, payloads in sent[0].items():
+        assert payloads == sent[1][key], key
+
+
+def test_every_plan_used_its_peer_s_plan_of_the_step_before(walks: list[Path]) -> None:
+    for name, of_robot in plans(walks[0]).items():
+        peer = "r2" if name == "r1" else "r1"
+        steps = [plan.step for plan in of_robot]
+        assert steps == list(range(steps[0], steps[0] + len(steps)))
+        assert of_robot[0].used == {}
+        for plan in of_robot[1:]:
+            assert plan.used == {peer: plan.step - 1}
+            assert plan.tick == STEP_MS * plan.step
+
+
+def test_every_plan_is_within_the_friction_cone(walks: list[Path]) -> None:
+    config: Config = load(None, {"team.robots": ROBOTS})
+    cone = config.planner.mu / np.sqrt(2.0)
+    for index, of_robot in enumerate(plans(walks[0]).values()):
+        assert {plan.status for plan in of_robot} == {"solved"}
+        assert any(
+            np.abs(plan.u - nominal_forces(horizon_stance(config, index, plan.step))).max() > 0.1
+            for plan in of_robot
+        )
+        for plan in of_robot:
+            stance = horizon_stance(config, index, plan.step)
+            forces = plan.u.reshape(-1, 4, 3)
+            assert not forces[~stance].any()
+            fx, fy, fz = forces[stance].T
+            assert fz.min() >= -1e-6
+            assert np.all(np.abs(fx) <= cone * fz + 1e-6)
+            assert np.all(np.abs(fy) <= cone * fz + 1e-6)

@@ -1,0 +1,143 @@
+"""A process freezes, dies or is told to stop: the others notice, say so and leave."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+
+import pytest
+
+from quadriga import launch
+from shared.bus import Bus
+from shared.clock import monotonic, sleep
+from shared.codec import decode
+from shared.config_text import to_toml
+from shared.errors import ProcessError
+from shared.messages import EStop, Status, Truth
+from shared.topics import TRUTH
+from tests.runtime.conftest import WAIT, Make, Team, run_alone
+
+FOREVER = 600.0  # s of world time
+Watcher = Callable[..., Bus]
+
+
+def never() -> bool:
+    return False
+
+
+def truth_tick(bus: Bus, team: Team) -> int:
+    """The world's time as it is now."""
+    bus.drain()
+    deadline = monotonic() + WAIT
+    while monotonic() < deadline:
+        packet = bus.get(1.0)
+        if packet is not None and packet[0] == TRUTH.key(team.config.team.name):
+            return decode(packet[1], Truth).tick
+    pytest.fail("the world stands still")
+
+
+def test_a_frozen_robot_is_named_and_the_world_goes_on_until_it_returns(
+    make_team: Make, watcher: Watcher
+) -> None:
+    team = make_team(world__seconds=FOREVER, world__command_timeout=0.3)
+    with team.launch() as running:
+        team.await_log("sim", "start")
+        bus = watcher(team)
+        os.kill(running.pids["r2"], signal.SIGSTOP)
+        team.await_log("sim", "fault r2 silent for 0.3 s: its joints are damped")
+        before = truth_tick(bus, team)
+        assert truth_tick(bus, team) > before
+        os.kill(running.pids["r2"], signal.SIGCONT)
+        team.await_log("sim", "fault r2 answers again")
+        running.watch(lambda: True)
+
+
+@pytest.mark.parametrize("name", ["sim", "r2", "operator"])
+def test_kill_9_of_one_stops_the_walk_and_names_it(make_team: Make, name: str) -> None:
+    team = make_team(world__seconds=FOREVER)
+    with team.launch() as running:
+        pids = running.pids
+        team.await_log("sim", "start")
+        os.kill(pids[name], signal.SIGKILL)
+        with pytest.raises(ProcessError, match=f"process {name}: got signal 9"):
+            running.watch(never)
+    assert not [pid for pid in pids.values() if os.path.exists(f"/proc/{pid}")]
+    if name == "r2":
+        assert "fault r2 gone" in team.log("sim")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stopped_sim_server_ends_the_walk_for_all(
+    make_team: Make, number: signal.Signals
+) -> None:
+    team = make_team(world__seconds=FOREVER)
+    with team.launch() as running:
+        team.await_log("sim", "start")
+        os.kill(running.pids["sim"], number)
+        running.watch(never)  # all leave by themselves, with exit status 0
+    assert team.log("sim").splitlines()[-1].endswith("stop  signal")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.usefixtures("_compiled")
+def test_a_stopped_agent_leaves_cleanly_and_the_walk_stops(
+    make_team: Make, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    monkeypatch.setattr(launch, "_EARLY", 0.3)
+    team = make_team(team__robots=1, world__seconds=FOREVER)
+    with team.launch(standing=False) as running:
+        team.await_log("sim", "start")
+        os.kill(running.pids["r1"], number)
+        with pytest.raises(ProcessError, match="process r1: got an end while the team walked"):
+            running.watch(never)
+    assert team.log("r1") == ""
+
+
+@pytest.mark.usefixtures("_compiled")
+def test_an_emergency_stop_damps_every_robot(make_team: Make, watcher: Watcher) -> None:
+    team = make_team(world__seconds=FOREVER)
+    with team.launch(standing=False) as running:
+        team.await_log("sim", "start")
+        bus = watcher(team)
+        stop = launch.Row("estop", (*launch.QUADRIGA, "estop", "--reason", "smoke", "--config",
+                                    str(team.folder / "config.toml")), 5.0)  # fmt: skip
+        assert run_alone(stop) == (0, "")
+        modes: dict[str, str] = {}
+        deadline = monotonic() + WAIT
+        while len(modes) < 2 and monotonic() < deadline:
+            packet = bus.get(1.0)
+            if packet is not None and packet[0].endswith("/status"):
+                status = decode(packet[1], Status)
+                if status.mode == "estop":
+                    modes[packet[0]] = status.reason
+            elif packet is not None and packet[0].endswith("/estop"):
+                assert decode(packet[1], EStop).reason == "smoke"
+        assert modes == {f"team/{robot}/status": "estop:smoke" for robot in ("r1", "r2")}
+        running.watch(lambda: True)
+
+
+@pytest.mark.parametrize("verb", [("sim",), ("operate",), ("record", "-o", "RUN")])
+def test_a_process_alone_names_the_absent(make_team: Make, verb: tuple[str, ...]) -> None:
+    team = make_team(bus__barrier_timeout=0.5)
+    file = team.folder / "config.toml"
+    file.write_text(to_toml(team.config), encoding="utf-8")
+    words = [str(team.folder / "alone.mcap") if word == "RUN" else word for word in verb]
+    row = launch.Row("alone", (*launch.QUADRIGA, *words, "--config", str(file)), 5.0)
+    status, said = run_alone(row)
+    assert status == 2
+    others = {"sim": "operator, r1, r2", "operate": "r1, r2, sim"}
+    absent = others.get(verb[0], "operator, r1, r2, sim")
+    assert f"no {absent} at stage 'here' after 0.5 s" in said
+    assert said.count("\n") == 1
+
+
+def test_a_process_that_waits_for_the_others_can_be_stopped(make_team: Make) -> None:
+    team = make_team()
+    with team.launch() as running:
+        sleep(0.2)
+        os.kill(running.pids["operator"], signal.SIGKILL)
+        with pytest.raises(ProcessError, match="process operator: got signal 9"):
+            running.watch(never)
+        begun = monotonic()
+    assert monotonic() - begun < 4.0  # SIGTERM was enough

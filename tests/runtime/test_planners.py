@@ -1,0 +1,82 @@
+"""Every kind of planner over the bus sends what the same team sends in one process, to the byte."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from agents.planner.store import load as load_predictor
+from quadriga.endpoint import free_endpoint
+from quadriga.identify import ensure_predictor, team_planner
+from quadriga.launch import Launch, table
+from quadriga.operator import reference_at
+from quadriga.rollout import Rollout
+from shared.codec import encode
+from shared.config import CENTRAL, Config
+from shared.config_file import load
+from shared.config_text import to_toml
+from shared.recording import Recording
+from shared.robot import robot_names
+
+pytestmark = pytest.mark.usefixtures("_compiled")
+
+ROBOTS, SECONDS = 2, 1.2
+KINDS: dict[str, dict[str, object]] = {
+    "centralised": {"planner.kind": "centralised", "planner.latency_ms": 8},
+    "deepc": {"planner.kind": "deepc"},
+    "exchanged": {"planner.exchanges": 2, "planner.compensation": True, "planner.damping": 0.2},
+}
+
+
+def config_of(kind: str) -> Config:
+    given: dict[str, object] = {
+        "team.robots": ROBOTS, "world.seconds": SECONDS, "world.seed": 4,
+        "bus.endpoint": free_endpoint(), **KINDS[kind],
+    }  # fmt: skip
+    return load(None, given)
+
+
+def in_one_process(config: Config, predictor: Path) -> dict[str, list[bytes]]:
+    """Commands, measurements and (of agents that make them) plans, by key."""
+    fitted, central = load_predictor(predictor, config)[0], config.planner.kind in CENTRAL
+    rollout = Rollout(
+        config, None if central else fitted,
+        lambda tick: reference_at(config, tick) if tick % 100 == 0 else None,
+        planner=team_planner(config, fitted) if central else None,
+    )  # fmt: skip
+    sent: dict[str, list[bytes]] = defaultdict(list)
+    for tick in rollout.ticks(round(1000 * SECONDS)):
+        for name, outputs in tick.outputs.items():
+            for topic in ("command", "measurement", "plan"):
+                message = getattr(outputs, topic)
+                if message is not None:
+                    sent[f"team/{name}/{topic}"].append(encode(message))
+    return sent
+
+
+def over_the_bus(config: Config, predictor: Path, folder: Path) -> dict[str, list[bytes]]:
+    """Everything recorded, by key."""
+    (folder / "config.toml").write_text(to_toml(config), encoding="utf-8")
+    with Launch(table(config, folder, predictor, ""), folder / "logs") as running:
+        running.watch(lambda: False)
+    sent: dict[str, list[bytes]] = defaultdict(list)
+    for entry in Recording(folder / "run.mcap").entries():
+        sent[entry.key].append(entry.payload)
+    return sent
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_bus_changes_nothing(kind: str, tmp_path: Path) -> None:
+    config = config_of(kind)
+    predictor = ensure_predictor(config, Console(stderr=True))
+    alone, together = in_one_process(config, predictor), over_the_bus(config, predictor, tmp_path)
+    for key, payloads in alone.items():
+        assert together[key] == payloads, key
+    for name in robot_names(ROBOTS):
+        exchanges = config.planner.exchanges + 1
+        steps = len(range(320, round(1000 * SECONDS), 40))
+        assert len(together[f"team/{name}/plan"]) == pytest.approx(steps * exchanges, abs=exchanges)
+        assert len(alone[f"team/{name}/command"]) == 1000 * SECONDS

@@ -1,0 +1,142 @@
+"""`quadriga walk` as a user runs it: its exit statuses, and what is left when it is killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from shared.clock import monotonic, sleep
+from shared.messages import Command
+from shared.recording import Recording
+from tests.runtime.conftest import WAIT
+
+Start = Callable[..., subprocess.Popen[str]]
+OPTIONS = ("--robots", "2", "--planner", "none", "--no-render")
+
+pytestmark = pytest.mark.usefixtures("_compiled")
+
+
+def processes_of(out: Path) -> dict[int, str]:
+    """Command lines of all processes that work for the run folder `out`, by process id."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                words = (entry / "cmdline").read_bytes().decode(errors="replace").split("\0")
+            except OSError:
+                continue
+            if any(word.startswith(str(out)) for word in words):
+                found[int(entry.name)] = " ".join(words)
+    return found
+
+
+def await_walking(out: Path) -> None:
+    """Wait until the world has begun."""
+    log = out / "logs" / "sim.log"
+    deadline = monotonic() + 2 * WAIT
+    while not (log.exists() and "start" in log.read_text()):
+        assert monotonic() < deadline, "the team never began to walk"
+        sleep(0.05)
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return tmp_path / "run"
+
+
+@pytest.fixture
+def start(out: Path) -> Iterator[Start]:
+    """A function that starts a walk into `out`; nothing of it outlives the test."""
+    walks = []
+
+    def start_walk(*options: str) -> subprocess.Popen[str]:
+        walk = subprocess.Popen(
+            [sys.executable, "-m", "quadriga", "walk", *OPTIONS, "--out", str(out), *options],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        )  # fmt: skip
+        walks.append(walk)
+        return walk
+
+    yield start_walk
+    for walk in walks:
+        walk.kill()
+        walk.communicate()
+    for pid in processes_of(out):
+        os.kill(pid, signal.SIGKILL)
+
+
+def test_a_walk_ends_with_its_figures_and_status_0(out: Path, start: Start) -> None:
+    walk = start("--seconds", "1.5")
+    said, complained = walk.communicate(timeout=4 * WAIT)
+    assert (walk.returncode, complained) == (0, "")
+    assert "falls" in said
+    summary = json.loads((out / "summary.json").read_text())
+    assert (summary["fell"], summary["gaps"], summary["robots"]) == (False, 0, 2)
+    assert len(list(Recording(out / "run.mcap").messages(Command, "r2"))) == 1500
+    assert not processes_of(out)
+
+
+def test_a_fall_is_status_1_even_without_a_recording(start: Start) -> None:
+    options = ("--seconds", "9", "--push", "r1:2000:90:0.1:0.2", "--set", "recorder.enabled=false")
+    walk = start(*options)
+    said, _ = walk.communicate(timeout=4 * WAIT)
+    assert walk.returncode == 1
+    assert "fall r1" in said
+
+
+def test_a_killed_agent_is_named_and_status_1(out: Path, start: Start) -> None:
+    walk = start("--seconds", "600")
+    await_walking(out)
+    agent = next(pid for pid, words in processes_of(out).items() if "--robot r2" in words)
+    os.kill(agent, signal.SIGKILL)
+    _, complained = walk.communicate(timeout=WAIT)
+    assert walk.returncode == 1
+    assert "process r2: got signal 9" in complained
+    assert not processes_of(out)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_and_sigterm_stop_all_cleanly(
+    out: Path, start: Start, number: signal.Signals
+) -> None:
+    walk = start("--seconds", "600")
+    await_walking(out)
+    walk.send_signal(number)
+    said, complained = walk.communicate(timeout=WAIT)
+    assert (walk.returncode, complained) == (130, "")
+    assert "interrupted; what was recorded is in" in said
+    assert not processes_of(out)
+    recording = Recording(out / "run.mcap")
+    ticks = [m.tick for m in recording.messages(Command, "r1")]
+    assert ticks == list(range(len(ticks)))
+    for log in (out / "logs").iterdir():
+        assert "Traceback" not in log.read_text()
+
+
+def test_kill_9_of_the_launcher_leaves_no_orphan(out: Path, start: Start) -> None:
+    walk = start("--seconds", "600")
+    await_walking(out)
+    assert len(processes_of(out)) == 6  # the launcher and five more
+    walk.kill()
+    walk.communicate()
+    deadline = monotonic() + WAIT
+    while processes_of(out) and monotonic() < deadline:
+        sleep(0.05)
+    assert not processes_of(out)
+
+
+def test_a_folder_with_a_recording_is_not_overwritten(out: Path, start: Start) -> None:
+    out.mkdir()
+    (out / "run.mcap").write_bytes(b"precious")
+    walk = start()
+    _, complained = walk.communicate(timeout=WAIT)
+    assert walk.returncode == 2
+    assert "expected a new folder" in complained
+    assert (out / "run.mcap").read_bytes() == b"precious"

@@ -1,0 +1,181 @@
+"""Real Zenoh over loopback: links, order, presence, and the errors of a network."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from quadriga.endpoint import free_endpoint
+from shared.bus import HERE, READY, Bus
+from shared.clock import monotonic
+from shared.config import BusConfig
+from shared.errors import BusError
+
+WAIT = 10.0  # s, far more than anything here takes
+Open = Callable[..., Bus]
+
+
+def never() -> bool:
+    return False
+
+
+@pytest.fixture
+def endpoint() -> str:
+    return free_endpoint()
+
+
+@pytest.fixture
+def opened(endpoint: str) -> Iterator[Open]:
+    """A function that opens a bus, by name, on the test's own endpoint; all are closed at last."""
+    with ExitStack() as stack:
+
+        def open_bus(name: str, team: str = "team", mode: str = "peer") -> Bus:
+            config = BusConfig(mode=mode, endpoint=endpoint)
+            return stack.enter_context(Bus.open(config, team, name))
+
+        yield open_bus
+
+
+def meet(*buses: Bus) -> None:
+    """Everyone here and seen by everyone."""
+    for bus in buses:
+        bus.declare(HERE)
+    for bus in buses:
+        assert bus.wait_for(HERE, {other.name for other in buses}, WAIT, never)
+
+
+def numbers(bus: Bus, count: int) -> list[int]:
+    """The next `count` payloads as numbers."""
+    packets = [bus.get(WAIT) for _ in range(count)]
+    return [int(packet[1]) for packet in packets if packet]
+
+
+def test_everyone_reaches_everyone_though_all_know_only_the_sim_server(opened: Open) -> None:
+    r1, r2 = opened("r1"), opened("r2")  # before the sim server
+    sim = opened("sim")
+    for bus in (sim, r1, r2):
+        bus.subscribe("team/*/x")
+    meet(sim, r1, r2)
+    put = r1.publisher("team/r1/x")
+    for k in range(200):
+        put(b"%d" % k)
+    assert numbers(r2, 200) == numbers(sim, 200) == list(range(200))
+    assert r1.get(0.05) is None  # nobody hears himself
+
+
+def test_a_key_tells_who_sent_what(opened: Open) -> None:
+    sim, r1 = opened("sim"), opened("r1")
+    sim.subscribe("team/**")
+    meet(sim, r1)
+    r1.publisher("team/r1/x")(b"\x00\xff")
+    assert sim.get(WAIT) == ("team/r1/x", b"\x00\xff")
+    r1.publisher("team/r1/y", droppable=True)(b"")
+    r1.publisher("team/z")(b"2")
+    assert sim.get(WAIT) == ("team/r1/y", b"")
+    assert sim.get(WAIT) == ("team/z", b"2")
+    assert sim.drain() == []
+
+
+def test_get_waits_no_longer_than_told(opened: Open) -> None:
+    sim = opened("sim")
+    begun = monotonic()
+    assert sim.get(0.05) is None
+    assert 0.04 < monotonic() - begun < 1.0
+
+
+def test_what_was_sent_before_closing_arrives(opened: Open) -> None:
+    sim, r1 = opened("sim"), opened("r1")
+    sim.subscribe("team/**")
+    meet(sim, r1)
+    put = r1.publisher("team/r1/x")
+    for k in range(5000):
+        put(b"%d" % k)
+    r1.close()
+    assert numbers(sim, 5000) == list(range(5000))
+
+
+def test_presence_comes_and_goes_by_stage(opened: Open) -> None:
+    sim, r1 = opened("sim"), opened("r1")
+    meet(sim, r1)
+    assert sim.present(READY) == frozenset()
+    r1.declare(READY)
+    assert sim.wait_for(READY, {"r1"}, WAIT, never)
+    assert sim.present(HERE) == {"r1"}
+    r1.close()
+    deadline = monotonic() + WAIT
+    while sim.present(HERE) and monotonic() < deadline:
+        sim.get(0.01)
+    assert sim.present(HERE) == sim.present(READY) == frozenset()
+
+
+def test_a_barrier_names_the_absent(opened: Open) -> None:
+    sim, r1 = opened("sim"), opened("r1")
+    r1.declare(HERE)
+    with pytest.raises(BusError, match=r"no r2, recorder at stage 'here' after 0\.5 s"):
+        sim.wait_for(HERE, {"r1", "r2", "recorder"}, 0.5, never)
+
+
+def test_a_barrier_without_a_link_says_so(opened: Open) -> None:
+    with pytest.raises(BusError, match=r"no sim at .*is bus\.endpoint right and reachable"):
+        opened("r1").wait_for(HERE, {"sim"}, 0.1, never)
+
+
+def test_a_barrier_can_be_left(opened: Open) -> None:
+    assert not opened("r1").wait_for(HERE, {"sim"}, WAIT, lambda: True)
+
+
+def test_two_processes_of_one_name_are_noticed(opened: Open) -> None:
+    sim, first, second = opened("sim"), opened("r1"), opened("r1")
+    meet(sim, first)
+    assert sim.doubles(HERE) == frozenset()
+    second.declare(HERE)
+    deadline = monotonic() + WAIT
+    while not (sim.doubles(HERE) and first.doubles(HERE)) and monotonic() < deadline:
+        sim.get(0.01)
+    assert sim.doubles(HERE) == first.doubles(HERE) == {"r1"}
+
+
+def test_a_port_in_use_is_one_clear_error(opened: Open, endpoint: str) -> None:
+    opened("sim")
+    with pytest.raises(BusError, match=rf"{endpoint}.*Address already in use.*another team"):
+        opened("sim", team="other")
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "cause"),
+    [
+        ("tcp/203.0.113.1:7447", "no interface of this machine"),
+        ("carrier-pigeon/roof:1", "not of the form tcp/HOST:PORT"),
+        ("", "not of the form tcp/HOST:PORT"),
+    ],
+)
+def test_an_endpoint_that_cannot_be_opened(opened: Open, cause: str) -> None:
+    with pytest.raises(BusError, match=cause):
+        opened("sim")
+
+
+def test_without_a_router_a_client_cannot_start(opened: Open) -> None:
+    with pytest.raises(BusError, match="no router there"):
+        opened("r1", mode="client")
+
+
+def test_two_teams_at_one_router_do_not_mix(opened: Open, endpoint: str) -> None:
+    with Bus.route(endpoint, "a"):
+        teams = []
+        for team in ("a", "b"):
+            sim, r1 = (opened(name, team=team, mode="client") for name in ("sim", "r1"))
+            sim.subscribe(f"{team}/**")
+            teams.append((team, sim, r1))
+        for team, sim, r1 in teams:
+            meet(sim, r1)
+            r1.publisher(f"{team}/r1/x")(team.encode())
+        for team, sim, _ in teams:
+            assert sim.get(WAIT) == (f"{team}/r1/x", team.encode())
+            assert sim.get(0.1) is None
+            assert sim.present(HERE) == {"r1"}
+            assert not sim.doubles(HERE)
+        for _, sim, r1 in teams:
+            r1.close()
+            sim.close()

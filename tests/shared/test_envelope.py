@@ -1,0 +1,44 @@
+"""Reading tick and stamp without decoding."""
+
+from __future__ import annotations
+
+import msgpack
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shared.codec import encode
+from shared.envelope import envelope
+from shared.messages import EStop, Event
+
+numbers = st.integers(0, (1 << 62) - 1)
+
+
+@given(tick=numbers, stamp_ns=numbers)
+def test_reads_what_encode_wrote(tick: int, stamp_ns: int) -> None:
+    assert envelope(encode(EStop(tick, stamp_ns, "tripped"))) == (tick, stamp_ns)
+
+
+@given(tick=numbers, stamp_ns=numbers)
+def test_any_order_of_fields_is_read(tick: int, stamp_ns: int) -> None:
+    body = {"reason": "", "stamp_ns": stamp_ns, "tick": tick, "schema": 1}
+    assert envelope(msgpack.packb(body)) == (tick, stamp_ns)
+
+
+@given(payload=st.binary(max_size=64))
+def test_noise_is_never_an_error(payload: bytes) -> None:
+    found = envelope(payload)
+    assert found is None or min(found) >= 0
+
+
+def test_a_cut_message_has_no_envelope() -> None:
+    whole = encode(Event(70_000, 70_000_000_000, "fall", "r1", ""))
+    for length in range(len(whole) - 1):
+        found = envelope(whole[:length])
+        assert found in (None, (70_000, 70_000_000_000))
+    assert envelope(whole[:20]) is None
+
+
+def test_wrong_types_have_no_envelope() -> None:
+    for tick in ("7", -1, 7.0, True, None, 1 << 63):
+        assert envelope(msgpack.packb({"schema": 1, "tick": tick, "stamp_ns": 0})) is None
+    assert envelope(msgpack.packb([1, 2, 3])) is None

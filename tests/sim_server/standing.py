@@ -1,0 +1,52 @@
+"""Worlds to test with and commands that make their robots stand."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from shared.config import Config, SensorsConfig, TeamConfig, WorldConfig
+from shared.messages import Command
+from shared.robot import N_JOINTS, q_stand
+from sim_server.world import World
+
+SILENT = SensorsConfig(**{item.name: 0.0 for item in fields(SensorsConfig)})
+
+
+def configured(
+    robots: int = 1, *, yokes: str = "complete", noise: bool = False, **world: Any
+) -> Config:
+    config = Config(team=TeamConfig(robots=robots, yokes=yokes), world=WorldConfig(**world))
+    return config if noise else replace(config, sensors=SILENT)
+
+
+def command(**values: Any) -> Command:
+    arrays = {name: np.zeros(N_JOINTS) for name in ("tau", "q_des", "v_des", "kp", "kd")}
+    for name, value in values.items():
+        arrays[name] = np.broadcast_to(np.asarray(value, dtype=float), N_JOINTS)
+    return Command(tick=0, stamp_ns=0, **arrays)
+
+
+STAND = command(q_des=q_stand(), kp=200.0, kd=4.0)
+
+
+def stand(world: World, ticks: int) -> None:
+    for _ in range(ticks):
+        world.step({name: STAND for name in world.names})
+
+
+def shift(world: World, dx: float = 0.0, dz: float = 0.0) -> None:
+    """Move the whole team at once, as no command could."""
+    q = world.physics.qpos.reshape(len(world.names), -1)
+    q[:, 0] += dx
+    q[:, 2] += dz
+    mujoco.mj_forward(world.team.model, world.physics)
+
+
+def momentum(world: World) -> Any:
+    """Linear momentum of everything, N·s, world frame."""
+    mujoco.mj_subtreeVel(world.team.model, world.physics)
+    return world.team.model.body_subtreemass[0] * world.physics.subtree_linvel[0]
