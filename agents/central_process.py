@@ -13,6 +13,7 @@ from agents.agent import REFERENCE_EPOCH_MS as EPOCH_MS
 from agents.central import Central, CentralOutputs, CentralState
 from agents.planner.central import TeamPlanner
 from agents.planner.horizon import step_ms
+from agents.rehearsal import rehearse_central
 from shared.barrier import PLANNER, SIM, meet
 from shared.blas import one_blas_thread
 from shared.bus import HERE, POLL, READY, Bus
@@ -50,6 +51,7 @@ def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None
         bus.subscribe(EVENT.key(team))
         if not meet(bus, config, stopped):
             return
+        rehearse_central(config, Central(config, planner))
         gc.collect()
         gc.freeze()
         gc.disable()

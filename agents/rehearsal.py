@@ -1,4 +1,4 @@
-"""A rehearsal: an agent walks a robot that merely stands, so that everything has run once.
+"""A rehearsal: robots that merely stand are walked, so that everything has run once.
 
 First calls compile, load and allocate; they must not fall into the first steps of a real robot.
 """
@@ -8,20 +8,48 @@ from __future__ import annotations
 import numpy as np
 
 from agents.agent import Agent, Inputs
-from agents.planner.horizon import step_ms
+from agents.central import Central, CentralState
+from agents.gait import nominal_forces, scheduled_stance
+from agents.planner.horizon import SAMPLE_MS, step_ms
+from agents.planning import first_step
 from shared.codec import decode, encode
 from shared.config import Config
-from shared.messages import Reference, State
-from shared.robot import GRAVITY, N_JOINTS, N_LEGS, TOTAL_MASS, q_stand
+from shared.messages import Measurement, Reference, State
+from shared.robot import (
+    GRAVITY,
+    N_JOINTS,
+    N_LEGS,
+    N_OUTPUTS,
+    TOTAL_MASS,
+    q_stand,
+    robot_names,
+)  # fmt: skip
 
 
 def rehearse(config: Config, agent: Agent) -> None:
     """Step `agent` through standing, the first walking ticks and two planning steps."""
     memory = agent.initial()
-    last = config.gait.stand_ms + 10 * config.planner.T_ini + 2 * step_ms(config)
-    reference = Reference(0, 0, 0.0, 0.0, 0.0, config.reference.height)
+    last = config.gait.stand_ms + SAMPLE_MS * config.planner.T_ini + 2 * step_ms(config)
     for tick in range(last + 1):
-        memory, _ = agent.step(memory, Inputs(standing(tick), references=(reference,)))
+        memory, _ = agent.step(memory, Inputs(standing(tick), references=(_stay(config),)))
+
+
+def rehearse_central(config: Config, central: Central) -> None:
+    """Let `central` plan the first two steps of a team that stands."""
+    state, y = CentralState(), np.zeros(N_OUTPUTS)
+    y[0] = config.reference.height
+    last = (first_step(config) + 1) * step_ms(config)
+    for tick in range(SAMPLE_MS, last + 1, SAMPLE_MS):
+        sampled = []
+        for index, name in enumerate(robot_names(config.team.robots)):
+            stance = scheduled_stance(config, index, np.array([tick - SAMPLE_MS]))[0]
+            u = nominal_forces(stance)
+            sampled.append((name, Measurement(tick, 0, u, y, stance.astype(float))))
+        state, _ = central.step(central.remember(state, sampled, [_stay(config)]))
+
+
+def _stay(config: Config) -> Reference:
+    return Reference(0, 0, 0.0, 0.0, 0.0, config.reference.height)
 
 
 def standing(tick: int) -> State:

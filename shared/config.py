@@ -79,7 +79,7 @@ class WorldConfig:
         "robot may be 'all'; direction 0 is forward, 90 is left",
     )  # fmt: skip
     command_timeout: float = key(
-        2.0,
+        10.0,
         "s wall",
         "lockstep: a robot silent longer is put into damping",
         low=0.05,
@@ -270,7 +270,7 @@ class PlannerConfig:
         high=250,
     )
     peer_timeout: float = key(
-        0.5, "s wall", "lockstep: longest wait for a peer's plan", low=0.01, high=10.0
+        5.0, "s wall", "lockstep: longest wait for a peer's plan", low=0.01, high=10.0
     )
 
 

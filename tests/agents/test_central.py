@@ -7,9 +7,10 @@ from itertools import permutations
 
 import numpy as np
 
-from agents.central import Central, CentralState
+from agents.central import Central, CentralOutputs, CentralState
 from agents.gait import nominal_forces, scheduled_stance
 from agents.planner.central import centralised
+from agents.rehearsal import rehearse_central
 from shared.config import Config, PlannerConfig, TeamConfig
 from shared.messages import Measurement
 from tests.agents.duet import asked, simple_predictor
@@ -85,3 +86,16 @@ def test_the_clock_is_only_told() -> None:
     assert (outputs.planner_ns, untimed.planner_ns) == (7, 0)
     assert outputs.plans[0][1].u.tobytes() == untimed.plans[0][1].u.tobytes()
     assert replace(outputs, planner_ns=0).plans[0][1].used == untimed.plans[0][1].used
+
+
+def test_a_rehearsal_plans_two_steps_of_standing() -> None:
+    planned = []
+
+    class Watched(Central):
+        def step(self, state: CentralState) -> tuple[CentralState, CentralOutputs]:
+            after, outputs = super().step(state)
+            planned.extend(plan.step for _, plan in outputs.plans)
+            return after, outputs
+
+    rehearse_central(CONFIG, Watched(CONFIG, centralised(CONFIG, simple_predictor(CONFIG))))
+    assert planned == [8, 8, 9, 9]
