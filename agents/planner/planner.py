@@ -35,7 +35,7 @@ class PeerTerms:
     """
 
     effect: Array | float = 0.0
-    deviations: Mapping[str, Array] = field(default_factory=dict)
+    deviations: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     used: Mapping[str, int] = field(default_factory=dict)
     lost: tuple[str, ...] = ()
     ages: Mapping[str, int] = field(default_factory=dict)
@@ -136,12 +136,13 @@ class Planner:
     def __init__(self, config: Config, index: int, predictor: Predictor) -> None:
         check_sizes(config, predictor)
         self._config, self._index, self._predictor = config, index, predictor
-        self._silent = np.zeros(predictor.meta.width)
+        self._silent = np.zeros(predictor.meta.width, dtype=np.float32)
         self._cycle = walking_steps(config)
+        self._others = [j for j in range(config.team.robots) if j != index]
         # Single precision is off by 3e-7 of an effect, and half as much memory to go through.
         self._rows = [
-            np.concatenate([*predictor.G[phase, index]], axis=1, dtype=np.float32)
-            for phase in range(predictor.phases)
+            np.moveaxis(G[index, self._others], 0, 1).reshape(G.shape[2], -1).astype(np.float32)
+            for G in predictor.G
         ]
         # One factorised problem per step of the gait's cycle: a memo, it changes no result.
         self._setups: dict[int, _Setup] = {}
@@ -163,16 +164,24 @@ class Planner:
             step: k, whose contact phase chooses the transition matrix.
             y_base: base of the outputs at the ends of the windows' samples, (T_ini, 6).
         """
+        if not selection.peers:
+            return PeerTerms()
+        parts = {
+            peer.index: _deviations(peer, y_base)
+            if peer.usable
+            else (before.deviations.get(peer.robot, self._silent),)
+            for peer in selection.peers
+        }
+        silent = (self._silent,)
+        z = np.concatenate(
+            [part for other in self._others for part in parts.get(other, silent)],
+            dtype=np.float32, casting="same_kind",
+        )  # fmt: skip
         width = len(self._silent)
-        z = np.zeros(self._config.team.robots * width, dtype=np.float32)
         deviations = {}
         for peer in selection.peers:
-            if peer.usable:
-                found = _deviations(peer, y_base)
-            else:
-                found = before.deviations.get(peer.robot, self._silent)
-            deviations[peer.robot] = found
-            z[peer.index * width : (peer.index + 1) * width] = found
+            place = peer.index - (peer.index > self._index)
+            deviations[peer.robot] = z[place * width : (place + 1) * width]
         effect = (self._rows[self.phase(step)] @ z).astype(np.float64)
         ages = {peer.robot: peer.age for peer in selection.peers}
         return PeerTerms(effect, deviations, selection.used, selection.lost, ages)
@@ -268,7 +277,9 @@ def check_sizes(config: Config, predictor: Predictor) -> None:
         )
 
 
-def _deviations(peer: PeerData, y_base: Array) -> Array:
-    """A peer's [u_ini; y_ini; u], unknown samples as no deviation. Shape (18 T_ini + 12 N,)."""
-    dy = np.where(peer.known[:, None], peer.y_ini - y_base, 0.0)
-    return np.concatenate([peer.du_ini.ravel(), dy.ravel(), peer.du.ravel()])
+def _deviations(peer: PeerData, y_base: Array) -> tuple[Array, Array, Array]:
+    """A peer's u_ini, y_ini and u, flat; an unknown sample does not deviate."""
+    dy = peer.y_ini - y_base
+    if not peer.known.all():
+        dy[~peer.known] = 0.0
+    return peer.du_ini.ravel(), dy.ravel(), peer.du.ravel()

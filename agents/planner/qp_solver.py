@@ -33,7 +33,8 @@ class Residuals:
     """How well the Karush-Kuhn-Tucker conditions hold.
 
     Attributes:
-        stationarity: ‖H v + f + λ_box + Aᵀ λ_A‖∞ over the largest of its terms (at least 1).
+        stationarity: ‖H v + f + λ_box + Aᵀ λ_A‖∞ over the largest of its terms (at least 1); of
+            the closed form a bound of it.
         primal: largest violation of a bound [N].
         complementarity: largest |λ · distance to its bound|, over the same terms [N].
     """
@@ -78,8 +79,9 @@ class DaqpSolver:
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
-        self._inverse = -linalg.inv(problem.H)
-        self._H = np.ascontiguousarray(problem.H)
+        inverse = linalg.inv(problem.H)
+        self._inverse = -inverse
+        self._closed = Residuals(_inversion_error(problem.H, inverse), 0.0, 0.0)
         self._free = np.zeros(len(problem.upper))
         self._free.setflags(write=False)
         self._cold = np.zeros(len(problem.upper), dtype=np.int32)
@@ -98,12 +100,10 @@ class DaqpSolver:
             return no_solution(self._problem, "not-finite")
         low = self._problem.lower if lower is None else lower
         high = self._problem.upper if upper is None else upper
-        if not len(self._problem.bounded):
-            x, inside, stationarity = closed_form(
-                self._inverse, self._H, f, low, high, self._problem.slope
-            )
-            if inside and stationarity <= _MAX_STATIONARITY:
-                return Solution(SOLVED, x, self._free, Residuals(stationarity, 0.0, 0.0), 0)
+        if not len(self._problem.bounded) and self._closed.stationarity <= _MAX_STATIONARITY:
+            x, inside = closed_form(self._inverse, f, low, high, self._problem.slope)
+            if inside:
+                return Solution(SOLVED, x, self._free, self._closed, 0)
         if upper is None:
             self._model.update(f=f, sense=self._cold)
         else:
@@ -146,9 +146,9 @@ class OsqpSolver:
 
 @compiled
 def closed_form(
-    minus_inverse: Array, H: Array, f: Array, lower: Array, upper: Array, slope: float
-) -> tuple[Array, bool, float]:
-    """The unconstrained minimiser x, whether box and pyramid hold at it, and its stationarity."""
+    minus_inverse: Array, f: Array, lower: Array, upper: Array, slope: float
+) -> tuple[Array, bool]:
+    """The unconstrained minimiser x, and whether box and pyramid hold at it."""
     x = minus_inverse @ f
     inside = True
     for i in range(len(x)):
@@ -156,12 +156,15 @@ def closed_form(
     for foot in range(len(x) // 3):
         limit = upper[len(x) + 4 * foot] + slope * x[3 * foot + 2]
         inside = inside and abs(x[3 * foot]) <= limit and abs(x[3 * foot + 1]) <= limit
-    left, scale = H @ x + f, 1.0
-    worst = 0.0
-    for i in range(len(x)):
-        scale = max(scale, abs(f[i]))
-        worst = max(worst, abs(left[i]))
-    return x, inside, worst / scale
+    return x, inside
+
+
+def _inversion_error(H: Array, inverse: Array) -> float:
+    """Bound of ‖H x + f‖∞ / ‖f‖∞ for x = −H⁻¹ f and every f, rounding of the product included."""
+    left = np.abs(np.eye(len(H)) - H @ inverse) + len(H) * np.finfo(float).eps * (
+        np.abs(H) @ np.abs(inverse)
+    )
+    return float(left.sum(axis=1).max())
 
 
 SOLVERS: Final[Mapping[str, type[Solver]]] = MappingProxyType(

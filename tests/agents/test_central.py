@@ -89,7 +89,7 @@ def test_the_clock_is_only_told() -> None:
 
 
 def test_a_rehearsal_plans_two_steps_of_standing() -> None:
-    planned = []
+    planned: list[int] = []
 
     class Watched(Central):
         def step(self, state: CentralState) -> tuple[CentralState, CentralOutputs]:
