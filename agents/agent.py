@@ -34,7 +34,7 @@ from agents.modes import (
     step_mode,
     stop_safely,
 )
-from agents.pilot import Awaited, Heard, Pilot, PilotState, Planned
+from agents.pilot import NOTHING, Awaited, Heard, Pilot, PilotState, Planned
 from agents.planner.predictor import Predictor
 from agents.planning import LocalPilot
 from agents.references import in_force, remember_references
@@ -149,8 +149,10 @@ class Agent:
 
     def awaited(self, tick: int) -> Awaited:
         """What lock-step waits for before the step of `tick`."""
-        awaited = Awaited() if self._pilot is None else self._pilot.awaited(tick)
+        awaited = NOTHING if self._pilot is None else self._pilot.awaited(tick)
         reference = tick if tick % REFERENCE_EPOCH_MS == 0 else None
+        if reference is None and not self._by_truth:
+            return awaited
         return replace(awaited, reference_tick=reference, truth=self._by_truth)
 
     @property

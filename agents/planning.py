@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 
 from agents.adaptation import Adapter
-from agents.flight import Flight, fading, launched, present
+from agents.flight import Flight, Present, fading, launched, present
 from agents.modes import WALK
-from agents.pilot import Awaited, Heard, PilotState, Planned
+from agents.pilot import NOTHING, Awaited, Heard, PilotState, Planned
 from agents.planner.episode import commanded_outputs, output_base
 from agents.planner.horizon import SAMPLE_MS, exchange_ms, step_ms
 from agents.planner.neighbours import Neighbours, PeerMemory
@@ -61,7 +61,7 @@ class LocalPilot:
         turn, off = divmod(rest, self._exchange_ms)
         exchanges = self._config.planner.exchanges
         if off or not 1 <= turn <= exchanges + 1 or not self.peers:
-            return Awaited()
+            return NOTHING
         if step < self._first_step:
             before = step == self._first_step - 1 and turn == exchanges + 1
             return Awaited(measurement_tick=step * self._step_ms if before else None)
@@ -77,7 +77,8 @@ class LocalPilot:
         own = state.own
         if heard.measurement is not None:
             own = (*own, heard.measurement)[-self._kept :]
-        state = replace(state, own=own, memory=memory)
+        if own is not state.own or memory is not state.memory:
+            state = replace(state, own=own, memory=memory)
         if heard.mode.name != WALK:
             return state, Planned()
         step, rest = divmod(tick, self._step_ms)
@@ -88,7 +89,7 @@ class LocalPilot:
             return self._answer(state, memory, (step, turn), heard)
         if news and state.terms_for != step + 1:
             state = self._prepare(state, memory, step + 1, heard.references)
-        return state, self._present(state, tick, Planned())
+        return state, Planned(present=self._in_force(state, tick))
 
     def _window_complete(self, state: PilotState, tick: int) -> bool:
         return _gapless(state.own, self._config.planner.T_ini, tick)
@@ -194,8 +195,11 @@ class LocalPilot:
         )
 
     def _present(self, state: PilotState, tick: int, planned: Planned) -> Planned:
+        return replace(planned, present=self._in_force(state, tick))
+
+    def _in_force(self, state: PilotState, tick: int) -> Present:
         track = self._config.planner.interface == "force"
-        return replace(planned, present=present(state.flights, tick, track_velocity=track))
+        return present(state.flights, tick, track_velocity=track)
 
 
 def _gapless(own: tuple[Measurement, ...], count: int, tick: int) -> bool:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
-from typing import Final
 
 from agents.agent import Agent, AgentState, Inputs, Outputs
 from agents.arrivals import Arrivals, Source
-from agents.pilot import Awaited
+from agents.pilot import NOTHING, Awaited
 from agents.planner.predictor import Predictor
 from agents.rehearsal import rehearse
 from agents.telemetry import Telemetry
@@ -21,8 +20,6 @@ from shared.config import Config
 from shared.messages import State
 from shared.signals import stop_on_signals
 from shared.topics import COMMAND, MEASUREMENT, PLAN, STATUS
-
-NOTHING: Final = Awaited()
 
 
 def run(
@@ -120,7 +117,7 @@ class _Shell:
         Who did not within the time-out is not waited for again until he has sent such a message.
         """
         awaited = self._agent.awaited(state.tick)
-        if self._lockstep and awaited != NOTHING:
+        if self._lockstep and awaited is not NOTHING:
             deadline = monotonic() + self._config.planner.peer_timeout
             while owing := self._owing(state.tick, awaited):
                 left = deadline - monotonic()

@@ -80,6 +80,7 @@ def fit(config: Config, dataset: Dataset, path: Path, console: Console) -> tuple
     Raises:
         PredictorError: too little data, not exciting, or refused by a gate.
     """
+    one_blas_thread()
     check_excitation(config, dataset.training)
     with console.status("fitting the predictor"):
         predictor = fit_predictor(dataset.training, PredictorMeta.of(config))

@@ -67,11 +67,12 @@ def step_contact(
     rate = dt / (1e-3 * config.ground_filter_ms + dt)
     if not config.contact_detection:
         return _scheduled_contact(previous, stance, half, foot_z, rate)
-    contact, early, unloaded, latched, ground, level = _step(
+    legs, level = _step(
         previous.contact, previous.early, previous.unloaded, previous.latched, previous.ground,
         previous.level, half != previous.half, stance, progress, foot_force, foot_z,
         config.contact_force, 1e-3 * config.lost_contact_ms, rate, dt,
     )  # fmt: skip
+    contact, early, unloaded, latched, ground = legs
     return ContactState(contact, early, unloaded, latched, ground, level, half)
 
 
@@ -91,9 +92,12 @@ def _step(
     contact0: Array, early0: Array, unloaded0: Array, latched0: Array, ground0: Array,
     level0: float, switched: bool, stance: Array, progress: float, foot_force: Array,
     foot_z: Array, threshold: float, patience: float, rate: float, dt: float,
-) -> tuple[Array, Array, Array, Array, Array, float]:  # fmt: skip
-    contact, early, unloaded = contact0.copy(), early0.copy(), unloaded0.copy()
-    latched, ground = latched0.copy(), ground0.copy()
+) -> tuple[Array, float]:  # fmt: skip
+    """The new contact, early, unloaded, latched, ground as rows of (5, 4), and the level."""
+    legs = np.empty((5, 4))
+    contact, early, unloaded, latched, ground = legs
+    contact[:], early[:], unloaded[:] = contact0, early0, unloaded0
+    latched[:], ground[:] = latched0, ground0
     total, count = 0.0, 0
     for leg in range(4):
         loaded = foot_force[leg] >= threshold
@@ -123,4 +127,4 @@ def _step(
     level = level0
     if count > 0:
         level += rate * (total / count - level0)
-    return contact, early, unloaded, latched, ground, level
+    return legs, level

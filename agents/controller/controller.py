@@ -72,9 +72,15 @@ class Controller:
 
     def __init__(self, config: Config) -> None:
         self._config = config.controller
-        self._stance_time = 1e-3 * config.gait.stance_ms
         self._gains = trunk_gains(config.controller)
         self.body = RigidBody()
+        controller = config.controller
+        self._feet_constants = np.array(
+            [
+                1e-3 * config.gait.stance_ms, controller.raibert_gain, controller.swing_height,
+                controller.descent_speed, controller.kp_swing, controller.kd_swing, self.body.mass,
+            ]
+        )  # fmt: skip
         self.weights = Weights(
             config.controller.gamma_tau,
             config.controller.gamma_force,
@@ -99,28 +105,44 @@ class Controller:
             state.contact, self._config, schedule.stance, schedule.progress, schedule.half,
             estimate.foot_force, estimate.p_foot[:, 2], dt,
         )  # fmt: skip
-        swing_start, foot_goal = _feet_anchors(
-            state.swing_start, state.foot_goal, estimate.p_foot, contact.contact, schedule.stance,
-            switched, self._config.descent_speed * dt,
-        )  # fmt: skip
         terms = self.body.terms(estimate, quat_wxyz)
         integrators, trunk, v_des = trunk_acceleration(
             state.integrators, self._gains, self.body, estimate, task, contact.level,
             schedule.stance, dt,
         )  # fmt: skip
-        feet = _feet_acceleration(
-            contact.contact, schedule.stance, schedule.progress, swing_start, foot_goal,
-            contact.ground, estimate.position, estimate.velocity, estimate.R, estimate.p_foot,
-            _foot_velocities(terms.J, terms.v, estimate.p_foot), v_des, task.wz,
-            self._stance_time, self._config.raibert_gain, self._config.swing_height,
-            self._config.descent_speed, self._config.kp_swing, self._config.kd_swing,
+        swing_start, foot_goal, feet, force = _feet(
+            state.swing_start, state.foot_goal, contact.contact, schedule.stance,
+            schedule.progress, switched, contact.ground, estimate.position, estimate.velocity,
+            estimate.R, estimate.p_foot, terms.J, terms.v, v_des, task.wz, task.deviation, dt,
+            self._feet_constants,
         )  # fmt: skip
-        force = _desired_force(contact.contact, task.deviation, estimate.R, self.body.mass)
         goal = Goal(contact.contact, trunk, feet, force)
         solution = whole_body_qp.solve_goal(
             terms, estimate.R, estimate.p_foot, goal, self.weights
         )  # fmt: skip
         return ControllerState(contact, integrators, swing_start, foot_goal), solution
+
+
+@compiled
+def _feet(
+    swing_start0: Array, foot_goal0: Array, contact: Array, stance: Array, progress: float,
+    switched: bool, ground: Array, position: Array, velocity: Array, R: Array, p_foot: Array,
+    J: Array, v: Array, v_des: Array, wz: float, deviation: Array, dt: float, constants: Array,
+) -> Array:  # fmt: skip
+    """New swing starts and foot goals, desired accelerations and forces, rows of (4, 4, 3)."""
+    duration, raibert_gain, height, descent_speed, kp, kd, mass = constants
+    swing_start, foot_goal = _feet_anchors(
+        swing_start0, foot_goal0, p_foot, contact, stance, switched, descent_speed * dt
+    )
+    out = np.empty((4, 4, 3))
+    out[0], out[1] = swing_start, foot_goal
+    out[2] = _feet_acceleration(
+        contact, stance, progress, swing_start, foot_goal, ground, position, velocity, R, p_foot,
+        _foot_velocities(J, v, p_foot), v_des, wz, duration, raibert_gain, height, descent_speed,
+        kp, kd,
+    )  # fmt: skip
+    out[3] = _desired_force(contact, deviation, R, mass)
+    return out
 
 
 @compiled

@@ -95,13 +95,14 @@ def estimate_trunk(
         noise: `noise_parameters`.
         dt: time since the last tick, s.
     """
-    mean, covariance, R, p_foot = _filter(
+    mean, covariance, frame = _filter(
         previous.mean, previous.covariance, state.imu_quat_wxyz, state.imu_gyro, state.imu_accel,
         state.q_joint, state.v_joint, trust, noise, dt,
     )  # fmt: skip
     estimate = Estimate(
-        mean[0], mean[1], R, state.imu_gyro, p_foot, state.q_joint, state.v_joint, state.foot_force
-    )
+        mean[0], mean[1], frame[:3], state.imu_gyro, frame[3:], state.q_joint, state.v_joint,
+        state.foot_force,
+    )  # fmt: skip
     return FilterState(mean, covariance), estimate
 
 
@@ -134,7 +135,8 @@ def _update(mean: Array, covariance: Array, h: Array, innovation: Array, varianc
 def _filter(
     mean0: Array, covariance0: Array, quat: Array, gyro: Array, accel: Array,
     q_joint: Array, v_joint: Array, trust: Array, noise: Array, dt: float,
-) -> tuple[Array, Array, Array, Array]:  # fmt: skip
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """The new mean and covariance; the trunk's R, (3, 3), over the feet's places, (4, 3)."""
     R = rotation_matrix(quat)
     p_leg, v_leg, omega_leg = leg_kinematics(q_joint, v_joint)
     mean, covariance = mean0.copy(), covariance0.copy()
@@ -161,7 +163,8 @@ def _filter(
             covariance[2 + leg, 2 + leg] += (noise[2] * dt) ** 2
 
     h = np.zeros(6)
-    p_foot = np.empty((4, 3))
+    frame = np.empty((7, 3))
+    frame[:3] = R
     for leg in range(4):
         reach = R @ p_leg[leg]
         h[:] = 0.0
@@ -173,8 +176,8 @@ def _filter(
             v_trunk = roll_velocity[leg] - R @ v_leg[leg] - cross(omega, reach)
             _update(mean, covariance, h, v_trunk - mean[1], (noise[4] / trust[leg]) ** 2)
     for leg in range(4):
-        p_foot[leg] = mean[0] + R @ p_leg[leg]
-    return mean, 0.5 * (covariance + covariance.T), R, p_foot
+        frame[3 + leg] = mean[0] + R @ p_leg[leg]
+    return mean, 0.5 * (covariance + covariance.T), frame
 
 
 def trunk_from_truth(truth: Truth, index: int, state: State) -> Estimate:

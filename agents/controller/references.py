@@ -64,17 +64,35 @@ def trunk_acceleration(
         The new integrators, the linear and angular acceleration (6,) and the desired velocity
         (3,), all in the odometry frame.
     """
-    height, speed, lead, yaw, trunk, v_des = _feedback(
+    height, yaw, speed_lead, demand = _trunk_acceleration(
         previous.height, previous.speed, previous.lead, previous.yaw, gains, estimate.position,
         estimate.velocity, estimate.R, estimate.omega, task.velocity, task.wz,
-        level + task.height, dt,
+        level + task.height, dt, task.feedforward, task.deviation, stance, estimate.p_foot,
+        body.mass, body.com, body.inertia_inverse,
     )  # fmt: skip
-    if task.feedforward:
+    return Integrators(height, speed_lead[:2], speed_lead[2:], yaw), demand[:6], demand[6:]
+
+
+@compiled
+def _trunk_acceleration(
+    height0: float, speed0: Array, lead0: Array, yaw0: float, gains: Array, position: Array,
+    velocity: Array, R: Array, omega: Array, v_yaw_frame: Array, wz: float, z_des: float,
+    dt: float, feedforward: bool, deviation: Array, stance: Array, p_foot: Array, mass: float,
+    com: Array, inertia_inverse: Array,
+) -> tuple[float, float, Array, Array]:  # fmt: skip
+    """Height and yaw, speed and lead as one (4,), acceleration and desired velocity as (9,)."""
+    height, speed, lead, yaw, trunk, v_des = _feedback(
+        height0, speed0, lead0, yaw0, gains, position, velocity, R, omega, v_yaw_frame, wz, z_des,
+        dt,
+    )  # fmt: skip
+    if feedforward:
         trunk += single_rigid_body(
-            task.deviation, stance, estimate.R, estimate.position, estimate.p_foot, body.mass,
-            body.com, body.inertia_inverse,
-        )  # fmt: skip
-    return Integrators(height, speed, lead, yaw), trunk, v_des
+            deviation, stance, R, position, p_foot, mass, com, inertia_inverse
+        )
+    speed_lead, demand = np.empty(4), np.empty(9)
+    speed_lead[:2], speed_lead[2:] = speed, lead
+    demand[:6], demand[6:] = trunk, v_des
+    return height, yaw, speed_lead, demand
 
 
 @compiled

@@ -12,6 +12,7 @@ No slip makes the forces affine in the torques, f = A τ + a₀, and with them t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Final
 
 import daqp
 import numpy as np
@@ -21,6 +22,7 @@ from agents.controller.rotation import cross
 from shared.jit import compiled
 from shared.robot import TORQUE_LIMIT, Array
 
+UNCONSTRAINED: Final = "unconstrained"
 _TOLERANCE = 1e-9
 
 
@@ -86,8 +88,14 @@ class Solution:
 
 
 def solve_goal(terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights) -> Solution:
-    """Build, solve, unpack; numbers beyond all bounds or a singular problem are no solution."""
+    """Build, solve, unpack; numbers beyond all bounds or a singular problem are no solution.
+
+    Where no limit is active, as at most ticks, all of it is one compiled call.
+    """
     try:
+        x, n_h, free = _closed_form(*_arguments(terms, R, p_foot, goal, weights))
+        if free:
+            return Solution(x[:12], x[12:24].reshape(4, 3), x[24 : 24 + n_h], UNCONSTRAINED)
         problem = build(terms, R, p_foot, goal, weights)
         return unpack(problem, goal.contact, *solve(problem))
     except np.linalg.LinAlgError:
@@ -96,13 +104,17 @@ def solve_goal(terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weigh
 
 def build(terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights) -> Problem:
     """Assemble the reduced QP at one instant."""
-    return Problem(
-        *_assemble(
-            terms.M_inverse, terms.nle, terms.J, terms.dJ, terms.v, R, p_foot,
-            goal.contact, goal.trunk, goal.swing, goal.force,
-            weights.gamma_tau, weights.gamma_force, weights.gamma_defect,
-            weights.mu, weights.force_min,
-        )
+    return Problem(*_assemble(*_arguments(terms, R, p_foot, goal, weights)))
+
+
+def _arguments(
+    terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights
+) -> tuple[Any, ...]:
+    return (
+        terms.M_inverse, terms.nle, terms.J, terms.dJ, terms.v, R, p_foot,
+        goal.contact, goal.trunk, goal.swing, goal.force,
+        weights.gamma_tau, weights.gamma_force, weights.gamma_defect,
+        weights.mu, weights.force_min,
     )  # fmt: skip
 
 
@@ -110,7 +122,7 @@ def solve(problem: Problem) -> tuple[Array, str]:
     """The optimal torques and the status; the closed form where no limit is active."""
     tau, feasible = _unconstrained(problem.H, problem.g, problem.C, problem.c, TORQUE_LIMIT)
     if feasible:
-        return tau, "unconstrained"
+        return tau, UNCONSTRAINED
     if not np.isfinite(tau).all():
         return np.zeros(12), "infeasible:singular"
     rows = len(problem.c)
@@ -250,3 +262,26 @@ def _assemble(
         C[5 * i + 3], c[5 * i + 3] = cone * z - y, y0 - cone * z0
         C[5 * i + 4], c[5 * i + 4] = cone * z + y, -y0 - cone * z0
     return 0.5 * scale * (H + H.T), scale * g, C, c, A, a0, B, b
+
+
+@compiled
+def _closed_form(
+    M_inverse: Array, nle: Array, J: Array, dJ: Array, v: Array, R: Array, p_foot: Array,
+    contact: Array, trunk: Array, swing: Array, force: Array,
+    gamma_tau: float, gamma_force: float, gamma_defect: float, mu: float, force_min: float,
+) -> tuple[Array, int, bool]:  # fmt: skip
+    """The optimum without limits, and whether it keeps them.
+
+    Torques, forces and defect are one array (42,), whose last part is as long as is told.
+    """
+    H, g, C, c, A, a0, B, defect0 = _assemble(
+        M_inverse, nle, J, dJ, v, R, p_foot, contact, trunk, swing, force,
+        gamma_tau, gamma_force, gamma_defect, mu, force_min,
+    )  # fmt: skip
+    x = np.zeros(42)
+    tau, feasible = _unconstrained(H, g, C, c, TORQUE_LIMIT)
+    implied, defect = _implied(A, a0, B, defect0, contact, tau)
+    x[:12] = tau
+    x[12:24] = implied.ravel()
+    x[24 : 24 + len(defect)] = defect
+    return x, len(defect), feasible

@@ -274,6 +274,10 @@ def fail(monkeypatch: pytest.MonkeyPatch) -> None:
     def no_solution(problem: Problem) -> tuple[Array, str]:
         return np.zeros(12), "infeasible:-1"
 
+    def limits_matter(*_: object) -> tuple[Array, int, bool]:
+        return np.zeros(42), 0, False
+
+    monkeypatch.setattr(whole_body_qp, "_closed_form", limits_matter)
     monkeypatch.setattr(whole_body_qp, "solve", no_solution)
 
 
