@@ -91,6 +91,8 @@ def parser() -> argparse.ArgumentParser:
     report = add("report", verbs.report, "show what came of a recorded walk")
     report.add_argument("run_dir", type=Path, metavar="DIR", help="the folder of a run.mcap")
     report.add_argument("--no-render", action="store_true", help="no pictures of the walk")
+    resim = add("resim", verbs.resim, "re-simulate a recorded world and compare it to the byte")
+    resim.add_argument("file", type=Path, metavar="FILE", help="a recording of a lock-step walk")
     router = add("router", verbs.router, "the router between processes in client mode")
     router.add_argument("--listen", metavar="ENDPOINT", help="where (bus.endpoint)")
     router.add_argument("--once", action="store_true", help="leave when the team has walked")

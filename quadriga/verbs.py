@@ -117,6 +117,14 @@ def report(arguments: argparse.Namespace, _config: Config, _given: Given) -> int
     return int(went_wrong(summary))
 
 
+def resim(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
+    """The world of a recording once more, compared to the byte."""
+    from quadriga.resim_run import run
+
+    _expect_no_options(given, "the recording's own configuration is used")
+    return int(not run(arguments.file, Console()))
+
+
 def operate(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """The operator's process."""
     from quadriga.operator import run
@@ -190,6 +198,13 @@ def router(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 
     run(config, arguments.listen or config.bus.endpoint, once=arguments.once)
     return 0
+
+
+def _expect_no_options(given: Given, why: str) -> None:
+    """Refuse configuration that would be ignored."""
+    if given:
+        names = [f"{section}.{key}" for section, keys in given.items() for key in keys]
+        raise ConfigError("options", ", ".join(names), "none of the configuration", why)
 
 
 def show_config(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
