@@ -117,6 +117,22 @@ def report(arguments: argparse.Namespace, _config: Config, _given: Given) -> int
     return int(went_wrong(summary))
 
 
+def play(arguments: argparse.Namespace, config: Config, given: Given) -> int:
+    """A recording back on the bus."""
+    from quadriga.play import play
+    from quadriga.tape import Tape, parse_remap
+    from shared.recording import Recording
+
+    remaps = [parse_remap(text) for text in arguments.remap]
+    recording = Recording(arguments.file)
+    if "name" in given.get("team", {}):
+        remaps.append((recording.metadata.get("team", ""), config.team.name))
+    tape = Tape(recording, arguments.topics, remaps, arguments.clock)
+    play(config.bus, tape, Console(), rate=arguments.rate, start=arguments.start,
+         loop=arguments.loop, paused=arguments.paused)  # fmt: skip
+    return 0
+
+
 def resim(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
     """The world of a recording once more, compared to the byte."""
     from quadriga.resim_run import run

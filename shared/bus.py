@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any, Final, Self
@@ -82,6 +83,21 @@ class Bus:
             if stopped and stopped():
                 raise KeyboardInterrupt
             sleep(POLL)
+
+    @classmethod
+    def join(cls, bus: BusConfig, team: str, name: str) -> Self:
+        """Join the network at `bus.endpoint`; in peer mode be who listens there if nobody does.
+
+        For a process that must be found although no sim server runs.
+
+        Raises:
+            BusError: the endpoint is malformed, or in client mode there is no router.
+        """
+        if bus.mode == "peer":
+            with suppress(BusError):  # somebody listens there, or it is another machine's
+                settings = member_settings(bus, name, hub=True)
+                return cls(_open(settings, bus.endpoint, name), team, name)
+        return cls.open(bus, team, name)
 
     @classmethod
     def route(cls, listen: str, team: str) -> Self:
