@@ -94,6 +94,12 @@ def parser() -> argparse.ArgumentParser:
     _add_play(add("play", verbs.play, "put a recording back on the bus"))
     resim = add("resim", verbs.resim, "re-simulate a recorded world and compare it to the byte")
     resim.add_argument("file", type=Path, metavar="FILE", help="a recording of a lock-step walk")
+    export = add("export", verbs.export, "convert a recording for other tools")
+    export.add_argument("file", type=Path, metavar="FILE", help="a recording")
+    export.add_argument("--to", required=True, choices=("foxglove", "rerun", "csv", "parquet"),
+                        help="MCAP for Foxglove or Rerun, or one table per key")  # fmt: skip
+    export.add_argument("-o", "--output", type=Path, metavar="OUT",
+                        help="a new file or folder (beside FILE)")  # fmt: skip
     router = add("router", verbs.router, "the router between processes in client mode")
     router.add_argument("--listen", metavar="ENDPOINT", help="where (bus.endpoint)")
     router.add_argument("--once", action="store_true", help="leave when the team has walked")

@@ -141,6 +141,15 @@ def resim(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
     return int(not run(arguments.file, Console()))
 
 
+def export(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
+    """A recording in a format of others."""
+    from quadriga.export.run import run
+
+    _expect_no_options(given, "the recording's own configuration is used")
+    run(arguments.file, arguments.to, arguments.output, Console())
+    return 0
+
+
 def operate(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """The operator's process."""
     from quadriga.operator import run
