@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
@@ -32,8 +35,12 @@ def write_foxglove(source: Source, out: Path, progress: Progress) -> tuple[Path,
         source: what to write.
         out: the file; it must not exist.
         progress: told the tick that was reached.
+
+    Raises:
+        OSError: the file cannot be written.
     """
-    with foxglove.open_mcap(out, context=(context := foxglove.Context())):
+    context = foxglove.Context()
+    with _opened(out, context):
         scalars, drawing = _Scalars(source, context), _Drawing(source, context)
         events = LogChannel("/events", context=context)
         for item in source.items():
@@ -45,6 +52,20 @@ def write_foxglove(source: Source, out: Path, progress: Progress) -> tuple[Path,
             elif isinstance(message, Event):
                 events.log(_said(message), log_time=time)
     return (out,)
+
+
+@contextmanager
+def _opened(out: Path, context: foxglove.Context) -> Iterator[None]:
+    """What is logged in `context` goes to a file; that its disk is full shows when it is closed."""
+    foxglove.set_log_level(logging.CRITICAL)  # it would complain of every message
+    writer = foxglove.open_mcap(out, context=context)
+    try:
+        yield
+    finally:
+        try:
+            writer.close()
+        except RuntimeError as error:
+            raise OSError(str(error)) from None
 
 
 class _Scalars:
@@ -62,7 +83,9 @@ class _Scalars:
         kind = self._types.get(layout.kind)
         if kind is None:
             kind = self._types[layout.kind] = type_of(layout)
-        payload = kind.encode(_plain(message, layout), item.numbers)
+        cut = layout.sampled
+        samples = item.numbers[:, :cut] if cut else None
+        payload = kind.encode(_plain(message, layout), item.numbers[0, cut:], samples)
         self._channel(f"/{item.name}", kind).log(payload, log_time=time)
         if self._tracking is not None and isinstance(message, Measurement):
             row = self._tracking.row(item.robot, message.tick)

@@ -68,6 +68,12 @@ class Layout:
         return found if found.shape[1] == len(self.numbers) else None
 
     @property
+    def sampled(self) -> int:
+        """How many of `numbers`, from the first on, differ from sample to sample."""
+        maps = sum(len(entries) for _, entries in self._maps)
+        return len(self.numbers) - maps if self.by_sample else 0
+
+    @property
     def by_sample(self) -> bool:
         """Whether a message has one row per sample of the horizon."""
         return any(item.metadata.get("shape", ("",))[0] == _SAMPLES for item in fields(self.kind))

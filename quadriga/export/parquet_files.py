@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any, Final
+from types import TracebackType
+from typing import Any, Final, Self
 
 import numpy as np
 import pyarrow as pa
@@ -27,8 +28,8 @@ def write_parquet(source: Source, out: Path, progress: Progress) -> tuple[Path, 
             table = tables.get(item.name)
             if table is None:
                 columns = build_columns(item.layout, item.robot)
-                table = tables[item.name] = _Table(file_of(out, item.name, "parquet"), columns)
-                files.callback(table.close)
+                path = file_of(out, item.name, "parquet")
+                table = tables[item.name] = files.enter_context(_Table(path, columns))
             table.append(item)
             progress(item.message.tick)
     return tuple(file_of(out, name, "parquet") for name in tables)
@@ -50,9 +51,21 @@ class _Table:
         if len(self._rows) >= _BATCH:
             self._flush()
 
-    def close(self) -> None:
-        self._flush()
-        self._writer.close()
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if kind is None:
+            self._flush()
+            self._writer.close()
+        else:  # the file is given up, and the first error is the one to tell
+            with suppress(OSError, pa.ArrowException):
+                self._writer.close()
 
     def _flush(self) -> None:
         if not self._rows:

@@ -30,7 +30,7 @@ class ProtobufType:
 
     def __init__(
         self, name: str, plain: Sequence[tuple[str, type]], lists: Sequence[str],
-        numbers: Sequence[str], *, by_sample: bool = False,
+        numbers: Sequence[str], samples: Sequence[str] = (),
     ) -> None:  # fmt: skip
         """Declare the type.
 
@@ -39,7 +39,7 @@ class ProtobufType:
             plain: fields of one value each, `int`, `float` or `str`.
             lists: fields that are repeated doubles.
             numbers: names of doubles; dots make nested messages.
-            by_sample: the doubles come once per sample, in a repeated field `samples`.
+            samples: names of doubles of a repeated field `samples`.
         """
         self.name = f"{_PACKAGE}.{name}"
         file = descriptor_pb2.FileDescriptorProto(
@@ -50,33 +50,38 @@ class ProtobufType:
             _add(top, field, _TYPES[of])
         for field in lists:
             _add(top, field, _Field.TYPE_DOUBLE, repeated=True)
-        paths = [_identifiers(number) for number in numbers]
-        if by_sample:
-            _nest(top, _SAMPLES, self.name, paths, repeated=True)
-        else:
-            _fill(top, self.name, paths)
+        paths, sampled = ([_identifiers(one) for one in names] for names in (numbers, samples))
+        _fill(top, self.name, paths)
+        if sampled:
+            _nest(top, _SAMPLES, self.name, sampled, repeated=True)
         self.descriptor = descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
         pool = descriptor_pool.DescriptorPool()
         pool.Add(file)
         self._make: Any = message_factory.GetMessageClass(pool.FindMessageTypeByName(self.name))
-        self._body, self._at = self._template(paths, by_sample)
-
-    def encode(self, plain: Mapping[str, Any], numbers: Array) -> bytes:
-        """A message with these plain fields and lists, and a row of doubles, or one per sample.
-
-        The doubles are put into a message laid out beforehand, at a tenth of the time that
-        setting them one by one would take; two serialised parts of a message are one message.
-        """
-        rows = np.atleast_2d(numbers)
-        body = np.tile(self._body, (len(rows), 1))
-        body[:, self._at] = np.ascontiguousarray(rows, "<f8").view(np.uint8)
-        head: bytes = self._make(**plain).SerializeToString()
-        return head + body.tobytes()
-
-    def _template(self, paths: Iterable[tuple[str, ...]], by_sample: bool) -> tuple[Any, Any]:
-        """Bytes of one row of doubles, and where in them the bytes of each double are."""
         message = self._make()
-        top = getattr(message, _SAMPLES).add() if by_sample else message
+        self._numbers = _Template(message, message, paths)
+        message = self._make()
+        if sampled:
+            self._samples = _Template(message, getattr(message, _SAMPLES).add(), sampled)
+
+    def encode(
+        self, plain: Mapping[str, Any], numbers: Array, samples: Array | None = None
+    ) -> bytes:
+        """A message with these plain fields and lists, a row of doubles, and one per sample.
+
+        The doubles are put into messages laid out beforehand, at a tenth of the time that
+        setting them one by one would take; serialised parts of a message are one message.
+        """
+        head: bytes = self._make(**plain).SerializeToString()
+        body = self._numbers.fill(np.atleast_2d(numbers))
+        return head + body + (b"" if samples is None else self._samples.fill(samples))
+
+
+class _Template:
+    """Bytes of a message of doubles, and where in them the bytes of each double are."""
+
+    def __init__(self, message: Any, top: Any, paths: Iterable[tuple[str, ...]]) -> None:
+        """Lay out `message` with doubles at `paths` in `top`, which is a part of it or itself."""
         marks = []
         for i, path in enumerate(paths):
             marks.append(struct.pack("<Q", _MARK + i))
@@ -86,14 +91,21 @@ class ProtobufType:
             setattr(owner, path[-1], struct.unpack("<d", marks[-1])[0])
         body: bytes = message.SerializeToString()
         at = [body.index(mark) + k for mark in marks for k in range(8)]
-        return np.frombuffer(body, np.uint8), np.array(at, dtype=np.intp)
+        self._body, self._at = np.frombuffer(body, np.uint8), np.array(at, dtype=np.intp)
+
+    def fill(self, rows: Array) -> bytes:
+        """One message after the other with these numbers, shape (rows, len(paths))."""
+        body = np.tile(self._body, (len(rows), 1))
+        body[:, self._at] = np.ascontiguousarray(rows, "<f8").view(np.uint8)
+        return body.tobytes()
 
 
 def type_of(layout: Layout) -> ProtobufType:
     """The protobuf type of a kind of message."""
     plain = (("tick", int), *layout.plain)
+    cut = layout.sampled
     return ProtobufType(
-        layout.kind.__name__, plain, layout.lists, layout.numbers, by_sample=layout.by_sample
+        layout.kind.__name__, plain, layout.lists, layout.numbers[cut:], layout.numbers[:cut]
     )
 
 

@@ -9,6 +9,8 @@ from typing import Any, Final
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
+from quadriga.export.source import Source
+from quadriga.export.written import remove
 from shared.clock import monotonic
 from shared.errors import ConfigError, RecordingError
 from shared.recording import Recording
@@ -43,8 +45,6 @@ def run(path: Path, form: str, out: Path | None, console: Console) -> None:
     if out.exists():
         raise ConfigError("--output", f"{out}, which exists", "a new file or folder",
                           "an export overwrites nothing")  # fmt: skip
-    from quadriga.export.source import Source
-
     begun = monotonic()
     source = Source(recording)
     if not source.topics:
@@ -65,10 +65,13 @@ def run(path: Path, form: str, out: Path | None, console: Console) -> None:
 
         try:
             files = write(source, out, progress)
-        except OSError as error:
-            raise ConfigError(
-                "--output", f"{out}: {error.strerror or error}", "room for it"
-            ) from None
+        except BaseException as error:
+            remove(out)
+            if isinstance(error, OSError):
+                raise ConfigError(
+                    "--output", f"{out}: {error.strerror or error}", "a writable place with room"
+                ) from None
+            raise
     size = sum(file.stat().st_size for file in files)
     count = f" with {len(files)} files" if len(files) > 1 else ""
     lines = [f"{out}{count}, {size / 1e6:.1f} MB in {monotonic() - begun:.1f} s"]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from shared.errors import ConfigError
@@ -20,6 +22,15 @@ def make_folder(out: Path) -> None:
         out.mkdir(parents=True)
     except OSError as error:
         raise ConfigError("--output", f"{out}: {error.strerror}", "a new folder") from None
+
+
+def remove(out: Path) -> None:
+    """Take back an export that was not finished."""
+    if out.is_dir():
+        shutil.rmtree(out, ignore_errors=True)
+    else:
+        with suppress(OSError):  # it was never there
+            out.unlink()
 
 
 def file_of(out: Path, name: str, suffix: str) -> Path:
