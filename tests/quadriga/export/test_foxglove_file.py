@@ -26,6 +26,7 @@ from shared.recording import Recording
 from shared.robot import FOOT_FRAMES, Array
 from sim_server.team_model import build_team_model
 from tests.quadriga.conftest import ESTIMATOR_ERROR, WriteRun, outputs, run_config
+from tests.quadriga.conftest import truth as truth_message
 from tests.quadriga.export.conftest import PLAN
 
 Topics = dict[str, list[tuple[int, Any]]]  # log time, ns, and decoded message
@@ -195,6 +196,17 @@ def test_a_recording_of_real_robots_has_no_scene(write_run: WriteRun, tmp_path: 
     assert len(found["/r1/tracking"]) == 50
     assert np.isnan(found["/r1/tracking"][0][1].true.z)
     assert not [topic for topic in found if topic.startswith(("/scene", "/frames"))]
+
+
+def test_forged_truths_are_left_out(
+    write_run: WriteRun, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config, out = run_config(2, 0.5), tmp_path / "out.mcap"
+    four = truth_message(run_config(4, 0.5), 200, 0.0)
+    folder = write_run(config, extra=[("team/sim/truth", four), ("other/sim/truth", four)])
+    assert main(["export", str(folder / "run.mcap"), "--to", "foxglove", "-o", str(out)]) == 0
+    assert "left out 1 messages of team/sim/truth" in capsys.readouterr().out
+    assert len(read(out)["/frames"]) == 51
 
 
 def test_rerun_finds_nothing_wrong_and_shows_named_columns(
