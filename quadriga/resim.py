@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
@@ -56,7 +57,10 @@ def resim(recording: Recording) -> Iterator[Resim]:
             "which command moved the motors in which tick is not recorded in real time",
         )  # fmt: skip
     world, silent = World(config), _Silent(config.team.name)
-    key_of = {name: COMMAND.key(config.team.name, name) for name in world.names}
+    keys = {
+        name: (STATE.key(config.team.name, name), COMMAND.key(config.team.name, name))
+        for name in world.names
+    }
     compared, lost = 0, ""
     for tick, entries in by_tick(recording, _NAMES):
         if lost:
@@ -75,7 +79,7 @@ def resim(recording: Recording) -> Iterator[Resim]:
             return
         compared += found
         silent.hear(entries)
-        commands = _commands(key_of, entries, silent.robots)
+        commands = _commands(keys, entries, silent.robots)
         absent = [name for name in world.names if name not in {*commands, *silent.robots}]
         if absent:
             lost = f"no command of {', '.join(absent)} at tick {tick}"
@@ -126,42 +130,55 @@ class _Silent:
 def _valid(key: str, entries: Iterable[Entry]) -> Iterator[Event]:
     for entry in entries:
         if entry.key == key:
-            try:
+            with suppress(MessageError):  # of a foreign publisher: the world's own are valid
                 yield decode(entry.payload, Event)
-            except MessageError:
-                continue  # of a foreign publisher: the world's own are valid
 
 
 def _compare(world: World, config: Config, entries: Iterable[Entry]) -> int | Difference:
-    """Number of the tick's messages that are equal to the world's, or the first that is not."""
+    """Number of the tick's messages that are equal to the world's, or the first that is not.
+
+    Anybody may publish on the world's keys: of several messages the world's must be one.
+    """
     team, count = config.team.name, 0
+    recorded: dict[str, list[bytes]] = {}
+    for key, _, _, payload in entries:
+        recorded.setdefault(key, []).append(payload)
     expected: dict[str, Message] = {
         STATE.key(team, name): state for name, state in world.states().items()
     }
-    sent = {key: encode(message) for key, message in expected.items()}
-    for key, _, _, payload in entries:
-        if key == TRUTH.key(team) and key not in sent:
-            expected[key] = world.truth()
-            sent[key] = encode(expected[key])
-        if key not in sent:
-            continue
-        if payload != sent[key]:
-            return difference(key, world.tick, payload, expected[key])
-        count += 1
+    if TRUTH.key(team) in recorded:
+        expected[TRUTH.key(team)] = world.truth()
+    for key, message in expected.items():
+        if key in recorded and encode(message) not in recorded[key]:
+            return difference(key, world.tick, recorded[key][0], message)
+        count += key in recorded
     return count
 
 
 def _commands(
-    key_of: Mapping[str, str], entries: Iterable[Entry], silent: set[str]
+    keys: Mapping[str, tuple[str, str]], entries: Sequence[Entry], silent: set[str]
 ) -> dict[str, Command]:
-    """What each robot that was not silent commanded, the first valid one as the world took it."""
-    found: dict[str, Command] = {}
-    robot_of = {key: name for name, key in key_of.items() if name not in silent}
+    """What each robot that was not silent commanded in a tick, by robot in the team's order."""
+    found = {}
+    for name, (state, command) in keys.items():
+        valid = [] if name in silent else list(_valid_commands(command, entries))
+        if valid:
+            asked = [entry.log_time_ns for entry in entries if entry.key == state]
+            found[name] = _taken(valid, min(asked, default=0))
+    return found
+
+
+def _valid_commands(key: str, entries: Iterable[Entry]) -> Iterator[tuple[int, Command]]:
     for entry in entries:
-        name = robot_of.get(entry.key)
-        if name is not None and name not in found:
-            try:
-                found[name] = decode(entry.payload, Command)
-            except MessageError:
-                continue  # the world dropped it, too
-    return {name: found[name] for name in key_of if name in found}
+        if entry.key == key:
+            with suppress(MessageError):  # the world dropped it, too
+                yield entry.log_time_ns, decode(entry.payload, Command)
+
+
+def _taken(commands: Sequence[tuple[int, Command]], asked: int) -> Command:
+    """Which of a robot's commands of one tick the world took, as it refuses early and stale ones.
+
+    The one that was recorded closest to the state it answers; links differ in speed, so that it
+    may stand before it.
+    """
+    return min(commands, key=lambda command: abs(command[0] - asked))[1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,11 @@ def packets(config: Config) -> Iterator[tuple[int, str, bytes]]:
         for name, sent in commands.items():
             if name != "r2" or tick not in SILENT or tick in LATE:
                 yield tick, f"team/{name}/command", encode(sent)
+        if tick % 50 == 20:  # refused by the world: of the future, of the past, and a foreign one's
+            for forged in (tick + 20, tick - 20):
+                yield tick, "team/r1/command", encode(replace(command(forged, 0), kp=np.ones(12)))
+            for key in ("team/r7/state", "team/r2/state"):
+                yield tick, key, encode(world.states()["r1"])
         if tick in (SILENT.start, SILENT.stop):
             said = "answers again" if tick == SILENT.stop else "silent for 10 s: damped"
             yield tick, "team/sim/event", encode(Event(tick, 10**6 * tick, "fault", "r2", said))
