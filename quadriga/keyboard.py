@@ -57,6 +57,8 @@ class Keyboard:
         return found
 
     def __enter__(self) -> Self:
+        if sys.stdin is None:  # started with it closed
+            return self
         try:
             self._stdin = sys.stdin.fileno()
             if os.tcgetpgrp(self._stdin) != os.getpgrp():
