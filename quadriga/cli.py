@@ -91,6 +91,15 @@ def parser() -> argparse.ArgumentParser:
     report = add("report", verbs.report, "show what came of a recorded walk")
     report.add_argument("run_dir", type=Path, metavar="DIR", help="the folder of a run.mcap")
     report.add_argument("--no-render", action="store_true", help="no pictures of the walk")
+    _add_play(add("play", verbs.play, "put a recording back on the bus"))
+    resim = add("resim", verbs.resim, "re-simulate a recorded world and compare it to the byte")
+    resim.add_argument("file", type=Path, metavar="FILE", help="a recording of a lock-step walk")
+    export = add("export", verbs.export, "convert a recording for other tools")
+    export.add_argument("file", type=Path, metavar="FILE", help="a recording")
+    export.add_argument("--to", required=True, choices=("foxglove", "rerun", "csv", "parquet"),
+                        help="MCAP for Foxglove or Rerun, or one table per key")  # fmt: skip
+    export.add_argument("-o", "--output", type=Path, metavar="OUT",
+                        help="a new file or folder (beside FILE)")  # fmt: skip
     router = add("router", verbs.router, "the router between processes in client mode")
     router.add_argument("--listen", metavar="ENDPOINT", help="where (bus.endpoint)")
     router.add_argument("--once", action="store_true", help="leave when the team has walked")
@@ -108,6 +117,27 @@ def parser() -> argparse.ArgumentParser:
     config.add_argument("--markdown", action="store_true", help="as documentation instead")
     add("version", verbs.version, "print the version")
     return top
+
+
+def _add_play(play: argparse.ArgumentParser) -> None:
+    play.epilog = "Keys in a terminal: space pauses, right arrow plays one planning step, q quits."
+    play.add_argument("file", type=Path, metavar="FILE", help="a recording")
+    play.add_argument("-r", "--rate", type=float, default=1.0, metavar="X",
+                      help="world time per wall time (%(default)g)")  # fmt: skip
+    play.add_argument("--start", type=float, default=0.0, metavar="S",
+                      help="begin at this world time [s]")  # fmt: skip
+    play.add_argument("--loop", action="store_true", help="begin again at the end")
+    play.add_argument("--paused", action="store_true", help="begin paused")
+    play.add_argument("--topics", nargs="+", default=["*"], metavar="GLOB",
+                      help="keys to play, with or without the team: 'r1/*' sim/truth")  # fmt: skip
+    play.add_argument("--remap", nargs="+", action="extend", default=[], metavar="FROM:TO",
+                      help="first parts of keys to replace: team:ghost")  # fmt: skip
+    play.add_argument(
+        "--clock",
+        choices=("world", "log"),
+        default="world",
+        help="time that paces: the world's or that of recording (%(default)s)",
+    )
 
 
 def _add_comparison(compare: argparse.ArgumentParser) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,7 +14,7 @@ from quadriga.traces import recorded_config
 from quadriga.truth_trace import Ticks
 from shared.codec import decode
 from shared.config import Config
-from shared.errors import RecordingError
+from shared.errors import MessageError, RecordingError
 from shared.messages import State, Truth
 from shared.recording import Recording
 from shared.robot import Array, q_stand, robot_names
@@ -58,7 +59,7 @@ def truth_ticks(recording: Recording) -> Ticks:
     Raises:
         RecordingError: there are none.
     """
-    ticks = {entry.tick for entry in recording.entries({TRUTH.name}) if entry.tick >= 0}
+    ticks = {truth.tick for truth in _truths(recording)}
     if not ticks:
         raise RecordingError(
             str(recording.path), "a recording without sim/truth", "one of a simulated walk",
@@ -79,21 +80,31 @@ def read_poses(recording: Recording, ticks: Ticks) -> Poses:
     qpos = np.full((len(ticks), len(names), NQ), np.nan)
     grf = np.zeros((len(ticks), len(names), 4, 3))
     robot_of = {STATE.key(config.team.name, name): i for i, name in enumerate(names)}
-    for key, tick, _, payload in recording.entries({STATE.name, TRUTH.name}):
-        at = row.get(tick)
-        if at is None:
-            continue
-        if key in robot_of:
-            qpos[at, robot_of[key], 7:] = decode(payload, State).q_joint
-        else:
-            truth = decode(payload, Truth)
+    for truth in _truths(recording):
+        at = row.get(truth.tick)
+        if at is not None:
             qpos[at, :, :3], qpos[at, :, 3:7] = truth.base_pos, truth.base_quat_wxyz
             grf[at] = truth.grf
+    for key, tick, _, payload in recording.entries({STATE.name}):
+        at = row.get(tick)
+        if at is not None and key in robot_of:
+            with suppress(MessageError):  # as if it had been lost
+                qpos[at, robot_of[key], 7:] = decode(payload, State).q_joint
     if np.isnan(qpos[..., :7]).any():
         raise RecordingError(str(recording.path), "instants without sim/truth", "truth every 10 ms")
     # A robot whose state was lost at an instant is shown standing.
     qpos[..., 7:] = np.where(np.isnan(qpos[..., 7:]), q_stand(), qpos[..., 7:])
     return Poses(config, ticks, qpos.reshape(len(ticks), -1), grf)
+
+
+def _truths(recording: Recording) -> Iterator[Truth]:
+    """Every valid truth about the team of the recording; anybody may have published others."""
+    names = robot_names(recorded_config(recording).team.robots)
+    for entry in recording.entries({TRUTH.name}):
+        with suppress(MessageError):
+            truth = decode(entry.payload, Truth)
+            if truth.robots == names and len(truth.base_pos) == len(names):
+                yield truth
 
 
 class PosedTeam:

@@ -75,7 +75,7 @@ def metadata(config: Config, predictor_sha256: str) -> dict[str, str]:
         "config_json": json.dumps(asdict(config), sort_keys=True),
         "config_sha256": config_sha256(config),
         "predictor_sha256": predictor_sha256,
-        "versions": json.dumps(_versions()),
+        "versions": json.dumps(versions()),
     }
 
 
@@ -107,7 +107,7 @@ def _take(bus: Bus, to: RecordingWriter, timeout: float) -> bool:
     return True
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
     """Versions of what a run's figures depend on."""
     found = {"python": platform.python_version(), "machine": platform.machine()}
     for package in _PACKAGES:

@@ -117,6 +117,39 @@ def report(arguments: argparse.Namespace, _config: Config, _given: Given) -> int
     return int(went_wrong(summary))
 
 
+def play(arguments: argparse.Namespace, config: Config, given: Given) -> int:
+    """A recording back on the bus."""
+    from quadriga.play import play
+    from quadriga.tape import Tape, parse_remap
+    from shared.recording import Recording
+
+    remaps = [parse_remap(text) for text in arguments.remap]
+    recording = Recording(arguments.file)
+    if "name" in given.get("team", {}):
+        remaps.append((recording.metadata.get("team", ""), config.team.name))
+    tape = Tape(recording, arguments.topics, remaps, arguments.clock)
+    play(config.bus, tape, Console(), rate=arguments.rate, start=arguments.start,
+         loop=arguments.loop, paused=arguments.paused)  # fmt: skip
+    return 0
+
+
+def resim(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
+    """The world of a recording once more, compared to the byte."""
+    from quadriga.resim_run import run
+
+    _expect_no_options(given, "the recording's own configuration is used")
+    return int(not run(arguments.file, Console()))
+
+
+def export(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
+    """A recording in a format of others."""
+    from quadriga.export.run import run
+
+    _expect_no_options(given, "the recording's own configuration is used")
+    run(arguments.file, arguments.to, arguments.output, Console())
+    return 0
+
+
 def operate(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """The operator's process."""
     from quadriga.operator import run
@@ -190,6 +223,13 @@ def router(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 
     run(config, arguments.listen or config.bus.endpoint, once=arguments.once)
     return 0
+
+
+def _expect_no_options(given: Given, why: str) -> None:
+    """Refuse configuration that would be ignored."""
+    if given:
+        names = [f"{section}.{key}" for section, keys in given.items() for key in keys]
+        raise ConfigError("options", ", ".join(names), "none of the configuration", why)
 
 
 def show_config(arguments: argparse.Namespace, config: Config, _given: Given) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any, Final, Self
@@ -23,6 +24,7 @@ ROUTER: Final = "router"
 POLL: Final = 0.1  # s, longest wait before a loop looks at its stop flag
 _ACK: Final = "received"  # key of the question whether everything before it has arrived
 _ACK_TIMEOUT: Final = 2.0  # s
+_LINK_TIMEOUT: Final = 5.0  # s
 _NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
 
 
@@ -82,6 +84,26 @@ class Bus:
             if stopped and stopped():
                 raise KeyboardInterrupt
             sleep(POLL)
+
+    @classmethod
+    def join(cls, bus: BusConfig, team: str, name: str) -> Self:
+        """Join the network at `bus.endpoint`; in peer mode be who listens there if nobody does.
+
+        For a process that must be found although no sim server runs. If somebody listens there,
+        this waits for the link to them.
+
+        Raises:
+            BusError: the endpoint is malformed, or in client mode there is no router.
+        """
+        if bus.mode == "peer":
+            with suppress(BusError):  # somebody listens there, or it is another machine's
+                settings = member_settings(bus, name, hub=True)
+                return cls(_open(settings, bus.endpoint, name), team, name)
+        joined = cls.open(bus, team, name)
+        deadline = monotonic() + _LINK_TIMEOUT
+        while not joined.linked and monotonic() < deadline:
+            sleep(0.005)
+        return joined
 
     @classmethod
     def route(cls, listen: str, team: str) -> Self:

@@ -12,10 +12,16 @@ _CLOSED: Final = {  # nobody is found by multicast, nothing goes through shared 
 }
 
 
-def member_settings(bus: BusConfig, name: str) -> dict[str, Any]:
-    """Settings of a process of the team; in peer mode the one named `sim` is who they all find."""
+def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str, Any]:
+    """Settings of a process of the team.
+
+    Args:
+        bus: the configuration.
+        name: of the process; in peer mode the one named `sim` is who they all find.
+        hub: be who they find although the name is another.
+    """
     peer = bus.mode == "peer"
-    hub = peer and name == "sim"
+    hub = peer and (hub or name == "sim")
     listen = [bus.endpoint] if hub else [bus.listen] if peer else []
     return {
         "mode": bus.mode,

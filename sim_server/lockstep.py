@@ -10,6 +10,7 @@ from shared.clock import monotonic
 from shared.messages import Command
 from sim_server.stage import Stage
 
+ANSWERS: Final = "answers again"  # how the event of a robot's return ends; a replay reads it
 _ALONE: Final = 0.001  # s, pace of a world that nobody answers, so that robots can come back
 
 
@@ -42,7 +43,7 @@ def _commands(stage: Stage, stopped: Callable[[], bool]) -> dict[str, Command]:
             waiting.discard(robot)
             if robot in stage.silent:
                 stage.silent.discard(robot)
-                stage.announce("fault", robot, "answers again")
+                stage.announce("fault", robot, ANSWERS)
     return {name: box.latest[name] for name in stage.world.names if box.tick_of(name) == tick}
 
 

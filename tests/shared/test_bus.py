@@ -137,6 +137,22 @@ def test_two_processes_of_one_name_are_noticed(opened: Open) -> None:
     assert sim.doubles(HERE) == first.doubles(HERE) == {"r1"}
 
 
+def test_who_joins_is_found_without_a_sim_server_and_steps_back_for_one_who_listens(
+    opened: Open, endpoint: str
+) -> None:
+    config = BusConfig(endpoint=endpoint)
+    early = opened("r1")
+    with Bus.join(config, "team", "first") as first, Bus.join(config, "team", "second") as second:
+        early.subscribe("team/*/x")
+        meet(early, first, second)
+        second.publisher("team/r2/x")(b"7")
+        assert numbers(early, 1) == [7]
+        with pytest.raises(BusError, match="another team or program listens there"):
+            opened("sim")
+    with pytest.raises(BusError, match="no router there"):
+        Bus.join(BusConfig(mode="client", endpoint=endpoint), "team", "third")
+
+
 def test_a_port_in_use_is_one_clear_error(opened: Open, endpoint: str) -> None:
     opened("sim")
     with pytest.raises(BusError, match=rf"{endpoint}.*Address already in use.*another team"):

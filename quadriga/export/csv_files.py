@@ -1,0 +1,35 @@
+"""Tables as CSV: a folder with one file per key."""
+
+from __future__ import annotations
+
+import csv
+from contextlib import ExitStack
+from math import isnan
+from pathlib import Path
+from typing import Any
+
+from quadriga.export.source import Source
+from quadriga.export.tables import build_columns, rows
+from quadriga.export.written import Progress, file_of, make_folder
+
+
+def write_csv(source: Source, out: Path, progress: Progress) -> tuple[Path, ...]:
+    """Write one file per key into the new folder `out`, numbers in full precision.
+
+    Entries that a message does not have are empty, lists are numbers separated by spaces.
+    """
+    make_folder(out)
+    writers: dict[str, Any] = {}
+    with ExitStack() as files:
+        for item in source.items():
+            writer = writers.get(item.name)
+            if writer is None:
+                path = file_of(out, item.name, "csv")
+                file = files.enter_context(path.open("x", newline="", encoding="utf-8"))
+                writer = writers[item.name] = csv.writer(file)
+                writer.writerow(build_columns(item.layout, item.robot).names)
+            for head, numbers, lists in rows(item):
+                shown = ["" if isnan(value) else value for value in numbers]
+                writer.writerow([*head, *shown, *(" ".join(map(repr, one)) for one in lists)])
+            progress(item.message.tick)
+    return tuple(file_of(out, name, "csv") for name in writers)

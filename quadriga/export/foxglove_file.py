@@ -1,0 +1,147 @@
+"""One MCAP file for Foxglove and Rerun: protobuf with named fields, and the team to look at."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+import foxglove
+import foxglove.messages as fox
+from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateChannel
+
+from quadriga.export.layout import Layout
+from quadriga.export.protobuf import ProtobufType, type_of
+from quadriga.export.scene import Scene, path_ticks, stamp_of
+from quadriga.export.source import Item, Source
+from quadriga.export.tracking import NAMES, Tracking
+from quadriga.export.written import Progress
+from quadriga.poses import Poses, read_poses, truth_ticks
+from shared.messages import Event, Measurement, Message, Truth
+from shared.topics import MEASUREMENT, TRUTH
+
+_PICTURE: Final = 10  # ms, least time between two poses of the team
+_WARNINGS: Final = ("fall", "fault")
+
+
+def write_foxglove(source: Source, out: Path, progress: Progress) -> tuple[Path, ...]:
+    """Write a recording for Foxglove and Rerun.
+
+    Times are the world's: a message of 12.3 s stands at 12.3 s since 1970.
+
+    Args:
+        source: what to write.
+        out: the file; it must not exist.
+        progress: told the tick that was reached.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    context = foxglove.Context()
+    with _opened(out, context):
+        scalars, drawing = _Scalars(source, context), _Drawing(source, context)
+        events = LogChannel("/events", context=context)
+        for item in source.items():
+            message, time = item.message, item.message.tick * 1_000_000
+            scalars.log(item, time)
+            if isinstance(message, Truth):
+                drawing.log(message.tick, time)
+                progress(message.tick)
+            elif isinstance(message, Event):
+                events.log(_said(message), log_time=time)
+    return (out,)
+
+
+@contextmanager
+def _opened(out: Path, context: foxglove.Context) -> Iterator[None]:
+    """What is logged in `context` goes to a file; that its disk is full shows when it is closed."""
+    foxglove.set_log_level(logging.CRITICAL)  # it would complain of every message
+    writer = foxglove.open_mcap(out, context=context)
+    try:
+        yield
+    finally:
+        try:
+            writer.close()
+        except RuntimeError as error:
+            raise OSError(str(error)) from None
+
+
+class _Scalars:
+    """One channel for each key, and `tracking` beside each robot's measurements."""
+
+    def __init__(self, source: Source, context: foxglove.Context) -> None:
+        self._context = context
+        self._types: dict[type[Message], ProtobufType] = {}
+        self._channels: dict[str, foxglove.Channel] = {}
+        self._tracking = Tracking(source.recording) if MEASUREMENT.name in source.topics else None
+        self._tracked = ProtobufType("Tracking", [("tick", int)], [], NAMES)
+
+    def log(self, item: Item, time: int) -> None:
+        message, layout = item.message, item.layout
+        kind = self._types.get(layout.kind)
+        if kind is None:
+            kind = self._types[layout.kind] = type_of(layout)
+        cut = layout.sampled
+        samples = item.numbers[:, :cut] if cut else None
+        payload = kind.encode(_plain(message, layout), item.numbers[0, cut:], samples)
+        self._channel(f"/{item.name}", kind).log(payload, log_time=time)
+        if self._tracking is not None and isinstance(message, Measurement):
+            row = self._tracking.row(item.robot, message.tick)
+            if row is not None:
+                payload = self._tracked.encode({"tick": message.tick}, row)
+                self._channel(f"/{item.robot}/tracking", self._tracked).log(payload, log_time=time)
+
+    def _channel(self, topic: str, kind: ProtobufType) -> foxglove.Channel:
+        found = self._channels.get(topic)
+        if found is None:
+            schema = foxglove.Schema(name=kind.name, encoding="protobuf", data=kind.descriptor)
+            found = self._channels[topic] = foxglove.Channel(
+                topic, schema=schema, message_encoding="protobuf", context=self._context
+            )
+        return found
+
+
+class _Drawing:
+    """Frames, bodies, terrain, yokes and forces, where the truth was recorded."""
+
+    def __init__(self, source: Source, context: foxglove.Context) -> None:
+        self._frames = FrameTransformsChannel("/frames", context=context)
+        self._bodies = SceneUpdateChannel("/scene/robots", context=context)
+        self._terrain = SceneUpdateChannel("/scene/terrain", context=context)
+        self._forces = SceneUpdateChannel("/scene/forces", context=context)
+        self._row: dict[int, int] = {}
+        self._drawn = False
+        if TRUTH.name in source.topics:
+            ticks = path_ticks(truth_ticks(source.recording), _PICTURE)
+            self._poses: Poses = read_poses(source.recording, ticks)
+            self._scene = Scene(source.config)
+            self._row = {tick: i for i, tick in enumerate(ticks.tolist())}
+
+    def log(self, tick: int, time: int) -> None:
+        at = self._row.pop(tick, None)
+        if at is None:
+            return
+        if not self._drawn:
+            self._drawn = True
+            self._bodies.log(self._scene.bodies(tick), log_time=time)
+            self._terrain.log(self._scene.terrain(tick, self._poses.centre()), log_time=time)
+        self._scene.set(self._poses.qpos[at])
+        self._frames.log(self._scene.frames(tick), log_time=time)
+        self._forces.log(self._scene.forces(tick, self._poses.grf[at]), log_time=time)
+
+
+def _plain(message: Message, layout: Layout) -> dict[str, object]:
+    plain: dict[str, object] = {"tick": message.tick}
+    plain |= {name: getattr(message, name) for name, _ in layout.plain}
+    plain |= {name: getattr(message, name).tolist() for name in layout.lists}
+    return plain
+
+
+def _said(event: Event) -> fox.Log:
+    level = fox.LogLevel.Warning if event.kind in _WARNINGS else fox.LogLevel.Info
+    return fox.Log(
+        timestamp=stamp_of(event.tick), level=level, name=event.robot or "world",
+        message=f"{event.kind}: {event.detail}",
+    )  # fmt: skip

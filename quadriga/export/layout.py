@@ -1,0 +1,123 @@
+"""The name of every number in a message, for readers that know nothing of this project."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Final
+
+import numpy as np
+
+from shared.config import Config
+from shared.messages import Message
+from shared.robot import JOINT_NAMES, OUTPUTS, Array, Leg, robot_names
+from shared.yokes import yoke_pairs
+
+LEGS: Final = tuple(leg.name for leg in Leg)
+JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
+_XYZ: Final = ("x", "y", "z")
+_WXYZ: Final = ("w", "x", "y", "z")
+FORCES: Final = tuple(f"{leg}.{axis}" for leg in LEGS for axis in _XYZ)
+_ENTRIES: Final = {  # of one robot and one sample
+    "q_joint": JOINTS, "v_joint": JOINTS, "tau_joint": JOINTS, "imu_quat_wxyz": _WXYZ,
+    "imu_gyro": _XYZ, "imu_accel": _XYZ, "foot_force": LEGS,
+    "tau": JOINTS, "q_des": JOINTS, "v_des": JOINTS, "kp": JOINTS, "kd": JOINTS,
+    "u": FORCES, "y": OUTPUTS, "stance": LEGS,
+    "base_pos": _XYZ, "base_quat_wxyz": _WXYZ, "base_vel": _XYZ, "base_omega": _XYZ,
+    "grf": FORCES, "yoke_error": ("",), "yoke_force": ("",),
+}  # fmt: skip
+_SAMPLES: Final = "N"  # the axis of the horizon: one row per entry
+_LISTS: Final = ("P", "K")  # axes without names, of any length
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What one kind of message holds, in a recording of one team.
+
+    Attributes:
+        kind: the type of the messages.
+        plain: fields that are one number or text.
+        numbers: names of the entries of all arrays and maps, parts joined by dots, in the order
+            in which `numbers_of` gives them.
+        lists: fields that are lists of numbers of any length.
+    """
+
+    kind: type[Message]
+    plain: tuple[tuple[str, type], ...]
+    numbers: tuple[str, ...]
+    lists: tuple[str, ...]
+    _arrays: tuple[str, ...]
+    _maps: tuple[tuple[str, tuple[str, ...]], ...]
+
+    def numbers_of(self, message: Any) -> Array | None:
+        """The entries of all arrays and maps, NaN where a map has no such entry.
+
+        Returns:
+            Shape (rows, len(numbers)), one row per sample of a plan and a single one for
+            everything else; None if the message is about another team.
+        """
+        arrays = [np.asarray(getattr(message, name)) for name in self._arrays]
+        rows = len(arrays[0]) if self.by_sample else 1
+        parts = [array.reshape(rows, -1) for array in arrays]
+        for name, entries in self._maps:
+            known = getattr(message, name)
+            row = [[float(known.get(entry, np.nan)) for entry in entries]]
+            parts.append(np.repeat(row, rows, axis=0))
+        found: Array = np.concatenate(parts, axis=1) if parts else np.zeros((rows, 0))
+        return found if found.shape[1] == len(self.numbers) else None
+
+    @property
+    def sampled(self) -> int:
+        """How many of `numbers`, from the first on, differ from sample to sample."""
+        maps = sum(len(entries) for _, entries in self._maps)
+        return len(self.numbers) - maps if self.by_sample else 0
+
+    @property
+    def by_sample(self) -> bool:
+        """Whether a message has one row per sample of the horizon."""
+        return any(item.metadata.get("shape", ("",))[0] == _SAMPLES for item in fields(self.kind))
+
+
+def build_layout(
+    kind: type[Message], config: Config, entries: Mapping[str, tuple[str, ...]]
+) -> Layout:
+    """The layout of a kind of message.
+
+    Args:
+        kind: the type.
+        config: the recorded configuration: robots and yokes.
+        entries: for each field that is a map, the names that occur in it.
+    """
+    robots = robot_names(config.team.robots)
+    pairs = yoke_pairs(len(robots), config.team.yokes)
+    owners = {"n": robots, "k": tuple(f"{robots[i]}-{robots[j]}" for i, j in pairs)}
+    plain, numbers, lists, arrays, maps = [], list[str](), [], [], []
+    for item in fields(kind):
+        shape, of = item.metadata.get("shape"), item.metadata.get("kind")
+        if shape is None:
+            if of is dict:
+                maps.append((item.name, entries.get(item.name, ())))
+            elif of in (int, float, str) and item.name not in ("tick", "stamp_ns"):
+                plain.append((item.name, of))
+        elif shape[0] in _LISTS:
+            lists.append(item.name)
+        else:
+            arrays.append(item.name)
+            for owner in owners.get(shape[0], ("",)):
+                names = (".".join((owner, item.name, entry)) for entry in _ENTRIES[item.name])
+                numbers += [name.strip(".") for name in names]
+    for name, among in maps:
+        numbers += _entry_names(name, among)
+    return Layout(kind, tuple(plain), tuple(numbers), tuple(lists), tuple(arrays), tuple(maps))
+
+
+def _entry_names(field: str, entries: tuple[str, ...]) -> list[str]:
+    """Names for the entries of a map, whatever a sender called them: plan.r1 becomes plan_r1."""
+    names: list[str] = []
+    for entry in entries:
+        name = f"{field}.{re.sub(r'[^A-Za-z0-9_-]', '_', entry) or '_'}"
+        while name in names:
+            name += "_"
+        names.append(name)
+    return names

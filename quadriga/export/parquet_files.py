@@ -1,0 +1,86 @@
+"""Tables as Parquet: a folder with one file per key."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from quadriga.export.source import Item, Source
+from quadriga.export.tables import Columns, build_columns, rows
+from quadriga.export.written import Progress, file_of, make_folder
+
+_BATCH: Final = 10_000  # rows that are kept in memory
+_TYPES: Final = {int: pa.int64(), float: pa.float64(), str: pa.string()}
+
+
+def write_parquet(source: Source, out: Path, progress: Progress) -> tuple[Path, ...]:
+    """Write one file per key into the new folder `out`; missing numbers are null."""
+    make_folder(out)
+    tables: dict[str, _Table] = {}
+    with ExitStack() as files:
+        for item in source.items():
+            table = tables.get(item.name)
+            if table is None:
+                columns = build_columns(item.layout, item.robot)
+                path = file_of(out, item.name, "parquet")
+                table = tables[item.name] = files.enter_context(_Table(path, columns))
+            table.append(item)
+            progress(item.message.tick)
+    return tuple(file_of(out, name, "parquet") for name in tables)
+
+
+class _Table:
+    """One file, written batch by batch."""
+
+    def __init__(self, path: Path, columns: Columns) -> None:
+        fields = [(name, _TYPES[of]) for name, of in columns.head]
+        fields += [(name, pa.float64()) for name in columns.numbers]
+        fields += [(name, pa.list_(pa.float64())) for name in columns.lists]
+        self._schema = pa.schema(fields)
+        self._writer = pq.ParquetWriter(path, self._schema, compression="zstd")
+        self._rows: list[tuple[list[Any], list[float], list[list[float]]]] = []
+
+    def append(self, item: Item) -> None:
+        self._rows.extend(rows(item))
+        if len(self._rows) >= _BATCH:
+            self._flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if kind is None:
+            self._flush()
+            self._writer.close()
+        else:  # the file is given up, and the first error is the one to tell
+            with suppress(OSError, pa.ArrowException):
+                self._writer.close()
+
+    def _flush(self) -> None:
+        if not self._rows:
+            return
+        heads, numbers, lists = zip(*self._rows, strict=True)
+        columns: list[Any] = list(zip(*heads, strict=True))
+        columns += list(np.array(numbers, dtype=np.float64).T)
+        columns += list(zip(*lists, strict=True))
+        self._writer.write_batch(
+            pa.record_batch(
+                [
+                    pa.array(column, field.type, from_pandas=True)
+                    for column, field in zip(columns, self._schema, strict=True)
+                ],
+                schema=self._schema,
+            )
+        )
+        self._rows.clear()

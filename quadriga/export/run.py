@@ -1,0 +1,93 @@
+"""SHELL of `quadriga export`: a bar while the files are written, then what they are."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Final
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from quadriga.export.source import Source
+from quadriga.export.written import remove
+from shared.clock import monotonic
+from shared.errors import ConfigError, RecordingError
+from shared.recording import Recording
+
+_WRITERS: Final = {  # module, function, what the default output is called
+    "foxglove": ("foxglove_file", "write_foxglove", "{}.foxglove.mcap"),
+    "rerun": ("foxglove_file", "write_foxglove", "{}.rerun.mcap"),
+    "csv": ("csv_files", "write_csv", "{}-csv"),
+    "parquet": ("parquet_files", "write_parquet", "{}-parquet"),
+}
+FORMATS: Final = tuple(_WRITERS)
+_STRIDE: Final = 100  # ticks between updates of the bar
+
+
+def run(path: Path, form: str, out: Path | None, console: Console) -> None:
+    """Export a recording.
+
+    Args:
+        path: the recording.
+        form: one of `FORMATS`.
+        out: file or folder to write, which must not exist; None puts it beside the recording.
+        console: for the bar and the last word.
+
+    Raises:
+        RecordingError: no recording, or nothing in it that can be exported.
+        ConfigError: the output exists or cannot be written, or a package is not installed.
+    """
+    recording = Recording(path)
+    module, function, name = _WRITERS[form]
+    write = _imported(module, function, form)
+    out = out or path.with_name(name.format(path.stem))
+    if out.exists():
+        raise ConfigError("--output", f"{out}, which exists", "a new file or folder",
+                          "an export overwrites nothing")  # fmt: skip
+    begun = monotonic()
+    source = Source(recording)
+    if not source.topics:
+        raise RecordingError(str(path), "no message of a known topic", "a recorded walk")
+    bar = Progress(
+        TextColumn("exporting"), BarColumn(), TextColumn("{task.completed:.1f}/{task.total:.1f} s"),
+        console=console, transient=True, disable=not console.is_terminal,
+    )  # fmt: skip
+    with bar:
+        task = bar.add_task("", total=source.last / 1000)
+        shown = 0
+
+        def progress(tick: int) -> None:
+            nonlocal shown
+            if tick >= shown + _STRIDE:
+                shown = tick
+                bar.update(task, completed=tick / 1000)
+
+        try:
+            files = write(source, out, progress)
+        except BaseException as error:
+            remove(out)
+            if isinstance(error, OSError):
+                raise ConfigError(
+                    "--output", f"{out}: {error.strerror or error}", "a writable place with room"
+                ) from None
+            raise
+    size = sum(file.stat().st_size for file in files)
+    count = f" with {len(files)} files" if len(files) > 1 else ""
+    lines = [f"{out}{count}, {size / 1e6:.1f} MB in {monotonic() - begun:.1f} s"]
+    if recording.cut:
+        lines.append(f"only as far as the recording goes: {recording.cut}")
+    lines += [f"left out {many} messages of {key}: not a valid message of a known topic"
+              for key, many in sorted(source.left_out.items())]  # fmt: skip
+    for line in lines:
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def _imported(module: str, function: str, form: str) -> Any:
+    try:
+        return getattr(import_module(f"quadriga.export.{module}"), function)
+    except ModuleNotFoundError as error:
+        raise ConfigError(
+            f"--to {form}", f"no Python package {error.name}", "the extra 'export'",
+            "pip install 'quadriga[export]'",
+        ) from None  # fmt: skip

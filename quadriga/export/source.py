@@ -1,0 +1,92 @@
+"""A recording as an export reads it: decoded messages in order, and what was left out."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import NamedTuple
+
+from quadriga.export.layout import Layout, build_layout
+from quadriga.traces import recorded_config
+from shared.codec import decode
+from shared.errors import MessageError
+from shared.messages import Message
+from shared.recording import Recording
+from shared.robot import Array
+from shared.topics import TABLE, topic_of
+
+
+class Item(NamedTuple):
+    """One decoded message: where it was published, and its numbers by `layout`."""
+
+    name: str  # the key without the team
+    robot: str
+    log_time_ns: int
+    message: Message
+    layout: Layout
+    numbers: Array  # (rows, len(layout.numbers))
+
+
+class Source:
+    """A recording to export.
+
+    Attributes:
+        config: the configuration of the run.
+        layouts: by type of message.
+        left_out: messages that are not exported, by key: not valid, or of no known topic.
+        last: the last tick that was recorded, ms.
+        topics: names of the topics that were recorded.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        """Look through the recording once, for the names that occur in maps.
+
+        Raises:
+            RecordingError, ConfigError: see `recorded_config`.
+        """
+        self.recording, self.config = recording, recorded_config(recording)
+        self.left_out: Counter[str] = Counter()
+        found: defaultdict[tuple[type[Message], str], set[str]] = defaultdict(set)
+        maps = {
+            topic.name: [i.name for i in fields(topic.type) if i.metadata.get("kind") is dict]
+            for topic in TABLE
+        }
+        self.last = 0
+        self.topics: set[str] = set()
+        kinds = {topic.name: topic.type for topic in TABLE}
+        for entry in recording.entries(set(kinds)):
+            self.last = max(self.last, entry.tick)
+            topic = topic_of(entry.key)[0]
+            self.topics.add(topic.name)
+            if maps[topic.name]:
+                try:
+                    message = decode(entry.payload, topic.type)
+                except MessageError:
+                    continue  # counted when it is its turn
+                for name in maps[topic.name]:
+                    found[topic.type, name] |= getattr(message, name).keys()
+        self.layouts = {
+            kind: build_layout(
+                kind, self.config,
+                {name: tuple(sorted(found[kind, name])) for name in maps[topic_name]},
+            )
+            for topic_name, kind in kinds.items()
+        }  # fmt: skip
+
+    def items(self) -> Iterator[Item]:
+        """All messages that can be exported, in the order of the recording."""
+        self.left_out.clear()
+        for key, _, log_time_ns, payload in self.recording.entries():
+            try:
+                topic, robot = topic_of(key)
+                message = decode(payload, topic.type)
+            except MessageError:
+                self.left_out[key] += 1
+                continue
+            layout = self.layouts[topic.type]
+            numbers = layout.numbers_of(message)
+            if numbers is None:
+                self.left_out[key] += 1
+                continue
+            yield Item(key.partition("/")[2], robot, log_time_ns, message, layout, numbers)

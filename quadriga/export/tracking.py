@@ -1,0 +1,60 @@
+"""What a robot's trunk was to do, was estimated to do and did, side by side for plotting."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from agents.sampling import SAMPLE_MS
+from quadriga.figures import stitched
+from quadriga.traces import in_force, read_traces
+from quadriga.truth_trace import Ticks
+from shared.recording import Recording
+from shared.robot import OUTPUTS, Array
+from shared.topics import MEASUREMENT, PLAN, REFERENCE, TRUTH
+
+NAMES: Final = (
+    *(f"{what}.{output}" for what in ("true", "estimated", "planned") for output in OUTPUTS),
+    *(f"reference.{name}" for name in ("vx", "vy", "wz", "height")),
+)
+
+
+class Tracking:
+    """Rows of `NAMES` by robot and tick of its measurements; NaN where something is not known."""
+
+    def __init__(self, recording: Recording) -> None:
+        """Read what is needed of a recording.
+
+        Raises:
+            RecordingError, ConfigError: see `read_traces`.
+        """
+        names = {topic.name for topic in (TRUTH, MEASUREMENT, PLAN, REFERENCE)}
+        traces = read_traces(recording, names)
+        self._rows: dict[str, tuple[Ticks, Array]] = {}
+        for i, robot in enumerate(traces.robots):
+            tick, estimated = traces.measurements[robot].tick, traces.measurements[robot].y
+            begin, _, planned = stitched(traces.plans[robot], traces.config.planner.applied)
+            rows = [
+                _at(tick, traces.truth.tick, traces.truth.y[:, i]), estimated,
+                _at(tick, np.rint(1000 * begin).astype(np.int64) + SAMPLE_MS, planned),
+                in_force(traces.references, tick),
+            ]  # fmt: skip
+            self._rows[robot] = tick, np.concatenate(rows, axis=1)
+
+    def row(self, robot: str, tick: int) -> Array | None:
+        """The row of a measurement. Shape (len(NAMES),)."""
+        ticks, rows = self._rows.get(robot, (np.zeros(0, dtype=np.int64), np.zeros((0, 0))))
+        at = int(np.searchsorted(ticks, tick))
+        return rows[at] if at < len(ticks) and ticks[at] == tick else None
+
+
+def _at(tick: Ticks, known: Ticks, values: Array) -> Array:
+    """Rows of `values` at each tick, NaN where none is known. Shape (len(tick), 6)."""
+    padded = np.vstack([np.full((1, len(OUTPUTS)), np.nan), values.reshape(-1, len(OUTPUTS))])
+    order = np.argsort(known, kind="stable")  # of several for one tick the last counts
+    newest = np.searchsorted(known[order], tick, side="right")
+    at = np.concatenate([[0], 1 + order])[newest]
+    at[(at > 0) & (np.concatenate([[-1], known])[at] != tick)] = 0
+    found: Array = padded[at]
+    return found

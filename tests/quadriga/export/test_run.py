@@ -1,0 +1,93 @@
+"""What can go wrong with an export is one line, and leaves nothing half-written."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from quadriga.cli import main, parser
+from quadriga.export.run import FORMATS
+from quadriga.recorder import metadata
+from shared.config import Config
+from shared.recording import RecordingWriter
+
+SMALL = """
+import resource, signal, sys
+from quadriga.cli import main
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, -1))
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def failed(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    status = main(["export", *map(str, arguments)])
+    out, err = capsys.readouterr()
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    return err
+
+
+def test_mistakes(capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path) -> None:
+    assert "No such file" in failed(capsys, tmp_path / "no.mcap", "--to", "csv")
+    there = tmp_path / "there"
+    there.write_text("precious")
+    for form in FORMATS:
+        assert "overwrites nothing" in failed(capsys, file, "--to", form, "-o", there)
+        assert there.read_text() == "precious"
+        below = there / "out"
+        said = failed(capsys, file, "--to", form, "-o", below)
+        assert f"--output: got {below}: Not a directory" in said
+    assert "got team.robots" in failed(capsys, file, "--to", "csv", "--robots", "3")
+    empty = tmp_path / "empty.mcap"
+    with RecordingWriter(empty, metadata(Config(), "")):
+        pass
+    assert "no message of a known topic" in failed(capsys, empty, "--to", "parquet")
+    assert not (tmp_path / "empty-parquet").exists()
+
+
+@pytest.mark.parametrize(
+    ("form", "package"), [("foxglove", "foxglove"), ("rerun", "google"), ("parquet", "pyarrow")]
+)
+def test_a_package_that_is_not_installed_is_named_with_its_remedy(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, file: Path, tmp_path: Path,
+    form: str, package: str,
+) -> None:  # fmt: skip
+    for name in list(sys.modules):
+        if name.partition(".")[0] == package or name.startswith("quadriga.export."):
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, package, None)
+    said = failed(capsys, file, "--to", form, "-o", tmp_path / "out")
+    assert f"--to {form}: got no Python package {package}" in said
+    assert "pip install 'quadriga[export]'" in said
+
+
+@pytest.mark.parametrize("form", ["foxglove", "csv", "parquet"])
+def test_a_full_disk_is_one_clear_error_and_leaves_nothing(
+    file: Path, tmp_path: Path, form: str
+) -> None:
+    out = tmp_path / "out"
+    command = [sys.executable, "-c", SMALL, "export", str(file), "--to", form, "-o", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert "expected a writable place with room" in done.stderr
+    assert not out.exists()
+
+
+def test_without_an_output_it_goes_beside_the_recording(
+    capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
+) -> None:
+    cut = tmp_path / "run.mcap"
+    cut.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
+    assert main(["export", str(cut), "--to", "csv"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith(str(tmp_path / "run-csv"))
+    assert "only as far as the recording goes: the file ends at byte" in said
+    assert (tmp_path / "run-csv" / "r1.state.csv").stat().st_size > 1000
+
+
+def test_the_command_line_offers_every_format() -> None:
+    for form in FORMATS:
+        assert parser().parse_args(["export", "f", "--to", form]).to == form

@@ -1,0 +1,31 @@
+"""A walk over the bus, one robot frozen for a while, is the same world when re-simulated."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import pytest
+
+from quadriga.cli import main
+from tests.runtime.conftest import Make
+
+
+def test_a_walk_with_a_frozen_robot_comes_out_equal(
+    make_team: Make, capsys: pytest.CaptureFixture[str]
+) -> None:
+    team = make_team(
+        recorder__enabled=True, world__seconds=4.0, world__command_timeout=0.3,
+        world__push="r1:50:90:0.3:0.1",
+    )  # fmt: skip
+    with team.launch() as running:
+        team.await_log("sim", "start")
+        os.kill(running.pids["r2"], signal.SIGSTOP)
+        team.await_log("sim", "fault r2 silent for 0.3 s")
+        os.kill(running.pids["r2"], signal.SIGCONT)
+        team.await_log("sim", "fault r2 answers again")
+        running.watch(lambda: False)
+    assert main(["resim", str(team.folder / "run.mcap")]) == 0
+    said = capsys.readouterr().out
+    assert "equal to the byte" in said
+    assert "only" not in said
