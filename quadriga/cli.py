@@ -89,7 +89,10 @@ def parser() -> argparse.ArgumentParser:
         waiting.add_argument("--wait", type=float, default=0.0, metavar="S",
                              help="wait so long for the predictor to be made (0)")  # fmt: skip
     report = add("report", verbs.report, "show what came of a recorded walk")
-    report.add_argument("run_dir", type=Path, metavar="DIR", help="the folder of a run.mcap")
+    report.add_argument("run", type=Path, metavar="FILE|DIR",
+                        help="a recording, or the folder of a run.mcap")  # fmt: skip
+    report.add_argument("--html", type=Path, metavar="FILE",
+                        help="the page of a recording's FILE (its name with .html)")  # fmt: skip
     report.add_argument("--no-render", action="store_true", help="no pictures of the walk")
     router = add("router", verbs.router, "the router between processes in client mode")
     router.add_argument("--listen", metavar="ENDPOINT", help="where (bus.endpoint)")

@@ -25,8 +25,10 @@ FALL_TILT: Final = 1.0  # rad
 FALL_HEIGHT: Final = 0.12  # m above the terrain
 
 
-def summarise(run_dir: Path) -> dict[str, Any]:
+def summarise(run_dir: Path, traces: Traces | None = None) -> dict[str, Any]:
     """Compute the figures of the run in `run_dir`, write them to `summary.json`, return them.
+
+    `traces` are those of its recording, if that has been read already.
 
     Lengths in m, speeds in m/s, angles in rad, world time in s. A figure that the recording does
     not hold (no planner, a walk too short for a steady part) is None. Tracking errors, mean speeds
@@ -36,7 +38,7 @@ def summarise(run_dir: Path) -> dict[str, Any]:
     Raises:
         RecordingError: there is no recording, or it is empty or foreign.
     """
-    summary = summary_of(read_traces(Recording(run_dir / RECORDING)))
+    summary = summary_of(traces or read_traces(Recording(run_dir / RECORDING)))
     text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
     (run_dir / SUMMARY).write_text(text + "\n", encoding="utf-8")
     return summary
