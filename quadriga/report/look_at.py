@@ -26,6 +26,7 @@ TILT: Final = 0.25  # rad; walks on rough ground stay below
 SLIP: Final = 0.2  # m/s; feet in stance roll at up to 0.06
 _LOST_MS: Final = 40  # ms of scheduled stance without contact
 _TORQUE: Final = 0.98  # share of the limit
+_TELLING: Final = ("push", "plan", "counted", "gap", "mode")  # kinds of moments that are signs
 _LIMP: Final = (f"({DAMPING})", f"({ESTOP})")
 _AT_LIMIT: Final = 0.99  # share of a planned force's limit
 
@@ -93,9 +94,11 @@ def _episode(run: Run, troubles: Sequence[Moment]) -> Episode:
     signs = [
         Sign(m.tick, m.robot, f"{m.kind}: {m.text}" if m.text else m.kind)
         for m in run.moments
-        if not m.trouble and tick - BEFORE_MS <= m.stop and m.tick <= tick
-        and m.kind in ("push", "plan", "counted", "gap", "mode")
-    ]  # fmt: skip
+        if m.kind in _TELLING
+        and tick - BEFORE_MS <= m.stop
+        and m.tick <= tick
+        and _down_since(run, m.robot, tick) is None
+    ]
     for robot in run.traces.robots:
         if _down_since(run, robot, tick) is None:
             signs += _signs(robot, _window(run.samples[robot], tick))
