@@ -82,6 +82,10 @@ def _world(traces: Traces) -> dict[str, Any]:
     down = (truth.tilt > FALL_TILT) | (truth.y[..., 0] < FALL_HEIGHT)
     seen = {traces.robots[i] for i in np.flatnonzero(down.any(axis=0))}
     told = {event.robot for event in traces.events if event.kind == "fall"}
+    if not len(truth.tick):  # then the robots' own word must do
+        told |= {
+            r for r, found in traces.statuses.items() if any(s.reason == "fall" for s in found)
+        }
     # The length of the way, sampled once a stride so that sway within it does not count.
     strides = truth.base_pos[truth.tick % (2 * traces.config.gait.stance_ms) == 0]
     way = np.concatenate([strides, truth.base_pos[-1:]])[..., :2]

@@ -44,17 +44,12 @@ def rows(s: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Name and text of each figure that there is."""
     shown = [
         ("falls", ", ".join(s["fallen"]) or "none"),
-        ("distance", f"{_text(s['distance'], '.2f')} m in {s['duration']:.1f} s"),
-        ("mean speed", f"vx {_text(s['mean_vx'], '+.3f')}, vy {_text(s['mean_vy'], '+.3f')} m/s, "
-                       f"wz {_text(s['mean_wz'], '+.3f')} rad/s"),
-        (f"RMSE from {s['steady_from']:.1f} s", _errors(s["rmse"])),
-        (f"estimator ({s['estimator']}) RMSE", _errors(s["estimator_rmse"])),
-        ("yoke drift", f"at most {_text(s['yoke_drift_max'], '.2f', 1e3)} mm"),
+        *_against_truth(s),
         ("planner", _planner(s)),
         ("control tick", _times(s, "tick_us", "µs", ".0f")),
         ("real-time factor", _text(s["real_time_factor"], ".2f")),
         ("messages", f"{s['messages']:,} recorded, {s['gaps']} gaps, {s['invalid']} invalid"),
-    ]  # fmt: skip
+    ]
     if counted := _counted(s["counters"]):
         shown.append(("counted by the agents", counted))
     if s["end"]:
@@ -63,6 +58,19 @@ def rows(s: Mapping[str, Any]) -> list[tuple[str, str]]:
     if s["cut"]:
         shown.append(("recording", s["cut"]))
     return shown
+
+
+def _against_truth(s: Mapping[str, Any]) -> list[tuple[str, str]]:
+    if s["distance"] is None:
+        return [("world time", f"{s['duration']:.1f} s, without truth to compare anything with")]
+    return [
+        ("distance", f"{_text(s['distance'], '.2f')} m in {s['duration']:.1f} s"),
+        ("mean speed", f"vx {_text(s['mean_vx'], '+.3f')}, vy {_text(s['mean_vy'], '+.3f')} m/s, "
+                       f"wz {_text(s['mean_wz'], '+.3f')} rad/s"),
+        (f"RMSE from {s['steady_from']:.1f} s", _errors(s["rmse"])),
+        (f"estimator ({s['estimator']}) RMSE", _errors(s["estimator_rmse"])),
+        ("yoke drift", f"at most {_text(s['yoke_drift_max'], '.2f', 1e3)} mm"),
+    ]  # fmt: skip
 
 
 def _counted(counters: Mapping[str, Mapping[str, int]]) -> str:

@@ -54,7 +54,9 @@ def build_moments(traces: Traces, begin: int, end: int) -> tuple[Moment, ...]:
     found = [
         Moment(e.tick, e.tick, e.robot, e.kind, e.detail) for e in traces.events if e.tick <= end
     ]
+    fallen = {event.robot for event in traces.events if event.kind == FALL}
     for robot, statuses in traces.statuses.items():
+        found += [moment for moment in _falls(robot, statuses) if robot not in fallen][:1]
         found += _modes(robot, [s for s in statuses if s.tick <= end])
         found += _counted(robot, [s for s in statuses if s.tick <= end])
     for robot, plans in traces.plans.items():
@@ -65,6 +67,13 @@ def build_moments(traces: Traces, begin: int, end: int) -> tuple[Moment, ...]:
     if traces.cut:
         found.append(Moment(end, end, "", "recording", traces.cut))
     return tuple(sorted(found, key=lambda m: (m.tick, m.kind != FALL, m.robot, m.text)))
+
+
+def _falls(robot: str, statuses: Sequence[Status]) -> Iterator[Moment]:
+    """A fall by the robot's own word, where no world tells of it."""
+    for status in statuses:
+        if status.reason == FALL:
+            yield Moment(status.tick, status.tick, robot, FALL, "by its own word")
 
 
 def _modes(robot: str, statuses: Sequence[Status]) -> Iterator[Moment]:

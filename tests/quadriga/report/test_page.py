@@ -138,7 +138,10 @@ def test_what_is_absent_is_left_out_and_said_so(
 def test_without_truth_the_agents_estimates_and_the_foot_sensors_are_shown(
     write_run: WriteRun,
 ) -> None:
-    found = outline(write_run(run_config(2, 1.0), change=_Without(msg.Truth), extra=fallen(900)))
+    own_word = list(fallen(900))[1:]
+    found = outline(write_run(run_config(2, 1.0), change=_Without(msg.Truth), extra=own_word))
+    assert "Fell: r2 at 0.90 s" in found.text
+    assert "r2 fell" in found.marks
     assert "contact by the foot sensor" in found.text
     assert "measured (truth)" not in found.text
     assert "Each robot's estimated output" in found.text
