@@ -16,6 +16,7 @@ from shared.robot import Array
 WIDTH: Final = 1000.0  # px of the drawing; the page scales it
 _LEFT, _RIGHT, _ABOVE, _BETWEEN, _BELOW = 58.0, 14.0, 20.0, 8.0, 36.0
 _LOG_FLOOR: Final = 1e-3
+_LINE, _NARROW, _WIDE = 15.0, 40.0, 60.0  # px between values of an axis, at least
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,9 +140,7 @@ def _panel(
 
 
 def _time_axis(box: _Box, *, named: bool) -> str:
-    ticks = [
-        t for t in nice(box.begin, box.end, max(3, int(box.w // 70))) if box.begin <= t <= box.end
-    ]
+    ticks = grid(box.begin, box.end, box.w, _NARROW if box.w < 300.0 else _WIDE)
     foot, parts = box.y + box.h, []
     for tick in ticks:
         x = float(box.at(np.array(tick)))
@@ -202,7 +201,7 @@ def _bars(panel: Panel, box: _Box) -> Iterator[str]:
 def _curves(panel: Panel, box: _Box, points: int) -> Iterator[str]:
     scale = _log if panel.log else _same
     low, high = _range(panel, box)
-    for tick in _decades(low, high) if panel.log else _values(low, high, box.h):
+    for tick in _decades(low, high) if panel.log else grid(low, high, box.h, _LINE):
         height = scale(np.array(float(tick)))
         if low <= height <= high:
             y = box.y + box.h * float((high - height) / (high - low))
@@ -267,6 +266,17 @@ def _range(panel: Panel, box: _Box) -> tuple[float, float]:
     return low - (0.0 if panel.floor is not None and not panel.log else margin), high + margin
 
 
+def grid(low: float, high: float, length: float, least: float) -> list[float]:
+    """As many round values from `low` to `high` as stand `least` px apart on an axis of `length`.
+
+    Two at least, unless `low` and `high` are one.
+    """
+    room = max(2, int(length // least))
+    found = [nice(low, high, count) for count in range(1, room + 3)]
+    fitting = [values for values in found if len(values) <= room]
+    return max(fitting or found[:1], key=len)
+
+
 def nice(low: float, high: float, count: int) -> list[float]:
     """Round values from `low` to `high`, some `count` of them."""
     step = (high - low) / max(count, 1)
@@ -276,16 +286,6 @@ def nice(low: float, high: float, count: int) -> list[float]:
     first = math.ceil(low / step - 1e-9)
     last = math.floor(high / step + 1e-9)
     return [round(k * step, digits) + 0.0 for k in range(first, last + 1)]
-
-
-def _values(low: float, high: float, height: float) -> list[float]:
-    """Values of the grid: some 25 px apart, and three at least where that leaves room."""
-    found: list[float] = []
-    for count in range(max(2, int(height // 25)), 3 + int(height // 12)):
-        found = nice(low, high, count)
-        if len(found) >= 3:
-            break
-    return found
 
 
 def _decades(low: float, high: float) -> list[float]:

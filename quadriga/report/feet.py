@@ -33,7 +33,7 @@ def whole(run: Run) -> str:
 
 def enlarged(run: Run) -> tuple[str, float, float]:
     """Vertical forces of all feet in four strides, and from when to when, s."""
-    begin, end = _middle(run, 2e-3 * run.traces.config.gait.stance_ms * _STRIDES)
+    begin, end = strides(run)
     panels = [
         _panel(run, i, leg, f"{robot} {leg.name} [N]") for i, robot in _robots(run) for leg in Leg
     ]
@@ -93,8 +93,9 @@ def _bars(tick: Ticks, mask: Any, style: str, shift: int = 0) -> list[tuple[floa
     return found
 
 
-def _middle(run: Run, seconds: float) -> tuple[float, float]:
-    """Some seconds in the middle of the run, or of what there is before its first fall."""
+def strides(run: Run) -> tuple[float, float]:
+    """Four strides in the middle of the run, or of what there is before its first fall, s."""
+    seconds = 2e-3 * run.traces.config.gait.stance_ms * _STRIDES
     end = min(run.end / 1000, until(run))
     middle = 0.5 * (run.begin / 1000 + end)
     begin = max(run.begin / 1000, middle - seconds / 2)

@@ -82,12 +82,13 @@ def _absent(run: Run) -> str:
 def _run(run: Run) -> str:
     config = run.traces.config
     changed = about.departures(config)
-    text = table(("key", "value", "default", "meaning"), changed) if changed else (
-        "<p>Every key has its default value.</p>"
+    facts = table((), list(about.facts(run)), named=True)
+    if not changed:
+        return facts + "<p>Every key of the configuration has its default value.</p>"
+    return facts + details(
+        f"Keys of the configuration that differ from their defaults: {len(changed)}",
+        table(("key", "value", "default", "meaning"), changed), opened=True,
     )  # fmt: skip
-    return table((), list(about.facts(run)), named=True) + details(
-        f"{len(changed)} keys of the configuration are not at their defaults", text, opened=True
-    )
 
 
 def _look(run: Run, troubles: Sequence[Episode]) -> str:
@@ -155,10 +156,12 @@ def _trunks(run: Run) -> Iterator[Section]:
         legend = (key("true", "measured (truth)") if run.has_truth else "") + key(
             "own", "estimated by the agent"
         ) + key("planned", "planned") + asked  # fmt: skip
-        parts = [
-            details(robot, figure(tracks.trajectories(run, i), legend), opened=i < 3)
-            for i, robot in enumerate(robots)
-        ]
+        parts = []
+        for i, robot in enumerate(robots):
+            whole = figure(tracks.trajectories(run, i), legend)
+            parts.append(details(robot, whole, opened=i < 3))
+            near = figure(tracks.trajectories(run, i, feet.strides(run)), legend)
+            parts.append(details(f"{robot}, four strides enlarged", near, opened=i == 0))
         fell = "<p class='soft'>The axes are chosen by what came before the first fall.</p>"
         parts.append(fell if tracks.falls(run) else "")
         yield "trajectories", "Trajectories", "".join(parts)
@@ -216,7 +219,7 @@ def _machine(run: Run) -> Iterator[Section]:
         "Solve and tick times",
         figure(machine.times(run), named) + table(head, machine.times_table(run), numbers=True),
     )
-    text = "<p>Peers' plans: how old each was when it was planned with, by world time.</p>"
+    text = "<p>How old, by world time, each peer's plan was when it was planned with.</p>"
     yield (
         "ages",
         "Ages of inputs",

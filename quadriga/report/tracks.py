@@ -59,8 +59,14 @@ def figure(
     )  # fmt: skip
 
 
-def trajectories(run: Run, index: int) -> str:
-    """Every output of one robot: asked for, planned, estimated and true."""
+def trajectories(run: Run, index: int, part: tuple[float, float] | None = None) -> str:
+    """Every output of one robot: asked for, planned, estimated and true.
+
+    Args:
+        run: the run.
+        index: the robot's place.
+        part: first and last time, s; None: the whole run.
+    """
     traces, robot = run.traces, run.traces.robots[index]
     own, truth = traces.measurements[robot], traces.truth
     begin, _, planned = stitched(traces.plans[robot], traces.config.planner.applied)
@@ -75,7 +81,10 @@ def trajectories(run: Run, index: int) -> str:
             Curve(begin + SAMPLE_MS / 1000, planned[:, i], "planned", gap=1.5e-3 * SAMPLE_MS)
         )
         curves.append(Curve(asked / 1000, wanted[:, i], "asked"))
-        panels.append(Panel(NAMES[i], curves, span=_SPANS[i], until=until(run)))
+        span = _SPANS[i] if part is None else 0.5 * _SPANS[i]
+        panels.append(Panel(NAMES[i], curves, span=span, until=until(run)))
+    if part is not None:
+        return draw(panels, *part, marks=falls(run), columns=2, name=f"part of {robot}'s")
     return figure(run, panels, f"trajectories of {robot}", most=points(run, 24))
 
 
