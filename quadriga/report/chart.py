@@ -11,11 +11,11 @@ from typing import Final
 import numpy as np
 
 from quadriga.report import path
+from quadriga.report.axis import decades, grid, logarithm, same
 from shared.robot import Array
 
 WIDTH: Final = 1000.0  # px of the drawing; the page scales it
 _LEFT, _RIGHT, _ABOVE, _BETWEEN, _BELOW = 58.0, 14.0, 20.0, 8.0, 36.0
-_LOG_FLOOR: Final = 1e-3
 _LINE, _NARROW, _WIDE = 15.0, 40.0, 60.0  # px between values of an axis, at least
 
 
@@ -199,9 +199,9 @@ def _bars(panel: Panel, box: _Box) -> Iterator[str]:
 
 
 def _curves(panel: Panel, box: _Box, points: int) -> Iterator[str]:
-    scale = _log if panel.log else _same
+    scale = logarithm if panel.log else same
     low, high = _range(panel, box)
-    for tick in _decades(low, high) if panel.log else grid(low, high, box.h, _LINE):
+    for tick in decades(low, high) if panel.log else grid(low, high, box.h, _LINE):
         height = scale(np.array(float(tick)))
         if low <= height <= high:
             y = box.y + box.h * float((high - height) / (high - low))
@@ -226,7 +226,7 @@ def _curves(panel: Panel, box: _Box, points: int) -> Iterator[str]:
 
 
 def _curve(curve: Curve, box: _Box, low: float, high: float, points: int, panel: Panel) -> str:
-    scale = _log if panel.log else _same
+    scale = logarithm if panel.log else same
     seen = (curve.time >= box.begin - 1.0) & (curve.time <= box.end + 1.0)
     time, value = curve.time[seen], curve.value[seen]
     if curve.gap:
@@ -256,7 +256,7 @@ def _range(panel: Panel, box: _Box) -> tuple[float, float]:
         values = np.append(values, panel.floor)
     if not len(values):
         values = np.zeros(1)
-    scaled = (_log if panel.log else _same)(np.minimum(values, panel.ceiling))
+    scaled = (logarithm if panel.log else same)(np.minimum(values, panel.ceiling))
     low, high = float(scaled.min()), float(scaled.max())
     missing = max(panel.span, 1e-9 + 1e-3 * abs(high)) - (high - low)
     if missing > 0.0:
@@ -264,40 +264,3 @@ def _range(panel: Panel, box: _Box) -> tuple[float, float]:
         low, high = low - (missing - up), high + up
     margin = 0.06 * (high - low)
     return low - (0.0 if panel.floor is not None and not panel.log else margin), high + margin
-
-
-def grid(low: float, high: float, length: float, least: float) -> list[float]:
-    """As many round values from `low` to `high` as stand `least` px apart on an axis of `length`.
-
-    Two at least, unless `low` and `high` are one.
-    """
-    room = max(2, int(length // least))
-    found = [nice(low, high, count) for count in range(1, room + 3)]
-    fitting = [values for values in found if len(values) <= room]
-    return max(fitting or found[:1], key=len)
-
-
-def nice(low: float, high: float, count: int) -> list[float]:
-    """Round values from `low` to `high`, some `count` of them."""
-    step = (high - low) / max(count, 1)
-    power = 10.0 ** math.floor(math.log10(max(step, 1e-12)))
-    step = next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= step * (1 - 1e-9))
-    digits = max(0, -math.floor(math.log10(step)) + 1)
-    first = math.ceil(low / step - 1e-9)
-    last = math.floor(high / step + 1e-9)
-    return [round(k * step, digits) + 0.0 for k in range(first, last + 1)]
-
-
-def _decades(low: float, high: float) -> list[float]:
-    exponents = range(math.floor(low), math.ceil(high) + 1)
-    factors = (1.0,) if high - low > 2.5 else (1.0, 2.0, 5.0)
-    return [round(m * 10.0**k, 6) for k in exponents for m in factors]
-
-
-def _same(values: Array) -> Array:
-    return values
-
-
-def _log(values: Array) -> Array:
-    logs: Array = np.log10(np.maximum(values, _LOG_FLOOR))
-    return logs

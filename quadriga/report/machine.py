@@ -10,15 +10,17 @@ import numpy as np
 from agents.planner.horizon import step_ms
 from quadriga.report.chart import Bars, Curve, Mark, Panel, draw
 from quadriga.report.feet import gait_panel
-from quadriga.report.look_at import AFTER_MS, BEFORE_MS, SLIP, TILT, Episode
+from quadriga.report.look_at import Episode
 from quadriga.report.run import Run
 from quadriga.report.samples import slipping
+from quadriga.report.second import BEFORE_MS, SLIP, TILT
 from quadriga.report.tracks import falls, figure, style
 from shared.barrier import PLANNER
 from shared.messages import Status
 from shared.robot import Array
 from shared.topics import REFERENCE
 
+_AFTER_MS: Final = 200  # of a close-up, shown after the second that is judged
 _SENT_S: Final = 0.3  # statuses further apart than this are not joined
 
 
@@ -124,7 +126,7 @@ def ages(run: Run) -> str:
 def closeup(run: Run, episode: Episode) -> str:
     """The second before a trouble: tilt, slip and torque of all robots, feet of those concerned."""
     begin = max(run.begin, episode.tick - BEFORE_MS) / 1000
-    end = min(run.end, episode.tick + AFTER_MS) / 1000
+    end = min(run.end, episode.tick + _AFTER_MS) / 1000
     tilt, slip, torque = [], [], []
     for index, robot in enumerate(run.traces.robots):
         samples = run.samples[robot]

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.report import about, feet, machine, tracks
+from quadriga.report.account import COLUMNS
 from quadriga.report.html import cells, details, figure, key, keys, section, table, time_link
 from quadriga.report.look import SCRIPT, style_sheet
-from quadriga.report.look_at import COLUMNS, Episode, episodes
+from quadriga.report.look_at import Episode, episodes
 from quadriga.report.moments import Moment
 from quadriga.report.run import Run
 from quadriga.table import rows as summary_rows
+from shared.config import CENTRAL
 from shared.errors import RecordingError
 
 PAGE: Final = "report.html"
@@ -220,11 +222,7 @@ def _machine(run: Run) -> Iterator[Section]:
         figure(machine.times(run), named) + table(head, machine.times_table(run), numbers=True),
     )
     text = "<p>How old, by world time, each peer's plan was when it was planned with.</p>"
-    yield (
-        "ages",
-        "Ages of inputs",
-        text
-        + figure(
-            machine.ages(run), named + key("asked", "reference") + key("planned", "central plan")
-        ),
-    )
+    central = run.traces.config.planner.kind in CENTRAL
+    legend = key("planned", "central plan") if central else named
+    shown = figure(machine.ages(run), legend + key("asked", "reference"))
+    yield "ages", "Ages of inputs", text + shown

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.report.look_at import COLUMNS, Episode, Sign, episodes
+from quadriga.report.account import COLUMNS
+from quadriga.report.look_at import Episode, Sign, episodes
 from quadriga.report.run import read_run
 from shared import messages as msg
 from shared.messages import Command, Message, Plan, State, Truth
