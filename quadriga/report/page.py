@@ -15,6 +15,7 @@ from quadriga.report.look_at import Episode, episodes
 from quadriga.report.moments import Moment
 from quadriga.report.run import Run
 from quadriga.table import rows as summary_rows
+from shared.barrier import PLANNER
 from shared.config import CENTRAL
 from shared.errors import RecordingError
 
@@ -213,16 +214,14 @@ def _gait_keys(run: Run) -> str:
 def _machine(run: Run) -> Iterator[Section]:
     if not any(run.traces.statuses.values()) and not any(run.traces.plans.values()):
         return
+    central = run.traces.config.planner.kind in CENTRAL
     named = "".join(key(tracks.style(i), robot) for i, robot in enumerate(run.traces.robots))
     head = ("process", "solves", "median [ms]", "99 % [ms]", "greatest [ms]",
             "ticks", "median [µs]", "99 % [µs]", "greatest [µs]")  # fmt: skip
-    yield (
-        "times",
-        "Solve and tick times",
-        figure(machine.times(run), named) + table(head, machine.times_table(run), numbers=True),
-    )
-    text = "<p>How old, by world time, each peer's plan was when it was planned with.</p>"
-    central = run.traces.config.planner.kind in CENTRAL
+    drawn = figure(machine.times(run), named + (key("asked", PLANNER) if central else ""))
+    told = table(head, machine.times_table(run), numbers=True)
+    yield "times", "Solve and tick times", drawn + told
+    what = "the plan in force was" if central else "each peer's plan was when it was planned with"
     legend = key("planned", "central plan") if central else named
-    shown = figure(machine.ages(run), legend + key("asked", "reference"))
-    yield "ages", "Ages of inputs", text + shown
+    drawn = figure(machine.ages(run), legend + key("asked", "reference"))
+    yield "ages", "Ages of inputs", f"<p>How old, by world time, {what}.</p>{drawn}"
