@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from html import escape
 from typing import Final
 
@@ -12,85 +11,11 @@ import numpy as np
 
 from quadriga.report import path
 from quadriga.report.axis import decades, grid, logarithm, same
-from shared.robot import Array
+from quadriga.report.panel import Box, Curve, Mark, Panel
 
 WIDTH: Final = 1000.0  # px of the drawing; the page scales it
 _LEFT, _RIGHT, _ABOVE, _BETWEEN, _BELOW = 58.0, 14.0, 20.0, 8.0, 36.0
 _LINE, _NARROW, _WIDE = 15.0, 40.0, 60.0  # px between values of an axis, at least
-
-
-@dataclass(frozen=True, slots=True)
-class Curve:
-    """One curve: times (k,) in s, values (k,), its class in the style sheet.
-
-    Attributes:
-        kind: line, step (held until the next point) or dots.
-        gap: points further apart than this, s, are not joined; 0 joins all.
-    """
-
-    time: Array
-    value: Array
-    style: str
-    kind: str = "line"
-    gap: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Bars:
-    """One row of bars: its name, and (begin s, end s, class) of each."""
-
-    name: str
-    bars: Sequence[tuple[float, float, str]]
-
-
-@dataclass(frozen=True, slots=True)
-class Panel:
-    """One pair of axes: curves, or rows of bars.
-
-    Attributes:
-        title: what is drawn, with its unit.
-        span: least range of the values, so that what is nearly constant does not look like noise.
-        until: curves choose the range up to this time, s; what leaves it later is cut off.
-        floor: the range reaches down to this value.
-        ceiling: the range reaches no further up than this.
-        log: whether values are drawn logarithmically.
-        levels: horizontal lines at (value, name).
-    """
-
-    title: str
-    curves: Sequence[Curve] = ()
-    rows: Sequence[Bars] = ()
-    span: float = 0.0
-    until: float = math.inf
-    floor: float | None = None
-    ceiling: float = math.inf
-    log: bool = False
-    levels: Sequence[tuple[float, str]] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """A time that every panel shows, s: its class in the style sheet and its name."""
-
-    time: float
-    style: str
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class _Box:
-    """A panel's place: left, top, width, height in px, and the times at its sides in s."""
-
-    x: float
-    y: float
-    w: float
-    h: float
-    begin: float
-    end: float
-
-    def at(self, time: Array) -> Array:
-        scaled: Array = self.x + self.w * (time - self.begin) / (self.end - self.begin)
-        return scaled
 
 
 def draw(
@@ -116,7 +41,7 @@ def draw(
         row = panels[first : first + columns]
         tall = max(15.0 * len(panel.rows) if panel.rows else height for panel in row)
         for k, panel in enumerate(row):
-            box = _Box(_LEFT + k * WIDTH / columns, y + _ABOVE, width, tall, begin, end)
+            box = Box(_LEFT + k * WIDTH / columns, y + _ABOVE, width, tall, begin, end)
             bottom = first + k + columns >= len(panels)
             parts.append(_panel(panel, box, marks, points, bottom=bottom, top=first == 0))
             places.append(f"{box.x:.0f} {box.w:.0f} {box.y:.0f} {box.h:.0f}")
@@ -130,7 +55,7 @@ def draw(
 
 
 def _panel(
-    panel: Panel, box: _Box, marks: Sequence[Mark], points: int, *, bottom: bool, top: bool
+    panel: Panel, box: Box, marks: Sequence[Mark], points: int, *, bottom: bool, top: bool
 ) -> str:
     inside = "".join(_bars(panel, box)) if panel.rows else "".join(_curves(panel, box, points))
     title = f'<text class="title" x="{box.x:.0f}" y="{box.y - 6:.0f}">{escape(panel.title)}</text>'
@@ -139,7 +64,7 @@ def _panel(
     return title + inside + _marks(box, marks, free) + frame + _time_axis(box, named=bottom)
 
 
-def _time_axis(box: _Box, *, named: bool) -> str:
+def _time_axis(box: Box, *, named: bool) -> str:
     ticks = grid(box.begin, box.end, box.w, _NARROW if box.w < 300.0 else _WIDE)
     foot, parts = box.y + box.h, []
     for tick in ticks:
@@ -153,7 +78,7 @@ def _time_axis(box: _Box, *, named: bool) -> str:
     return "".join(parts)
 
 
-def _marks(box: _Box, marks: Sequence[Mark], free: float) -> str:
+def _marks(box: Box, marks: Sequence[Mark], free: float) -> str:
     """Lines at the marks; their names stand to the right of `free`, px, and of one another."""
     parts = []
     for mark in sorted(marks, key=lambda mark: mark.time):
@@ -171,7 +96,7 @@ def _marks(box: _Box, marks: Sequence[Mark], free: float) -> str:
     return "".join(parts)
 
 
-def _bars(panel: Panel, box: _Box) -> Iterator[str]:
+def _bars(panel: Panel, box: Box) -> Iterator[str]:
     tall = box.h / len(panel.rows)
     for k, row in enumerate(panel.rows):
         y = box.y + k * tall
@@ -198,7 +123,7 @@ def _bars(panel: Panel, box: _Box) -> Iterator[str]:
                 yield f'<path class="bar {style}" transform="scale(.1)" d="{"".join(shapes)}"/>'
 
 
-def _curves(panel: Panel, box: _Box, points: int) -> Iterator[str]:
+def _curves(panel: Panel, box: Box, points: int) -> Iterator[str]:
     scale = logarithm if panel.log else same
     low, high = _range(panel, box)
     for tick in decades(low, high) if panel.log else grid(low, high, box.h, _LINE):
@@ -225,7 +150,7 @@ def _curves(panel: Panel, box: _Box, points: int) -> Iterator[str]:
     yield "</g></svg>"
 
 
-def _curve(curve: Curve, box: _Box, low: float, high: float, points: int, panel: Panel) -> str:
+def _curve(curve: Curve, box: Box, low: float, high: float, points: int, panel: Panel) -> str:
     scale = logarithm if panel.log else same
     seen = (curve.time >= box.begin - 1.0) & (curve.time <= box.end + 1.0)
     time, value = curve.time[seen], curve.value[seen]
@@ -245,7 +170,7 @@ def _curve(curve: Curve, box: _Box, low: float, high: float, points: int, panel:
     return "".join(parts)
 
 
-def _range(panel: Panel, box: _Box) -> tuple[float, float]:
+def _range(panel: Panel, box: Box) -> tuple[float, float]:
     """Least and greatest value to draw, with a margin, on the panel's scale."""
     shown = []
     for curve in panel.curves:

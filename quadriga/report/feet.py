@@ -9,7 +9,8 @@ import numpy as np
 
 from agents.sampling import SAMPLE_MS
 from quadriga.figures import stitched
-from quadriga.report.chart import Bars, Curve, Panel, draw
+from quadriga.report.chart import draw
+from quadriga.report.panel import Bars, Curve, Panel
 from quadriga.report.path import spells
 from quadriga.report.run import Run
 from quadriga.report.tracks import falls, until

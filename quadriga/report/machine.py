@@ -8,9 +8,10 @@ from typing import Final
 import numpy as np
 
 from agents.planner.horizon import step_ms
-from quadriga.report.chart import Bars, Curve, Mark, Panel, draw
+from quadriga.report.chart import draw
 from quadriga.report.feet import gait_panel
 from quadriga.report.look_at import Episode
+from quadriga.report.panel import Bars, Curve, Mark, Panel
 from quadriga.report.run import Run
 from quadriga.report.samples import slipping
 from quadriga.report.second import BEFORE_MS, SLIP, TILT

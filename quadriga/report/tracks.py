@@ -9,7 +9,8 @@ import numpy as np
 from agents.sampling import SAMPLE_MS
 from quadriga.figures import stitched
 from quadriga.report.axis import nice
-from quadriga.report.chart import WIDTH, Curve, Mark, Panel, draw
+from quadriga.report.chart import WIDTH, draw
+from quadriga.report.panel import Curve, Mark, Panel
 from quadriga.report.run import Run
 from quadriga.traces import in_force
 from quadriga.truth_trace import Ticks

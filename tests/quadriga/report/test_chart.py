@@ -7,7 +7,8 @@ import re
 import numpy as np
 import pytest
 
-from quadriga.report.chart import Bars, Curve, Mark, Panel, draw
+from quadriga.report.chart import draw
+from quadriga.report.panel import Bars, Curve, Mark, Panel
 
 TIME = np.linspace(0.0, 10.0, 101)
 
