@@ -89,7 +89,10 @@ def parser() -> argparse.ArgumentParser:
         waiting.add_argument("--wait", type=float, default=0.0, metavar="S",
                              help="wait so long for the predictor to be made (0)")  # fmt: skip
     report = add("report", verbs.report, "show what came of a recorded walk")
-    report.add_argument("run_dir", type=Path, metavar="DIR", help="the folder of a run.mcap")
+    report.add_argument("run", type=Path, metavar="FILE|DIR",
+                        help="a recording, or the folder of a run.mcap")  # fmt: skip
+    report.add_argument("--html", type=Path, metavar="FILE",
+                        help="the page of a recording's FILE (its name with .html)")  # fmt: skip
     report.add_argument("--no-render", action="store_true", help="no pictures of the walk")
     _add_play(add("play", verbs.play, "put a recording back on the bus"))
     resim = add("resim", verbs.resim, "re-simulate a recorded world and compare it to the byte")

@@ -39,13 +39,17 @@ _ROBOTS: Final = (
 _INSTANTS: Final = 6
 
 
-def draw(run_dir: Path) -> tuple[Path, ...]:
+def draw(run_dir: Path, traces: Traces | None = None) -> tuple[Path, ...]:
     """Write the figures of the run in `run_dir` and return their paths.
+
+    Args:
+        run_dir: its folder.
+        traces: of its recording, if that has been read already.
 
     Raises:
         RecordingError: the recording is missing, empty or foreign.
     """
-    traces = read_traces(Recording(run_dir / "run.mcap"), _TOPICS)
+    traces = traces or read_traces(Recording(run_dir / "run.mcap"), _TOPICS)
     return tuple(
         _save(figure, run_dir / name)
         for name, figure in (
@@ -66,8 +70,9 @@ def stitched(plans: Sequence[Plan], applied: int) -> tuple[Array, Array, Array]:
 
     Returns:
         Time at which each sample begins (k,), s; its forces (k, 12), N, held for 10 ms; and the
-        outputs planned for its end (k, 6).
+        outputs planned for its end (k, 6). A plan shorter than `applied` is passed over.
     """
+    plans = [plan for plan in plans if len(plan.u) >= applied]
     if not plans:
         return np.zeros(0), np.zeros((0, 12)), np.zeros((0, 6))
     begin = [plan.tick + SAMPLE_MS * np.arange(applied) for plan in plans]

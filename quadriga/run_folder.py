@@ -10,9 +10,14 @@ from rich.console import Console
 
 from quadriga.figures import draw
 from quadriga.render import render
+from quadriga.report.about import absent
+from quadriga.report.page import PAGE, write_page
+from quadriga.report.run import build_run, read_run
 from quadriga.summary import RECORDING, print_table, summarise
+from quadriga.traces import read_traces
 from shared.clock import wall_ns
 from shared.errors import ConfigError, ProcessError
+from shared.recording import Recording
 
 
 def make_run_dir(out: Path | None) -> Path:
@@ -37,14 +42,20 @@ def make_run_dir(out: Path | None) -> Path:
 
 
 def report(run_dir: Path, *, pictures: bool, console: Console) -> dict[str, Any]:
-    """Sum up the recording in `run_dir`, draw its figures, show its table; the summary.
+    """Sum up the recording in `run_dir`, draw its figures, write its page, show its table.
+
+    Returns:
+        The summary.
 
     Raises:
-        RecordingError: there is no recording, or it is empty or foreign.
+        RecordingError: there is no recording, it is empty or foreign, or a file cannot be written.
         ProcessError: the walk did not come to its end.
     """
-    summary = summarise(run_dir)
-    draw(run_dir)
+    recording = Recording(run_dir / RECORDING)
+    traces = read_traces(recording)
+    summary = summarise(run_dir, traces)
+    draw(run_dir, traces)
+    write_page(build_run(recording, traces, summary), run_dir / PAGE)
     if pictures:
         with console.status("rendering"):
             render(run_dir)
@@ -52,6 +63,29 @@ def report(run_dir: Path, *, pictures: bool, console: Console) -> dict[str, Any]
     console.print(f"run folder: {run_dir}", markup=False, highlight=False)
     _check_end(summary)
     return summary
+
+
+def report_file(path: Path, page: Path | None, *, console: Console) -> dict[str, Any]:
+    """Write the page of a recording that may have come from elsewhere, show its table.
+
+    Args:
+        path: the recording.
+        page: the file to write; by default beside the recording, with its name.
+        console: where to show the table.
+
+    Returns:
+        The summary.
+
+    Raises:
+        RecordingError: the recording is empty or foreign, or the page cannot be written.
+    """
+    run = read_run(path)
+    print_table(dict(run.summary), console)
+    for said in absent(run):
+        console.print(said, style="yellow", markup=False, highlight=False)
+    written = write_page(run, page or path.with_suffix(".html"))
+    console.print(f"page: {written}", markup=False, highlight=False)
+    return dict(run.summary)
 
 
 def went_wrong(summary: dict[str, Any]) -> bool:

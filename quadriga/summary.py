@@ -25,8 +25,10 @@ FALL_TILT: Final = 1.0  # rad
 FALL_HEIGHT: Final = 0.12  # m above the terrain
 
 
-def summarise(run_dir: Path) -> dict[str, Any]:
+def summarise(run_dir: Path, traces: Traces | None = None) -> dict[str, Any]:
     """Compute the figures of the run in `run_dir`, write them to `summary.json`, return them.
+
+    `traces` are those of its recording, if that has been read already.
 
     Lengths in m, speeds in m/s, angles in rad, world time in s. A figure that the recording does
     not hold (no planner, a walk too short for a steady part) is None. Tracking errors, mean speeds
@@ -36,7 +38,7 @@ def summarise(run_dir: Path) -> dict[str, Any]:
     Raises:
         RecordingError: there is no recording, or it is empty or foreign.
     """
-    summary = summary_of(read_traces(Recording(run_dir / RECORDING)))
+    summary = summary_of(traces or read_traces(Recording(run_dir / RECORDING)))
     text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
     (run_dir / SUMMARY).write_text(text + "\n", encoding="utf-8")
     return summary
@@ -80,6 +82,10 @@ def _world(traces: Traces) -> dict[str, Any]:
     down = (truth.tilt > FALL_TILT) | (truth.y[..., 0] < FALL_HEIGHT)
     seen = {traces.robots[i] for i in np.flatnonzero(down.any(axis=0))}
     told = {event.robot for event in traces.events if event.kind == "fall"}
+    if not len(truth.tick):  # then the robots' own word must do
+        told |= {
+            r for r, found in traces.statuses.items() if any(s.reason == "fall" for s in found)
+        }
     # The length of the way, sampled once a stride so that sway within it does not count.
     strides = truth.base_pos[truth.tick % (2 * traces.config.gait.stance_ms) == 0]
     way = np.concatenate([strides, truth.base_pos[-1:]])[..., :2]

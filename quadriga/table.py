@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any
 
 from rich.console import Console
@@ -23,9 +24,14 @@ def print_table(summary: dict[str, Any], console: Console) -> None:
     table = Table(show_header=False, title=_title(summary), title_justify="left")
     table.add_column(style="bold", no_wrap=True)
     table.add_column()
-    for name, text in _rows(summary):
-        table.add_row(name, text)
+    for name, text in rows(summary):
+        marked = f"[red]{escape(text)}[/red]" if _is_bad(name, text) else escape(text)
+        table.add_row(name, marked)
     console.print(table)
+
+
+def _is_bad(name: str, text: str) -> bool:
+    return name == "recording" or (name == "falls" and text != "none")
 
 
 def _title(summary: dict[str, Any]) -> str:
@@ -34,38 +40,46 @@ def _title(summary: dict[str, Any]) -> str:
     return f"{team}, {summary['terrain']}, seed {summary['seed']}, {summary['mode']}"
 
 
-def _rows(s: dict[str, Any]) -> list[tuple[str, str]]:
-    fallen = ", ".join(s["fallen"])
-    rows = [
-        ("falls", f"[red]{escape(fallen)}[/red]" if fallen else "none"),
+def rows(s: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Name and text of each figure that there is."""
+    shown = [
+        ("falls", ", ".join(s["fallen"]) or "none"),
+        *_against_truth(s),
+        ("planner", _planner(s)),
+        ("control tick", _times(s, "tick_us", "µs", ".0f")),
+        ("real-time factor", _text(s["real_time_factor"], ".2f")),
+        ("messages", f"{s['messages']:,} recorded, {s['gaps']} gaps, {s['invalid']} invalid"),
+    ]
+    if counted := _counted(s["counters"]):
+        shown.append(("counted by the agents", counted))
+    if s["end"]:
+        shown.append(("end", s["end"]))
+    shown += [(f"{robot} stopped", reason) for robot, reason in s["stop_reasons"].items()]
+    if s["cut"]:
+        shown.append(("recording", s["cut"]))
+    return shown
+
+
+def _against_truth(s: Mapping[str, Any]) -> list[tuple[str, str]]:
+    if s["distance"] is None:
+        return [("world time", f"{s['duration']:.1f} s, without truth to compare anything with")]
+    return [
         ("distance", f"{_text(s['distance'], '.2f')} m in {s['duration']:.1f} s"),
         ("mean speed", f"vx {_text(s['mean_vx'], '+.3f')}, vy {_text(s['mean_vy'], '+.3f')} m/s, "
                        f"wz {_text(s['mean_wz'], '+.3f')} rad/s"),
         (f"RMSE from {s['steady_from']:.1f} s", _errors(s["rmse"])),
         (f"estimator ({s['estimator']}) RMSE", _errors(s["estimator_rmse"])),
         ("yoke drift", f"at most {_text(s['yoke_drift_max'], '.2f', 1e3)} mm"),
-        ("planner", _planner(s)),
-        ("control tick", _times(s, "tick_us", "µs", ".0f")),
-        ("real-time factor", _text(s["real_time_factor"], ".2f")),
-        ("messages", f"{s['messages']:,} recorded, {s['gaps']} gaps, {s['invalid']} invalid"),
     ]  # fmt: skip
-    if counted := _counted(s["counters"]):
-        rows.append(("counted by the agents", escape(counted)))
-    if s["end"]:
-        rows.append(("end", escape(s["end"])))
-    rows += [(f"{robot} stopped", escape(reason)) for robot, reason in s["stop_reasons"].items()]
-    if s["cut"]:
-        rows.append(("recording", f"[red]{escape(s['cut'])}[/red]"))
-    return rows
 
 
-def _counted(counters: dict[str, dict[str, int]]) -> str:
+def _counted(counters: Mapping[str, Mapping[str, int]]) -> str:
     """Sums over the robots of what their last statuses count."""
     total = sum((Counter(counts) for counts in counters.values()), Counter[str]())
     return ", ".join(f"{name} {count:,}" for name, count in sorted(total.items()))
 
 
-def _planner(s: dict[str, Any]) -> str:
+def _planner(s: Mapping[str, Any]) -> str:
     if not s["planner_solves"]:
         return f"{s['planner']}, no solves"
     return f"{s['planner']}, {_times(s, 'planner_ms', 'ms', '.2f')}"
@@ -81,7 +95,7 @@ def _errors(rmse: dict[str, float | None]) -> str:
     return ", ".join(parts[:half]) + "\n" + ", ".join(parts[half:])
 
 
-def _times(s: dict[str, Any], name: str, unit: str, digits: str) -> str:
+def _times(s: Mapping[str, Any], name: str, unit: str, digits: str) -> str:
     median, p99 = s[f"{name}_median"], s[f"{name}_p99"]
     return f"median {_text(median, digits)} {unit}, p99 {_text(p99, digits)} {unit}"
 

@@ -33,6 +33,7 @@ class TruthTrace:
         base_quat_wxyz: trunk to world, shape (T, n, 4).
         grf: ground on foot, world frame, shape (T, n, 4, 3), N.
         yoke_error: shape (T, k), m.
+        yoke_force: shape (T, k), N, positive when the yoke pushes its robots apart.
         y: the planner's outputs z, vx, vy, roll, pitch, wz, shape (T, n, 6); z is the trunk's
             height above the mean terrain under its feet's places, velocities are in the yaw frame.
         tilt: angle between the trunk's z axis and the vertical, shape (T, n), rad.
@@ -44,6 +45,7 @@ class TruthTrace:
     base_quat_wxyz: Array
     grf: Array
     yoke_error: Array
+    yoke_force: Array
     y: Array
     tilt: Array
 
@@ -67,6 +69,7 @@ def build_truth_trace(messages: Sequence[Truth], config: Config) -> TruthTrace:
     return TruthTrace(
         tick=ticks_of(messages), base_pos=pos, base_vel=vel, base_quat_wxyz=quat,
         grf=stack(messages, "grf", n, 4, 3), yoke_error=stack(messages, "yoke_error", 0),
+        yoke_force=stack(messages, "yoke_force", 0),
         y=np.stack(outputs, axis=-1),
         tilt=np.arccos(np.clip(np.cos(roll) * np.cos(pitch), -1.0, 1.0)),
     )  # fmt: skip

@@ -92,7 +92,7 @@ def record(arguments: argparse.Namespace, config: Config, given: Given) -> int:
         if stopped() or not arguments.report:
             print(f"recorded to {path}")
             return 0
-    arguments.run_dir = path.parent
+    arguments.run, arguments.html = path.parent, None
     return report(arguments, config, given)
 
 
@@ -111,9 +111,15 @@ def _fitted_sha256(config: Config, wait: float) -> str:
 
 def report(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     """What came of a recorded walk."""
-    from quadriga.run_folder import report, went_wrong
+    from quadriga.run_folder import report, report_file, went_wrong
 
-    summary = report(arguments.run_dir, pictures=not arguments.no_render, console=Console())
+    if arguments.run.is_file():
+        summary = report_file(arguments.run, arguments.html, console=Console())
+    elif arguments.html is not None:
+        raise ConfigError("--html", str(arguments.html), "a recording's FILE before it",
+                          "a run folder's page is its report.html")  # fmt: skip
+    else:
+        summary = report(arguments.run, pictures=not arguments.no_render, console=Console())
     return int(went_wrong(summary))
 
 

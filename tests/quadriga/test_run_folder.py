@@ -45,6 +45,7 @@ def test_a_finished_walk_is_summed_up_and_drawn(write_run: WriteRun) -> None:
     assert not summary["fell"]
     assert (folder / SUMMARY).is_file()
     assert (folder / "trajectory.png").is_file()
+    assert (folder / "report.html").stat().st_size > 50_000
 
 
 def test_a_walk_that_was_cut_short_is_a_failure_but_summed_up(write_run: WriteRun) -> None:

@@ -236,3 +236,19 @@ def test_metadata_brings_the_configuration_back(write_run: WriteRun) -> None:
     recording = Recording(write_run(config) / "run.mcap")
     assert recorded_config(recording) == config
     assert recording.metadata["config_sha256"] == config_sha256(config)
+
+
+def test_without_truth_a_fall_is_told_by_the_robot_and_no_figure_is_made_up(
+    write_run: WriteRun,
+) -> None:
+    def change(key: str, message: msg.Message) -> msg.Message | None:
+        if isinstance(message, msg.Status) and key == "team/r2/status" and message.tick >= 500:
+            return replace(message, mode="damping", reason="fall")
+        return None if isinstance(message, msg.Truth) else message
+
+    summary = summarise(write_run(run_config(2, 1.0), change=change))
+    assert summary["fallen"] == ["r2"]
+    text = table(summary)
+    assert "without truth" in text
+    assert "yoke drift" not in text
+    assert "RMSE" not in text

@@ -1,0 +1,155 @@
+"""What the head of the page says: scenario, seed, versions, configuration, what is absent."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import fields
+from datetime import UTC, datetime
+from typing import Any, Final
+
+import numpy as np
+
+from quadriga.report.run import Run
+from shared.config import Config
+from shared.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, STATE, STATUS, TRUTH
+
+_DIGITS: Final = 12  # of a digest
+
+
+def title(run: Run) -> str:
+    """The run in one line."""
+    config = run.traces.config
+    n = config.team.robots
+    who = f"{n} yoked robots" if n > 1 else "1 robot"
+    return f"{who} on {_ground(config)}, seed {config.world.seed}"
+
+
+def verdict(run: Run) -> tuple[str, bool]:
+    """How it went in one line, and whether it went well."""
+    falls = [moment for moment in run.moments if moment.kind == "fall"]
+    if falls or run.summary["fell"]:
+        when = ", ".join(f"{m.robot} at {m.tick / 1000:.2f} s" for m in falls)
+        return f"Fell: {when or ', '.join(run.summary['fallen'])}", False
+    if run.summary["stop_reasons"]:
+        said = "; ".join(f"{robot}: {why}" for robot, why in run.summary["stop_reasons"].items())
+        return f"Stopped: {said}", False
+    seconds = (run.end - run.begin) / 1000
+    ended = run.summary["end"]
+    return f"{seconds:.1f} s without a fall ({ended or 'no end was recorded'})", True
+
+
+def facts(run: Run) -> Iterator[tuple[str, str]]:
+    """Name and text of what identifies the run."""
+    traces, config = run.traces, run.traces.config
+    if traces.log_times:
+        began = datetime.fromtimestamp(1e-9 * traces.log_times[0], UTC)
+        yield "recorded", f"{began:%Y-%m-%d %H:%M:%S} UTC, {run.path.name}"
+    else:
+        yield "recorded", run.path.name
+    yield "world time", f"{run.begin / 1000:.2f} … {run.end / 1000:.2f} s, {config.world.mode}"
+    yield "team", f"{config.team.name}: {', '.join(traces.robots)}; yokes {config.team.yokes}"
+    yield "ground", f"{_ground(config)}, friction {config.world.friction:g}"
+    if config.world.payload:
+        yield "payload", f"{config.world.payload:g} kg on {config.world.payload_on}"
+    if config.world.push:
+        yield "pushes", config.world.push
+    asked = config.reference
+    yield "asked for", f"vx {asked.vx:g} m/s, vy {asked.vy:g} m/s, wz {asked.wz:g} rad/s"
+    yield "planner", f"{config.planner.kind}, {config.planner.interface}"
+    digest = traces.metadata.get("predictor_sha256", "")
+    kind = config.identification.predictor
+    yield "predictor", f"{kind}, {digest[:_DIGITS]}" if digest else "none named"
+    yield "estimator", config.estimator.kind
+    yield "configuration", traces.metadata.get("config_sha256", "")[:_DIGITS] or "unnamed"
+    yield "versions", ", ".join(f"{k} {v}" for k, v in _versions(run).items()) or "not recorded"
+
+
+def departures(config: Config) -> list[tuple[str, str, str, str]]:
+    """Keys whose values are not the defaults: key, value, default, meaning with unit."""
+    default, found = Config(), []
+    for section in fields(config):
+        if section.name == "bus":  # how the processes reached each other changes nothing they did
+            continue
+        mine, theirs = getattr(config, section.name), getattr(default, section.name)
+        for item in fields(mine):
+            value, usual = getattr(mine, item.name), getattr(theirs, item.name)
+            if value != usual:
+                unit = item.metadata["unit"]
+                doc = item.metadata["doc"] + ("" if unit in ("-", "1") else f" [{unit}]")
+                found.append((f"{section.name}.{item.name}", _text(value), _text(usual), doc))
+    return found
+
+
+def absent(run: Run) -> list[str]:
+    """What the recording does not hold, and what the page leaves out for it; empty if whole."""
+    traces, said = run.traces, []
+    names = {key.partition("/")[2].rpartition("/")[2] or key for key in traces.ticks}
+    keys = {key.partition("/")[2] for key in traces.ticks}
+    if TRUTH.name not in keys:
+        said.append(
+            "No sim/truth, as of real robots: measured curves are the agents' own estimates, "
+            "contacts are those of the foot sensors; true forces, yokes, paths and estimator "
+            "errors are left out."
+        )
+    for topic, without in (
+        (STATE, "tilt, contacts, slips and torques are left out"),
+        (COMMAND, "nothing on this page is made of them, but they are missing"),
+        (MEASUREMENT, "the agents' estimates are left out, the gait is the configured one"),
+        (STATUS, "modes, stop reasons, solve times and ages are left out"),
+        (REFERENCE, "what was asked for is not known"),
+    ):
+        if topic.name not in names and topic.name not in keys:
+            said.append(f"No {topic.name}: {without}.")
+    if PLAN.name not in names and traces.config.planner.kind != "none":
+        said.append("No plan: planned curves are left out.")
+    silent = [
+        robot
+        for robot in traces.robots
+        if STATE.name in names and STATE.key(traces.config.team.name, robot) not in traces.ticks
+    ]
+    if silent:
+        said.append(f"Nothing of the sensors of {', '.join(silent)}.")
+    if run.begin > 0:
+        said.append(f"The recording begins at {run.begin / 1000:.2f} s.")
+    if traces.cut:
+        said.append(f"The recording is cut: {traces.cut}. Everything before is shown.")
+    elif not run.complete:
+        said.append("The recording was not finished: its recorder was killed or lost its disk.")
+    return said
+
+
+def traffic(run: Run) -> list[tuple[str, ...]]:
+    """A row for each key: messages, rate, first and last tick, missing and invalid ones."""
+    traces = run.traces
+    rows: list[tuple[str, ...]] = []
+    gaps = run.summary["gaps_per_topic"]
+    for key, count in traces.messages.items():
+        ticks = traces.ticks.get(key, np.zeros(0, dtype=np.int64))
+        seconds = (int(ticks.max()) - int(ticks.min())) / 1000 if len(ticks) else 0.0
+        rate = f"{(len(ticks) - 1) / seconds:.1f}" if seconds > 0 else "–"
+        span = f"{ticks.min() / 1000:.2f} … {ticks.max() / 1000:.2f}" if len(ticks) else "–"
+        missing = str(gaps[key]) if key in gaps else "–"
+        rows.append((key, f"{count:,}", rate, span, missing, str(traces.invalid.get(key, 0))))
+    return rows
+
+
+def _ground(config: Config) -> str:
+    world = config.world
+    if world.terrain == "flat":
+        return "flat ground"
+    return f"{world.terrain} up to {1000 * world.terrain_height:.0f} mm"
+
+
+def _versions(run: Run) -> dict[str, Any]:
+    try:
+        found = json.loads(run.traces.metadata.get("versions", "{}"))
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, tuple):
+        return ", ".join(f"{item:g}" for item in value)
+    return str(value) if str(value) else "(empty)"

@@ -1,0 +1,70 @@
+"""What the last bits of a sum depend on, besides the code: the machine and its libraries.
+
+OpenBLAS, numpy and the C library each choose their kernels by the processor they find. These add
+and multiply in another order, or fuse the two, and so differ in the last bits. With the golden
+walk, as the largest deviation of a field relative to its largest magnitude: OpenBLAS's Haswell
+instead of SkylakeX kernels 4e-12, its Nehalem kernels 2e-8, numpy without AVX-512 5e-13, the C
+library without fused multiply-add 2e-12. The processor that numba compiles for made none: without
+`fastmath` it may neither reorder nor fuse.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import math
+import platform
+import struct
+from pathlib import Path
+
+import llvmlite.binding
+import numba
+import numpy as np
+import scipy.linalg  # noqa: F401  (loads the BLAS that is asked about)
+from threadpoolctl import threadpool_info
+
+TOLD = ("cpu", "numba's processor")  # whom to ask about it; they decide on no bit themselves
+_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "pin", "libpinocchio", "daqp")
+
+
+def arithmetic() -> dict[str, str]:
+    """Names of everything here that decides on the last bits. Equal maps: equal bytes."""
+    cores = sorted(
+        f"{info['version']} {info['architecture']}"
+        for info in threadpool_info()
+        if info["user_api"] == "blas"
+    )
+    simd = np.show_config(mode="dicts")["SIMD Extensions"]
+    return {
+        "cpu": _cpu(),
+        "machine": platform.machine(),
+        "libc": f"{' '.join(platform.libc_ver())} {_libm()}",
+        "python": ".".join(platform.python_version_tuple()[:2]),
+        "BLAS": ", ".join(cores),
+        "numpy's SIMD": " ".join(simd.get("found", [])) or "baseline",
+        "numba's processor": numba.config.CPU_NAME or llvmlite.binding.get_host_cpu_name(),
+        **{name: importlib.metadata.version(name) for name in _PACKAGES},
+    }
+
+
+def differences(here: dict[str, str], there: dict[str, str]) -> list[str]:
+    """What differs between two machines, in words; empty if their last bits must be equal."""
+    return [
+        f"{name} {here.get(name, 'unknown')!r} instead of {there.get(name, 'unknown')!r}"
+        for name in sorted(here.keys() | there.keys())
+        if name not in TOLD and here.get(name) != there.get(name)
+    ]
+
+
+def _libm() -> str:
+    """Digest of some values: with one version of the library they depend on the processor."""
+    values = [f(0.37 * k) for k in range(1, 200) for f in (math.sin, math.cos, math.exp, math.atan)]
+    return hashlib.sha256(struct.pack(f"<{len(values)}d", *values)).hexdigest()[:8]
+
+
+def _cpu() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((x.partition(":")[2].strip() for x in lines if x.startswith("model name")), "?")

@@ -1,0 +1,148 @@
+"""What to look at before a fall is found where it was planted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from quadriga.report.account import COLUMNS
+from quadriga.report.look_at import Episode, Sign, episodes
+from quadriga.report.run import read_run
+from shared import messages as msg
+from shared.messages import Command, Message, Plan, State, Truth
+from shared.robot import TORQUE_LIMIT
+from tests.quadriga.conftest import Change, WriteRun, run_config
+from tests.quadriga.report.test_page import fallen
+
+FALL = 1500
+CONFIG = run_config(2, 1.6)
+
+
+def told(write_run: WriteRun, change: Change = lambda _, message: message, **more: Any) -> Path:
+    """The run without commands, which would take most of the time and say nothing here."""
+    return write_run(
+        CONFIG, change=lambda k, m: None if isinstance(m, Command) else change(k, m), **more
+    )
+
+
+def only(folder: Path) -> Episode:
+    (episode,) = episodes(read_run(folder / "run.mcap"))
+    return episode
+
+
+def cell(episode: Episode, robot: str, column: str) -> tuple[str, bool]:
+    account = next(account for account in episode.accounts if account.robot == robot)
+    return account.cells[COLUMNS.index(column)]
+
+
+def signs(episode: Episode, robot: str) -> list[Sign]:
+    return [sign for sign in episode.signs if sign.robot == robot]
+
+
+def test_a_fall_and_the_agents_word_on_it_are_one_episode(write_run: WriteRun) -> None:
+    episode = only(told(write_run, extra=fallen(FALL)))
+    assert (episode.tick, episode.robots) == (FALL, ("r2",))
+    assert {moment.kind for moment in episode.troubles} == {"fall", "stopped"}
+    assert len(episode.accounts) == 2
+    assert all(len(account.cells) == len(COLUMNS) for account in episode.accounts)
+
+
+def test_troubles_far_apart_are_two_and_who_is_down_is_not_judged(write_run: WriteRun) -> None:
+    extra = [*fallen(900, "r1"), *fallen(FALL, "r2")]
+    first, second = episodes(read_run(told(write_run, extra=extra) / "run.mcap"))
+    assert (first.tick, second.tick) == (900, FALL)
+    assert second.accounts[0].cells == (("down since 0.90 s", False),)
+    assert not signs(second, "r1")
+
+
+def test_tilt_torque_and_a_foot_without_ground_are_found(write_run: WriteRun) -> None:
+    def change(key: str, message: Message) -> Message:
+        if isinstance(message, State) and key == "team/r2/state" and message.tick >= 1300:
+            torque = message.tau_joint.copy()
+            torque[4] = -TORQUE_LIMIT
+            half = 0.15
+            tilted = np.array([np.cos(half), np.sin(half), 0.0, 0.0])
+            return replace(message, tau_joint=torque, imu_quat_wxyz=tilted)
+        if isinstance(message, Truth) and 1310 <= message.tick < 1390:
+            grf = message.grf.copy()
+            grf[1, :, 2] = 0.0
+            return replace(message, grf=grf)
+        return message
+
+    episode = only(told(write_run, change, extra=fallen(FALL)))
+    assert cell(episode, "r2", "greatest tilt") == ("0.30 rad", True)
+    assert cell(episode, "r1", "greatest tilt") == ("0.00 rad", False)
+    assert cell(episode, "r2", "torque at most") == ("100 %", True)
+    text, marked = cell(episode, "r2", "stance without ground")
+    assert marked
+    assert "80 ms" in text
+    found = {sign.text.partition(",")[0]: sign.tick for sign in signs(episode, "r2")}
+    assert found["tilts more than 0.25 rad"] == 1300
+    assert found["a joint at its torque limit"] == 1300
+    assert any("finds no ground" in text and tick == 1310 for text, tick in found.items())
+
+
+def test_a_foot_that_slides_is_told_from_one_that_stands(write_run: WriteRun) -> None:
+    # The closed-form robot's legs do not move, so at 0.51 m/s every loaded foot slides.
+    def lifted(_key: str, message: Message) -> Message:
+        if isinstance(message, Truth):
+            grf = message.grf.copy()
+            grf[0, :, 2] = 0.0
+            return replace(message, grf=grf)
+        return message
+
+    episode = only(told(write_run, lifted, extra=fallen(FALL)))
+    text, marked = cell(episode, "r2", "fastest slip")
+    assert marked
+    assert float(text.split()[0]) == pytest.approx(0.51, abs=0.02)
+    assert cell(episode, "r1", "fastest slip") == ("0.00 m/s, FL", False)
+
+
+def test_plans_that_failed_aged_or_pushed_at_their_limits_are_told(write_run: WriteRun) -> None:
+    def change(key: str, message: Message) -> Message | None:
+        if not isinstance(message, Plan) or message.tick < 900:
+            return message
+        if key == "team/r1/plan":
+            return None if message.tick > 1000 else message
+        strong = message.u.copy()
+        strong[:, 0] = 0.7 * strong[:, 2]
+        return replace(
+            message, status="nominal:infeasible", used={"r1": message.step - 4}, u=strong
+        )
+
+    episode = only(told(write_run, change, extra=fallen(FALL)))
+    text, marked = cell(episode, "r2", "plans")
+    assert marked
+    assert "nominal:infeasible 15" in text
+    assert cell(episode, "r2", "oldest input") == ("plan.r1 160 ms", True)
+    text, marked = cell(episode, "r2", "planned force at a limit")
+    assert marked
+    assert text != "0 % of samples"
+    assert cell(episode, "r1", "plans")[0].endswith("the last 500 ms before")
+    assert ("plan: nominal:infeasible, 17 plans", 920) in [
+        (sign.text, sign.tick) for sign in signs(episode, "r2")
+    ]
+
+
+def test_a_robot_that_makes_no_plan_is_named(write_run: WriteRun) -> None:
+    def change(key: str, message: Message) -> Message | None:
+        return None if key == "team/r1/plan" else message
+
+    episode = only(told(write_run, change, extra=fallen(FALL)))
+    assert "makes no plan in this second" in [sign.text for sign in signs(episode, "r1")]
+    assert cell(episode, "r1", "plans") == ("none", True)
+
+
+def test_a_gap_in_the_sensors_and_a_push_are_signs(write_run: WriteRun) -> None:
+    def change(key: str, message: Message) -> Message | None:
+        return None if key == "team/r1/state" and 1000 <= message.tick < 1050 else message
+
+    push = [("team/sim/event", msg.Event(800, 0, "push", "r2", "90 N"))]
+    episode = only(told(write_run, change, extra=[*push, *fallen(FALL)]))
+    gap = "gap: 50 messages of r1/state are missing"
+    assert (1000, gap) in [(sign.tick, sign.text) for sign in signs(episode, "r1")]
+    assert (800, "push: 90 N") in [(sign.tick, sign.text) for sign in signs(episode, "r2")]
