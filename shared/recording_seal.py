@@ -21,14 +21,14 @@ def seal(values: Mapping[str, str]) -> dict[str, str]:
 
 
 def unseal(stored: Mapping[str, str], name: str) -> dict[str, str]:
-    """What `seal` was given; metadata without format and checksum are taken as they are.
+    """What `seal` was given; metadata without a trace of a seal are taken as they are.
 
     Raises:
         RecordingError: a newer format, or damaged; `name` is the file's.
     """
     values = dict(stored)
-    crc = values.pop(_CRC_KEY, None)
-    if crc is not None and crc != _crc(values):
+    sealed = any(mark in repr(stored) for mark in (f"'{_FORMAT_KEY}'", _CRC_KEY))
+    if sealed and values.pop(_CRC_KEY, "") != _crc(values):
         raise RecordingError(
             name, "metadata that fail their checksum", "metadata as they were written",
             "a damaged file: `quadriga recover` writes what is readable",

@@ -100,6 +100,10 @@ class RecordingWriter:
         track.note(tick)
         self.messages += 1
 
+    def note(self, name: str, values: Mapping[str, str]) -> None:
+        """Write down something about the recording, see `Recording.notes`."""
+        self._mcap.metadata(name, dict(values))
+
     def flush(self) -> None:
         """Close the open chunk, so that what was written so far survives a kill."""
         self._mcap.flush()
