@@ -19,6 +19,7 @@ from shared.errors import MessageError, RecordingError
 from shared.messages import Event, Measurement, Message, Plan, Reference, Status, Truth
 from shared.recording import Recording
 from shared.robot import Array, robot_names
+from shared.salvage import Salvage
 from shared.topics import COMMAND, STATE, topic_of
 from shared.yokes import yoke_pairs
 
@@ -66,7 +67,7 @@ class Traces:
     events: tuple[Event, ...]
 
 
-def recorded_config(recording: Recording) -> Config:
+def recorded_config(recording: Recording | Salvage) -> Config:
     """The configuration of a recorded run.
 
     Raises:

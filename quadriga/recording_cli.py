@@ -1,0 +1,38 @@
+"""Options of the commands that make, read and mend recordings."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from quadriga import recording_verbs as verbs
+
+Add = Callable[[str, Any, str], argparse.ArgumentParser]
+_KEYS = "a topic, a robot or a key: plan, r2, r1/state, 'r*/**'"
+
+
+def add_record_options(record: argparse.ArgumentParser) -> None:
+    """Of `quadriga record`."""
+    record.add_argument("-o", "--output", type=Path, metavar="FILE",
+                        help="a new file (runs/<date>-<time>/run.mcap)")  # fmt: skip
+    record.add_argument("--topics", nargs="+", default=[], metavar="GLOB",
+                        help=f"record only these keys: {_KEYS}")  # fmt: skip
+    record.add_argument("--exclude", nargs="+", default=[], metavar="GLOB",
+                        help="do not record these keys")  # fmt: skip
+    record.add_argument("--max-size", type=float, default=0.0, metavar="MB",
+                        help="begin a new file (run-1.mcap, …) before one exceeds this size")  # fmt: skip
+    record.add_argument("--max-duration", type=float, default=0.0, metavar="S",
+                        help="begin a new file every so many seconds of wall time")  # fmt: skip
+    record.add_argument("--now", action="store_true",
+                        help="record whatever is there until interrupted; wait for no team")  # fmt: skip
+    record.add_argument("--predictor-sha256", default="", help="stored with the recording")
+    record.add_argument("--report", action="store_true", help="after the walk show what came of it")
+    record.add_argument("--no-render", action="store_true", help="no pictures of the walk")
+
+
+def add_verbs(add: Add) -> None:
+    """The commands themselves."""
+    info = add("info", verbs.info, "say what a recording holds")
+    info.add_argument("file", type=Path, metavar="FILE", help="an MCAP recording")
