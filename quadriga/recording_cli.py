@@ -36,3 +36,7 @@ def add_verbs(add: Add) -> None:
     """The commands themselves."""
     info = add("info", verbs.info, "say what a recording holds")
     info.add_argument("file", type=Path, metavar="FILE", help="an MCAP recording")
+    recover = add("recover", verbs.recover, "write what is readable of a damaged recording")
+    recover.add_argument("file", type=Path, metavar="FILE", help="a cut or damaged recording")
+    recover.add_argument("-o", "--output", type=Path, metavar="OUT",
+                         help="the whole file that is made (FILE.recovered.mcap)")  # fmt: skip

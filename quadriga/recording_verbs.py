@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from shared.config import Config
 from shared.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -48,4 +49,17 @@ def info(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     print("\n".join(info(found)))
     if found.error is not None:
         raise found.error
+    return 0
+
+
+def recover(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
+    """A whole file from what is left of a damaged one."""
+    from quadriga.recover import recover, told
+
+    done = recover(arguments.file, arguments.output)
+    if done is None:
+        print(f"{arguments.file} is whole: nothing to recover")
+        return 0
+    print(f"damaged: {done.error.got}")
+    print("\n".join(told(done)))
     return 0

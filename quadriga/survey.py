@@ -12,13 +12,13 @@ from shared.codec import decode
 from shared.config import Config
 from shared.errors import MessageError, QuadrigaError, RecordingError
 from shared.mcap_chunk import name_of
-from shared.messages import Event, Status
+from shared.messages import Event, Message, Status
 from shared.recording import Entry, Recording
 from shared.salvage import Damage, Salvage
 from shared.tick_track import TickTrack, periods
 from shared.topics import EVENT, STATUS, TABLE, topic_of
 
-_DECODED = {EVENT.name: Event, STATUS.name: Status}
+_DECODED: dict[str, type[Message]] = {EVENT.name: Event, STATUS.name: Status}
 _TYPES = {topic.name: topic.type.__name__ for topic in TABLE}
 
 
@@ -106,6 +106,7 @@ def type_of(key: str) -> str:
 
 def _read(entries: Iterator[Entry], every: Mapping[str, int]) -> dict[str, Any]:
     tracks: dict[str, TickTrack] = {}
+    kinds: dict[str, type[Message] | None] = {}
     first = last = invalid = 0
     events: list[Event] = []
     statuses: dict[str, Status] = {}
@@ -113,14 +114,15 @@ def _read(entries: Iterator[Entry], every: Mapping[str, int]) -> dict[str, Any]:
         track = tracks.get(key)
         if track is None:
             track = tracks[key] = TickTrack(every.get(name_of(key), 0))
+            kinds[key] = _DECODED.get(name_of(key))
         track.note(tick)
         first = min(first, log_time) if first else log_time
         last = max(last, log_time)
-        kind = _DECODED.get(key.partition("/")[2]) or _DECODED.get(key.rpartition("/")[2])
+        kind = kinds[key]
         if kind is None:
             continue
         try:
-            message = decode(payload, kind)
+            message: Message = decode(payload, kind)
         except MessageError:
             invalid += 1
             continue
