@@ -22,11 +22,11 @@ def add_record_options(record: argparse.ArgumentParser) -> None:
     record.add_argument("--exclude", nargs="+", default=[], metavar="GLOB",
                         help="do not record these keys")  # fmt: skip
     record.add_argument("--max-size", type=float, default=0.0, metavar="MB",
-                        help="begin a new file (run-1.mcap, …) before one exceeds this size")  # fmt: skip
+                        help="no file exceeds this size: run-1.mcap, … follow")  # fmt: skip
     record.add_argument("--max-duration", type=float, default=0.0, metavar="S",
                         help="begin a new file every so many seconds of wall time")  # fmt: skip
     record.add_argument("--now", action="store_true",
-                        help="record whatever is there until interrupted; wait for no team")  # fmt: skip
+                        help="record who is there until interrupted; wait for no team")  # fmt: skip
     record.add_argument("--predictor-sha256", default="", help="stored with the recording")
     record.add_argument("--report", action="store_true", help="after the walk show what came of it")
     record.add_argument("--no-render", action="store_true", help="no pictures of the walk")
@@ -40,3 +40,5 @@ def add_verbs(add: Add) -> None:
     recover.add_argument("file", type=Path, metavar="FILE", help="a cut or damaged recording")
     recover.add_argument("-o", "--output", type=Path, metavar="OUT",
                          help="the whole file that is made (FILE.recovered.mcap)")  # fmt: skip
+    check = add("check", verbs.check, "hold every message of a recording against the rules")
+    check.add_argument("file", type=Path, metavar="FILE", help="an MCAP recording")

@@ -63,3 +63,12 @@ def recover(arguments: argparse.Namespace, _config: Config, _given: Given) -> in
     print(f"damaged: {done.error.got}")
     print("\n".join(told(done)))
     return 0
+
+
+def check(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
+    """Every message of a recording against the rules; 1 if one is broken."""
+    from quadriga.check import check, told
+
+    findings = check(arguments.file)
+    print("\n".join(told(findings)))
+    return int(not all(finding.passed for finding in findings))
