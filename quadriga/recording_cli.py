@@ -42,3 +42,14 @@ def add_verbs(add: Add) -> None:
                          help="the whole file that is made (FILE.recovered.mcap)")  # fmt: skip
     check = add("check", verbs.check, "hold every message of a recording against the rules")
     check.add_argument("file", type=Path, metavar="FILE", help="an MCAP recording")
+    echo = add("echo", verbs.echo, "print messages, live or from a recording, one line each")
+    echo.add_argument("key", nargs="+", metavar="KEY", help=_KEYS)
+    echo.add_argument("--full", action="store_true", help="every number of every array")
+    hz = add("hz", verbs.hz, "print how often messages come, live or from a recording")
+    hz.add_argument("keys", nargs="*", metavar="KEY", help=f"{_KEYS} (all)")
+    hz.add_argument("--every", type=float, default=1.0, metavar="S",
+                    help="live: seconds between two tables (1)")  # fmt: skip
+    for looking, what in ((echo, "messages"), (hz, "tables")):
+        looking.add_argument("--file", type=Path, metavar="FILE", help="a recording, not the bus")
+        looking.add_argument("-n", "--count", type=int, default=0, metavar="COUNT",
+                             help=f"stop after so many {what} (0: never)")  # fmt: skip

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+import sys
+from collections.abc import Generator, Iterator
+from contextlib import AbstractContextManager, closing
+from typing import TYPE_CHECKING, Any, cast
 
+from shared.clock import monotonic
 from shared.config import Config
 from shared.errors import ConfigError
+from shared.signals import stop_flag
 
 if TYPE_CHECKING:
     from quadriga.recorder import Recorded
     from quadriga.recording_choice import Wanted
+    from shared.recording import Entry
 
 Given = dict[str, Any]
 _SMALLEST = 0.1  # MB, of a file: its schemas and index alone take some of that
@@ -72,3 +78,71 @@ def check(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     findings = check(arguments.file)
     print("\n".join(told(findings)))
     return int(not all(finding.passed for finding in findings))
+
+
+def echo(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """Messages as text, one line each."""
+    from quadriga.echo import line
+    from quadriga.feed import from_bus, from_file
+
+    if arguments.count < 0:
+        raise ConfigError("-n", str(arguments.count), "at least 0")
+    left = arguments.count or -1
+    with stop_flag() as stopped:
+        if arguments.file:
+            feed: Iterator[Entry | None] = from_file(arguments.file, arguments.key)
+        else:
+            feed = from_bus(config, "echo", arguments.key, stopped, _say)
+        with closing_feed(feed):
+            for entry in feed:
+                if stopped():
+                    break
+                if entry is None:
+                    continue
+                print(line(entry, full=arguments.full), flush=not arguments.file)
+                left -= 1
+                if not left:
+                    break
+    return 0
+
+
+def hz(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """Rates, intervals and gaps by key."""
+    from quadriga.feed import config_of, from_bus, from_file
+    from quadriga.hz import Paces
+    from shared.tick_track import periods
+
+    if arguments.file:
+        paces = Paces(periods(config_of(arguments.file)))
+        try:
+            for entry in from_file(arguments.file, arguments.keys):
+                paces.add(entry)
+        finally:
+            print("\n".join(paces.table()))
+        return 0
+    if arguments.count < 0 or not arguments.every > 0.0:
+        raise ConfigError("-n, --every", f"{arguments.count}, {arguments.every:g}", "more than 0")
+    paces, left, begun = Paces(periods(config)), arguments.count or -1, monotonic()
+    with stop_flag() as stopped:
+        feed = from_bus(config, "hz", arguments.keys, stopped, _say)
+        with closing_feed(feed):
+            for each in feed:
+                if each is not None:
+                    paces.add(each)
+                if monotonic() - begun < arguments.every or paces.empty:
+                    continue
+                print("\n".join((*paces.table(), "")), flush=True)
+                paces.again()
+                begun, left = monotonic(), left - 1
+                if not left:
+                    break
+    return 0
+
+
+def closing_feed(feed: Iterator[Any]) -> AbstractContextManager[Any]:
+    """Leave the bus when the reading ends early."""
+    return closing(cast("Generator[Any]", feed))
+
+
+def _say(text: str) -> None:
+    print(f"quadriga: {text}", file=sys.stderr, flush=True)
