@@ -150,10 +150,14 @@ class _Session:
             self._take(max(0.0, self._flushed + FLUSH - monotonic()))
             if late and monotonic() - self._begun > _LOOK and self._to.messages:
                 late = False
-                self._say(f"joined late, has {_since(self._to.since())}")
+                self._tell_missed()
             sleep(_GATHER)
         if late and self._to.messages:
-            self._say(f"joined late, has {_since(self._to.since())}")
+            self._tell_missed()
+
+    def _tell_missed(self) -> None:
+        if words := _missed(self._to.since()):
+            self._say(words)
 
     def drain(self) -> None:
         """What was sent before the end may still be under way when the end is noticed."""
@@ -186,17 +190,19 @@ class _Session:
         self._seen = self._seen or there
 
 
-def _since(first: Mapping[str, int]) -> str:
-    """Since when a recording has each topic, in words."""
+def _missed(first: Mapping[str, int]) -> str:
+    """Since when a recording has each topic, in words; "" if it has them from the first tick on."""
     found: dict[str, list[int]] = {}
     for key, tick in first.items():
         if tick >= 0:
-            found.setdefault(name_of(key) or key, []).append(tick)
+            found.setdefault(name_of(key) or "others", []).append(tick)
+    if min(map(min, found.values()), default=0) == 0:
+        return ""
     words = []
     for name, ticks in sorted(found.items(), key=lambda item: min(item[1])):
         spread = f"{min(ticks)} to {max(ticks)}" if max(ticks) > min(ticks) else f"{min(ticks)}"
         words.append(f"{name} since tick {spread}")
-    return ", ".join(words) or "no message with a tick yet"
+    return f"joined late, has {', '.join(words)}; what was before is missing"
 
 
 def _versions() -> dict[str, str]:
