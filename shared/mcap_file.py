@@ -35,6 +35,7 @@ from mcap.writer import MCAP0_MAGIC
 _MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
 _MESSAGE_FIELDS: Final = 22  # bytes of a message record's content before the payload
 _FOOTER: Final = struct.Struct("<BQQQ")  # opcode, length, summary, offsets; a checksum follows
+_ENTRY: Final = 24  # bytes that a message takes in the index, with its share of what is around it
 _REPEATED: Final = 4096  # bytes of channels that a chunk repeats, enough for a team of ten
 _INDEX_HEAD: Final = struct.Struct("<BQHI")  # opcode, length, channel, bytes of entries
 
@@ -52,6 +53,7 @@ class McapFile:
         self._known = b""  # the channels' records, for each chunk
         self._parts: list[bytes] = []  # of the open chunk
         self._size = 0  # bytes in it
+        self._waiting = 0  # bytes of its indexes
         self._entries: defaultdict[int, list[int]] = defaultdict(list)  # log time, offset, …
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
@@ -66,7 +68,7 @@ class McapFile:
     @property
     def size(self) -> int:
         """Bytes written, waiting (the open chunk before compression) and of the index to come."""
-        return self._written + self._size + self._index_size
+        return self._written + self._size + self._waiting + self._index_size
 
     def metadata(self, name: str, values: dict[str, str]) -> None:
         """Write a metadata record, ahead of the open chunk."""
@@ -102,6 +104,7 @@ class McapFile:
         head = _MESSAGE.pack(Opcode.MESSAGE, length, channel, sequence, log_time, publish_time)
         self._parts += (head, payload)
         self._size += len(head) + len(payload)
+        self._waiting += _ENTRY
         if self._size > self._chunk_size:
             self._close_chunk()
 
@@ -167,7 +170,7 @@ class McapFile:
         self._chunks.append(_bytes(index))
         self._index_size += len(self._chunks[-1])
         self._times = [min([first, *self._times[:1]]), max([last, *self._times[1:]])]
-        self._parts, self._size = [self._known], len(self._known)
+        self._parts, self._size, self._waiting = [self._known], len(self._known), 0
         self._entries.clear()
 
     def _statistics(self) -> Statistics:

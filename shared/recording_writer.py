@@ -70,14 +70,15 @@ class RecordingWriter:
         self._unknown = self._mcap.schema(
             _UNKNOWN, '{"description":"a key outside the table of topics"}'
         )
+        self._end_size = 1024 + sum(len(k) + len(v) + 8 for k, v in self._metadata.items())
         self._channels: dict[str, tuple[int, TickTrack]] = {}
         self._periods, self._after = periods or {}, after or {}
         self._file.flush()
 
     @property
     def size(self) -> int:
-        """Bytes that the file will have if it is finished now, or somewhat less."""
-        return self._mcap.size
+        """Bytes that the file will hardly exceed if it is finished now."""
+        return self._mcap.size + self._end_size
 
     @property
     def tracks(self) -> dict[str, TickTrack]:
@@ -146,6 +147,7 @@ class RecordingWriter:
             schema = self._schemas[name]
         except MessageError:
             name, schema, encoding = "", self._unknown, "application/octet-stream"
+        self._end_size += 2 * len(key) + 64  # of what is noted of it at the end
         track = TickTrack(self._periods.get(name, 0), self._after.get(key, -1))
         return self._mcap.channel(key, encoding, schema), track
 
