@@ -31,6 +31,7 @@ class Finding:
         objections: how many break the rule.
         first: the first of those.
         notes: what is worth knowing though no rule is broken.
+        count: said instead of how many of them break the rule.
     """
 
     name: str
@@ -39,11 +40,20 @@ class Finding:
     objections: int = 0
     first: list[Objection] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    count: str = ""
 
     @property
     def passed(self) -> bool:
         """Whether nothing breaks the rule."""
         return not self.objections
+
+    @property
+    def text(self) -> str:
+        """How much it looked at, and how much of that breaks the rule."""
+        if self.count:
+            return self.count
+        some = "" if self.passed else f"{self.objections:,} of "
+        return f"{some}{self.looked:,} {self.of}"
 
     def object(self, tick: int, key: str, got: str, limit: str, count: int = 1) -> None:
         """Count something that breaks the rule."""
