@@ -95,7 +95,10 @@ def open_any(path: Path) -> tuple[Recording | Salvage, RecordingError | None]:
         recording = Recording(path)
         recording.require_whole()
     except RecordingError as error:
-        return Salvage(path), error
+        salvage = Salvage(path)
+        next(salvage.entries(), None)  # raises if a newer version wrote them
+        return salvage, error
+    next(recording.entries(), None)
     return recording, None
 
 
