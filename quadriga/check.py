@@ -11,10 +11,10 @@ from quadriga.checks.limits import Friction, Torques
 from quadriga.checks.sequence import Ages, Gaps, Order
 from quadriga.columns import columns
 from quadriga.survey import open_any
-from quadriga.traces import recorded_config
 from shared.codec import decode
 from shared.errors import MessageError, RecordingError
 from shared.recording import COUNTS, Entry, Recording
+from shared.recording_config import recorded_config
 from shared.salvage import Salvage
 from shared.topics import Topic, topic_of
 

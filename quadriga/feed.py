@@ -12,13 +12,13 @@ from typing import Final
 
 from quadriga.key_patterns import KeyPattern, key_patterns
 from quadriga.survey import open_any
-from quadriga.traces import recorded_config
 from shared.bus import POLL, Bus
 from shared.clock import monotonic, wall_ns
 from shared.config import Config
 from shared.envelope import envelope
 from shared.errors import QuadrigaError
 from shared.recording import Entry
+from shared.recording_config import recorded_config
 
 _PATIENCE: Final = 3.0  # s wall without a message after which a listener is told where it listens
 

@@ -9,11 +9,11 @@ from typing import Final
 
 from quadriga.columns import columns
 from quadriga.survey import open_any
-from quadriga.traces import recorded_config
 from shared.clock import wall_ns
 from shared.config import Config
 from shared.errors import QuadrigaError, RecordingError
 from shared.recording import COUNTS, LOST, PROFILE, Recording, RecordingWriter
+from shared.recording_config import recorded_config
 from shared.recording_writer import reason
 from shared.salvage import Damage, Salvage
 from shared.tick_track import TickTrack, periods

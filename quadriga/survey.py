@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from quadriga.traces import recorded_config
 from shared.codec import decode
 from shared.config import Config
 from shared.errors import MessageError, QuadrigaError, RecordingError
 from shared.mcap_chunk import name_of
 from shared.messages import Event, Message, Status
 from shared.recording import Entry, Recording
+from shared.recording_config import recorded_config
 from shared.salvage import Damage, Salvage
 from shared.tick_track import TickTrack, periods
 from shared.topics import EVENT, STATUS, TABLE, topic_of

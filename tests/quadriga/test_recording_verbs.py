@@ -214,7 +214,7 @@ def test_recover_makes_a_whole_file_and_says_what_is_lost(
 
 
 @settings(
-    max_examples=40, deadline=None,
+    max_examples=12, deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )  # fmt: skip
 @given(data=st.data())
