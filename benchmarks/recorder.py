@@ -31,10 +31,12 @@ from shared.codec import encode
 from shared.config import Config
 from shared.config_file import load
 from shared.config_text import to_toml
+from shared.errors import RecordingError
 from shared.messages import Reference
 from shared.recording import Recording
 
 KEYS = 10  # of each publisher
+PROBE = "probe"  # sent until the recorder has heard every publisher
 BURST = 0.001  # s, what is due is sent this often: as a world of many robots does
 
 
@@ -46,8 +48,10 @@ def publish(
         if name == SIM:
             bus.declare(HERE)
             bus.declare(READY)
+        probe = bus.publisher(f"{config.team.name}/{name}/{PROBE}")
         puts = [bus.publisher(f"{config.team.name}/{name}-{k}/bench") for k in range(KEYS)]
-        go.wait()
+        while not go.wait(0.05):
+            probe(b"")
         begun, count = monotonic(), 0
         while (since := monotonic() - begun) < seconds:
             while count < rate * since:
@@ -86,7 +90,8 @@ def measure(rate: float, seconds: float, publishers: int, folder: Path) -> dict[
         [sys.executable, "-m", "quadriga", "record", "--now", "-o", str(file), "--config",
          str(folder / "bench.toml")], stdout=subprocess.DEVNULL,
     )  # fmt: skip
-    sleep(4.0)  # until all are linked
+    while probed(file) < publishers:
+        sleep(0.1)
     before = processor_time(recorder.pid)
     go.set()
     sleep(seconds + 1.0)
@@ -100,11 +105,21 @@ def measure(rate: float, seconds: float, publishers: int, folder: Path) -> dict[
             "asked_per_s": rate, "load": os.getloadavg()[0]}  # fmt: skip
 
 
+def probed(file: Path) -> int:
+    """How many publishers the recorder hears."""
+    try:
+        return len({entry.key for entry in Recording(file).entries()})
+    except RecordingError:
+        return 0
+
+
 def figures(file: Path, sent: int) -> dict[str, float]:
     """What the file tells."""
     ticks: defaultdict[str, list[int]] = defaultdict(list)
     times = []
     for key, tick, log_time, _ in Recording(file).entries():
+        if key.endswith(PROBE):
+            continue
         ticks[key].append(tick)
         times.append(log_time)
     gaps = sum(int((np.diff(found) != 1).sum()) + found[0] for found in ticks.values())
