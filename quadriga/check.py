@@ -34,8 +34,8 @@ def check(path: Path) -> list[Finding]:
     filtered = "topics" in source.metadata or "exclude" in source.metadata
     schema = Finding("schema", "messages")
     checks: tuple[Check, ...] = (
-        Order(), Gaps(config, filtered=filtered), Delay(config), Friction(config), Torques(),
-        Ages(),
+        Order(), Gaps(config, filtered=filtered), Delay(config, whole=error is None),
+        Friction(config), Torques(), Ages(),
     )  # fmt: skip
     times = Finding("log times", "messages")
     for item in _items(source.entries(), schema, times):

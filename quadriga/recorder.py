@@ -13,13 +13,14 @@ from typing import Final
 
 from quadriga.recording_choice import Filter, Wanted, wishes
 from quadriga.recording_parts import Parts
-from shared.barrier import RECORDER, SIM, meet, members
+from shared.barrier import PLANNER, RECORDER, SIM, meet, members
 from shared.bus import HERE, READY, Bus
 from shared.clock import monotonic, sleep, wall_ns
 from shared.config import Config
 from shared.config_text import config_sha256
 from shared.errors import RecordingError
-from shared.mcap_chunk import name_of
+from shared.mcap_chunk import name_of, robot_of
+from shared.robot import robot_names
 from shared.signals import stop_on_signals
 from shared.tick_track import periods
 
@@ -84,12 +85,12 @@ def run(
             with Parts(path, about, config.recorder.chunk_kib, periods_, limits) as to:
                 paths = to.paths
                 bus.subscribe(chosen.expression)
-                session = _Session(bus, to, chosen, stopped, say)
+                session = _Session(bus, to, chosen, config.team.robots, stopped, say)
                 joined = _join(bus, config, stopped, at_once=wanted.at_once)
                 if joined == MEMBER:
                     bus.declare(READY)
                 if joined:
-                    session.record(late=joined == LATE)
+                    session.record(late=joined == LATE, seen=not wanted.at_once)
                 session.drain()
             return Recorded(tuple(to.paths), to.messages, to.all_lost())
     except OSError as error:
@@ -135,16 +136,23 @@ class _Session:
     """The loop from the bus to the file."""
 
     def __init__(
-        self, bus: Bus, to: Parts, chosen: Filter, stopped: Callable[[], bool],
+        self, bus: Bus, to: Parts, chosen: Filter, robots: int, stopped: Callable[[], bool],
         say: Callable[[str], None],
     ) -> None:  # fmt: skip
+        self._robots = robots
         self._bus, self._to, self._chosen, self._stopped = bus, to, chosen, stopped
         self._say = say
         self._flushed = self._begun = monotonic()
         self._ended = self._seen = False
 
-    def record(self, *, late: bool) -> None:
-        """Until the end; a late one says what it has once it knows."""
+    def record(self, *, late: bool, seen: bool) -> None:
+        """Until the end; a late one says what it has once it knows.
+
+        Args:
+            late: nobody has waited for this recorder.
+            seen: the sim server has been there; its leaving is the end.
+        """
+        self._seen = seen
         self._flushed = self._begun = monotonic()
         while not (self._stopped() or self._ended):
             self._take(max(0.0, self._flushed + FLUSH - monotonic()))
@@ -156,8 +164,15 @@ class _Session:
             self._tell_missed()
 
     def _tell_missed(self) -> None:
-        if words := _missed(self._to.since()):
+        since = self._to.since()
+        if words := _missed(since):
             self._say(words)
+        robots = {robot for robot in map(robot_of, since) if robot}
+        if strangers := robots - {*robot_names(self._robots), PLANNER}:
+            self._say(
+                f"{', '.join(sorted(strangers))} walk too, but the configuration that is stored is "
+                f"of {', '.join(robot_names(self._robots))}: give the team's with --config"
+            )
 
     def drain(self) -> None:
         """What was sent before the end may still be under way when the end is noticed."""

@@ -55,7 +55,8 @@ class Parts:
         if self._split:
             self._refuse_later(path)
         self.paths: list[Path] = []
-        self.lost: Counter[str] = Counter()
+        self._lost: Counter[str] = Counter()
+        self._first: dict[str, int] = {}
         self._begun, self._messages = now(), 0
         self._writer = self._next({})
 
@@ -85,11 +86,11 @@ class Parts:
 
     def all_lost(self) -> dict[str, int]:
         """By key, messages that did not come, of all files."""
-        return dict(sorted((self.lost + Counter(lost_by_key(self._writer.tracks))).items()))
+        return dict(sorted((self._lost + Counter(lost_by_key(self._writer.tracks))).items()))
 
     def since(self) -> dict[str, int]:
-        """Tick of the first message of each key of the present file."""
-        return {key: track.first for key, track in self._writer.tracks.items()}
+        """Tick of the first message of each key."""
+        return self._firsts() | self._first
 
     def __enter__(self) -> Self:
         return self
@@ -102,11 +103,15 @@ class Parts:
     ) -> None:
         self.finish()
 
+    def _firsts(self) -> dict[str, int]:
+        return {key: track.first for key, track in self._writer.tracks.items()}
+
     def _turn(self) -> None:
         before = self._writer
+        self._first = self._firsts() | self._first
         before.finish()
         self._messages += before.messages
-        self.lost += Counter(lost_by_key(before.tracks))
+        self._lost += Counter(lost_by_key(before.tracks))
         self._begun = self._now()
         self._writer = self._next({key: track.last for key, track in before.tracks.items()})
 

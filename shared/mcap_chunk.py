@@ -101,6 +101,14 @@ def name_of(key: str) -> str:
         return ""
 
 
+def robot_of(key: str) -> str:
+    """The robot in a key, "" if it has none or the table does not know it."""
+    try:
+        return topic_of(key)[1]
+    except MessageError:
+        return ""
+
+
 def _learn(
     chunk: bytes, at: int, length: int, names: Container[str] | None,
     wanted: dict[int, str | None],

@@ -167,6 +167,10 @@ def test_answers_within_a_step_use_the_plans_of_that_step(tmp_path: Path) -> Non
     late = [*good[:-1], ("r2", bare(21, 1, {"r1": 20}))]
     finding = plans_only(tmp_path, config, late)
     assert [o.got for o in finding.first] == ["used step 20 of r1"]
+    (tmp_path / "plans.mcap").unlink()
+    invented = [*good, ("r2", bare(23, 0, {"r1": 22}))]
+    finding = plans_only(tmp_path, config, invented)
+    assert [o.got for o in finding.first] == ["used step 22 of r1, which is not recorded"]
 
 
 def test_other_planners_have_other_rules(tmp_path: Path) -> None:

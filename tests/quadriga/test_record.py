@@ -130,6 +130,15 @@ def test_beside_a_team_s_own_recorder_nobody_is_doubled(
     assert len(list(Recording(tmp_path / "run.mcap").entries())) == 1
 
 
+def test_another_team_s_configuration_is_noticed(start: Start, world: Bus, tmp_path: Path) -> None:
+    recorder = start()
+    for robot in ("r1", "r2"):
+        world.publisher(f"band/{robot}/state")(encode(state(70)))
+    sleep(0.1)
+    _, err = ended(recorder, world)
+    assert "r2 walk too, but the configuration that is stored is of r1: give" in err
+
+
 def test_only_what_is_asked_for(start: Start, world: Bus, tmp_path: Path) -> None:
     recorder = start("--topics", "state", "r2", "--exclude", "r3/*")
     for key in ("r1/state", "r2/state", "r2/plan", "r3/state", "r1/command", "reference"):
