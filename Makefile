@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 ARGS ?=
 
-.PHONY: install walk test lint format docs acceptance bench-planner
+.PHONY: install walk test lint format docs acceptance bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -47,3 +47,7 @@ acceptance: $(STAMP)
 # more for a team of five that has not walked here before.
 bench-planner: $(STAMP)
 	$(BIN)/python benchmarks/planner.py $(ARGS)
+
+# Whether the recorder keeps up with 20,000 messages a second; some ten seconds.
+bench-recorder: $(STAMP)
+	$(BIN)/python benchmarks/recorder.py $(ARGS)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from quadriga import verbs
+from quadriga import recording_cli, verbs
 from shared.config import Config
 from shared.config_file import build, layers, parse_assignment
 from shared.errors import ProcessError, QuadrigaError
@@ -79,12 +79,8 @@ def parser() -> argparse.ArgumentParser:
         "plan", verbs.plan, "the planner of the whole team (planner.kind centralised, deepc)"
     )
     plan.add_argument("--predictor", type=Path, metavar="FILE", help="instead of the cached one")
-    record = add("record", verbs.record, "record all traffic to an MCAP file")
-    record.add_argument("-o", "--output", type=Path, metavar="FILE",
-                        help="a new file (runs/<date>-<time>/run.mcap)")  # fmt: skip
-    record.add_argument("--predictor-sha256", default="", help="stored with the recording")
-    record.add_argument("--report", action="store_true", help="after the walk show what came of it")
-    record.add_argument("--no-render", action="store_true", help="no pictures of the walk")
+    record = add("record", verbs.record, "record the traffic of a team to an MCAP file")
+    recording_cli.add_record_options(record)
     for waiting in (agent, plan, record):
         waiting.add_argument("--wait", type=float, default=0.0, metavar="S",
                              help="wait so long for the predictor to be made (0)")  # fmt: skip
@@ -103,6 +99,7 @@ def parser() -> argparse.ArgumentParser:
                         help="MCAP for Foxglove or Rerun, or one table per key")  # fmt: skip
     export.add_argument("-o", "--output", type=Path, metavar="OUT",
                         help="a new file or folder (beside FILE)")  # fmt: skip
+    recording_cli.add_verbs(add)
     router = add("router", verbs.router, "the router between processes in client mode")
     router.add_argument("--listen", metavar="ENDPOINT", help="where (bus.endpoint)")
     router.add_argument("--once", action="store_true", help="leave when the team has walked")

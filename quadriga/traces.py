@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter, defaultdict
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,13 +13,15 @@ from quadriga.truth_trace import Ticks, TruthTrace, build_truth_trace, stack, ti
 from shared.barrier import PLANNER
 from shared.codec import decode
 from shared.config import Config
-from shared.config_file import build
 from shared.errors import MessageError, RecordingError
 from shared.messages import Event, Measurement, Message, Plan, Reference, Status, Truth
 from shared.recording import Recording
+from shared.recording_config import recorded_config
 from shared.robot import Array, robot_names
 from shared.topics import COMMAND, STATE, topic_of
 from shared.yokes import yoke_pairs
+
+__all__ = ["MeasurementTrace", "Traces", "in_force", "read_traces", "recorded_config"]
 
 _TIMED_ONLY: Final = (STATE.name, COMMAND.name)  # 1 kHz each: only their ticks are read
 
@@ -64,24 +65,6 @@ class Traces:
     plans: Mapping[str, tuple[Plan, ...]]
     statuses: Mapping[str, tuple[Status, ...]]
     events: tuple[Event, ...]
-
-
-def recorded_config(recording: Recording) -> Config:
-    """The configuration of a recorded run.
-
-    Raises:
-        RecordingError: the recording holds none.
-        ConfigError: it has keys or values that this version does not know.
-    """
-    try:
-        sections = json.loads(recording.metadata.get("config_json", ""))
-    except ValueError:
-        sections = None
-    if not isinstance(sections, dict):
-        raise RecordingError(
-            str(recording.path), "metadata without a configuration", "config_json in the metadata"
-        )
-    return build(sections)
 
 
 def read_traces(recording: Recording, names: Container[str] | None = None) -> Traces:

@@ -77,9 +77,10 @@ def plan(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 def record(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     """The recorder's process."""
     from quadriga.recorder import run
+    from quadriga.recording_verbs import recorded, wanted
     from quadriga.summary import RECORDING
 
-    path = arguments.output
+    path, choice = arguments.output, wanted(arguments)
     if path is None:
         from quadriga.run_folder import make_run_dir
 
@@ -87,10 +88,13 @@ def record(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     elif arguments.report and path.name != RECORDING:
         raise ConfigError("--output", str(path), f"DIR/{RECORDING}", "--report fills its folder")
     sha256 = arguments.predictor_sha256 or _fitted_sha256(config, arguments.wait)
+    say = Console(stderr=True, markup=False, highlight=False, soft_wrap=True).print
     with stop_flag() as stopped:
-        run(config, path, predictor_sha256=sha256, stopped=stopped)
+        done = run(
+            config, path, predictor_sha256=sha256, stopped=stopped, wanted=choice, say=say
+        )  # fmt: skip
         if stopped() or not arguments.report:
-            print(f"recorded to {path}")
+            print(recorded(done))
             return 0
     arguments.run, arguments.html = path.parent, None
     return report(arguments, config, given)

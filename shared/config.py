@@ -339,7 +339,9 @@ class RecorderConfig:
     """The recording of all traffic."""
 
     enabled: bool = key(True, "-", "the team waits for the recorder before it walks")
-    chunk_kib: int = key(256, "KiB", "MCAP chunk size; what kill -9 may lose", low=16, high=65536)
+    chunk_kib: int = key(
+        256, "KiB", "largest MCAP chunk; smaller ones are closed every 50 ms", low=16, high=65536
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,148 @@
+"""What the recorder takes in: real publishers over real Zenoh, messages/s, gaps, share of a core.
+
+Run: python benchmarks/recorder.py [--rate 20000] [--seconds 5] [--publishers 2] [--json FILE]
+
+Publishers are processes that send commands of a growing tick in real time, each on keys of its own,
+and wait for nobody; `quadriga record --now` writes them down. Gaps are looked for in the file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from multiprocessing.synchronize import Event
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from quadriga.endpoint import free_endpoint
+from shared.barrier import SIM
+from shared.bus import HERE, READY, Bus
+from shared.clock import monotonic, sleep
+from shared.codec import encode
+from shared.config import Config
+from shared.config_file import load
+from shared.config_text import to_toml
+from shared.errors import RecordingError
+from shared.messages import Reference
+from shared.recording import Recording
+
+KEYS = 10  # of each publisher
+PROBE = "probe"  # sent until the recorder has heard every publisher
+BURST = 0.001  # s, what is due is sent this often: as a world of many robots does
+
+
+def publish(
+    config: Config, name: str, rate: float, seconds: float, go: Event, ended: Event, sent: Any
+) -> None:
+    """Send small messages on `KEYS` keys, `rate` a second in all, for `seconds`."""
+    with Bus.open(config.bus, config.team.name, name) as bus:
+        if name == SIM:
+            bus.declare(HERE)
+            bus.declare(READY)
+        probe = bus.publisher(f"{config.team.name}/{name}/{PROBE}")
+        puts = [bus.publisher(f"{config.team.name}/{name}-{k}/bench") for k in range(KEYS)]
+        while not go.wait(0.05):
+            probe(b"")
+        begun, count = monotonic(), 0
+        while (since := monotonic() - begun) < seconds:
+            while count < rate * since:
+                tick = count // KEYS
+                puts[count % KEYS](encode(Reference(tick, 1_000_000 * tick, 0.5, 0.0, 0.0, 0.26)))
+                count += 1
+            sleep(BURST)
+        sent.value = count
+        ended.wait()
+
+
+def processor_time(pid: int) -> float:
+    """Seconds of processor time that a process has taken so far, user and system."""
+    fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(") ")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def measure(rate: float, seconds: float, publishers: int, folder: Path) -> dict[str, float]:
+    """Publish and record once; the figures."""
+    config = load(None, {"bus.endpoint": free_endpoint(), "team.name": "bench"})
+    (folder / "bench.toml").write_text(to_toml(config), encoding="utf-8")
+    spawn = multiprocessing.get_context("spawn")
+    go, ended = spawn.Event(), spawn.Event()
+    names = [SIM, *(f"p{k}" for k in range(1, publishers))]
+    counts = [spawn.Value("q", 0) for _ in names]
+    senders = [
+        spawn.Process(
+            target=publish, args=(config, name, rate / publishers, seconds, go, ended, count)
+        )
+        for name, count in zip(names, counts, strict=True)
+    ]
+    for sender in senders:
+        sender.start()
+    file = folder / "bench.mcap"
+    recorder = subprocess.Popen(
+        [sys.executable, "-m", "quadriga", "record", "--now", "-o", str(file), "--config",
+         str(folder / "bench.toml")], stdout=subprocess.DEVNULL,
+    )  # fmt: skip
+    while probed(file) < publishers:
+        sleep(0.1)
+    before = processor_time(recorder.pid)
+    go.set()
+    sleep(seconds + 1.0)
+    used = processor_time(recorder.pid) - before
+    recorder.send_signal(signal.SIGINT)
+    recorder.wait()
+    ended.set()
+    for sender in senders:
+        sender.join()
+    return {**figures(file, sum(count.value for count in counts)), "core": used / seconds,
+            "asked_per_s": rate, "load": os.getloadavg()[0]}  # fmt: skip
+
+
+def probed(file: Path) -> int:
+    """How many publishers the recorder hears."""
+    try:
+        return len({entry.key for entry in Recording(file).entries()})
+    except RecordingError:
+        return 0
+
+
+def figures(file: Path, sent: int) -> dict[str, float]:
+    """What the file tells."""
+    ticks: defaultdict[str, list[int]] = defaultdict(list)
+    times = []
+    for key, tick, log_time, _ in Recording(file).entries():
+        if key.endswith(PROBE):
+            continue
+        ticks[key].append(tick)
+        times.append(log_time)
+    gaps = sum(int((np.diff(found) != 1).sum()) + found[0] for found in ticks.values())
+    return {
+        "sent": sent, "recorded": len(times), "gaps": gaps,
+        "per_s": (len(times) - 1) / max(1e-9 * (times[-1] - times[0]), 1e-9),
+        "bytes": file.stat().st_size,
+    }  # fmt: skip
+
+
+if __name__ == "__main__":
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--rate", type=float, default=20_000.0)
+    arguments.add_argument("--seconds", type=float, default=5.0)
+    arguments.add_argument("--publishers", type=int, default=2)
+    arguments.add_argument("--json", type=Path, default=None, metavar="FILE")
+    options = arguments.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        found = measure(options.rate, options.seconds, options.publishers, Path(scratch))
+    print(
+        f"{found['per_s']:,.0f} messages/s recorded of {found['asked_per_s']:,.0f} asked for; "
+        f"{found['recorded']:,.0f} of {found['sent']:,.0f} sent, {found['gaps']:.0f} gaps; "
+        f"{100 * found['core']:.0f} % of a core; load {found['load']:.1f}"
+    )
+    if options.json is not None:
+        options.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")

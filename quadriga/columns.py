@@ -1,0 +1,30 @@
+"""Rows of cells as aligned lines without borders, fit for a terminal, a pipe and `grep`."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from typing import Final
+
+NOTHING: Final = "–"
+
+
+def columns(
+    rows: Iterable[Sequence[str]], *, right: Collection[int] = (), indent: str = "  "
+) -> list[str]:
+    """One line for each row, its cells side by side.
+
+    Args:
+        rows: cells of plain text; the same number in each.
+        right: columns that are flush right, as numbers are.
+        indent: what each line begins with.
+    """
+    cells = [tuple(row) for row in rows]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = []
+    for row in cells:
+        padded = [
+            cell.rjust(width) if k in right else cell.ljust(width)
+            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append((indent + "  ".join(padded)).rstrip())
+    return lines

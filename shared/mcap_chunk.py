@@ -1,0 +1,120 @@
+"""Reading the inside of an MCAP chunk: channels, schemas and messages of this project."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Container, Iterator
+from io import BytesIO
+from typing import Final, NamedTuple
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Schema
+
+from shared.envelope import envelope
+from shared.errors import MessageError
+from shared.recording_seal import newer
+from shared.topics import TABLE, topic_of
+
+RECORD: Final = struct.Struct("<BQ")  # opcode, length
+_MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
+_KNOWN: Final = {f"quadriga.{topic.type.__name__}": topic.type.SCHEMA for topic in TABLE}
+
+# What the MCAP library and LZ4 raise on bytes that are no record.
+CORRUPT: Final = (
+    McapError, struct.error, ValueError, RuntimeError, IndexError, EOFError, MemoryError,
+)  # fmt: skip
+
+
+class Entry(NamedTuple):
+    """One recorded message.
+
+    `tick` is -1 where the message carries none that can be read.
+    """
+
+    key: str
+    tick: int
+    log_time_ns: int
+    payload: bytes
+
+
+def stream(content: bytes) -> ReadDataStream:
+    """The content of a record for the MCAP library."""
+    return ReadDataStream(BytesIO(content))
+
+
+def messages_of(
+    chunk: bytes, names: Container[str] | None, wanted: dict[int, str | None], path: str
+) -> Iterator[Entry]:
+    """Entries of one chunk of the topics `names` (None: all, also of keys outside the table).
+
+    Args:
+        chunk: its records, uncompressed.
+        names: see above.
+        wanted: keys by channel, None for one that is not wanted; learns them as they pass by.
+        path: the file's, for the error.
+
+    Raises:
+        RecordingError: the messages are of a schema later than this version's.
+    """
+    at = 0
+    while at < len(chunk):
+        if chunk[at] != Opcode.MESSAGE:
+            opcode, length = RECORD.unpack_from(chunk, at)
+            at += RECORD.size
+            if opcode == Opcode.CHANNEL:
+                _learn(chunk, at, length, names, wanted)
+            elif opcode == Opcode.SCHEMA:
+                check_schema(Schema.read(stream(chunk[at : at + length])), path)
+            at += length
+            continue
+        _, length, channel_id, _, log_time, _ = _MESSAGE.unpack_from(chunk, at)
+        key = wanted.get(channel_id)
+        end = at + RECORD.size + length
+        if key is not None:
+            payload = chunk[at + _MESSAGE.size : end]
+            found = envelope(payload)
+            yield Entry(key, -1 if found is None else found[0], log_time, payload)
+        at = end
+
+
+def check_schema(schema: Schema, path: str) -> None:
+    """Raise RecordingError if a schema is later than this version's."""
+    mine = _KNOWN.get(schema.name)
+    if mine is None:
+        return
+    try:
+        version = json.loads(schema.data)["properties"]["schema"]["const"]
+    except (ValueError, TypeError, LookupError):
+        return
+    if isinstance(version, int) and version > mine:
+        raise newer(path, f"messages {schema.name} of schema {version}", f"schema {mine}")
+
+
+def name_of(key: str) -> str:
+    """Name of a key's topic, "" if the table has none."""
+    try:
+        return topic_of(key)[0].name
+    except MessageError:
+        return ""
+
+
+def robot_of(key: str) -> str:
+    """The robot in a key, "" if it has none or the table does not know it."""
+    try:
+        return topic_of(key)[1]
+    except MessageError:
+        return ""
+
+
+def _learn(
+    chunk: bytes, at: int, length: int, names: Container[str] | None,
+    wanted: dict[int, str | None],
+) -> None:  # fmt: skip
+    if int.from_bytes(chunk[at : at + 2], "little") in wanted:
+        return  # every chunk repeats them
+    channel = Channel.read(stream(chunk[at : at + length]))
+    skipped = names is not None and name_of(channel.topic) not in names
+    wanted[channel.id] = None if skipped else channel.topic

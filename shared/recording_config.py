@@ -1,0 +1,29 @@
+"""The configuration of a recorded run, from the recording's metadata."""
+
+from __future__ import annotations
+
+import json
+
+from shared.config import Config
+from shared.config_file import build
+from shared.errors import RecordingError
+from shared.recording import Recording
+from shared.salvage import Salvage
+
+
+def recorded_config(recording: Recording | Salvage) -> Config:
+    """The configuration of a recorded run.
+
+    Raises:
+        RecordingError: the recording holds none.
+        ConfigError: it has keys or values that this version does not know.
+    """
+    try:
+        sections = json.loads(recording.metadata.get("config_json", ""))
+    except ValueError:
+        sections = None
+    if not isinstance(sections, dict):
+        raise RecordingError(
+            str(recording.path), "metadata without a configuration", "config_json in the metadata"
+        )
+    return build(sections)

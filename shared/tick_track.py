@@ -1,0 +1,78 @@
+"""What the ticks of one key tell: since when it is there, and which messages are missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from shared.config import Config
+from shared.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, STATE, STATUS, TABLE, TRUTH
+
+_SAMPLE: Final = 10  # ms, of measurements, truth and the planner
+_JUMP: Final = 600_000  # ms: a longer jump is another clock or a forged tick, not a loss
+_KEPT: Final = 1000  # gaps that are remembered one by one
+
+Gap = tuple[int, int]  # last tick before it, first tick after it
+
+
+def periods(config: Config) -> dict[str, int]:
+    """World time between two messages of a topic by its name, ms; 0: sent on event.
+
+    In real time an agent that was late says its status later.
+    """
+    lockstep = config.world.mode == "lockstep"
+    found = dict.fromkeys((topic.name for topic in TABLE), 0)
+    return found | {
+        STATE.name: 1,
+        COMMAND.name: 1,
+        MEASUREMENT.name: _SAMPLE,
+        PLAN.name: _SAMPLE * config.planner.applied,
+        STATUS.name: round(1000 / STATUS.rate_hz) if lockstep else 0,
+        REFERENCE.name: round(1000 / REFERENCE.rate_hz),
+        TRUTH.name: 1 if config.estimator.kind == "truth" else _SAMPLE,
+    }
+
+
+class TickTrack:
+    """The ticks of one key, followed message by message.
+
+    Attributes:
+        count: messages.
+        first, last: ticks of the first and the newest message, −1 before them.
+        lost: messages that are missing between them, by the topic's period.
+        gaps: where, at most the first thousand.
+    """
+
+    __slots__ = ("_period", "count", "first", "gaps", "last", "lost")
+
+    def __init__(self, period: int, before: int = -1) -> None:
+        """Begin to follow.
+
+        Args:
+            period: world time between two messages, ms; 0: none is missed.
+            before: tick of the message before the first one here, −1 if unknown.
+        """
+        self._period, self.last = period, before
+        self.first = -1
+        self.count = self.lost = 0
+        self.gaps: list[Gap] = []
+
+    def note(self, tick: int) -> None:
+        """A message has come; a negative tick stands for one that could not be read."""
+        self.count += 1
+        if tick < 0:
+            return
+        step = tick - self.last
+        if step > self._period > 0 <= self.last and step < _JUMP:
+            missing = (step - 1) // self._period
+            self.lost += missing
+            if missing and len(self.gaps) < _KEPT:
+                self.gaps.append((self.last, tick))
+        if self.first < 0:
+            self.first = tick
+        self.last = tick
+
+
+def lost_by_key(tracks: Mapping[str, TickTrack]) -> dict[str, int]:
+    """Missing messages of the keys that miss some."""
+    return {key: track.lost for key, track in sorted(tracks.items()) if track.lost}

@@ -1,0 +1,299 @@
+"""`quadriga record` beside a team that walks: late, in part, in parts, killed, out of room."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quadriga.cli import main
+from quadriga.endpoint import free_endpoint
+from quadriga.survey import survey
+from shared.barrier import RECORDER, SIM
+from shared.bus import HERE, READY, Bus
+from shared.clock import monotonic, sleep, wall_ns
+from shared.codec import encode
+from shared.config import BusConfig, Config, RecorderConfig, TeamConfig
+from shared.config_text import to_toml
+from shared.messages import Plan, Reference
+from shared.recording import LOST, SINCE, Recording
+from tests.shared.test_recording import state
+
+WAIT = 20.0  # s
+
+
+@pytest.fixture
+def config() -> Config:
+    bus = BusConfig(endpoint=free_endpoint(), barrier_timeout=WAIT)
+    return Config(team=TeamConfig(name="band", robots=1), bus=bus)
+
+
+@pytest.fixture
+def world(config: Config) -> Iterator[Bus]:
+    """The sim server's place on the bus; the team walks already."""
+    with Bus.open(config.bus, "band", SIM) as bus:
+        bus.declare(HERE)
+        bus.declare(READY)
+        yield bus
+
+
+Start = Callable[..., subprocess.Popen[str]]
+
+
+@pytest.fixture
+def start(config: Config, tmp_path: Path) -> Iterator[Start]:
+    """A function that starts `quadriga record` with more options, linked to the world."""
+    started = []
+
+    def begin(
+        *options: str, room: int = -1, of: Config = config, out: Path | None = None
+    ) -> subprocess.Popen[str]:
+        file = tmp_path / "band.toml"
+        file.write_text(to_toml(of), encoding="utf-8")
+        out = out or tmp_path / "run.mcap"
+        recorder = subprocess.Popen(
+            [sys.executable, "-m", "quadriga", "record", "--config", str(file), "-o", str(out),
+             *options],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, -1)),
+        )  # fmt: skip
+        started.append(recorder)
+        await_start(recorder, out)
+        return recorder
+
+    yield begin
+    for recorder in started:
+        if recorder.poll() is None:
+            recorder.kill()
+        recorder.communicate()
+
+
+def await_start(recorder: subprocess.Popen[str], file: Path) -> None:
+    """Wait until a recorder has made its file and hears what the world publishes."""
+    deadline = monotonic() + WAIT
+    while not file.exists():
+        assert recorder.poll() is None
+        assert monotonic() < deadline
+        sleep(0.02)
+    sleep(0.6)
+
+
+def ended(recorder: subprocess.Popen[str], world: Bus) -> tuple[str, str]:
+    """End the walk; what the recorder said on stdout and stderr."""
+    world.withdraw()
+    out, err = recorder.communicate(timeout=WAIT)
+    assert recorder.returncode == 0, err
+    return out, err
+
+
+def test_joining_late_says_what_it_missed_and_counts_what_is_lost(
+    start: Start, world: Bus, tmp_path: Path
+) -> None:
+    put = world.publisher("band/r1/state")
+    put(encode(state(0)))
+    recorder = start()
+    for tick in range(4000, 5000):
+        if not 4100 <= tick < 4110 and tick != 4500:
+            put(encode(state(tick)))
+    out, err = ended(recorder, world)
+    assert "joined late, has state since tick 4000" in err
+    assert "989 messages, 11 lost" in out
+    recording = Recording(tmp_path / "run.mcap")
+    recording.require_whole()
+    assert recording.notes()[LOST] == {"band/r1/state": "11"}
+    assert recording.notes()[SINCE] == {"band/r1/state": "4000"}
+
+
+def test_beside_a_team_s_own_recorder_nobody_is_doubled(
+    config: Config, start: Start, tmp_path: Path
+) -> None:
+    with (
+        Bus.open(config.bus, "band", SIM) as world,
+        Bus.open(config.bus, "band", RECORDER) as other,
+    ):
+        other.declare(HERE)
+        world.declare(HERE)
+        recorder = start()
+        sleep(0.5)
+        assert world.doubles(HERE) == frozenset()
+        world.publisher("band/r1/state")(encode(state(0)))
+        sleep(0.1)
+        _, err = ended(recorder, world)
+    assert err == ""
+    assert len(list(Recording(tmp_path / "run.mcap").entries())) == 1
+
+
+def test_another_team_s_configuration_is_noticed(start: Start, world: Bus, tmp_path: Path) -> None:
+    recorder = start()
+    for robot in ("r1", "r2"):
+        world.publisher(f"band/{robot}/state")(encode(state(70)))
+    sleep(0.1)
+    _, err = ended(recorder, world)
+    assert "r2 walk too, but the configuration that is stored is of r1: give" in err
+
+
+def test_only_what_is_asked_for(start: Start, world: Bus, tmp_path: Path) -> None:
+    recorder = start("--topics", "state", "r2", "--exclude", "r3/*")
+    for key in ("r1/state", "r2/state", "r2/plan", "r3/state", "r1/command", "reference"):
+        world.publisher(f"band/{key}")(encode(state(0)))
+    sleep(0.1)
+    ended(recorder, world)
+    recording = Recording(tmp_path / "run.mcap")
+    keys = sorted(entry.key for entry in recording.entries())
+    assert keys == ["band/r1/state", "band/r2/plan", "band/r2/state"]
+    assert recording.metadata["topics"] == '["state", "r2"]'
+
+
+def test_parts_are_whole_small_and_together_everything(
+    start: Start, world: Bus, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorder = start("--max-size", "0.2")
+    put, sent = world.publisher("band/r1/state"), []
+    for tick in range(1200):
+        sent.append(encode(state(tick)))
+        put(sent[-1])
+    out, _ = ended(recorder, world)
+    paths = [tmp_path / "run.mcap", *(tmp_path / f"run-{k}.mcap" for k in (1, 2, 3))]
+    assert "1,200 messages, 0 lost" in out
+    assert sorted(tmp_path.glob("*.mcap")) == sorted(paths)
+    found = []
+    for number, path in enumerate(paths):
+        assert path.stat().st_size <= 200_000
+        recording = Recording(path)
+        recording.require_whole()
+        assert recording.metadata["part"] == str(number)
+        assert recording.notes()[LOST] == {}
+        found += [entry.payload for entry in recording.entries()]
+    assert found == sent
+    assert main(["record", "-o", str(tmp_path / "run.mcap"), "--max-size", "1"]) == 2
+    assert "never overwritten" in capsys.readouterr().err
+
+
+def test_kill_9_loses_a_tenth_of_a_second_at_most(start: Start, world: Bus, tmp_path: Path) -> None:
+    put = world.publisher("band/r1/state")
+    losses = []
+    for attempt in range(3):  # a busy machine may keep messages from even reaching the recorder
+        path = tmp_path / f"{attempt}.mcap"
+        recorder = start(out=path)
+        sent: list[int] = []
+        begun = monotonic()
+        while monotonic() - begun < 1.0 + 0.03 * attempt:
+            put(encode(state(len(sent))))
+            sent.append(wall_ns())
+            sleep(0.001)
+        killed = wall_ns()
+        recorder.kill()
+        recorder.communicate()
+        found = survey(path)
+        assert found.error is not None
+        (track,) = found.tracks.values()
+        assert (track.first, track.lost) == (0, 0)
+        losses.append(1e-9 * (killed - sent[track.last]))
+        if losses[-1] < 0.1:
+            return
+    pytest.fail(f"{losses} s were lost")
+
+
+def test_what_is_lost_is_known_after_a_kill(start: Start, world: Bus, tmp_path: Path) -> None:
+    recorder = start()
+    put = world.publisher("band/r1/state")
+    for tick in (*range(100), *range(107, 200)):
+        put(encode(state(tick)))
+    sleep(0.5)
+    recorder.kill()
+    recorder.communicate()
+    (track,) = survey(tmp_path / "run.mcap").tracks.values()
+    assert (track.lost, track.gaps) == (7, [(99, 107)])
+
+
+def test_a_full_disk_is_one_clear_error(start: Start, world: Bus, tmp_path: Path) -> None:
+    recorder = start(room=100_000)
+    put = world.publisher("band/r1/state")
+    for tick in range(1000):
+        put(encode(state(tick)))
+        sleep(0.0005)
+    out, err = recorder.communicate(timeout=WAIT)
+    assert (recorder.returncode, out) == (2, "")
+    assert err.count("\n") == 1
+    assert "run.mcap: got File too large, expected room for the recording" in err
+    assert survey(tmp_path / "run.mcap").tracks["band/r1/state"].count > 100
+
+
+def test_a_full_file_system_is_named(start: Start, world: Bus, tmp_path: Path) -> None:
+    small = tmp_path / "small"
+    small.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", str(small)]
+    if os.geteuid() or subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("no small file system can be mounted here")
+    recorder = None
+    try:
+        recorder = start(out=small / "run.mcap")
+        put = world.publisher("band/r1/state")
+        for tick in range(1000):
+            put(encode(state(tick)))
+            sleep(0.0005)
+        _, err = recorder.communicate(timeout=WAIT)
+        assert recorder.returncode == 2
+        assert "got No space left on device, expected room for the recording" in err
+        assert err.count("\n") == 1
+        assert survey(small / "run.mcap").tracks["band/r1/state"].count > 0
+    finally:
+        if recorder is not None:
+            recorder.kill()
+            recorder.wait()
+        subprocess.run(["umount", "--lazy", str(small)], check=True)
+
+
+def test_at_once_waits_for_no_team(config: Config, start: Start, tmp_path: Path) -> None:
+    with Bus.open(config.bus, "band", SIM) as hub:  # it never says that it is there
+        recorder = start("--now")
+        plan = Plan(40, 40, 1, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 0)
+        hub.publisher("band/r1/plan")(encode(plan))
+        hub.publisher("band/reference")(encode(Reference(0, 0, 0.0, 0.0, 0.0, 0.26)))
+        sleep(0.2)
+        recorder.terminate()
+        recorder.communicate(timeout=WAIT)
+    assert recorder.returncode == 0
+    assert len(list(Recording(tmp_path / "run.mcap").entries())) == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--topics", "a//b"), "--topics: got 'a//b'"),
+        (("--max-size", "0.01"), "--max-size: got 0.01 MB, expected at least 0.1"),
+        (("--max-duration", "-1"), "--max-duration: got -1 s"),
+        (("--report", "--max-size", "5", "-o", "x/run.mcap"), "--report: got a recording in parts"),
+    ],
+)
+def test_mistakes_are_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
+    options: tuple[str, ...], message: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert main(["record", *options]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert message in err
+
+
+def test_a_team_without_recorder_is_recorded_from_the_start(
+    config: Config, start: Start, tmp_path: Path
+) -> None:
+    alone = replace(config, recorder=RecorderConfig(enabled=False))
+    with Bus.open(alone.bus, "band", SIM) as world:
+        world.declare(HERE)
+        recorder = start(of=alone)
+        put = world.publisher("band/r1/state")
+        for tick in range(10):
+            put(encode(state(tick)))
+        sleep(0.1)
+        _, err = ended(recorder, world)
+    assert err == ""

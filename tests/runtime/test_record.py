@@ -1,0 +1,73 @@
+"""A recorder beside a team of real processes: whatever becomes of it, the team walks on."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from quadriga.survey import survey
+from shared.clock import monotonic, sleep
+from shared.messages import Event
+from tests.runtime.conftest import WAIT, Make, Team
+
+
+def beside(team: Team, name: str, room: int = -1) -> subprocess.Popen[str]:
+    """A `quadriga record` of its own, which may write no more than `room` bytes."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "quadriga", "record", "-o", str(team.folder / name), "--config",
+         str(team.folder / "config.toml")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, -1)),
+    )  # fmt: skip
+
+
+def test_recorders_die_beside_a_team_that_walks_on(make_team: Make) -> None:
+    team = make_team(recorder__enabled=True, world__seconds=600.0)
+    late = team.folder / "late.mcap"
+    others = []
+    try:
+        with team.launch() as running:
+            team.await_log("sim", "start")
+            others = [
+                beside(team, "full.mcap", 60_000), beside(team, "killed.mcap"),
+                beside(team, "late.mcap"),
+            ]  # fmt: skip
+            await_size(team.folder / "killed.mcap", 50_000)
+            others[1].kill()
+            others[0].wait(WAIT)
+            await_size(late, (late.stat().st_size if late.exists() else 0) + 100_000)
+            os.kill(running.pids["sim"], signal.SIGTERM)
+            running.watch(lambda: False)  # raises if any process of the team has failed
+        said = [other.communicate(timeout=WAIT)[1] for other in others]
+    finally:
+        for other in others:
+            other.kill()
+            other.wait()
+    assert [other.returncode for other in others] == [2, -signal.SIGKILL, 0], said
+    assert "got File too large, expected room for the recording" in said[0]
+    assert "joined late, has" in said[2]
+    recording = team.recording()
+    recording.require_whole()
+    end = list(recording.messages(Event))[-1]
+    assert end.kind == "stop"
+    assert end.detail.startswith("signal")
+    found = survey(late)
+    assert found.error is None
+    state = found.tracks["team/r1/state"]
+    assert state.first > 0
+    assert state.last == survey(team.folder / "run.mcap").tracks["team/r1/state"].last
+    cut = survey(team.folder / "killed.mcap")
+    assert cut.error is not None
+    assert cut.tracks["team/r1/state"].last < state.last
+
+
+def await_size(path: Path, size: int) -> None:
+    """Wait until a file has grown to `size` bytes."""
+    deadline = monotonic() + WAIT
+    while not path.exists() or path.stat().st_size < size:
+        assert monotonic() < deadline, f"{path} does not grow to {size}"
+        sleep(0.02)
