@@ -1,0 +1,92 @@
+"""What an agent took in at which tick, told wherever it does not follow from the rules alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from agents.agent import Inputs
+from agents.arrivals import OPERATOR, WORLD, Order, Source, Wanted, order_of
+from shared.config import Config
+from shared.messages import Consumed, Message
+from shared.topics import ESTOP, MEASUREMENT, PLAN, REFERENCE, TRUTH
+
+ANYONE: Final = "anyone"  # who sent an emergency stop
+_FIRST: Final = (-1, 0)
+
+
+class Intake:
+    """Decides at each step whether a `Consumed` is due.
+
+    In real time what an agent knew depends on who was faster: due is one at every step that took
+    in more than the state after the last one. In lock-step `Arrivals` and `Agent.awaited` say what
+    is taken in at each tick: due is one when a message was owed, came too late for the step that
+    awaited it, when a state was passed over, and at an emergency stop.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._lockstep = config.world.mode == "lockstep"
+        self._number = 0
+        self._handed_over: dict[Source, Order] = {}  # in lock-step: up to where
+
+    def record(
+        self, last: int, inputs: Inputs, wanted: Iterable[Wanted], owed: Iterable[Source]
+    ) -> Consumed | None:
+        """The record of one step, if one is due.
+
+        Args:
+            last: tick of the step before, −1 before the first.
+            inputs: what this step took in.
+            wanted: what lock-step awaited for it.
+            owed: who had not sent it when the step was made.
+        """
+        tick = inputs.state.tick
+        passed, owing = tick - last - 1, tuple(sorted("/".join(source) for source in owed))
+        taken = taken_in(inputs)
+        unusual = bool(taken)
+        if self._lockstep:
+            unusual = bool(owing) or inputs.estop is not None or self._late(taken)
+            self._handed_over.update((source, due) for source, due in wanted)
+        if not (unusual or passed):
+            return None
+        record = Consumed(
+            tick, tick * 1_000_000, self._number, passed,
+            tuple(reference_to(*item) for item in taken), owing if self._lockstep else (),
+        )  # fmt: skip
+        self._number += 1
+        return record
+
+    def _late(self, taken: Iterable[tuple[Source, Order]]) -> bool:
+        """Whether a message was due at an earlier step already."""
+        return any(order <= self._handed_over.get(source, _FIRST) for source, order in taken)
+
+
+def taken_in(inputs: Inputs) -> list[tuple[Source, Order]]:
+    """Source and order of every message of a step but the state."""
+    found: list[tuple[str, str, Message]] = [
+        *((PLAN.name, name, plan) for name, plan in inputs.plans),
+        *((MEASUREMENT.name, name, sample) for name, sample in inputs.measurements),
+        *((REFERENCE.name, OPERATOR, reference) for reference in inputs.references),
+    ]
+    if inputs.estop is not None:
+        found.append((ESTOP.name, ANYONE, inputs.estop))
+    if inputs.truth is not None:
+        found.append((TRUTH.name, WORLD, inputs.truth))
+    return [((topic, sender), order_of(message)) for topic, sender, message in found]
+
+
+def reference_to(source: Source, order: Order) -> str:
+    """How `Consumed` refers to a message: `plan:r1:12.0`, `measurement:r1:480`."""
+    topic, sender = source
+    serial = f"{order[0]}.{order[1]}" if topic == PLAN.name else str(order[0])
+    return f"{topic}:{sender}:{serial}"
+
+
+def referred(text: str) -> tuple[Source, Order] | None:
+    """The inverse of `reference_to`; None for what it never writes."""
+    parts = text.split(":")
+    serial = parts[-1].split(".")
+    if len(parts) != 3 or len(serial) > 2 or not all(part.isdecimal() for part in serial):
+        return None
+    step, exchange = (*serial, "0")[:2]
+    return (parts[0], parts[1]), (int(step), int(exchange))
