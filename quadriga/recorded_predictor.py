@@ -13,7 +13,7 @@ import numpy as np
 
 from agents.planner.predictor import Predictor
 from agents.planner.store import predictor_sha256, read
-from quadriga.cache import cache_dir, predictor_path
+from quadriga.cache import cache_dir
 from shared.config import CENTRAL, Config
 from shared.errors import PredictorError, RecordingError
 from shared.recording import Recording
@@ -64,8 +64,7 @@ def recorded_predictor(
         predictor = read(given)[0]
         return predictor, not sha256 or predictor_sha256(predictor) == sha256
     beside = recording.path.parent / PREDICTOR
-    places = (beside, predictor_path(config), *sorted(cache_dir().glob("predictor-*.npz")))
-    for path in places:
+    for path in (beside, *sorted(cache_dir().glob("predictor-*.npz"))):
         if sha256 and _digest(path) == sha256:
             return read(path)[0], True
     wanted = f"with digest {sha256[:16]}…" if sha256 else "of unknown digest"

@@ -45,7 +45,7 @@ class Tape:
         records: what it said it took in, by tick.
         said: commands, measurements and own plans by topic and order, payloads as above.
         peers_awake: ticks of the 100 Hz grid at which a peer gave a command, by peer.
-        last: tick of its last command or record, −1 if there is none.
+        last: tick of its last command or record, at most that of the last state; −1: none.
     """
 
     states: dict[int, list[bytes]] = field(default_factory=lambda: defaultdict(list))
@@ -82,6 +82,8 @@ def read_tape(
             taker(entry)
         if count % _REPORT_AFTER == 0:
             progress(entry.tick)
+    # A forged tick must not ask for years of steps.
+    tape.last = min(tape.last, max(tape.states, default=-1))
     _check(tape, recording, config, agent.robot)
     return tape
 
@@ -97,8 +99,7 @@ def _takers(
 
     def command(entry: Entry) -> None:
         tape.said[COMMAND.name, entry.tick, 0].append(entry.payload)
-        if _valid(entry, COMMAND) is not None:
-            tape.last = max(tape.last, entry.tick)
+        tape.last = max(tape.last, entry.tick)
 
     def record(entry: Entry) -> None:
         found = _valid(entry, INPUTS)
