@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import bdb
 from collections.abc import Mapping
 
 from agents.agent import Agent, AgentState, Inputs
@@ -21,15 +20,12 @@ def stop_here(
         recorded: what it said then, by topic.
 
     Raises:
-        KeyboardInterrupt: the user has left the debugger.
+        bdb.BdbQuit: the user has left the debugger.
     """
     print(
         f"before the step of {agent.robot} at tick {inputs.state.tick}; in scope: agent, memory, "
         "inputs, recorded\n"
         "try: new, outputs = agent.step(memory, inputs); c goes on, q leaves"
     )
-    try:
-        breakpoint()
-        return  # the debugger stops here, in the frame that holds all of it
-    except bdb.BdbQuit:
-        raise KeyboardInterrupt from None
+    breakpoint()
+    return  # the debugger stops here, in the frame that holds all of it

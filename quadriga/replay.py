@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bdb
 import gc
 from collections.abc import Callable, Mapping
 from contextlib import closing
@@ -141,7 +142,10 @@ def break_in(
     """
     _known((robot,), robot_names(readable_config(Recording(path)).team.robots))
     job = Job(path, robot, given, predictor, _folder(path, out))
-    return replay_one(job, look=stop_here, at=round(1000 * seconds))
+    try:
+        return replay_one(job, look=stop_here, at=round(1000 * seconds))
+    except bdb.BdbQuit:
+        raise KeyboardInterrupt from None
 
 
 def replay_one(
@@ -194,6 +198,7 @@ def replay_one(
     gc.freeze()  # the tape need not be looked through again and again
     rerun(agent, Feed(config, recorded_agent, arrivals, tape), comparison.note, missed, before_step)
     comparison.finish()
+    wall = monotonic() - begun
     if look is not None and not looked:
         raise ConfigError(
             "--break", f"{at / 1000:g} s", f"a time up to {verdict.last / 1000:g} s",
@@ -201,13 +206,13 @@ def replay_one(
         )  # fmt: skip
     files: tuple[Path, ...] = ()
     if curves is not None:
-        title = f"{job.robot} of {job.path}: {changed.strip()}"
+        title = f"{job.robot} of {job.path.parent.name}/{job.path.name}: {changed.strip()}"
         files = (job.out / f"replay-{job.robot}.png",)
         draw(curves, title, files[0])
     elif verdict.first is not None:
         files = _save_problem(job, agent, verdict)
     outcome = Outcome(
-        job.robot, verdict, changed.strip(), (verdict.last + 1) / 1000, monotonic() - begun,
+        job.robot, verdict, changed.strip(), (verdict.last + 1) / 1000, wall,
         "" if verdict.step is None else in_short(verdict.step), files,
     )  # fmt: skip
     verdict.step = None  # not to be carried between processes
@@ -255,5 +260,5 @@ def _folder(path: Path, out: Path | None) -> Path:
 def _bar(console: Console) -> Progress:
     return Progress(
         TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=console,
-        transient=True,
+        transient=True, disable=not console.is_terminal,
     )  # fmt: skip

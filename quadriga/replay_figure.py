@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,10 +12,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from agents.sampling import SAMPLE_MS
+from shared.errors import RecordingError
 from shared.messages import Command, Measurement, Message, Plan
 from shared.robot import JOINT_NAMES, OUTPUTS, Array, Leg
 
-_BLUE, _ORANGE, _GREY = "#1f77b4", "#e6550d", "0.75"
+_BLUE, _ORANGE = "#1f77b4", "#e6550d"
+_TINY: Final = 1e-9
 _AXES: Final = "xyz"
 _UNITS: Final = ("m", "m/s", "m/s", "rad", "rad", "rad/s")
 _NAMES: Final = {
@@ -57,48 +59,61 @@ class Curves:
         values = [np.array([row[k] for row in rows]).reshape(-1, width) for k in (1, 2)]
         return np.array([row[0] for row in rows]), values[0], values[1]
 
-    def greatest(self, kind: str) -> tuple[float, int, float]:
-        """Where the two are farthest apart: difference, place among the m values, time [s]."""
-        time, old, new = self.of(kind)
-        if not len(time):
-            return 0.0, 0, 0.0
-        apart = np.abs(new - old)
-        row, column = np.unravel_index(int(apart.argmax()), apart.shape)
-        return float(apart[row, column]), int(column), float(time[row])
+    def changed_most(self, kind: str) -> int:
+        """The component that is farthest off, measured by how much it varies in the recording."""
+        _, old, new = self.of(kind)
+        if not len(old):
+            return 0
+        return int((np.abs(new - old).max(axis=0) / (np.ptp(old, axis=0) + _TINY)).argmax())
 
 
 def draw(curves: Curves, title: str, path: Path) -> None:
-    """Write the figure: of each kind the component that has changed most."""
-    figure = Figure(figsize=(10.0, 9.0), layout="constrained")
+    """Write the figure: of each kind the component that has changed most, and by how much.
+
+    Raises:
+        RecordingError: it cannot be written.
+    """
+    figure = Figure(figsize=(12.0, 9.0), layout="constrained")
     FigureCanvasAgg(figure)
-    panels = figure.subplots(len(_TITLES), 1, sharex=True)
-    for kind, panel in zip(_TITLES, panels, strict=True):
-        _fill(panel, curves, kind)
-    panels[-1].set_xlabel("time [s]")
-    handles, labels = panels[-1].get_legend_handles_labels()
+    panels = figure.subplots(len(_TITLES), 2, sharex=True, width_ratios=(3, 2))
+    for kind, (both, apart) in zip(_TITLES, panels, strict=True):
+        _fill(both, apart, curves, kind)
+    for panel in panels[-1]:
+        panel.set_xlabel("time [s]")
+    handles, labels = panels[-1, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
     figure.suptitle(title, fontsize="medium")
-    figure.savefig(path, dpi=110)
+    try:
+        figure.savefig(path, dpi=110)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise RecordingError(str(path), reason, "a file that can be written") from None
 
 
-def _fill(panel: Axes, curves: Curves, kind: str) -> None:
+def _fill(both: Axes, apart: Axes, curves: Curves, kind: str) -> None:
     time, old, new = curves.of(kind)
-    apart, column, at = curves.greatest(kind)
-    panel.spines[["top", "right"]].set_visible(False)
-    panel.grid(color="0.92", linewidth=0.6)
+    column = curves.changed_most(kind)
+    name, _, unit = _NAMES[kind][column].rpartition(" ")
+    for panel in (both, apart):
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.grid(color="0.92", linewidth=0.6)
+    both.set_title(f"{_TITLES[kind]}: {name}", loc="left", fontsize="small")
+    both.set_ylabel(unit)
     if not len(time):
-        panel.text(0.5, 0.5, "none recorded", transform=panel.transAxes, ha="center")
-        panel.set_title(_TITLES[kind], loc="left", fontsize="small")
+        both.text(0.5, 0.5, "none recorded", transform=both.transAxes, ha="center")
         return
-    style = "steps-post" if kind == "force" else "default"
-    panel.plot(time, old[:, column], color=_BLUE, linewidth=1.4, drawstyle=style, label="recorded")
-    panel.plot(time, new[:, column], color=_ORANGE, linewidth=0.9, drawstyle=style,
-               label="recomputed")  # fmt: skip
-    if apart:
-        panel.axvline(at, color=_GREY, linewidth=1.0, zorder=0)
-    rms = float(np.sqrt(np.mean((new - old)[:, column] ** 2)))
-    panel.set_ylabel(_NAMES[kind][column])
-    panel.set_title(
-        f"{_TITLES[kind]}: at most {apart:.3g} apart, at {at:.2f} s; rms {rms:.3g}",
+    style: Any = "steps-post" if kind == "force" else "default"
+    for values, colour, width, label in (
+        (old, _BLUE, 1.4, "recorded"), (new, _ORANGE, 0.9, "recomputed"),
+    ):  # fmt: skip
+        both.plot(time, values[:, column], color=colour, linewidth=width, drawstyle=style,
+                  label=label)  # fmt: skip
+    difference = new[:, column] - old[:, column]
+    apart.plot(time, difference, color="0.25", linewidth=0.9, drawstyle=style)
+    worst = int(np.abs(difference).argmax())
+    rms = float(np.sqrt(np.mean(difference**2)))
+    apart.set_title(
+        f"recomputed − recorded: at most {abs(difference[worst]):.3g}, at {time[worst]:.2f} s; "
+        f"rms {rms:.3g}" if difference.any() else "the same",
         loc="left", fontsize="small",
     )  # fmt: skip
