@@ -201,7 +201,7 @@ def replay_one(
     wall = monotonic() - begun
     if look is not None and not looked:
         raise ConfigError(
-            "--break", f"{at / 1000:g} s", f"a time up to {verdict.last / 1000:g} s",
+            "--break", f"{at / 1000:g} s", f"a time up to {tape.last / 1000:g} s",
             f"{job.robot} has no step after it",
         )  # fmt: skip
     files: tuple[Path, ...] = ()

@@ -30,7 +30,7 @@ from shared.codec import decode
 from shared.config import CENTRAL
 from shared.config_file import load
 from shared.config_text import to_toml
-from shared.messages import Command, Consumed, Measurement, Plan, Status, Truth
+from shared.messages import Command, Consumed, Measurement, Message, Plan, Status, Truth
 from shared.recording import Recording
 from shared.topics import TRUTH
 from tests.quadriga.rewritten import planted_bit, rewritten, without
@@ -82,10 +82,10 @@ def check_exact(path: Path, outcomes: list[Outcome], *, plans: bool = True) -> N
     for outcome in outcomes:
         verdict = outcome.verdict
         assert verdict.exact, (outcome.robot, verdict.first, verdict.missing)
-        kinds = [("command", Command), ("measurement", Measurement)]
-        for name, kind in [*kinds, *([("plan", Plan)] if plans else [])]:
-            recorded = list(recording.messages(kind, outcome.robot))  # type: ignore[type-var]
-            assert verdict.equal[name] == len(recorded) > 0, name
+        kinds: list[type[Message]] = [Command, Measurement, *([Plan] if plans else [])]
+        for kind in kinds:
+            recorded = len(list(recording.messages(kind, outcome.robot)))
+            assert verdict.equal[kind.__name__.lower()] == recorded > 0, kind
         assert not verdict.differing
 
 
