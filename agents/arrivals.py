@@ -40,6 +40,7 @@ class Arrivals:
         topics: row of the table and sender of every key that it subscribes to.
         counters: refused messages, states passed over and waits given up, by name.
         heard: valid messages by topic and sender.
+        flooded: whether a valid message was refused because too many were held.
         ended: whether the world has said that the walk is over.
     """
 
@@ -62,7 +63,7 @@ class Arrivals:
             self.topics[MEASUREMENT.key(team, peer)] = (MEASUREMENT, peer)
         self.counters: Counter[str] = Counter()
         self.heard: Counter[Source] = Counter()
-        self.ended = False
+        self.flooded = self.ended = False
         self._newest: dict[Source, Order] = {}
         self._held: dict[str, list[tuple[str, Any]]] = {}  # sender and message by topic
         self._state: State | None = None
@@ -101,6 +102,7 @@ class Arrivals:
             held = self._held.setdefault(topic.name, [])
             if len(held) >= _HELD:
                 self.counters[f"flooded_{topic.name}"] += 1
+                self.flooded = True
                 return
             held.append((sender, message))
             source = (topic.name, sender)

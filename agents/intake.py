@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from typing import Final
 
 from agents.agent import Inputs
-from agents.arrivals import OPERATOR, WORLD, Order, Source, Wanted, order_of
+from agents.arrivals import OPERATOR, WORLD, Arrivals, Order, Source, order_of
+from agents.pilot import NOTHING, Awaited
 from shared.config import Config
 from shared.messages import Consumed, Message
 from shared.topics import ESTOP, MEASUREMENT, PLAN, REFERENCE, TRUTH
@@ -20,38 +21,42 @@ class Intake:
 
     In real time what an agent knew depends on who was faster: due is one at every step that took
     in more than the state after the last one. In lock-step `Arrivals` and `Agent.awaited` say what
-    is taken in at each tick: due is one when a message was owed, came too late for the step that
-    awaited it, when a state was passed over, and at an emergency stop.
+    is taken in at each tick: due is one when a message was owed, or came too late for the step that
+    awaited it, when a state was passed over, at an emergency stop, and after a flood.
+
+    Args:
+        config: the team's configuration.
+        arrivals: where the agent's inputs come from.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, arrivals: Arrivals) -> None:
         self._lockstep = config.world.mode == "lockstep"
+        self._arrivals = arrivals
         self._number = 0
         self._handed_over: dict[Source, Order] = {}  # in lock-step: up to where
 
-    def record(
-        self, last: int, inputs: Inputs, wanted: Iterable[Wanted], owed: Iterable[Source]
-    ) -> Consumed | None:
+    def record(self, last: int, inputs: Inputs, awaited: Awaited) -> Consumed | None:
         """The record of one step, if one is due.
 
         Args:
             last: tick of the step before, −1 before the first.
-            inputs: what this step took in.
-            wanted: what lock-step awaited for it.
-            owed: who had not sent it when the step was made.
+            inputs: what this step took in; nothing has been taken in since.
+            awaited: what it awaited.
         """
-        tick = inputs.state.tick
-        passed, owing = tick - last - 1, tuple(sorted("/".join(source) for source in owed))
-        taken = taken_in(inputs)
+        tick, taken, owed = inputs.state.tick, taken_in(inputs), frozenset[Source]()
         unusual = bool(taken)
         if self._lockstep:
-            unusual = bool(owing) or inputs.estop is not None or self._late(taken)
-            self._handed_over.update((source, due) for source, due in wanted)
-        if not (unusual or passed):
+            if unusual:
+                unusual = inputs.estop is not None or self._arrivals.flooded or self._late(taken)
+            if awaited != NOTHING:
+                owed = self._arrivals.owing(tick, awaited)
+                self._handed_over.update(self._arrivals.wanted(tick, awaited))
+        if not (unusual or owed or tick != last + 1):
             return None
         record = Consumed(
-            tick, tick * 1_000_000, self._number, passed,
-            tuple(reference_to(*item) for item in taken), owing if self._lockstep else (),
+            tick, tick * 1_000_000, self._number, tick - last - 1,
+            tuple(reference_to(*item) for item in taken),
+            tuple(sorted("/".join(source) for source in owed)),
         )  # fmt: skip
         self._number += 1
         return record

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Final, Protocol
 
 from agents.flight import Flight, Present
 from agents.modes import Mode
@@ -68,6 +68,9 @@ class Awaited:
     measurement_tick: int | None = None
     reference_tick: int | None = None
     truth: bool = False
+
+
+NOTHING: Final = Awaited()
 
 
 @dataclass(frozen=True, slots=True)

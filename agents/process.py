@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
-from typing import Final
 
 from agents.agent import Agent, AgentState, Inputs, Outputs
 from agents.arrivals import Arrivals, Source
 from agents.intake import Intake
-from agents.pilot import Awaited
+from agents.pilot import NOTHING, Awaited
 from agents.planner.predictor import Predictor
 from agents.rehearsal import rehearse
 from agents.telemetry import Telemetry
@@ -22,8 +21,6 @@ from shared.config import Config
 from shared.messages import State
 from shared.signals import stop_on_signals
 from shared.topics import COMMAND, INPUTS, MEASUREMENT, PLAN, STATUS
-
-NOTHING: Final = Awaited()
 
 
 def run(
@@ -73,7 +70,7 @@ class _Shell:
             for topic in (COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS)
         }
         self._telemetry = Telemetry(config.estimator.kind)
-        self._intake = Intake(config)
+        self._intake = Intake(config, arrivals)
         self._given_up: dict[Source, int] = {}  # what had been heard of whom when given up
 
     def walk(self, stopped: Callable[[], bool]) -> None:
@@ -121,11 +118,7 @@ class _Shell:
 
     def _publish_intake(self, last: int, inputs: Inputs, awaited: Awaited) -> None:
         """Tell the recorder what was taken in, where it could not tell by itself."""
-        tick, arrivals = inputs.state.tick, self._arrivals
-        waited = self._lockstep and awaited != NOTHING
-        wanted = arrivals.wanted(tick, awaited) if waited else ()
-        owed = arrivals.owing(tick, awaited) if waited else ()
-        record = self._intake.record(last, inputs, wanted, owed)
+        record = self._intake.record(last, inputs, awaited)
         if record is not None:
             self._put[INPUTS](encode(record))
 
