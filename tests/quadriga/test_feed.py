@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -54,8 +55,18 @@ def sent(config: Config) -> list[tuple[int, str, Source, Message]]:
     return found
 
 
-def lived(mode: str, seed: int, late: float, skipped: float) -> tuple[Tape, Taken]:
-    """A walk in which messages come late or never and states are passed over; its recording."""
+def lived(
+    mode: str, seed: int, late: float, skipped: float, second: Sequence[tuple[int, int]] = ()
+) -> tuple[Tape, Taken]:
+    """A walk in which messages come late or never and states are passed over; its recording.
+
+    Args:
+        mode: lockstep or realtime.
+        seed: of the delays.
+        late: share of messages that come late or never.
+        skipped: share of states passed over.
+        second: tick and delay of references that a second operator sends beside the first.
+    """
     rng = np.random.default_rng(seed)
     config, agent = AGENTS[mode]
     arrivals, tape = Arrivals(config, "r2", agent.peers), Tape()
@@ -70,11 +81,10 @@ def lived(mode: str, seed: int, late: float, skipped: float) -> tuple[Tape, Take
         comes[source] = max(comes[source], tick + delay())  # a key keeps its order
         pending.append((comes[source], key, source, message))
         tape.heard[source][order_of(message)].append((key, encode(message)))
-    for tick in range(55, TICKS, 90) if late else ():  # of a second operator, beside the first
-        key, source = "team/reference", ("reference", "operator")
-        message = Reference(tick, tick, 0.2, 0.0, 0.0, 0.26)
-        pending.append((tick + delay(), key, source, message))
-        tape.heard[source][order_of(message)].append((key, encode(message)))
+    for tick, after in second:
+        source, message = ("reference", "operator"), Reference(tick, tick, 0.2, 0.0, 0.0, 0.26)
+        pending.append((tick + after, "team/reference", source, message))
+        tape.heard[source][order_of(message)].append(("team/reference", encode(message)))
     taken: Taken = []
     last = -1
     for tick in range(TICKS):
@@ -117,13 +127,22 @@ def fed(mode: str, tape: Tape) -> list[Fed]:
 @given(
     seed=st.integers(0, 1 << 32), late=st.sampled_from([0.0, 0.05, 0.5]),
     skipped=st.sampled_from([0.0, 0.02, 0.5]), held=st.sampled_from([256, 20, 7]),
+    second=st.lists(
+        st.tuples(st.sampled_from([55, 145, 235, 325]), st.integers(1, 300)), max_size=4,
+        unique_by=lambda sent: sent[0],
+    ),
 )  # fmt: skip
 def test_a_replay_takes_in_what_the_agent_took_in(
-    mode: str, seed: int, late: float, skipped: float, held: int
+    mode: str,
+    seed: int,
+    late: float,
+    skipped: float,
+    held: int,
+    second: list[tuple[int, int]],
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("agents.arrivals._HELD", held)
-        tape, taken = lived(mode, seed, late, skipped)
+        tape, taken = lived(mode, seed, late, skipped, second)
     steps = fed(mode, tape)
     assert not [step.missing for step in steps if step.missing]
     again = [(step.tick, taken_in(step.inputs)) for step in steps if step.inputs is not None]
