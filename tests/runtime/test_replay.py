@@ -24,6 +24,7 @@ from quadriga.launch import Launch, table
 from quadriga.recorded_predictor import keep
 from quadriga.replay import Outcome, replay
 from quadriga.saved_qp import load as load_qp
+from quadriga.traces import recorded_config
 from shared.bus import Bus
 from shared.clock import monotonic
 from shared.codec import decode
@@ -85,7 +86,9 @@ def check_exact(path: Path, outcomes: list[Outcome], *, plans: bool = True) -> N
         kinds: list[type[Message]] = [Command, Measurement, *([Plan] if plans else [])]
         for kind in kinds:
             recorded = len(list(recording.messages(kind, outcome.robot)))
-            assert verdict.equal[kind.__name__.lower()] == recorded > 0, kind
+            assert verdict.equal[kind.__name__.lower()] == recorded, kind
+            # On a busy machine a robot may miss so much in real time that it never plans.
+            assert recorded or (kind is Plan and recorded_config(recording).world.mode != LOCKSTEP)
         assert not verdict.differing
 
 
