@@ -24,7 +24,6 @@ from quadriga.launch import Launch, table
 from quadriga.recorded_predictor import keep
 from quadriga.replay import Outcome, replay
 from quadriga.saved_qp import load as load_qp
-from quadriga.traces import recorded_config
 from shared.bus import Bus
 from shared.clock import monotonic
 from shared.codec import decode
@@ -76,7 +75,9 @@ def replayed(path: Path, *robots: str, **keys: Any) -> list[Outcome]:
     return replay(path, robots, given, None, None, Console(stderr=True))
 
 
-def check_exact(path: Path, outcomes: list[Outcome], *, plans: bool = True) -> None:
+def check_exact(
+    path: Path, outcomes: list[Outcome], *, plans: bool = True, realtime: bool = False
+) -> None:
     """Every recorded message of every robot is recomputed to the byte."""
     recording = Recording(path)
     assert [outcome.robot for outcome in outcomes] == ["r1", "r2"]
@@ -87,8 +88,7 @@ def check_exact(path: Path, outcomes: list[Outcome], *, plans: bool = True) -> N
         for kind in kinds:
             recorded = len(list(recording.messages(kind, outcome.robot)))
             assert verdict.equal[kind.__name__.lower()] == recorded, kind
-            # On a busy machine a robot may miss so much in real time that it never plans.
-            assert recorded or (kind is Plan and recorded_config(recording).world.mode != LOCKSTEP)
+            assert recorded or (kind is Plan and realtime), kind
         assert not verdict.differing
 
 
@@ -227,7 +227,8 @@ def test_real_time_is_replayed_to_the_byte(tmp_path: Path) -> None:
             break
     records = list(Recording(run).messages(Consumed, "r1"))
     assert len([r for r in records if any("measurement:r2" in text for text in r.taken)]) > 5
-    check_exact(run, replayed(run))
+    # On a busy machine a robot may miss so many states that it never plans.
+    check_exact(run, replayed(run), realtime=True)
     assert len(list(Recording(run).messages(Command, "r1"))) > 300
     lost = rewritten(run, tmp_path / "lost.mcap", without("team/r1/inputs", records[9].tick))
     shutil.copy(run.parent / "predictor.npz", tmp_path)
