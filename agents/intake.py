@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from agents.agent import Inputs
+from agents.agent import REFERENCE_EPOCH_MS, Inputs
 from agents.arrivals import OPERATOR, WORLD, Arrivals, Order, Source, order_of
 from agents.pilot import NOTHING, Awaited
 from shared.config import Config
@@ -22,7 +22,7 @@ class Intake:
     In real time what an agent knew depends on who was faster: due is one at every step that took
     in more than the state after the last one. In lock-step `Arrivals` and `Agent.awaited` say what
     is taken in at each tick: due is one when a message was owed, or came too late for the step that
-    awaited it, when a state was passed over, at an emergency stop, and after a flood.
+    awaited it, when a state was passed over, after a flood, and of what no rule expects.
 
     Args:
         config: the team's configuration.
@@ -47,7 +47,7 @@ class Intake:
         unusual = bool(taken)
         if self._lockstep:
             if unusual:
-                unusual = inputs.estop is not None or self._arrivals.flooded or self._late(taken)
+                unusual = self._arrivals.flooded or not self._by_rule(taken)
             if awaited != NOTHING:
                 owed = self._arrivals.owing(tick, awaited)
                 self._handed_over.update(self._arrivals.wanted(tick, awaited))
@@ -61,9 +61,23 @@ class Intake:
         self._number += 1
         return record
 
-    def _late(self, taken: Iterable[tuple[Source, Order]]) -> bool:
-        """Whether a message was due at an earlier step already."""
-        return any(order <= self._handed_over.get(source, _FIRST) for source, order in taken)
+    def _by_rule(self, taken: Iterable[tuple[Source, Order]]) -> bool:
+        """Whether all that was taken in was due now, and at no earlier step."""
+        return all(
+            expected(source, order) and order > self._handed_over.get(source, _FIRST)
+            for source, order in taken
+        )
+
+
+def expected(source: Source, order: Order) -> bool:
+    """Whether the rules of lock-step speak of such a message.
+
+    They know nothing of an emergency stop, nor of a second operator's words between those of the
+    first.
+    """
+    if source[0] == REFERENCE.name:
+        return order[0] % REFERENCE_EPOCH_MS == 0
+    return source[0] != ESTOP.name
 
 
 def taken_in(inputs: Inputs) -> list[tuple[Source, Order]]:

@@ -8,7 +8,8 @@ from typing import Final
 
 from agents.agent import Agent, Inputs
 from agents.arrivals import Arrivals, Order, Source, Wanted
-from agents.intake import reference_to, referred
+from agents.intake import expected, reference_to, referred
+from agents.pilot import NOTHING
 from agents.sampling import SAMPLE_MS
 from quadriga.tape import Tape
 from shared.config import Config
@@ -66,9 +67,10 @@ class Feed:
         return self._after.get(tick, tick + 1)
 
     def _step(self, tick: int) -> Fed:
-        record, awaited = self._tape.records.get(tick), self._agent.awaited(tick)
+        record = self._tape.records.get(tick)
         missing = list(self._lost.get(tick, ()))
-        wanted = self._arrivals.wanted(tick, awaited) if self._lockstep else []
+        awaited = self._agent.awaited(tick) if self._lockstep else NOTHING
+        wanted = [] if awaited == NOTHING else self._arrivals.wanted(tick, awaited)
         if record is not None:
             missing += self._take_listed(record)
             self._pass(wanted)
@@ -117,7 +119,7 @@ class Feed:
         missing = self._missing_samples(source, due) + ([] if due in heard else [due])
         while queue and queue[0] <= due:
             order = queue.pop(0)
-            if (source, order) not in self._claimed:
+            if expected(source, order) and (source, order) not in self._claimed:
                 for packet in heard[order]:
                     self._arrivals.take(*packet)
         self._due[source] = due

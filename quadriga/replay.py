@@ -195,8 +195,12 @@ def replay_one(
         verdict.missing.append((tick, name))
         return not changed  # nothing after it could be equal but by chance
 
-    gc.freeze()  # the tape need not be looked through again and again
-    rerun(agent, Feed(config, recorded_agent, arrivals, tape), comparison.note, missed, before_step)
+    feed = Feed(config, recorded_agent, arrivals, tape)
+    gc.disable()  # a long tape need not be looked through again and again
+    try:
+        rerun(agent, feed, comparison.note, missed, before_step)
+    finally:
+        gc.enable()
     comparison.finish()
     wall = monotonic() - begun
     if look is not None and not looked:

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from quadriga.replay import Outcome
 
 _SHOWN: Final = 3  # messages missing from the recording that are named
-_IDENTICAL: Final = "equal to the byte"
 
 
 def in_short(step: Step) -> str:
@@ -49,18 +48,27 @@ def described(outcome: Outcome) -> str:
 
 
 def _counts(outcome: Outcome) -> str:
-    verdict, parts = outcome.verdict, []
-    for name in (topic.name for topic in reversed(COMPARED)):
-        equal, differing = verdict.equal[name], verdict.differing[name]
-        if differing:
-            parts.append(f"{differing} of {equal + differing} {name}s differ")
-        elif equal:
-            parts.append(f"{equal} {name}s {_IDENTICAL}")
-        if lost := verdict.unrecorded[name]:
-            parts.append(f"{lost} {name}s not in the recording")
-    text = ", ".join(parts)
-    # Said once at the end of a row of counts, it reads better than after each.
-    return text.replace(f" {_IDENTICAL},", ",", text.count(f" {_IDENTICAL},")) if parts else "none"
+    """What differs, what is equal, what the recorder lost."""
+    verdict, names = outcome.verdict, [topic.name for topic in reversed(COMPARED)]
+    differing = [
+        f"{verdict.differing[name]} of {_some(verdict.equal[name] + verdict.differing[name], name)}"
+        for name in names
+        if verdict.differing[name]
+    ]
+    equal = [
+        _some(verdict.equal[name], name)
+        for name in names
+        if verdict.equal[name] and not verdict.differing[name]
+    ]
+    lost = [_some(verdict.unrecorded[name], name) for name in names if verdict.unrecorded[name]]
+    parts = (
+        (differing, "differ"), (equal, "equal to the byte"), (lost, "not in the recording"),
+    )  # fmt: skip
+    return "; ".join(f"{', '.join(found)} {what}" for found, what in parts if found) or "nothing"
+
+
+def _some(count: int, name: str) -> str:
+    return f"{count} {name}{'' if count == 1 else 's'}"
 
 
 def _pace(outcome: Outcome) -> str:

@@ -192,7 +192,7 @@ def test_a_command_the_recorder_lost_is_counted_and_the_rest_is_equal(
     shutil.copy(lockstep.parent / "predictor.npz", tmp_path)
     rewritten(lockstep, run, without("team/r2/command", 500))
     assert main(["replay", str(run), "--robot", "r2"]) == 0
-    assert "999 commands, 1 commands not in the recording" in capsys.readouterr().out
+    assert "equal to the byte; 1 command not in the recording; 1.0 s in" in capsys.readouterr().out
 
 
 def test_the_debugger_stops_with_the_agent_in_scope(lockstep: Path) -> None:
