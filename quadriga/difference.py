@@ -42,17 +42,15 @@ class Difference:
         )
 
 
-def difference(tick: int, topic: Topic, recorded: bytes | None, message: Message) -> Difference:
+def difference(tick: int, topic: Topic, recorded: bytes, message: Message) -> Difference:
     """How a recomputed message differs from what was recorded in its place.
 
     Args:
         tick: of the step.
         topic: of the message.
-        recorded: its payload; None: nothing, where a message was to be expected.
+        recorded: the payload in its place.
         message: recomputed; of a payload with other bytes.
     """
-    if recorded is None:
-        return Difference(tick, topic.name, "", "no such message", "one")
     try:
         old = decode(recorded, topic.type)
     except MessageError as error:

@@ -48,4 +48,3 @@ def test_plain_fields_shapes_and_what_is_no_message() -> None:
     text = str(difference(40, PLAN, encode(PLAN_0), replace(PLAN_0, status="faded")))
     assert text == "tick 40, plan.status: recorded 'solved', recomputed 'faded'"
     assert "no message" in str(difference(40, PLAN, b"\xc1", PLAN_0))
-    assert "no such message" in str(difference(40, PLAN, None, PLAN_0))
