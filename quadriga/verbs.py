@@ -119,8 +119,8 @@ def report(arguments: argparse.Namespace, _config: Config, _given: Given) -> int
 
 def replay(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
     """Recorded agents, run again; the configuration is the recording's, with `given` changed."""
-    from quadriga.replay import break_in, replay
-    from quadriga.replay_text import described
+    from quadriga.replay.run import break_in, replay
+    from quadriga.replay.text import described
     from quadriga.summary import RECORDING
 
     path = arguments.recording

@@ -12,7 +12,7 @@ from agents.planner.store import load, predictor_sha256
 from quadriga.identify import ensure_predictor
 from quadriga.launch import Launch, Row, table
 from quadriga.progress import WalkProgress
-from quadriga.recorded_predictor import keep
+from quadriga.replay.recorded_predictor import keep
 from quadriga.run_folder import make_run_dir, report, went_wrong
 from quadriga.warm_up import warm_up
 from shared.config import Config

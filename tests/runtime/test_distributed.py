@@ -15,7 +15,7 @@ from rich.console import Console
 from agents.gait import nominal_forces
 from agents.planner.horizon import horizon_stance
 from quadriga.identify import ensure_predictor
-from quadriga.replay import replay
+from quadriga.replay.run import replay
 from shared.config import Config
 from shared.config_file import load
 from shared.messages import Plan

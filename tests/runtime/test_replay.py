@@ -21,9 +21,9 @@ from quadriga.cli import main
 from quadriga.endpoint import free_endpoint
 from quadriga.identify import ensure_predictor
 from quadriga.launch import Launch, table
-from quadriga.recorded_predictor import keep
-from quadriga.replay import Outcome, replay
-from quadriga.saved_qp import load as load_qp
+from quadriga.replay.recorded_predictor import keep
+from quadriga.replay.run import Outcome, replay
+from quadriga.replay.saved_qp import load as load_qp
 from shared.bus import Bus
 from shared.clock import monotonic
 from shared.codec import decode
@@ -33,7 +33,7 @@ from shared.config_text import to_toml
 from shared.messages import Command, Consumed, Measurement, Message, Plan, Status, Truth
 from shared.recording import Recording
 from shared.topics import TRUTH
-from tests.quadriga.rewritten import planted_bit, rewritten, without
+from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
 from tests.runtime.conftest import WAIT
 
 pytestmark = pytest.mark.usefixtures("_compiled")
@@ -118,7 +118,7 @@ def test_a_planted_bit_in_a_state_is_found_at_its_tick(
     saved = tmp_path / "replay-r2-702-command.npz"
     qp = load_qp(saved)
     np.testing.assert_allclose(qp.solve(), qp.x, atol=1e-6)
-    alone = [sys.executable, "-m", "quadriga.saved_qp", str(saved)]
+    alone = [sys.executable, "-m", "quadriga.replay.saved_qp", str(saved)]
     done = subprocess.run(alone, capture_output=True, text=True, check=True)
     assert "whole-body QP of r2 at tick 702" in done.stdout
 

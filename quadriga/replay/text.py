@@ -6,10 +6,10 @@ from collections import defaultdict
 from typing import TYPE_CHECKING, Final
 
 from agents.intake import taken_in
-from quadriga.rerun import COMPARED, Step
+from quadriga.replay.rerun import COMPARED, Step
 
 if TYPE_CHECKING:
-    from quadriga.replay import Outcome
+    from quadriga.replay.run import Outcome
 
 _SHOWN: Final = 3  # messages missing from the recording that are named
 
@@ -77,4 +77,6 @@ def _pace(outcome: Outcome) -> str:
 
 
 def _what(suffix: str) -> str:
-    return "figure" if suffix == ".png" else "the QP of that step (python -m quadriga.saved_qp)"
+    return (
+        "figure" if suffix == ".png" else "the QP of that step (python -m quadriga.replay.saved_qp)"
+    )

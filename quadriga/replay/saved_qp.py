@@ -8,7 +8,7 @@ A saved file is an .npz with these arrays, `x` (what the agent made of it) and `
     x, cost, flag, info = daqp.solve(qp["H"], qp["f"], qp["A"], qp["upper"], qp["lower"],
                                      np.zeros(len(qp["upper"]), dtype=np.intc))
 
-or `python -m quadriga.saved_qp FILE`, which does just that and says how far `x` is from it.
+or `python -m quadriga.replay.saved_qp FILE`, which does just that and says how far `x` is from it.
 """
 
 from __future__ import annotations
@@ -159,4 +159,4 @@ if __name__ == "__main__":
     except RecordingError as wrong:
         sys.exit(f"saved_qp: {wrong}")
     except IndexError:
-        sys.exit("usage: python -m quadriga.saved_qp FILE")
+        sys.exit("usage: python -m quadriga.replay.saved_qp FILE")

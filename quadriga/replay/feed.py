@@ -11,7 +11,7 @@ from agents.arrivals import Arrivals, Order, Source, Wanted
 from agents.intake import expected, reference_to, referred
 from agents.pilot import NOTHING
 from agents.sampling import SAMPLE_MS
-from quadriga.tape import Tape
+from quadriga.replay.tape import Tape
 from shared.config import Config
 from shared.messages import Consumed, State
 from shared.topics import INPUTS, MEASUREMENT, STATE

@@ -13,18 +13,18 @@ from agents.planner.predictor import Predictor, PredictorMeta
 from agents.planner.store import Provenance, predictor_sha256, save
 from agents.rehearsal import standing
 from quadriga.cli import main
-from quadriga.recorded_predictor import PREDICTOR, keep, recorded_predictor
 from quadriga.recorder import metadata
-from quadriga.saved_qp import SavedQp
-from quadriga.saved_qp import load as load_qp
-from quadriga.saved_qp import save as save_qp
+from quadriga.replay.recorded_predictor import PREDICTOR, keep, recorded_predictor
+from quadriga.replay.saved_qp import SavedQp
+from quadriga.replay.saved_qp import load as load_qp
+from quadriga.replay.saved_qp import save as save_qp
 from shared.codec import encode
 from shared.config import Config
 from shared.config_file import load
 from shared.errors import PredictorError, RecordingError
 from shared.messages import Command, Reference
 from shared.recording import Recording, RecordingWriter
-from tests.quadriga.rewritten import rewritten
+from tests.quadriga.replay.rewritten import rewritten
 
 REPORT = GateReport(1, {}, {}, 0.5, (0.1,), ((1.0,),), (0.3, 2.0), 0.1, 0.5, (), ())
 

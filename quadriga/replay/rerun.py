@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 
 from agents.agent import Agent, AgentState, Inputs, Outputs
 from agents.arrivals import order_of
-from quadriga.difference import Difference, difference
-from quadriga.feed import Feed
-from quadriga.tape import Serial, Tape
+from quadriga.replay.difference import Difference, difference
+from quadriga.replay.feed import Feed
+from quadriga.replay.tape import Serial, Tape
 from shared.codec import decode, encode
 from shared.errors import MessageError
 from shared.messages import Message

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.difference import difference
+from quadriga.replay.difference import difference
 from shared.codec import encode
 from shared.messages import Command, Plan
 from shared.topics import COMMAND, PLAN

@@ -15,15 +15,15 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from agents.agent import Agent, AgentState, Inputs
 from agents.arrivals import Arrivals
-from quadriga.breakpoint import stop_here
-from quadriga.changed import changed_config, changes, check_change, readable_config
-from quadriga.feed import Feed
-from quadriga.recorded_predictor import recorded_predictor
-from quadriga.replay_figure import Curves, draw
-from quadriga.replay_text import in_short
-from quadriga.rerun import Comparison, Verdict, rerun
-from quadriga.saved_qp import PLANNER, WHOLE_BODY, captured, save
-from quadriga.tape import read_tape
+from quadriga.replay.breakpoint import stop_here
+from quadriga.replay.changed import changed_config, changes, check_change, readable_config
+from quadriga.replay.feed import Feed
+from quadriga.replay.figure import Curves, draw
+from quadriga.replay.recorded_predictor import recorded_predictor
+from quadriga.replay.rerun import Comparison, Verdict, rerun
+from quadriga.replay.saved_qp import PLANNER, WHOLE_BODY, captured, save
+from quadriga.replay.tape import read_tape
+from quadriga.replay.text import in_short
 from quadriga.warm_up import warm_up
 from quadriga.workers import each_done
 from shared.blas import one_blas_thread

@@ -15,8 +15,8 @@ from agents.arrivals import Arrivals, Order, Source, order_of
 from agents.intake import Intake, reference_to, taken_in
 from agents.planner.predictor import Predictor, PredictorMeta
 from agents.rehearsal import standing
-from quadriga.feed import Fed, Feed
-from quadriga.tape import Tape
+from quadriga.replay.feed import Fed, Feed
+from quadriga.replay.tape import Tape
 from shared.codec import encode
 from shared.config import Config
 from shared.config_file import load
