@@ -19,6 +19,7 @@ OPERATOR: Final = "operator"
 WORLD: Final = "sim"
 Source = tuple[str, str]  # name of a topic, name of who sends it
 Order = tuple[int, int]  # a tick, or the step and exchange of a plan
+Wanted = tuple[Source, Order]  # a message of a source, and all before it
 _NEVER: Final = (-1, 0)
 _HELD: Final = 256  # messages of one topic; more can only be a flood
 
@@ -36,9 +37,10 @@ class Arrivals:
         peers: robots whose plans and measurements matter to it.
 
     Attributes:
-        keys: what to subscribe to.
+        topics: row of the table and sender of every key that it subscribes to.
         counters: refused messages, states passed over and waits given up, by name.
         heard: valid messages by topic and sender.
+        flooded: whether a valid message was refused because too many were held.
         ended: whether the world has said that the walk is over.
     """
 
@@ -46,31 +48,35 @@ class Arrivals:
         team, central = config.team.name, config.planner.kind in CENTRAL
         self._lockstep = config.world.mode == "lockstep"
         self._peers, self._planners = tuple(peers), (PLANNER,) if central else tuple(peers)
-        self._topics: dict[str, tuple[Topic, str]] = {
+        self.topics: dict[str, tuple[Topic, str]] = {
             STATE.key(team, robot): (STATE, robot),
             REFERENCE.key(team): (REFERENCE, OPERATOR),
             ESTOP.key(team): (ESTOP, ""),
             EVENT.key(team): (EVENT, WORLD),
         }
         if config.estimator.kind == "truth":
-            self._topics[TRUTH.key(team)] = (TRUTH, WORLD)
+            self.topics[TRUTH.key(team)] = (TRUTH, WORLD)
         if central:
-            self._topics[PLAN.key(team, robot)] = (PLAN, PLANNER)
+            self.topics[PLAN.key(team, robot)] = (PLAN, PLANNER)
         for peer in self._peers:
-            self._topics[PLAN.key(team, peer)] = (PLAN, peer)
-            self._topics[MEASUREMENT.key(team, peer)] = (MEASUREMENT, peer)
-        self.keys = tuple(self._topics)
+            self.topics[PLAN.key(team, peer)] = (PLAN, peer)
+            self.topics[MEASUREMENT.key(team, peer)] = (MEASUREMENT, peer)
         self.counters: Counter[str] = Counter()
         self.heard: Counter[Source] = Counter()
-        self.ended = False
+        self.flooded = self.ended = False
         self._newest: dict[Source, Order] = {}
         self._held: dict[str, list[tuple[str, Any]]] = {}  # sender and message by topic
         self._state: State | None = None
         self._estop: EStop | None = None
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """What to subscribe to."""
+        return tuple(self.topics)
+
     def take(self, key: str, payload: bytes) -> None:
         """Take in a packet; one that is not a valid message is dropped and counted."""
-        row = self._topics.get(key)
+        row = self.topics.get(key)
         if row is None:
             self.counters["dropped_foreign"] += 1
             return
@@ -96,28 +102,33 @@ class Arrivals:
             held = self._held.setdefault(topic.name, [])
             if len(held) >= _HELD:
                 self.counters[f"flooded_{topic.name}"] += 1
+                self.flooded = True
                 return
             held.append((sender, message))
             source = (topic.name, sender)
-            self._newest[source] = max(self._newest.get(source, _NEVER), _order(message))
+            self._newest[source] = max(self._newest.get(source, _NEVER), order_of(message))
 
     def state(self) -> State | None:
         """The newest state, once."""
         state, self._state = self._state, None
         return state
 
-    def owing(self, tick: int, awaited: Awaited) -> frozenset[Source]:
-        """Whose message, of which topic, for the step of `tick` has not come yet."""
+    def wanted(self, tick: int, awaited: Awaited) -> list[Wanted]:
+        """The last message of each source that the step of `tick` awaits."""
         wanted: list[tuple[Topic, str, Order | None]] = [
             *((PLAN, name, awaited.plan) for name in self._planners),
             *((MEASUREMENT, name, _tick(awaited.measurement_tick)) for name in self._peers),
             (REFERENCE, OPERATOR, _tick(awaited.reference_tick)),
             (TRUTH, WORLD, _tick(tick if awaited.truth else None)),
         ]
+        return [((topic.name, sender), due) for topic, sender, due in wanted if due is not None]
+
+    def owing(self, tick: int, awaited: Awaited) -> frozenset[Source]:
+        """Whose message, of which topic, for the step of `tick` has not come yet."""
         return frozenset(
-            (topic.name, sender)
-            for topic, sender, due in wanted
-            if due is not None and self._newest.get((topic.name, sender), _NEVER) < due
+            source
+            for source, due in self.wanted(tick, awaited)
+            if self._newest.get(source, _NEVER) < due
         )
 
     def inputs(self, state: State, awaited: Awaited) -> Inputs:
@@ -139,13 +150,14 @@ class Arrivals:
         due: list[tuple[str, Any]] = []
         later: list[tuple[str, Any]] = []
         for item in held:
-            on_time = not self._lockstep or limit is None or _order(item[1]) <= limit
+            on_time = not self._lockstep or limit is None or order_of(item[1]) <= limit
             (due if on_time else later).append(item)
         self._held[topic.name] = later
-        return sorted(due, key=lambda item: (item[0], _order(item[1])))
+        return sorted(due, key=lambda item: (item[0], order_of(item[1])))
 
 
-def _order(message: Message) -> Order:
+def order_of(message: Message) -> Order:
+    """Where a message stands among those of its source: by tick, or by step and exchange."""
     return message.serial if isinstance(message, Plan) else (message.tick, 0)
 
 

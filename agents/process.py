@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from agents.agent import Agent, AgentState, Inputs, Outputs
 from agents.arrivals import Arrivals, Source
+from agents.intake import Intake
 from agents.pilot import NOTHING, Awaited
 from agents.planner.predictor import Predictor
 from agents.rehearsal import rehearse
@@ -19,7 +20,7 @@ from shared.codec import encode
 from shared.config import Config
 from shared.messages import State
 from shared.signals import stop_on_signals
-from shared.topics import COMMAND, MEASUREMENT, PLAN, STATUS
+from shared.topics import COMMAND, INPUTS, MEASUREMENT, PLAN, STATUS
 
 
 def run(
@@ -66,9 +67,10 @@ class _Shell:
         self._lockstep = not realtime
         self._put = {
             topic: bus.publisher(topic.key(team, agent.robot), droppable=realtime)
-            for topic in (COMMAND, MEASUREMENT, PLAN, STATUS)
+            for topic in (COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS)
         }
         self._telemetry = Telemetry(config.estimator.kind)
+        self._intake = Intake(config, arrivals)
         self._given_up: dict[Source, int] = {}  # what had been heard of whom when given up
 
     def walk(self, stopped: Callable[[], bool]) -> None:
@@ -95,11 +97,14 @@ class _Shell:
 
     def _answer(self, memory: AgentState, state: State) -> AgentState:
         begun = monotonic_ns()
-        inputs = self._complete(state)
+        awaited = self._agent.awaited(state.tick)
+        inputs = self._complete(state, awaited)
+        last = memory.tick
         memory, outputs = self._agent.step(memory, inputs)
         self._put[COMMAND](encode(outputs.command))
         self._telemetry.note(outputs, monotonic_ns() - begun)
         self._publish_rest(state.tick, outputs)
+        self._publish_intake(last, inputs, awaited)
         return memory
 
     def _publish_rest(self, tick: int, outputs: Outputs) -> None:
@@ -111,12 +116,17 @@ class _Shell:
         if status is not None:
             self._put[STATUS](encode(status))
 
-    def _complete(self, state: State) -> Inputs:
+    def _publish_intake(self, last: int, inputs: Inputs, awaited: Awaited) -> None:
+        """Tell the recorder what was taken in, where it could not tell by itself."""
+        record = self._intake.record(last, inputs, awaited)
+        if record is not None:
+            self._put[INPUTS](encode(record))
+
+    def _complete(self, state: State, awaited: Awaited) -> Inputs:
         """The inputs of a step; in lock-step once those who owe a message have sent it.
 
         Who did not within the time-out is not waited for again until he has sent such a message.
         """
-        awaited = self._agent.awaited(state.tick)
         if self._lockstep and awaited is not NOTHING:
             deadline = monotonic() + self._config.planner.peer_timeout
             while owing := self._owing(state.tick, awaited):

@@ -100,6 +100,8 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("-o", "--output", type=Path, metavar="OUT",
                         help="a new file or folder (beside FILE)")  # fmt: skip
     recording_cli.add_verbs(add)
+    _add_replay(add("replay", verbs.replay,
+                    "run recorded agents again and compare what they say to the byte"))  # fmt: skip
     router = add("router", verbs.router, "the router between processes in client mode")
     router.add_argument("--listen", metavar="ENDPOINT", help="where (bus.endpoint)")
     router.add_argument("--once", action="store_true", help="leave when the team has walked")
@@ -138,6 +140,19 @@ def _add_play(play: argparse.ArgumentParser) -> None:
         default="world",
         help="time that paces: the world's or that of recording (%(default)s)",
     )
+
+
+def _add_replay(replay: argparse.ArgumentParser) -> None:
+    replay.add_argument("recording", type=Path, metavar="FILE", help="a run.mcap or its folder")
+    whom = replay.add_mutually_exclusive_group(required=True)
+    whom.add_argument("--robot", metavar="NAME", help="r1 … rn")
+    whom.add_argument("--all", action="store_true", help="every robot of the team")
+    replay.add_argument("--predictor", type=Path, metavar="FILE",
+                        help="the team's, or another to see what it changes")  # fmt: skip
+    replay.add_argument("--break", type=float, metavar="S", dest="stop_at",
+                        help="stop in the debugger before the step at this time [s]")  # fmt: skip
+    replay.add_argument("--out", type=Path, metavar="DIR",
+                        help="where figures and problems go (beside the recording)")  # fmt: skip
 
 
 def _add_comparison(compare: argparse.ArgumentParser) -> None:

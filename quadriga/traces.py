@@ -18,12 +18,13 @@ from shared.messages import Event, Measurement, Message, Plan, Reference, Status
 from shared.recording import Recording
 from shared.recording_config import recorded_config
 from shared.robot import Array, robot_names
-from shared.topics import COMMAND, STATE, topic_of
+from shared.topics import COMMAND, INPUTS, STATE, topic_of
 from shared.yokes import yoke_pairs
 
 __all__ = ["MeasurementTrace", "Traces", "in_force", "read_traces", "recorded_config"]
 
-_TIMED_ONLY: Final = (STATE.name, COMMAND.name)  # 1 kHz each: only their ticks are read
+# Up to 1 kHz each: only their ticks are read.
+_TIMED_ONLY: Final = (STATE.name, COMMAND.name, INPUTS.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +45,7 @@ class Traces:
         robots: names r1 … rn.
         cut: where the recording was cut; empty if it is whole.
         messages: number of messages by key.
-        invalid: number of messages by key that do not decode; of states and commands only the
+        invalid: number of messages by key that do not decode; of 1 kHz topics only the
             tick is looked at.
         ticks: ticks by key, in the order of the recording.
         log_times: log times of the first and the last state, ns, and None without states.

@@ -160,6 +160,27 @@ def export(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
     return 0
 
 
+def replay(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
+    """Recorded agents, run again; the configuration is the recording's, with `given` changed."""
+    from quadriga.replay.run import break_in, replay
+    from quadriga.replay.text import described
+    from quadriga.summary import RECORDING
+
+    path = arguments.recording
+    path = path / RECORDING if path.is_dir() else path
+    options = (given, arguments.predictor, arguments.out)
+    if arguments.stop_at is not None:
+        if arguments.all:
+            raise ConfigError("--break", "--all", "--robot NAME", "one debugger, one robot")
+        outcomes = [break_in(path, arguments.robot, *options, arguments.stop_at)]
+    else:
+        robots = () if arguments.all else (arguments.robot,)
+        outcomes = replay(path, robots, *options, Console(stderr=True))
+    for outcome in outcomes:
+        print(described(outcome))
+    return int(any(outcome.failed for outcome in outcomes))
+
+
 def operate(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """The operator's process."""
     from quadriga.operator import run

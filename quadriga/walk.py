@@ -12,6 +12,7 @@ from agents.planner.store import load, predictor_sha256
 from quadriga.identify import ensure_predictor
 from quadriga.launch import Launch, Row, table
 from quadriga.progress import WalkProgress
+from quadriga.replay.recorded_predictor import keep
 from quadriga.run_folder import make_run_dir, report, went_wrong
 from quadriga.warm_up import warm_up
 from shared.config import Config
@@ -45,6 +46,7 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
     if config.planner.kind != "none":
         predictor = ensure_predictor(config, console)
         sha256 = predictor_sha256(load(predictor, config)[0])
+        keep(predictor, run_dir)
     (run_dir / "config.toml").write_text(to_toml(config), encoding="utf-8")
     rows = table(config, run_dir, predictor, sha256)
     with stop_flag() as stopped:

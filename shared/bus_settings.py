@@ -6,9 +6,13 @@ from typing import Any, Final
 
 from shared.config import BusConfig
 
-_CLOSED: Final = {  # nobody is found by multicast, nothing goes through shared memory
+_COMMON: Final = {
+    # Nobody is found by multicast, nothing goes through shared memory.
     "scouting/multicast/enabled": False,
     "transport/shared_memory/enabled": False,
+    # Messages that may wait for a link in real time before they are dropped. With Zenoh's 2 a
+    # recorder on a busy machine loses one in a thousand.
+    "transport/link/tx/queue/size/data": 16,
 }
 
 
@@ -34,7 +38,7 @@ def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str
             "period_init_ms": 20, "period_max_ms": 200, "period_increase_factor": 1.5,
         },
         "scouting/gossip/enabled": peer,
-        **_CLOSED,
+        **_COMMON,
     }  # fmt: skip
 
 
@@ -45,5 +49,5 @@ def router_settings(listen: str) -> dict[str, Any]:
         "connect/endpoints": [],
         "listen/endpoints": [listen],
         "scouting/gossip/enabled": False,
-        **_CLOSED,
+        **_COMMON,
     }

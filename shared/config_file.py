@@ -39,13 +39,21 @@ def load(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -
 def layers(path: Path | None, overrides: Mapping[str, Any]) -> dict[str, Any]:
     """What is given explicitly, by section and key: the file, then `overrides` on top.
 
+    Raises:
+        ConfigError: the file cannot be read or parsed, or an override names no key.
+    """
+    return overlaid(_read(path) if path else {}, overrides)
+
+
+def overlaid(given: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """`given`, by section and key, with `overrides`, by `section.key`, on top.
+
     A preset that comes with the overrides also replaces what the file says of the keys that
     presets set, so that a file with every key written out can still be walked with another one.
 
     Raises:
-        ConfigError: the file cannot be read or parsed, or an override names no key.
+        ConfigError: an override names no key.
     """
-    given = _read(path) if path else {}
     if "controller.preset" in overrides and isinstance(given.get("controller"), dict):
         preset_keys = {key for preset in CONTROLLER.values() for key in preset}
         given["controller"] = {k: v for k, v in given["controller"].items() if k not in preset_keys}

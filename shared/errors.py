@@ -18,6 +18,10 @@ class QuadrigaError(Exception):
         tail = f" ({cause})" if cause else ""
         super().__init__(f"{name}: got {got}, expected {expected}{tail}")
 
+    def __reduce__(self) -> tuple[type[QuadrigaError], tuple[str, str, str, str]]:
+        """So that a worker process can hand it on."""
+        return type(self), (self.name, self.got, self.expected, self.cause)
+
 
 class ConfigError(QuadrigaError):
     """A configuration key, a command-line argument or a TOML file is wrong."""

@@ -99,6 +99,22 @@ class Status(Message):
 
 
 @dataclass(frozen=True, slots=True)
+class Consumed(Message):
+    """What an agent took in at the step of `tick`, all of it: sent where no rule tells it.
+
+    In real time that is every step that took in more than the state after the last one, in
+    lock-step only one at which something was owed, late or passed over (see `agents.intake`).
+    Messages are referred to as `topic:sender:serial`; the serial is the tick, of a plan its step
+    and exchange: `measurement:r1:480`, `plan:r1:12.0`.
+    """
+
+    number: int = plain(int, "how many of these the agent has sent before")
+    passed: int = plain(int, "ticks between the last step and this one, whose states were lost")
+    taken: tuple[str, ...] = plain(list, "the messages taken in, the state of `tick` aside")
+    owed: tuple[str, ...] = plain(list, "in lock-step: topic/sender of what was not waited for")
+
+
+@dataclass(frozen=True, slots=True)
 class Reference(Message):
     """What the operator asks of the team; in force from `tick` on."""
 

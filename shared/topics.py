@@ -38,13 +38,14 @@ COMMAND: Final = Topic("command", msg.Command, True, 1000.0, 20)
 MEASUREMENT: Final = Topic("measurement", msg.Measurement, True, 100.0, 200)
 PLAN: Final = Topic("plan", msg.Plan, True, 25.0, 200)
 STATUS: Final = Topic("status", msg.Status, True, 10.0, 1000)
+INPUTS: Final = Topic("inputs", msg.Consumed, True, 0.0, 0)
 REFERENCE: Final = Topic("reference", msg.Reference, False, 10.0, 500)
 ESTOP: Final = Topic("estop", msg.EStop, False, 0.0, 0)
 TRUTH: Final = Topic("sim/truth", msg.Truth, False, 100.0, 0)
 EVENT: Final = Topic("sim/event", msg.Event, False, 0.0, 0)
 
 TABLE: Final = (
-    STATE, COMMAND, MEASUREMENT, PLAN, STATUS, REFERENCE, ESTOP, TRUTH, EVENT,
+    STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, ESTOP, TRUTH, EVENT,
 )  # fmt: skip
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}
 

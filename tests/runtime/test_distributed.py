@@ -15,6 +15,7 @@ from rich.console import Console
 from agents.gait import nominal_forces
 from agents.planner.horizon import horizon_stance
 from quadriga.identify import ensure_predictor
+from quadriga.replay.run import replay
 from shared.config import Config
 from shared.config_file import load
 from shared.messages import Plan
@@ -110,3 +111,13 @@ def test_every_plan_is_within_the_friction_cone(walks: list[Path]) -> None:
             assert fz.min() >= -1e-6
             assert np.all(np.abs(fx) <= cone * fz + 1e-6)
             assert np.all(np.abs(fy) <= cone * fz + 1e-6)
+
+
+def test_a_run_folder_is_all_that_a_replay_needs(
+    walks: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    run = walks[0] / "run.mcap"
+    (outcome,) = replay(run, ("r2",), {}, None, None, Console(stderr=True))
+    assert outcome.verdict.exact
+    assert outcome.verdict.equal["command"] == 1000 * SECONDS

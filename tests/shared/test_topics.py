@@ -34,7 +34,8 @@ def test_every_message_type_has_one_row_and_one_name() -> None:
 def test_the_keys_are_the_contract_with_other_tools() -> None:
     assert [topic.key("team", "r1") for topic in TABLE] == [
         "team/r1/state", "team/r1/command", "team/r1/measurement", "team/r1/plan",
-        "team/r1/status", "team/reference", "team/estop", "team/sim/truth", "team/sim/event",
+        "team/r1/status", "team/r1/inputs", "team/reference", "team/estop", "team/sim/truth",
+        "team/sim/event",
     ]  # fmt: skip
 
 

@@ -1,0 +1,77 @@
+"""A recorded agent's configuration with some keys changed, and which changes make sense."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from typing import Any
+
+from agents.agent import Agent
+from quadriga.traces import recorded_config
+from shared.config import CENTRAL, BusConfig, Config
+from shared.config_file import build, overlaid
+from shared.errors import ConfigError, RecordingError
+from shared.recording import Recording
+
+
+def readable_config(recording: Recording) -> Config:
+    """The configuration of a recorded run.
+
+    Raises:
+        RecordingError: there is none, or it is another version's.
+    """
+    try:
+        return recorded_config(recording)
+    except ConfigError as error:
+        raise RecordingError(
+            f"configuration of {recording.path}", f"{error.name} = {error.got}", error.expected,
+            "recorded by another version of quadriga; replay it with that one",
+        ) from None  # fmt: skip
+
+
+def changed_config(config: Config, given: Mapping[str, Any]) -> Config:
+    """The configuration with what was given, by section and key, changed.
+
+    Raises:
+        ConfigError: an unknown key or a wrong value.
+    """
+    overrides = {
+        f"{section}.{key}": value for section, keys in given.items() for key, value in keys.items()
+    }
+    return build(overlaid(asdict(config), overrides))
+
+
+def changes(old: Config, new: Config) -> str:
+    """Every changed key with its two values, or ""; how to reach the bus changes nothing."""
+    before, after = (asdict(replace(config, bus=BusConfig())) for config in (old, new))
+    return ", ".join(
+        f"{section}.{key} {value} → {after[section][key]}"
+        for section, keys in before.items()
+        for key, value in keys.items()
+        if after[section][key] != value
+    )
+
+
+def check_change(old: Agent, new: Agent) -> None:
+    """Refuse a change under which the agent would need what it had not taken in.
+
+    Raises:
+        ConfigError: it would need other messages than those it had.
+    """
+    was, now = old.config, new.config
+    for key, one, other in (
+        ("team.name", was.team.name, now.team.name),
+        ("team.robots", was.team.robots, now.team.robots),
+    ):
+        if one != other:
+            raise ConfigError(key, repr(other), f"{one!r} as recorded", "a replay keeps the team")
+    unheard = sorted(set(new.peers) - set(old.peers))
+    central = [config.planner.kind in CENTRAL for config in (was, now)]
+    if central[0] != central[1] or unheard:
+        raise ConfigError(
+            "planner.kind", repr(now.planner.kind), f"one like the recorded {was.planner.kind!r}",
+            f"the agent had taken in no plans of {', '.join(unheard) or 'such a planner'}",
+        )  # fmt: skip
+    if now.estimator.kind == "truth" != was.estimator.kind:
+        raise ConfigError("estimator.kind", "'truth'", f"{was.estimator.kind!r} as recorded",
+                          "the agent had not taken in the truth")  # fmt: skip

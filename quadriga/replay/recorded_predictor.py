@@ -1,0 +1,84 @@
+"""The predictor a recorded team walked with: beside the recording, or in the user's cache."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import zipfile
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from agents.planner.predictor import Predictor
+from agents.planner.store import predictor_sha256, read
+from quadriga.cache import cache_dir
+from shared.config import CENTRAL, Config
+from shared.errors import PredictorError, RecordingError
+from shared.recording import Recording
+
+PREDICTOR: Final = "predictor.npz"  # its name in a run folder
+
+
+def keep(predictor: Path, run_dir: Path) -> None:
+    """Put a predictor beside the recording, so that a run folder is all a replay needs.
+
+    Raises:
+        RecordingError: it cannot be written.
+    """
+    kept = run_dir / PREDICTOR
+    try:
+        kept.unlink(missing_ok=True)
+        try:
+            os.link(predictor, kept)  # a file of the cache is replaced, never written to
+        except OSError:  # another file system, or one without links
+            shutil.copyfile(predictor, kept)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise RecordingError(str(kept), reason, "room for the predictor") from None
+
+
+def recorded_predictor(
+    recording: Recording, config: Config, given: Path | None
+) -> tuple[Predictor | None, bool]:
+    """The predictor of a recorded walk's agents, and whether it is the one they had.
+
+    Args:
+        recording: of the walk.
+        config: its configuration.
+        given: a file to take instead.
+
+    Raises:
+        PredictorError: the agents had one, and it is nowhere; or `given` is none.
+    """
+    if config.planner.kind in ("none", *CENTRAL):
+        if given is not None:
+            raise PredictorError(
+                f"--predictor {given}", f"planner.kind {config.planner.kind!r}",
+                "agents that plan for themselves", "the recorded ones had no predictor",
+            )  # fmt: skip
+        return None, True
+    sha256 = recording.metadata.get("predictor_sha256", "")
+    if given is not None:
+        predictor = read(given)[0]
+        return predictor, not sha256 or predictor_sha256(predictor) == sha256
+    beside = recording.path.parent / PREDICTOR
+    for path in (beside, *sorted(cache_dir().glob("predictor-*.npz"))):
+        if sha256 and _digest(path) == sha256:
+            return read(path)[0], True
+    wanted = f"with digest {sha256[:16]}…" if sha256 else "of unknown digest"
+    raise PredictorError(
+        f"predictor of {recording.path}", f"none in {beside.parent} or {cache_dir()}",
+        f"the one the team walked with, {wanted}",
+        f"give it with --predictor FILE: `quadriga walk` leaves it in its run folder as {PREDICTOR}"
+    )  # fmt: skip
+
+
+def _digest(path: Path) -> str:
+    """The digest a predictor file says it has; "" if it is none."""
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            return str(json.loads(str(archive["document"]))["sha256"])
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
+        return ""

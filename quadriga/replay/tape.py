@@ -1,0 +1,172 @@
+"""One robot's agent in a recording: all that it may have heard, and all that it said."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from agents.agent import Agent
+from agents.arrivals import Arrivals, Order, Source, order_of
+from agents.intake import ANYONE
+from agents.sampling import SAMPLE_MS
+from shared.codec import decode
+from shared.config import CENTRAL, Config
+from shared.errors import MessageError, RecordingError
+from shared.messages import Consumed, Message
+from shared.recording import Entry, Recording
+from shared.topics import (
+    COMMAND,
+    ESTOP,
+    EVENT,
+    INPUTS,
+    MEASUREMENT,
+    PLAN,
+    STATE,
+    STATUS,
+    TABLE,
+    Topic,
+)
+
+Packet = tuple[str, bytes]  # key, payload
+Serial = tuple[str, int, int]  # topic of an output and its order
+_NEEDED: Final = frozenset(topic.name for topic in TABLE) - {STATUS.name, EVENT.name}
+_REPORT_AFTER: Final = 2000  # entries
+
+
+@dataclass(slots=True)
+class Tape:
+    """What a recording holds of one agent.
+
+    Attributes:
+        states: own sensors by tick, all payloads of a tick in the order of the file.
+        heard: everything else it may have taken in: packets of each source by order.
+        records: what it said it took in, by tick.
+        said: commands, measurements and own plans by topic and order, payloads as above.
+        peers_awake: ticks of the 100 Hz grid at which a peer gave a command, by peer.
+        last: tick of its last command or record, at most that of the last state; −1: none.
+    """
+
+    states: dict[int, list[bytes]] = field(default_factory=lambda: defaultdict(list))
+    heard: dict[Source, dict[Order, list[Packet]]] = field(
+        default_factory=lambda: defaultdict(lambda: defaultdict(list))
+    )
+    records: dict[int, Consumed] = field(default_factory=dict)
+    said: dict[Serial, list[bytes]] = field(default_factory=lambda: defaultdict(list))
+    peers_awake: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
+    last: int = -1
+
+
+def read_tape(
+    recording: Recording, config: Config, agent: Agent, arrivals: Arrivals,
+    progress: Callable[[int], None] = lambda tick: None,
+) -> Tape:  # fmt: skip
+    """Everything of one agent in a recording.
+
+    Args:
+        recording: of a walk.
+        config: its configuration.
+        agent: the agent as it was configured.
+        arrivals: says what it had subscribed to.
+        progress: told the tick now and then.
+
+    Raises:
+        RecordingError: the recording holds nothing of this robot, nor what a replay needs.
+    """
+    tape = Tape()
+    takers = _takers(tape, config, agent, arrivals)
+    for count, entry in enumerate(recording.entries(_NEEDED)):
+        taker = takers.get(entry.key)
+        if taker is not None and entry.tick >= 0:
+            taker(entry)
+        if count % _REPORT_AFTER == 0:
+            progress(entry.tick)
+    # A forged tick must not ask for years of steps.
+    tape.last = min(tape.last, max(tape.states, default=-1))
+    _check(tape, recording, config, agent.robot)
+    return tape
+
+
+def _takers(
+    tape: Tape, config: Config, agent: Agent, arrivals: Arrivals
+) -> Mapping[str, Callable[[Entry], None]]:
+    """What to do with an entry, by its key."""
+    team, robot = config.team.name, agent.robot
+
+    def state(entry: Entry) -> None:
+        tape.states[entry.tick].append(entry.payload)
+
+    def command(entry: Entry) -> None:
+        tape.said[COMMAND.name, entry.tick, 0].append(entry.payload)
+        tape.last = max(tape.last, entry.tick)
+
+    def record(entry: Entry) -> None:
+        found = _valid(entry, INPUTS)
+        if isinstance(found, Consumed):
+            tape.records[found.tick] = found
+            tape.last = max(tape.last, found.tick)
+
+    takers: dict[str, Callable[[Entry], None]] = {}
+    for key, (topic, sender) in arrivals.topics.items():
+        if topic not in (STATE, EVENT):
+            takers[key] = _listener(tape, topic, ANYONE if topic is ESTOP else sender)
+    takers[STATE.key(team, robot)] = state
+    takers[COMMAND.key(team, robot)] = command
+    takers[INPUTS.key(team, robot)] = record
+    takers[MEASUREMENT.key(team, robot)] = _speaker(tape, MEASUREMENT)
+    if config.planner.kind not in CENTRAL:
+        takers[PLAN.key(team, robot)] = _speaker(tape, PLAN)
+    for peer in agent.peers:
+        takers[COMMAND.key(team, peer)] = _watcher(tape.peers_awake[peer])
+    return takers
+
+
+def _listener(tape: Tape, topic: Topic, sender: str) -> Callable[[Entry], None]:
+    by_order = tape.heard[topic.name, sender]
+
+    def listen(entry: Entry) -> None:
+        message = _valid(entry, topic)
+        if message is not None:  # what is not valid, the agent dropped
+            by_order[order_of(message)].append((entry.key, entry.payload))
+
+    return listen
+
+
+def _speaker(tape: Tape, topic: Topic) -> Callable[[Entry], None]:
+    def speak(entry: Entry) -> None:
+        message = _valid(entry, topic)
+        order = (entry.tick, 0) if message is None else order_of(message)
+        tape.said[topic.name, *order].append(entry.payload)
+
+    return speak
+
+
+def _watcher(ticks: set[int]) -> Callable[[Entry], None]:
+    def watch(entry: Entry) -> None:
+        if entry.tick % SAMPLE_MS == 0:
+            ticks.add(entry.tick)
+
+    return watch
+
+
+def _valid(entry: Entry, topic: Topic) -> Message | None:
+    try:
+        return decode(entry.payload, topic.type)
+    except MessageError:
+        return None
+
+
+def _check(tape: Tape, recording: Recording, config: Config, robot: str) -> None:
+    path = str(recording.path)
+    if not tape.states or tape.last < 0:
+        what = "states" if not tape.states else "commands"
+        raise RecordingError(
+            path, f"no {what} of {robot}", f"every message of {robot}", recording.cut
+        )
+    if config.world.mode == "realtime" and not tape.records:
+        raise RecordingError(
+            path, f"no message on {INPUTS.key(config.team.name, robot)}",
+            "what the agent took in at which tick",
+            "in real time nothing else tells; recorded by an older version, or left out",
+        )  # fmt: skip

@@ -1,0 +1,191 @@
+"""Mistakes about a replay cost one clear line each; what it needs is found where it is kept."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.planner.gates import GateReport
+from agents.planner.predictor import Predictor, PredictorMeta
+from agents.planner.store import Provenance, predictor_sha256, save
+from agents.rehearsal import standing
+from quadriga.cli import main
+from quadriga.recorder import metadata
+from quadriga.replay.recorded_predictor import PREDICTOR, keep, recorded_predictor
+from quadriga.replay.saved_qp import SavedQp
+from quadriga.replay.saved_qp import load as load_qp
+from quadriga.replay.saved_qp import save as save_qp
+from shared.codec import encode
+from shared.config import Config
+from shared.config_file import load
+from shared.errors import PredictorError, RecordingError
+from shared.messages import Command, Reference
+from shared.recording import Recording, RecordingWriter
+from tests.quadriga.replay.rewritten import rewritten
+
+REPORT = GateReport(1, {}, {}, 0.5, (0.1,), ((1.0,),), (0.3, 2.0), 0.1, 0.5, (), ())
+
+
+def configured(**keys: object) -> Config:
+    """A configuration of one robot."""
+    given = {name.replace("__", "."): value for name, value in keys.items()}
+    return load(None, {"team.robots": 1, "planner.kind": "none", **given})
+
+
+def write(path: Path, config: Config, sha256: str = "", ticks: int = 5) -> Path:
+    """A recording of a robot that stands for some ticks with torques that no agent gave."""
+    zero = np.zeros(12)
+    with RecordingWriter(path, metadata(config, sha256)) as to:
+        to.write("team/reference", encode(Reference(0, 0, 0.0, 0.0, 0.0, 0.26)), 0)
+        for tick in range(ticks):
+            command = Command(tick, 10**6 * tick, zero, zero, zero, zero, zero)
+            to.write("team/r1/state", encode(standing(tick)), tick)
+            to.write("team/r1/command", encode(command), tick)
+    return path
+
+
+def fitted(path: Path, config: Config, scale: float = 0.0) -> str:
+    """Write a predictor file; its digest."""
+    meta = PredictorMeta.of(config)
+    G = np.full((1, 1, 1, 6 * meta.N, meta.width), scale)
+    provenance = Provenance("abc", (1,), (900,), (100,), {}, REPORT)
+    return save(path, Predictor(meta, G), provenance)
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    return write(tmp_path / "run.mcap", configured())
+
+
+@pytest.fixture(autouse=True)
+def _cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+def complaint(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
+    """What a wrong command says: one line, exit status 2."""
+    assert main(["replay", *map(str, arguments)]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    return err
+
+
+def test_mistakes_on_the_command_line(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments, said in (
+        ((run, "--robot", "r2"), "--robot: got 'r2', expected one of r1"),
+        ((run.parent / "no.mcap", "--all"), "no.mcap: got No such file"),
+        ((run, "--all", "--break", "1"), "--break: got --all, expected --robot NAME"),
+        ((run, "--robot", "r1", "--break", "9"), "--break: got 9 s, expected a time up to 0.004 s"),
+        ((run, "--all", "--set", "controller.kp_swng=1"), "did you mean 'controller.kp_swing'?"),
+        ((run, "--all", "--set", "team.robots=2"), "team.robots: got 2, expected 1 as recorded"),
+        ((run, "--all", "--set", "estimator.kind=truth"), "had not taken in the truth"),
+        ((run, "--all", "--set", "planner.kind=deepc"), "no plans of such a planner"),
+        ((run, "--all", "--predictor", run), "expected agents that plan for themselves"),
+        ((run, "--all", "--out", run), "--out"),
+    ):
+        assert said in complaint(capsys, *arguments), said
+
+
+def test_a_recording_of_another_version(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    future = rewritten(run, tmp_path / "future.mcap", config={"controller.kp_tail": 3.0})
+    said = complaint(capsys, future, "--all")
+    assert "configuration of " in said
+    assert "controller.kp_tail" in said
+    assert "replay it with that one" in said
+    nothing = rewritten(run, tmp_path / "nothing.mcap", metadata={"config_json": ""})
+    assert "metadata without a configuration" in complaint(capsys, nothing, "--all")
+
+
+def test_recordings_that_lack_what_a_replay_needs(
+    tmp_path: Path, run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    realtime = write(tmp_path / "real.mcap", configured(world__mode="realtime"))
+    assert "no message on team/r1/inputs" in complaint(capsys, realtime, "--all")
+    silent = rewritten(run, tmp_path / "silent.mcap", lambda entry: None)
+    assert "no states of r1" in complaint(capsys, silent, "--all")
+    late = rewritten(run, tmp_path / "late.mcap", lambda e: e.payload if e.tick > 1 else None)
+    assert main(["replay", str(late), "--all"]) == 1
+    said = capsys.readouterr().out
+    assert "input missing from the recording: reference:operator:0 (tick 0); state of r1" in said
+
+
+def test_a_false_command_is_told_with_its_values(
+    run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["replay", str(run), "--robot", "r1"]) == 1
+    said = capsys.readouterr().out
+    assert "r1: 5 of 5 commands differ; " in said
+    assert "first difference: tick 0, command.tau[0]: recorded 0.0, recomputed " in said
+    assert "inputs there: state of tick 0; reference of operator: 0; mode stand" in said
+    assert "replay-r1-0-command.npz" in said
+    assert "missing" not in said
+
+
+def test_the_predictor_is_found_by_its_digest(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = configured(planner__kind="distributed")
+    own, other = tmp_path / "own.npz", tmp_path / "other.npz"
+    sha256, _ = fitted(own, config), fitted(other, config, 0.1)
+    recording = Recording(write(tmp_path / "run.mcap", config, sha256))
+    said = complaint(capsys, recording.path, "--all")
+    assert f"digest {sha256[:16]}" in said
+    assert "--predictor FILE" in said
+    assert recorded_predictor(recording, config, own)[1]
+    assert not recorded_predictor(recording, config, other)[1]
+    with pytest.raises(PredictorError, match="no such file"):
+        recorded_predictor(recording, config, tmp_path / "none.npz")
+    keep(other, tmp_path)  # another one beside the recording is not taken for it
+    cached = tmp_path / "cache" / "quadriga" / "predictor-0.npz"
+    cached.parent.mkdir(parents=True)
+    cached.write_bytes(own.read_bytes())
+    found, same = recorded_predictor(recording, config, None)
+    assert found is not None
+    assert (predictor_sha256(found), same) == (sha256, True)
+    cached.unlink()
+    keep(own, tmp_path)
+    assert recorded_predictor(recording, config, None)[1]
+
+
+def test_keeping_a_predictor_copies_where_no_link_is_possible(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, run_dir = tmp_path / "source.npz", tmp_path / "run"
+    source.write_bytes(b"predictor")
+    run_dir.mkdir()
+
+    def refuse(*_: object) -> None:
+        raise OSError("another file system")
+
+    keep(source, run_dir)
+    assert (run_dir / PREDICTOR).samefile(source)
+    monkeypatch.setattr("os.link", refuse)
+    keep(source, run_dir)
+    assert not (run_dir / PREDICTOR).samefile(source)
+    assert (run_dir / PREDICTOR).read_bytes() == b"predictor"
+    with pytest.raises(RecordingError, match="room for the predictor"):
+        keep(source, tmp_path / "nowhere")
+
+
+def test_a_saved_problem_can_be_solved_on_its_own(tmp_path: Path) -> None:
+    # min ½ |x|² − x₁ − x₂ with x₁ ≤ 0.25 and x₁ + x₂ ≤ 1: at (0.25, 0.75).
+    far = np.array([1e30, 1e30])
+    lower, upper = np.append(-far, -1e30), np.array([0.25, 1e30, 1.0])
+    qp = SavedQp(np.eye(2), -np.ones(2), np.ones((1, 2)), lower, upper, np.zeros(2), "an example")
+    save_qp(tmp_path / "qp.npz", qp)
+    np.testing.assert_allclose(load_qp(tmp_path / "qp.npz").solve(), [0.25, 0.75])
+    (tmp_path / "bad.npz").write_bytes(b"nothing")
+    for name in ("bad.npz", "none.npz"):
+        with pytest.raises(RecordingError):
+            load_qp(tmp_path / name)
+
+
+def test_an_error_survives_the_way_out_of_a_worker() -> None:
+    error = RecordingError("run.mcap", "nothing", "something", "lost")
+    again = pickle.loads(pickle.dumps(error))
+    assert (type(again), str(again)) == (RecordingError, str(error))

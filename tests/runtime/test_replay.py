@@ -1,0 +1,287 @@
+"""Real walks, recorded over the bus, replayed to the byte; what is planted or lost is found."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from agents.planner.store import load as load_predictor
+from agents.planner.store import predictor_sha256
+from quadriga.cli import main
+from quadriga.endpoint import free_endpoint
+from quadriga.identify import ensure_predictor
+from quadriga.launch import Launch, table
+from quadriga.replay.recorded_predictor import keep
+from quadriga.replay.run import Outcome, replay
+from quadriga.replay.saved_qp import load as load_qp
+from shared.bus import Bus
+from shared.clock import monotonic
+from shared.codec import decode
+from shared.config import CENTRAL
+from shared.config_file import load
+from shared.config_text import to_toml
+from shared.messages import Command, Consumed, Measurement, Message, Plan, Status, Truth
+from shared.recording import Recording
+from shared.topics import TRUTH
+from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
+from tests.runtime.conftest import WAIT
+
+pytestmark = pytest.mark.usefixtures("_compiled")
+
+Disturb = Callable[[Launch, str], None]
+SWING = (
+    301  # the first tick at which a swing foot is off its reference: it leaves the ground at 300
+)
+
+
+def walked(folder: Path, disturb: Disturb | None = None, **keys: Any) -> Path:
+    """The recording of a walk of two robots with all processes."""
+    given = {"team.robots": 2, "bus.endpoint": free_endpoint(), "world.seed": 5}
+    given |= {name.replace("__", "."): value for name, value in keys.items()}
+    config = load(None, given)
+    predictor = ensure_predictor(config, Console(stderr=True))
+    folder.mkdir()
+    keep(predictor, folder)
+    (folder / "config.toml").write_text(to_toml(config), encoding="utf-8")
+    sha256 = predictor_sha256(load_predictor(predictor, config)[0])
+    with Launch(table(config, folder, predictor, sha256), folder / "logs") as running:
+        if disturb is not None:
+            disturb(running, config.bus.endpoint)
+        running.watch(lambda: False)
+    return folder / "run.mcap"
+
+
+@pytest.fixture(scope="module")
+def lockstep(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return walked(tmp_path_factory.mktemp("lockstep") / "run", world__seconds=1.0)
+
+
+def replayed(path: Path, *robots: str, **keys: Any) -> list[Outcome]:
+    """Outcomes of a replay, `section__key` changed."""
+    given: dict[str, dict[str, Any]] = {}
+    for name, value in keys.items():
+        section, _, key = name.partition("__")
+        given.setdefault(section, {})[key] = value
+    return replay(path, robots, given, None, None, Console(stderr=True))
+
+
+def check_exact(
+    path: Path, outcomes: list[Outcome], *, plans: bool = True, realtime: bool = False
+) -> None:
+    """Every recorded message of every robot is recomputed to the byte."""
+    recording = Recording(path)
+    assert [outcome.robot for outcome in outcomes] == ["r1", "r2"]
+    for outcome in outcomes:
+        verdict = outcome.verdict
+        assert verdict.exact, (outcome.robot, verdict.first, verdict.missing)
+        kinds: list[type[Message]] = [Command, Measurement, *([Plan] if plans else [])]
+        for kind in kinds:
+            recorded = len(list(recording.messages(kind, outcome.robot)))
+            assert verdict.equal[kind.__name__.lower()] == recorded, kind
+            assert recorded or (kind is Plan and realtime), kind
+        assert not verdict.differing
+
+
+def test_lock_step_is_replayed_to_the_byte(
+    lockstep: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["replay", str(lockstep.parent), "--all"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line[:16] for line in lines] == ["r1: 1000 command", "r2: 1000 command"]
+    assert all("measurements equal to the byte" in line for line in lines)
+    assert not list(Recording(lockstep).messages(Consumed)), "nothing unusual happened"
+    check_exact(lockstep, replayed(lockstep))
+
+
+def test_a_planted_bit_in_a_state_is_found_at_its_tick(
+    lockstep: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tmp_path / "run.mcap"
+    shutil.copy(lockstep.parent / "predictor.npz", tmp_path)
+    rewritten(lockstep, run, planted_bit("team/r2/state", 702, "v_joint"))
+    assert main(["replay", str(run), "--robot", "r1"]) == 0, "no input of r1"
+    capsys.readouterr()
+    assert main(["replay", str(run), "--robot", "r2"]) == 1
+    said = capsys.readouterr().out
+    assert "first difference: tick 702, command.tau[" in said
+    assert "inputs there: state of tick 702; mode walk" in said
+    saved = tmp_path / "replay-r2-702-command.npz"
+    qp = load_qp(saved)
+    np.testing.assert_allclose(qp.solve(), qp.x, atol=1e-6)
+    alone = [sys.executable, "-m", "quadriga.replay.saved_qp", str(saved)]
+    done = subprocess.run(alone, capture_output=True, text=True, check=True)
+    assert "whole-body QP of r2 at tick 702" in done.stdout
+
+
+def test_a_planted_bit_in_a_peer_s_measurement_is_found_in_the_next_plan(
+    lockstep: Path, tmp_path: Path
+) -> None:
+    run = tmp_path / "run.mcap"
+    shutil.copy(lockstep.parent / "predictor.npz", tmp_path)
+    rewritten(lockstep, run, planted_bit("team/r1/measurement", 630, "y"))
+    (outcome,) = replayed(run, "r2")
+    first = outcome.verdict.first
+    assert first is not None
+    # Taken in at 660 with the samples up to 640, and used by the plan of step 17.
+    assert (first.tick, first.topic) == (680, "plan")
+    (saved,) = outcome.files
+    qp = load_qp(saved)
+    assert saved.name == "replay-r2-680-plan.npz"
+    np.testing.assert_allclose(qp.solve(), qp.x, atol=1e-5)
+
+
+def test_a_changed_gain_is_found_at_the_first_tick_it_acts(lockstep: Path, tmp_path: Path) -> None:
+    run = tmp_path / "run.mcap"
+    shutil.copy(lockstep.parent / "predictor.npz", tmp_path)
+    rewritten(lockstep, run, config={"controller.kp_swing": 401.0})
+    for outcome in replayed(run):
+        first = outcome.verdict.first
+        assert first is not None
+        assert (first.tick, first.topic) == (SWING, "command")
+        assert outcome.failed
+
+
+def test_a_change_is_drawn_instead_of_failing(
+    lockstep: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--robot", "r2", "--set", "planner.R=[0.1,0.1,0.1]", "--out", str(tmp_path)]
+    assert main(["replay", str(lockstep), *options]) == 0
+    said = capsys.readouterr().out
+    assert "changed: planner.R (0.2, 0.2, 0.05) → (0.1, 0.1, 0.1)" in said
+    assert "first difference: tick 320, plan.u[" in said
+    assert (tmp_path / "replay-r2.png").stat().st_size > 20_000
+    # A value that is the recorded one is no change.
+    assert main(["replay", str(lockstep), "--robot", "r2", "--set", "planner.N=25"]) == 0
+    assert "changed" not in capsys.readouterr().out
+
+
+LOST: dict[str, tuple[str, int, int, str]] = {
+    "state": ("team/r2/state", 500, 500, "state of r2 at tick 500"),
+    "plan": ("team/r1/plan", 480, 500, "plan:r1:12.0"),
+    "measurement": ("team/r1/measurement", 470, 500, "measurement:r1:470"),
+    "reference": ("team/reference", 600, 600, "reference:operator:600"),
+}
+
+
+@pytest.mark.parametrize("name", LOST)
+def test_a_message_the_recorder_lost_is_named(
+    lockstep: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    key, made, tick, said = LOST[name]
+    run = tmp_path / "run.mcap"
+    shutil.copy(lockstep.parent / "predictor.npz", tmp_path)
+    rewritten(lockstep, run, without(key, made))
+    assert main(["replay", str(run), "--robot", "r2"]) == 1
+    assert f"input missing from the recording: {said} (tick {tick})" in capsys.readouterr().out
+
+
+def test_a_command_the_recorder_lost_is_counted_and_the_rest_is_equal(
+    lockstep: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tmp_path / "run.mcap"
+    shutil.copy(lockstep.parent / "predictor.npz", tmp_path)
+    rewritten(lockstep, run, without("team/r2/command", 500))
+    assert main(["replay", str(run), "--robot", "r2"]) == 0
+    assert "equal to the byte; 1 command not in the recording; 1.0 s in" in capsys.readouterr().out
+
+
+def test_the_debugger_stops_with_the_agent_in_scope(lockstep: Path) -> None:
+    typed = "p 'ticks', memory.tick, inputs.state.tick, recorded['command'].tick\nc\n"
+    command = [sys.executable, "-m", "quadriga", "replay", str(lockstep), "--robot", "r1"]
+    done = subprocess.run(
+        [*command, "--break", "0.6"], input=typed, capture_output=True, text=True, check=True,
+        timeout=WAIT,
+    )  # fmt: skip
+    assert "('ticks', 599, 600, 600)" in done.stdout
+    assert "measurements equal to the byte" in done.stdout
+    done = subprocess.run(
+        [*command, "--break", "0.6"], input="q\n", capture_output=True, text=True, check=False,
+        timeout=WAIT,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (130, "quadriga: interrupted\n")
+
+
+def lossless(path: Path) -> bool:
+    """Whether the recorder got every state and record; on a busy machine links drop some."""
+    recording = Recording(path)
+    numbers = [list(recording.messages(Consumed, robot)) for robot in ("r1", "r2")]
+    ticks = [e.tick for e in recording.entries({"state"})]
+    whole = all([m.number for m in found] == list(range(len(found))) for found in numbers)
+    return whole and len(ticks) == 2 * (max(ticks) + 1)
+
+
+def test_real_time_is_replayed_to_the_byte(tmp_path: Path) -> None:
+    for attempt in range(3):
+        run = walked(tmp_path / str(attempt), world__mode="realtime", world__seconds=1.5)
+        if lossless(run):
+            break
+    records = list(Recording(run).messages(Consumed, "r1"))
+    assert len([r for r in records if any("measurement:r2" in text for text in r.taken)]) > 5
+    # On a busy machine a robot may miss so many states that it never plans.
+    check_exact(run, replayed(run), realtime=True)
+    assert len(list(Recording(run).messages(Command, "r1"))) > 300
+    lost = rewritten(run, tmp_path / "lost.mcap", without("team/r1/inputs", records[9].tick))
+    shutil.copy(run.parent / "predictor.npz", tmp_path)
+    (outcome,) = replayed(lost, "r1")
+    tick, name = outcome.verdict.missing[0]
+    assert tick == records[8].tick + 1
+    assert name == f"1 of inputs of r1 between ticks {records[8].tick} and {records[10].tick}"
+
+
+def frozen_for_a_while(running: Launch, endpoint: str) -> None:
+    """Freeze r1 in mid-walk until the others have gone on without it."""
+    config = load(None, {"bus.endpoint": endpoint})
+    bus = Bus.open(config.bus, "team", "watcher")
+    bus.subscribe(TRUTH.key("team"))
+
+    def await_tick(tick: int) -> None:
+        deadline = monotonic() + WAIT
+        while monotonic() < deadline:
+            packet = bus.get(1.0)
+            if packet is not None and decode(packet[1], Truth).tick >= tick:
+                return
+        pytest.fail("the world stands still")
+
+    try:
+        await_tick(500)
+        os.kill(running.pids["r1"], signal.SIGSTOP)
+        await_tick(800)
+        os.kill(running.pids["r1"], signal.SIGCONT)
+    finally:
+        bus.close()
+
+
+def test_waits_that_were_given_up_are_replayed_to_the_byte(tmp_path: Path) -> None:
+    run = walked(
+        tmp_path / "run", frozen_for_a_while, world__seconds=1.3, world__command_timeout=0.3,
+        planner__peer_timeout=0.1,
+    )  # fmt: skip
+    recording = Recording(run)
+    records = {robot: list(recording.messages(Consumed, robot)) for robot in ("r1", "r2")}
+    assert any("plan/r1" in record.owed for record in records["r2"])
+    assert max(record.passed for record in records["r1"]) > 50
+    last = list(recording.messages(Status, "r2"))[-1]
+    assert last.counters["waits_given_up"] >= 1
+    check_exact(run, replayed(run))
+
+
+@pytest.mark.parametrize("kind", CENTRAL[:1])
+def test_the_plans_of_a_central_planner_are_inputs(tmp_path: Path, kind: str) -> None:
+    run = walked(tmp_path / "run", world__seconds=0.7, planner__kind=kind)
+    outcomes = replayed(run)
+    check_exact(run, outcomes, plans=False)
+    assert not outcomes[0].verdict.equal["plan"]
+    edit = planted_bit("team/r2/plan", 480, "u")
+    (outcome,) = replayed(rewritten(run, tmp_path / "planted.mcap", edit), "r2")
+    assert outcome.verdict.first is not None
+    assert outcome.verdict.first.tick == 481  # a plan arrives a tick after its data
