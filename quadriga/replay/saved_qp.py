@@ -97,13 +97,17 @@ def captured(about: str) -> Iterator[dict[str, SavedQp]]:
     found: dict[str, SavedQp] = {}
 
     def whole_body(solve: Callable[..., Any]) -> Callable[..., Any]:
-        def observed(problem: whole_body_qp.Problem) -> Any:
-            answer = solve(problem)
+        def observed(*arguments: Any) -> whole_body_qp.Solution:
+            answer: whole_body_qp.Solution = solve(*arguments)
+            try:
+                problem = whole_body_qp.build(*arguments)
+            except np.linalg.LinAlgError:
+                return answer  # there is no problem to save
             box = np.full(len(problem.H), TORQUE_LIMIT)
             found[WHOLE_BODY] = SavedQp(
                 problem.H, problem.g, problem.C, np.concatenate([-box, problem.c]),
-                np.concatenate([box, np.full(len(problem.c), _FAR)]), answer[0],
-                f"whole-body QP of {about}, {answer[1]}: x is the torques [N·m]",
+                np.concatenate([box, np.full(len(problem.c), _FAR)]), answer.tau,
+                f"whole-body QP of {about}, {answer.status}: x is the torques [N·m]",
             )  # fmt: skip
             return answer
 
@@ -126,7 +130,7 @@ def captured(about: str) -> Iterator[dict[str, SavedQp]]:
         return observed
 
     with ExitStack() as stack:
-        stack.enter_context(_instead(whole_body_qp, "solve", whole_body))
+        stack.enter_context(_instead(whole_body_qp, "solve_goal", whole_body))
         for kind in SOLVERS.values():
             stack.enter_context(_instead(kind, "solve", planner))
         yield found
