@@ -86,6 +86,8 @@ def resim(recording: Recording) -> Iterator[Resim]:
         else:
             world.step(commands)
         yield Resim(tick + 1, compared)
+    if compared and recording.cut:
+        yield Resim(tick + 1, compared, recording.cut)
     if not compared:
         raise RecordingError(
             str(recording.path), "nothing that a world published from tick 0 on",

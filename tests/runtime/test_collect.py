@@ -53,7 +53,7 @@ def test_an_interrupted_collection(tmp_path: Path, number: signal.Signals, statu
         os.killpg(collection.pid, number)
     else:
         collection.send_signal(number)
-    _, said = collection.communicate(timeout=10.0)
+    _, said = collection.communicate(timeout=WAIT)
     assert collection.returncode == status
     assert "Traceback" not in said
     while any(map(alive, workers)) and monotonic() < deadline:
