@@ -1,65 +1,84 @@
-"""The first field in which a recorded message and a recomputed one differ."""
+"""Where a recomputed message departs from the recorded one: field, place, both values."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shared.codec import decode
 from shared.errors import MessageError
 from shared.messages import Message
+from shared.robot import Array
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Where two messages part.
+    """The first field in which two messages differ.
 
     Attributes:
-        key, tick: of the message.
-        field: its first field that differs, with the index of the first number for an array.
-        recorded, recomputed: the values there, in full precision.
+        tick: of the step that gave the message.
+        name: of its topic, or its key.
+        field: name of the field, with the place of an array's first differing entry.
+        recorded, recomputed: the two values as text.
+        others: how many entries of the same array differ as well, or names of other fields.
     """
 
-    key: str
     tick: int
+    name: str
     field: str
     recorded: str
     recomputed: str
+    others: str = ""
 
     def __str__(self) -> str:
-        """One sentence."""
+        rest = f" ({self.others})" if self.others else ""
+        place = f"{self.name}.{self.field}" if self.field else self.name
         return (
-            f"first difference at tick {self.tick} ({self.tick / 1000:.3f} s), {self.key}, "
-            f"{self.field}: recorded {self.recorded}, recomputed {self.recomputed}"
+            f"tick {self.tick}, {place}: "
+            f"recorded {self.recorded}, recomputed {self.recomputed}{rest}"
         )
 
 
-def difference(key: str, tick: int, recorded: bytes, recomputed: Message) -> Difference:
-    """What tells a recorded message from `recomputed`, whose bytes differ from it."""
+def difference(tick: int, name: str, recorded: bytes, message: Message) -> Difference:
+    """How a recomputed message differs from what was recorded in its place.
+
+    Args:
+        tick: of the step.
+        name: of the message's topic, or its key.
+        recorded: the payload in its place.
+        message: recomputed; of a payload with other bytes.
+    """
     try:
-        message = decode(recorded, type(recomputed))
+        old = decode(recorded, type(message))
     except MessageError as error:
-        return Difference(key, tick, "message", f"one that is not valid ({error})", "a valid one")
-    for item in fields(recomputed):
-        was, now = getattr(message, item.name), getattr(recomputed, item.name)
-        if "shape" not in item.metadata:
-            if was != now:
-                return Difference(key, tick, item.name, repr(was), repr(now))
-        elif (found := _in_arrays(item.name, was, np.asarray(now))) is not None:
-            return Difference(key, tick, *found)
-    return Difference(key, tick, "bytes", "another order of the fields", "the codec's")
+        return Difference(tick, name, "", f"what is no message ({error})", "one")
+    differing = [item for item in fields(message) if not _same(old, message, item.name)]
+    if not differing:
+        return Difference(tick, name, "", "the same values", "in another order on the wire")
+    item = differing[0]
+    also = ", ".join(other.name for other in differing[1:])
+    was, now = getattr(old, item.name), getattr(message, item.name)
+    if "shape" not in item.metadata or was.shape != now.shape:
+        one, other = (repr(v.shape if "shape" in item.metadata else v) for v in (was, now))
+        return Difference(tick, name, item.name, one, other, f"also in {also}" if also else "")
+    places = np.argwhere(_bits(was) != _bits(now))
+    place = tuple(int(k) for k in places[0])
+    others = [f"{len(places)} of {was.size} entries differ" if was.size > 1 else ""]
+    others += [f"also in {also}"] if also else []
+    return Difference(
+        tick, name, f"{item.name}[{', '.join(map(str, place))}]",
+        repr(float(was[place])), repr(float(now[place])), "; ".join(filter(None, others)),
+    )  # fmt: skip
 
 
-def _in_arrays(name: str, was: Any, now: Any) -> tuple[str, str, str] | None:
-    if was.shape != now.shape:
-        return name, f"shape {was.shape}", f"shape {now.shape}"
-    # As bits: 0.0 and −0.0 are equal numbers of different bytes.
-    apart = np.argwhere(was.view(np.int64) != np.ascontiguousarray(now).view(np.int64))
-    if not len(apart):
-        return None
-    at = tuple(apart[0].tolist())
-    many = f", {len(apart)} of {was.size} numbers differ" if len(apart) > 1 else ""
-    where = f"{name}[{', '.join(map(str, at))}]{many}"
-    return where, repr(float(was[at])), repr(float(now[at]))
+def _bits(array: Array) -> NDArray[np.uint64]:
+    return np.ascontiguousarray(array, dtype="<f8").view(np.uint64)
+
+
+def _same(one: Message, other: Message, name: str) -> bool:
+    first, second = getattr(one, name), getattr(other, name)
+    if isinstance(first, np.ndarray):
+        return first.shape == np.shape(second) and bool((_bits(first) == _bits(second)).all())
+    return bool(first == second)

@@ -152,7 +152,7 @@ def _compare(world: World, config: Config, entries: Iterable[Entry]) -> int | Di
         expected[TRUTH.key(team)] = world.truth()
     for key, message in expected.items():
         if key in recorded and encode(message) not in recorded[key]:
-            return difference(key, world.tick, recorded[key][0], message)
+            return difference(world.tick, key, recorded[key][0], message)
         count += key in recorded
     return count
 

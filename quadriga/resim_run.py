@@ -50,7 +50,10 @@ def _say(last: Resim, recording: Recording, spent: float, console: Console) -> N
         lines = [f"equal to the byte: {last.compared} states and truths, {pace}"]
         lines += [f"compared up to there only: {last.note}"] if last.note else []
     else:
-        lines = [str(last.difference), f"{last.compared} messages before it are equal; {pace}"]
+        lines = [
+            f"first difference: {last.difference}",
+            f"{last.compared} messages before it are equal; {pace}",
+        ]
         if others := other_versions(recording, versions()):
             lines.append(f"recorded with other versions, which may be why: {others}")
     for line in lines:

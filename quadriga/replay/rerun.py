@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from agents.agent import Agent, AgentState, Inputs, Outputs
 from agents.arrivals import order_of
-from quadriga.replay.difference import Difference, difference
+from quadriga.difference import Difference, difference
 from quadriga.replay.feed import Feed
 from quadriga.replay.tape import Serial, Tape
 from shared.codec import decode, encode
@@ -137,7 +137,7 @@ class Comparison:
             else:
                 verdict.differing[topic.name] += 1
                 if verdict.first is None:
-                    verdict.first = difference(tick, topic, recorded[0], message)
+                    verdict.first = difference(tick, topic.name, recorded[0], message)
                     verdict.step = step
 
     def finish(self) -> Verdict:

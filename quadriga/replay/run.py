@@ -229,7 +229,7 @@ def _save_problem(job: Job, agent: Agent, verdict: Verdict) -> tuple[Path, ...]:
         return ()
     with captured(f"{job.robot} at tick {verdict.first.tick}") as found:
         agent.step(verdict.step.before, verdict.step.inputs)
-    kind = PLANNER if verdict.first.topic == PLAN.name else WHOLE_BODY
+    kind = PLANNER if verdict.first.name == PLAN.name else WHOLE_BODY
     if kind not in found:
         return ()
     path = job.out / f"replay-{job.robot}-{verdict.first.tick}-{kind}.npz"

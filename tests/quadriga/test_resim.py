@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,6 @@ import pytest
 
 from quadriga.by_tick import by_tick
 from quadriga.cli import main
-from quadriga.difference import difference
 from shared.codec import decode, encode
 from shared.messages import Command, State, Truth
 from shared.recording import Recording
@@ -65,8 +64,8 @@ def flipped(
 @pytest.mark.parametrize(
     ("change", "tick", "found"),
     [
-        (flipped(State, 177, "imu_gyro", 2), 177, "team/r2/state, imu_gyro[2]"),
-        (flipped(Truth, 210, "base_pos", 4), 210, "team/sim/truth, base_pos[1, 1]"),
+        (flipped(State, 177, "imu_gyro", 2), 177, "team/r2/state.imu_gyro[2]"),
+        (flipped(Truth, 210, "base_pos", 4), 210, "team/sim/truth.base_pos[1, 1]"),
         # The last bit of a gain may be lost as torques are summed.
         (flipped(Command, 200, "kp", 0, bit=20), 201, "team/r1/state"),
     ],
@@ -76,10 +75,10 @@ def test_one_flipped_bit_is_found_at_its_tick(
 ) -> None:
     status, said = resim(capsys, write_lockstep(tmp_path / "run.mcap", config(), change))
     assert status == 1
-    assert f"first difference at tick {tick} (0.{tick} s)" in said
+    assert f"first difference: tick {tick}, " in said
     assert found in said
     recorded, recomputed = said.partition("recorded ")[2].split(", recomputed ")
-    assert recorded != recomputed.split("\n")[0]
+    assert recorded != recomputed.split(" (")[0]
 
 
 def test_a_difference_names_the_versions_that_may_explain_it(
@@ -148,16 +147,3 @@ def test_ticks_come_in_order_with_all_their_entries(whole: Path) -> None:
     assert all({entry.tick for entry in entries} == {tick} for tick, entries in found)
     count = sum(len(entries) for _, entries in found)
     assert count == sum(1 for _ in Recording(whole).entries({"state", "command"}))
-
-
-def test_every_field_of_a_message_is_compared() -> None:
-    three, quat, yoke = np.zeros((1, 3)), np.zeros((1, 4)), np.zeros(1)
-    grf = np.zeros((1, 4, 3))
-    truth = Truth(3, 3, ("r1",), three, quat, three, three, grf, yoke, yoke)
-    for item in fields(Truth):
-        value = getattr(truth, item.name)
-        other = -value if isinstance(value, np.ndarray) else ("r2",) if value == ("r1",) else 4
-        changed: dict[str, Any] = {item.name: other}
-        found = difference("k", 3, encode(replace(truth, **changed)), truth)
-        assert found.field.startswith(item.name)
-    assert "not valid" in difference("k", 3, b"garbage", truth).recorded

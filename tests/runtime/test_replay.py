@@ -133,7 +133,7 @@ def test_a_planted_bit_in_a_peer_s_measurement_is_found_in_the_next_plan(
     first = outcome.verdict.first
     assert first is not None
     # Taken in at 660 with the samples up to 640, and used by the plan of step 17.
-    assert (first.tick, first.topic) == (680, "plan")
+    assert (first.tick, first.name) == (680, "plan")
     (saved,) = outcome.files
     qp = load_qp(saved)
     assert saved.name == "replay-r2-680-plan.npz"
@@ -147,7 +147,7 @@ def test_a_changed_gain_is_found_at_the_first_tick_it_acts(lockstep: Path, tmp_p
     for outcome in replayed(run):
         first = outcome.verdict.first
         assert first is not None
-        assert (first.tick, first.topic) == (SWING, "command")
+        assert (first.tick, first.name) == (SWING, "command")
         assert outcome.failed
 
 
