@@ -75,14 +75,24 @@ def die_with_parent(parent: int) -> None:
 
 @contextmanager
 def interrupts_held() -> Iterator[None]:
-    """Deliver SIGINT only after the block; processes started in it are never interrupted.
+    """Deliver SIGINT and SIGTERM only after the block; processes started in it know no SIGINT.
 
     For workers: Ctrl-C, which the terminal sends to all, is their parent's to handle. A worker
     inherits the blocked signal, so there is no moment, not even among its first imports, at which
-    it would be hit.
+    it would be hit. The parent's other threads do not block it; so it is noted here, and raised at
+    the end: in the midst of a start Python may lose an interrupt.
     """
+    noted: list[int] = []
+    handlers = {
+        number: signal.signal(number, lambda found, _frame: noted.append(found))
+        for number in _STOPS
+    }
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        if noted:
+            signal.raise_signal(noted[0])

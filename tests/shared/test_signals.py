@@ -6,11 +6,12 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 
 import pytest
 
 from shared.clock import monotonic, sleep
-from shared.signals import stop_flag
+from shared.signals import interrupts_held, stop_flag
 
 CHILD = """
 import os, sys
@@ -64,3 +65,25 @@ def test_a_child_whose_parent_is_gone_already_ends_itself() -> None:
     orphan = subprocess.run([sys.executable, "-c", CHILD, "1"], capture_output=True, check=False)
     assert orphan.returncode == -signal.SIGTERM
     assert orphan.stdout == b""
+
+
+def interrupted_while_held(from_a_thread: bool, done: list[bool]) -> None:
+    with interrupts_held():
+        if from_a_thread:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+            thread = threading.Thread(target=signal.raise_signal, args=(signal.SIGINT,))
+            thread.start()
+            thread.join()
+        else:
+            signal.raise_signal(signal.SIGINT)
+        done.append(True)
+
+
+@pytest.mark.parametrize("from_a_thread", [False, True])
+def test_an_interrupt_comes_after_the_block(from_a_thread: bool) -> None:
+    """Whichever thread the kernel gives it to."""
+    done: list[bool] = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupted_while_held(from_a_thread, done)
+    assert done == [True]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
