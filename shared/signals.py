@@ -57,7 +57,8 @@ def interrupt_on_sigterm() -> None:
 
     Both are let through from now on; one that was held back raises here.
     """
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for number in _STOPS:  # SIGINT too: a script's background job is started with it ignored
+        signal.signal(number, signal.default_int_handler)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
 
 
