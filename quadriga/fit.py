@@ -22,6 +22,7 @@ from quadriga.fit_report import FitReport, Unfit, horizon_errors, refusal
 from quadriga.fit_sheets import comparison, report_sheets
 from quadriga.identify import check_excitation, ensure_data, provenance
 from quadriga.sheet import Sheet, show
+from shared.blas import one_blas_thread
 from shared.clock import monotonic
 from shared.config import Config
 from shared.errors import PredictorError
@@ -77,6 +78,7 @@ def fitted(config: Config, dataset: Dataset, name: str) -> FitReport | Unfit:
         predictor, origin = read(path)  # whose limits are those of `config`: they name the file
         seconds = _seconds_told(path, predictor_sha256(predictor))
     else:
+        one_blas_thread()
         check_excitation(config, dataset.training)
         begun = monotonic()
         try:
