@@ -49,7 +49,7 @@ def nominal_forces(stance: NDArray[np.bool_]) -> Array:
     Returns:
         Shape (..., 12): per leg (0, 0, m g / N_c) for stance legs and zero for swing legs, N.
     """
-    forces: Array = _NOMINAL[stance @ _BITS]
+    forces: Array = NOMINAL_FORCES[stance @ _BITS]
     return forces
 
 
@@ -61,4 +61,4 @@ def _nominal_table() -> Array:
     return forces.reshape(16, 3 * N_LEGS)
 
 
-_NOMINAL = _nominal_table()
+NOMINAL_FORCES = _nominal_table()  # by stance pattern, its bits in the order of the legs

@@ -103,7 +103,7 @@ def _tick(
         before=np.stack(before),
         inputs=inputs,
         selections=tuple(
-            Selection(tuple(peer for peer in peers if peer.index != i)) for i in range(n)
+            Selection(tuple(peer for peer in peers if peer.index != i), step - 1) for i in range(n)
         ),
         base_before=earlier[0].y_base_ini,
     )

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.gait import nominal_forces
+from agents.planner.coupling import Coupling, fill_deviations
+from agents.planner.free_step import FreeStep
 from agents.planner.horizon import horizon_stance, phase_of, walking_steps
-from agents.planner.neighbours import PeerData, Selection
+from agents.planner.neighbours import Selection
 from agents.planner.planner_qp import Problem, build_problem, unpack
 from agents.planner.predictor import Predictor
 from agents.planner.qp_solver import SOLVED, SOLVERS, Residuals, Solver, no_solution
@@ -119,6 +121,7 @@ class _Setup:
     problem: Problem
     solver: Solver
     nominal: Array
+    free: FreeStep | None
 
 
 class Planner:
@@ -139,15 +142,13 @@ class Planner:
         self._silent = np.zeros(predictor.meta.width, dtype=np.float32)
         self._cycle = walking_steps(config)
         self._others = [j for j in range(config.team.robots) if j != index]
-        # Single precision is off by 3e-7 of an effect, and half as much memory to go through.
-        self._rows = [
-            np.moveaxis(G[index, self._others], 0, 1).reshape(G.shape[2], -1).astype(np.float32)
-            for G in predictor.G
-        ]
-        # One factorised problem per step of the gait's cycle: a memo, it changes no result.
+        # What is set up once for each step of the gait's cycle: memos, they change no result.
         self._setups: dict[int, _Setup] = {}
+        self._couplings: dict[tuple[int, int], Coupling] = {}
+        behind = 0 if config.planner.compensation else 1
         for step in self._cycle:
             self._setup(step)
+            self._coupling(step, step - behind)
 
     def initial(self) -> PlannerState:
         """No plan made yet."""
@@ -166,23 +167,17 @@ class Planner:
         """
         if not selection.peers:
             return PeerTerms()
-        parts = {
-            peer.index: _deviations(peer, y_base)
-            if peer.usable
-            else (before.deviations.get(peer.robot, self._silent),)
-            for peer in selection.peers
-        }
-        silent = (self._silent,)
-        z = np.concatenate(
-            [part for other in self._others for part in parts.get(other, silent)],
-            dtype=np.float32, casting="same_kind",
-        )  # fmt: skip
         width = len(self._silent)
+        z = np.zeros(len(self._others) * width, dtype=np.float32)
         deviations = {}
         for peer in selection.peers:
-            place = peer.index - (peer.index > self._index)
-            deviations[peer.robot] = z[place * width : (place + 1) * width]
-        effect = (self._rows[self.phase(step)] @ z).astype(np.float64)
+            place = width * (peer.index - (peer.index > self._index))
+            part = deviations[peer.robot] = z[place : place + width]
+            if peer.usable:
+                fill_deviations(part, peer.du_ini, peer.y_ini, y_base, peer.known, peer.du)
+            else:
+                part[:] = before.deviations.get(peer.robot, self._silent)
+        effect = self._coupling(step, selection.window_step).effect(z)
         ages = {peer.robot: peer.age for peer in selection.peers}
         return PeerTerms(effect, deviations, selection.used, selection.lost, ages)
 
@@ -199,6 +194,10 @@ class Planner:
             G_ii: instead of the predictor's own block, which costs a new set-up.
         """
         setup = self._setup(inputs.step) if G_ii is None else self._set_up(inputs.step, G_ii)
+        if setup.free is not None and not peers.lost:
+            found = _unbounded(setup.free, inputs, peers)
+            if found is not None:
+                return PlannerState(inputs.step, found.du, state.solves + 1), found
         problem = setup.problem
         past, y_des = inputs.past(), (inputs.y_des - inputs.y_base).ravel()
         y_free = problem.condensed.Y_past @ past + peers.effect
@@ -243,9 +242,23 @@ class Planner:
         """The contact phase of a planning step, which chooses the transition matrix."""
         return phase_of(self._config, step, self._predictor.phases)
 
-    def _setup(self, step: int) -> _Setup:
+    def _place(self, step: int) -> int:
+        """The step of the first cycle that does the same as `step`."""
         begin = self._cycle.start
-        place = begin + (step - begin) % len(self._cycle) if step >= begin else step
+        return begin + (step - begin) % len(self._cycle) if step >= begin else step
+
+    def _coupling(self, step: int, window_step: int) -> Coupling:
+        """What the peers do from planning step `step` on, told of by plans from another one on."""
+        place = self._place(step), self._place(window_step)
+        found = self._couplings.get(place)
+        if found is None:
+            G = self._predictor.G[self.phase(step)][self._index, self._others]
+            stance = [horizon_stance(self._config, j, window_step) for j in self._others]
+            found = self._couplings[place] = Coupling(G, stance)
+        return found
+
+    def _setup(self, step: int) -> _Setup:
+        place = self._place(step)
         found = self._setups.get(place)
         if found is None:
             G_ii = self._predictor.block(self._index, self._index, self.phase(place))
@@ -256,8 +269,21 @@ class Planner:
         past = self._predictor.meta.past
         stance = horizon_stance(self._config, self._index, step)
         problem = build_problem(self._config.planner, G_ii[:, past:], stance, G_ii[:, :past])
-        solver = SOLVERS[self._config.planner.solver](problem)
-        return _Setup(problem, solver, nominal_forces(stance))
+        solver, nominal = SOLVERS[self._config.planner.solver](problem), nominal_forces(stance)
+        closed = None if self._config.planner.damping else solver.closed_form
+        free = None if closed is None else FreeStep(problem, closed, nominal)
+        return _Setup(problem, solver, nominal, free)
+
+
+def _unbounded(free: FreeStep, inputs: PlannerInputs, peers: PeerTerms) -> PlanResult | None:
+    """The plan if no bound is active at the optimum."""
+    plan = free.plan(
+        inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini, inputs.y_base,
+        inputs.y_des, peers.effect,
+    )  # fmt: skip
+    if plan is None:
+        return None
+    return PlanResult(SOLVED, *plan, peers.used, peers.lost, free.residuals, 0)
 
 
 def check_sizes(config: Config, predictor: Predictor) -> None:
@@ -275,11 +301,3 @@ def check_sizes(config: Config, predictor: Predictor) -> None:
         raise PredictorError(
             "predictor", f"(robots, N, T_ini) = {got}", f"{expected}", "of another team?"
         )
-
-
-def _deviations(peer: PeerData, y_base: Array) -> tuple[Array, Array, Array]:
-    """A peer's u_ini, y_ini and u, flat; an unknown sample does not deviate."""
-    dy = peer.y_ini - y_base
-    if not peer.known.all():
-        dy[~peer.known] = 0.0
-    return peer.du_ini.ravel(), dy.ravel(), peer.du.ravel()

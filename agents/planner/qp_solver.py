@@ -55,10 +55,28 @@ class Solution:
     iterations: int
 
 
+@dataclass(frozen=True, slots=True)
+class ClosedForm:
+    """The optimum while no bound is active: x = −H⁻¹ f.
+
+    Attributes:
+        minus_inverse: −H⁻¹, (nv, nv).
+        residuals: bounds of its residuals for any f.
+    """
+
+    minus_inverse: Array
+    residuals: Residuals
+
+
 class Solver(Protocol):
     """Solves one `Problem` for any f and bounds; the answer does not depend on earlier solves."""
 
     def __init__(self, problem: Problem) -> None: ...
+
+    @property
+    def closed_form(self) -> ClosedForm | None:
+        """What answers as `solve` does wherever its x keeps to the bounds; None: nothing does."""
+        ...
 
     def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> Solution:
         """The minimiser, or the reason why there is none. Never raises for a bad f.
@@ -80,8 +98,7 @@ class DaqpSolver:
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
         inverse = linalg.inv(problem.H)
-        self._inverse = -inverse
-        self._closed = Residuals(_inversion_error(problem.H, inverse), 0.0, 0.0)
+        self._closed = ClosedForm(-inverse, Residuals(_inversion_error(problem.H, inverse), 0, 0))
         self._free = np.zeros(len(problem.upper))
         self._free.setflags(write=False)
         self._cold = np.zeros(len(problem.upper), dtype=np.int32)
@@ -92,6 +109,13 @@ class DaqpSolver:
             np.minimum(problem.upper, _FAR), np.maximum(problem.lower, -_FAR), self._cold,
         )  # fmt: skip
 
+    @property
+    def closed_form(self) -> ClosedForm | None:
+        """See `Solver`."""
+        exact = self._closed.residuals.stationarity <= _MAX_STATIONARITY
+        usable = exact and self._ready >= 0 and not len(self._problem.bounded)
+        return self._closed if usable else None
+
     def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> Solution:
         """See `Solver`."""
         if self._ready < 0:  # bounds that contradict each other are found at set-up
@@ -100,10 +124,11 @@ class DaqpSolver:
             return no_solution(self._problem, "not-finite")
         low = self._problem.lower if lower is None else lower
         high = self._problem.upper if upper is None else upper
-        if not len(self._problem.bounded) and self._closed.stationarity <= _MAX_STATIONARITY:
-            x, inside = closed_form(self._inverse, f, low, high, self._problem.slope)
+        closed = self.closed_form
+        if closed is not None:
+            x, inside = unconstrained(closed.minus_inverse, f, low, high, self._problem.slope)
             if inside:
-                return Solution(SOLVED, x, self._free, self._closed, 0)
+                return Solution(SOLVED, x, self._free, closed.residuals, 0)
         if upper is None:
             self._model.update(f=f, sense=self._cold)
         else:
@@ -123,6 +148,11 @@ class OsqpSolver:
         self._problem = problem
         self._P = sparse.csc_matrix(np.triu(problem.H))
         self._A = sparse.csc_matrix(np.vstack([np.eye(len(problem.H)), problem.A]))
+
+    @property
+    def closed_form(self) -> ClosedForm | None:
+        """See `Solver`: this one is to answer as the paper's does."""
+        return None
 
     def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> Solution:
         """See `Solver`."""
@@ -145,7 +175,7 @@ class OsqpSolver:
 
 
 @compiled
-def closed_form(
+def unconstrained(
     minus_inverse: Array, f: Array, lower: Array, upper: Array, slope: float
 ) -> tuple[Array, bool]:
     """The unconstrained minimiser x, and whether box and pyramid hold at it."""

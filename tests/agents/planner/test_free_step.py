@@ -1,0 +1,92 @@
+"""The compiled planning step against the way through the solver."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agents.gait import nominal_forces
+from agents.planner.free_step import FreeStep
+from agents.planner.planner import PlannerInputs
+from agents.planner.planner_qp import build_problem, unpack
+from agents.planner.qp_solver import SOLVED, SOLVERS
+from shared.config import PlannerConfig
+
+T_INI, N = 3, 5
+CONFIG = replace(PlannerConfig(), T_ini=T_INI, N=N)
+RNG = np.random.default_rng(7)
+G = 0.01 * RNG.normal(size=(6 * N, 18 * T_INI + 12 * N))
+STANCE = np.tile([True, False, False, True], (N, 1))
+STANCE[3:] = ~STANCE[3:]
+NOMINAL = nominal_forces(STANCE)
+PROBLEM = build_problem(CONFIG, G[:, 18 * T_INI :], STANCE, G[:, : 18 * T_INI])
+SOLVER = SOLVERS["daqp"](PROBLEM)
+
+
+@pytest.fixture(scope="module")
+def free() -> FreeStep:
+    closed = SOLVER.closed_form
+    assert closed is not None
+    return FreeStep(PROBLEM, closed, NOMINAL)
+
+
+def inputs_of(seed: int, size: float) -> PlannerInputs:
+    rng = np.random.default_rng(seed)
+    stance_ini = rng.random((T_INI, 4)) < 0.5
+    return PlannerInputs(
+        step=3,
+        u_ini=nominal_forces(stance_ini) + size * rng.normal(size=(T_INI, 12)),
+        y_ini=1e-2 * size * rng.normal(size=(T_INI, 6)),
+        stance_ini=stance_ini,
+        y_base_ini=1e-2 * size * rng.normal(size=(T_INI, 6)),
+        y_base=rng.normal(size=(N, 6)),
+        y_des=rng.normal(size=(1, 6)) + 1e-3 * size * rng.normal(size=(N, 6)),
+    )
+
+
+@given(seed=st.integers(0, 2**32 - 1), size=st.floats(0.0, 2.0))
+def test_both_ways_lead_to_the_same_plan(free: FreeStep, seed: int, size: float) -> None:
+    inputs = inputs_of(seed, size)
+    inputs = replace(inputs, y_des=inputs.y_base + 1e-3 * size * (inputs.y_des - inputs.y_base))
+    effect = 1e-3 * size * np.random.default_rng(seed + 1).normal(size=6 * N)
+    y_free = PROBLEM.condensed.Y_past @ inputs.past() + effect
+    f = PROBLEM.gradient @ (y_free - (inputs.y_des - inputs.y_base).ravel())
+    solution = SOLVER.solve(f)
+    plan = free.plan(
+        inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini, inputs.y_base,
+        inputs.y_des, effect,
+    )  # fmt: skip
+    assert solution.status == SOLVED
+    if plan is None:  # a bound is active
+        assert solution.iterations > 0
+        return
+    du, dy = unpack(PROBLEM, solution.x, y_free)
+    expected = NOMINAL + du, du, inputs.y_base + dy, inputs.y_base + y_free.reshape(N, 6)
+    for found, wanted in zip(plan, expected, strict=True):
+        np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9)
+    assert (plan[0].reshape(N, 4, 3)[~STANCE] == 0.0).all()
+
+
+def test_small_errors_are_free_and_large_ones_are_not(free: FreeStep) -> None:
+    """The comparison above sees both sides."""
+    zero = np.zeros((N, 6))
+    for size, is_free in ((1e-6, True), (10.0, False)):
+        plan = free.plan(
+            nominal_forces(STANCE[:T_INI]), zero[:T_INI], STANCE[:T_INI], zero[:T_INI], zero,
+            np.full((N, 6), size), np.zeros(6 * N),
+        )  # fmt: skip
+        assert (plan is not None) is is_free
+
+
+def test_a_number_that_is_not_finite_is_left_to_the_solver(free: FreeStep) -> None:
+    inputs = inputs_of(1, 0.01)
+    for bad in (np.nan, np.inf):
+        effect = np.full(6 * N, bad)
+        assert free.plan(
+            inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini, inputs.y_base,
+            inputs.y_des, effect,
+        ) is None  # fmt: skip
