@@ -4,25 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
-from agents.controller.controller import Controller, ControllerState, Schedule, Task
-from agents.controller.estimator import (
-    Estimate,
-    FilterState,
-    estimate_trunk,
-    filter_at,
-    foot_trust,
-    initial_filter,
-    noise_parameters,
-    trunk_from_truth,
-)
-from agents.controller.rotation import roll_pitch_yaw
-from agents.controller.whole_body_qp import Solution
+from agents.controller.controller import Controller, Schedule, Task
+from agents.controller.estimator import trunk_from_truth
+from agents.controller.memory import Memory
+from agents.controller.sensing import Seen
+from agents.controller.whole_body_qp import UNCONSTRAINED, Solution
 from agents.following import Follower
-from agents.gait import nominal_forces, stance_of_half, stance_progress
+from agents.gait import stance_of_half, stance_progress
 from agents.modes import (
     DAMPING,
     ESTOP,
@@ -34,26 +26,25 @@ from agents.modes import (
     step_mode,
     stop_safely,
 )
-from agents.pilot import NOTHING, Awaited, Heard, Pilot, PilotState, Planned
+from agents.pilot import NOTHING, NOTHING_PLANNED, Awaited, Heard, Pilot, PilotState, Planned
 from agents.planner.predictor import Predictor
+from agents.planner.qp_solver import SOLVED
 from agents.planning import LocalPilot
 from agents.references import in_force, remember_references
-from agents.sampling import SAMPLE_MS, ForceMean, measured, no_force, outputs_of
+from agents.sampling import SAMPLE_MS, measured
 from shared.config import CENTRAL, Config
 from shared.messages import Command, EStop, Measurement, Plan, Reference, State, Truth
+from shared.record import record
 from shared.robot import Array, robot_names
 from shared.topics import REFERENCE
 
-_ZERO = _NO_FORCE = np.zeros(12)
-# By half period (−1: standing): stance of the legs, of the forces, and the nominal forces.
-_STANCE = {half: stance_of_half(half).astype(float) for half in (-1, 0, 1)}
-_STANCE_OF_FORCE = {half: np.repeat(stance, 3) for half, stance in _STANCE.items()}
-_NOMINAL = {half: nominal_forces(stance > 0.5) for half, stance in _STANCE.items()}
+_ZERO = np.zeros(12)
+_STANDING = Schedule(stance_of_half(-1).astype(float), 0.5, -1)
 _LONGEST_DT = 0.02  # s, after a gap in the ticks the filters advance by no more than this
 REFERENCE_EPOCH_MS = 100  # the operator speaks at multiples of this
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Inputs:
     """Everything that reached the agent since its last step, sorted by robot, then tick.
 
@@ -76,7 +67,7 @@ class Inputs:
     excitation: Array | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Outputs:
     """What one step of the agent gives: the command always, the rest when it is due.
 
@@ -93,16 +84,14 @@ class Outputs:
     planner_ns: int | None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class AgentState:
     """Everything the agent remembers between ticks."""
 
     tick: int
     mode: Mode
-    filter: FilterState | None = None
-    controller: ControllerState | None = None
+    low_level: Memory | None = None
     references: tuple[Reference, ...] = ()
-    forces: ForceMean = field(default_factory=no_force)
     pilot: PilotState = field(default_factory=PilotState)
     last_tau: Array = field(default_factory=lambda: np.zeros(12))
     failures: int = 0
@@ -128,7 +117,10 @@ class Agent:
         self.robot = robot
         self.index = robot_names(config.team.robots).index(robot)
         self._controller = Controller(config)
-        self._noise = noise_parameters(config.estimator)
+        self._by_truth = config.estimator.kind == "truth"
+        self._stand_ms, self._stance_ms = config.gait.stand_ms, config.gait.stance_ms
+        self._height = config.reference.height
+        self._schedules = _schedules(config, self.index)
         self._pilot: Pilot | None = None
         if config.planner.kind in CENTRAL:
             self._pilot = Follower(config, self.index)
@@ -155,108 +147,92 @@ class Agent:
             return awaited
         return replace(awaited, reference_tick=reference, truth=self._by_truth)
 
-    @property
-    def _by_truth(self) -> bool:
-        return self.config.estimator.kind == "truth"
-
     def step(self, state: AgentState, inputs: Inputs) -> tuple[AgentState, Outputs]:
         """Advance to the tick of `inputs.state`; that tick must be later than the last one."""
         tick = inputs.state.tick
         dt = 1e-3 if state.tick < 0 else min(_LONGEST_DT, 1e-3 * (tick - state.tick))
-        counters = dict(state.counters)
         references = remember_references(state.references, inputs.references, tick)
-        reference, reference_age = in_force(references, tick, self.config.reference.height)
-
-        mode = step_mode(
-            state.mode, tick, self.config.gait.stand_ms, self._half_boundary(state.tick, tick)
-        )
-        if inputs.estop is not None:
-            mode = go_limp(mode, tick, ESTOP, f"estop:{inputs.estop.reason}")
-        if mode.name == WALK and reference_age > REFERENCE.max_age_ms:
-            mode = stop_safely(mode, tick, "reference-lost")
-
+        reference, reference_age = in_force(references, tick, self._height)
+        mode = self._mode(state, inputs, reference_age)
         schedule = self._schedule(tick, mode)
-        filter_state, estimate = self._estimate(state, inputs, schedule, dt)
-        controller = state.controller or self._controller.initial(
-            estimate, float(roll_pitch_yaw(estimate.R)[2])
-        )
-        outputs = outputs_of(estimate, controller.contact.level)
-        if not mode.limp and estimate.R[2, 2] < self._fallen_cosine:
+        seen = self._sense(state, inputs, schedule, dt)
+        if seen.upright < self._fallen_cosine and not mode.limp:
             mode = go_limp(mode, tick, DAMPING, "fall")
 
-        measurement, forces = None, state.forces
+        measurement = None
         if tick % SAMPLE_MS == 0 and tick > 0:
-            measurement = measured(tick, forces, outputs, self._stance_before(tick, state.mode))
-            forces = no_force()
-        pilot, planned = state.pilot, Planned()
+            stance = self._schedule(tick - SAMPLE_MS, state.mode).stance  # during the sample
+            measurement = measured(tick, seen.memory.mean_force, seen.outputs, stance)
+        pilot, planned = state.pilot, NOTHING_PLANNED
         if self._pilot is not None:
             heard = Heard(tick, mode, references, measurement, inputs.measurements, inputs.plans)
             pilot, planned = self._pilot.step(state.pilot, heard)
             if planned.stop_reason:
                 mode = stop_safely(mode, tick, planned.stop_reason)
-            if planned.plan is not None and planned.plan.status != "solved":
-                _count(counters, f"plan_{planned.plan.status.partition(':')[0]}")
 
-        factor = mode.speed_factor(tick)
-        deviation = planned.present.deviation
-        if inputs.excitation is not None:
-            deviation = deviation + inputs.excitation
-        deviation = deviation * _STANCE_OF_FORCE[schedule.half] if mode.name == WALK else _NO_FORCE
-        velocity = planned.present.velocity
-        if velocity is None:
-            velocity = factor * np.array([reference.vx, reference.vy])
-        task = Task(velocity, factor * reference.wz, reference.height, deviation, self._feedforward)
-        controller, solution = self._controller.step(
-            controller, estimate, inputs.state.imu_quat_wxyz, schedule, task, dt
-        )
-        failures, mode = self._count_failures(state.failures, solution, counters, mode, tick)
+        task = self._task(tick, mode, reference, planned, inputs.excitation)
+        acted = self._controller.act(seen, schedule, task, dt, new_sample=measurement is not None)
+        solution = acted.solution
+        failures, mode = self._failures(state.failures, solution, mode, tick)
+        counters = _counted(state.counters, planned, solution)
         command = self._command(tick, solution, state.last_tau, mode)
-        applied = _NOMINAL[schedule.half] + deviation
         new = AgentState(
-            tick, mode, filter_state, controller, references, forces.add(applied), pilot,
+            tick, mode, acted.memory, references, pilot,
             command.tau if solution.solved else state.last_tau, failures, counters,
         )  # fmt: skip
-        ages = {"reference": float(reference_age), **planned.ages_ms}
         return new, Outputs(
-            command, measurement, planned.plan, mode.name, mode.reason, counters, ages,
-            planned.planner_ns,
+            command, measurement, planned.plan, mode.name, mode.reason, counters,
+            {"reference": float(reference_age), **planned.ages_ms}, planned.planner_ns,
         )  # fmt: skip
 
-    def _half_boundary(self, last: int, tick: int) -> bool:
-        stance_ms, stand_ms = self.config.gait.stance_ms, self.config.gait.stand_ms
-        return (last - stand_ms) // stance_ms != (tick - stand_ms) // stance_ms
+    def _mode(self, state: AgentState, inputs: Inputs, reference_age: int) -> Mode:
+        """What the robot does from now on, as far as it is known before the tick."""
+        tick, mode = inputs.state.tick, state.mode
+        if mode.name != WALK:
+            stand_ms, stance_ms = self._stand_ms, self._stance_ms
+            boundary = (state.tick - stand_ms) // stance_ms != (tick - stand_ms) // stance_ms
+            mode = step_mode(mode, tick, stand_ms, boundary)
+        if inputs.estop is not None:
+            mode = go_limp(mode, tick, ESTOP, f"estop:{inputs.estop.reason}")
+        if reference_age > REFERENCE.max_age_ms and mode.name == WALK:
+            mode = stop_safely(mode, tick, "reference-lost")
+        return mode
 
     def _schedule(self, tick: int, mode: Mode) -> Schedule:
         if mode.name not in (WALK, STOPPING):
-            return Schedule(_STANCE[-1], 0.5, -1)
-        progress, half = stance_progress(self.config, self.index, tick)
-        return Schedule(_STANCE[half], progress, half)
+            return _STANDING
+        return self._schedules[(tick - self._stand_ms) % len(self._schedules)]
 
-    def _stance_before(self, tick: int, mode: Mode) -> Array:
-        """Scheduled stance during the sample that ends at `tick`. Shape (4,)."""
-        return self._schedule(tick - SAMPLE_MS, mode).stance
+    def _task(
+        self, tick: int, mode: Mode, reference: Reference, planned: Planned,
+        excitation: Array | None,
+    ) -> Task:  # fmt: skip
+        """The operator's wish with what is planned."""
+        deviation, velocity = planned.present.deviation, planned.present.velocity
+        if excitation is not None:
+            deviation = deviation + excitation
+        if mode.name != WALK:
+            deviation = _ZERO
+        factor = mode.speed_factor(tick)
+        vx, vy = factor * reference.vx, factor * reference.vy
+        if velocity is not None:
+            vx, vy = float(velocity[0]), float(velocity[1])
+        return Task(vx, vy, factor * reference.wz, reference.height, deviation, self._feedforward)
 
-    def _estimate(
-        self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float
-    ) -> tuple[FilterState, Estimate]:
-        previous = state.filter or initial_filter(inputs.state)
-        if self._by_truth and inputs.truth is not None:
+    def _sense(self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float) -> Seen:
+        if self._by_truth and inputs.truth is not None:  # a lost one is bridged by the filter
             estimate = trunk_from_truth(inputs.truth, self.index, inputs.state)
-            return filter_at(estimate), estimate  # a tick whose truth is lost goes on from here
-        trust = foot_trust(
-            schedule.stance, schedule.progress, inputs.state.foot_force,
-            self.config.estimator.trust_ramp, self.config.estimator.contact_force,
-        )  # fmt: skip
-        return estimate_trunk(previous, inputs.state, trust, self._noise, dt)
+            return self._controller.place(
+                state.low_level, estimate, inputs.state.imu_quat_wxyz, schedule, dt
+            )
+        return self._controller.sense(state.low_level, inputs.state, schedule, dt)
 
-    def _count_failures(
-        self, failures: int, solution: Solution, counters: dict[str, int], mode: Mode, tick: int
+    def _failures(
+        self, failures: int, solution: Solution, mode: Mode, tick: int
     ) -> tuple[int, Mode]:
+        """How many ticks in a row had no solution, and what becomes of the mode."""
         if solution.solved:
-            if solution.status == "constrained":
-                _count(counters, "qp_constrained")
             return 0, mode
-        _count(counters, "qp_failed")
         if failures + 1 >= self.config.controller.max_failures:
             mode = go_limp(mode, tick, DAMPING, f"qp-{solution.status}")
         return failures + 1, mode
@@ -270,5 +246,24 @@ class Agent:
         return Command(tick, tick * 1_000_000, solution.tau, _ZERO, _ZERO, _ZERO, _ZERO)
 
 
-def _count(counters: dict[str, int], name: str) -> None:
-    counters[name] = counters.get(name, 0) + 1
+def _schedules(config: Config, index: int) -> tuple[Schedule, ...]:
+    """A robot's gait at every tick of its period, the first one at the end of the stand."""
+    made, stance = [], [stance_of_half(half).astype(float) for half in (0, 1)]
+    for since in range(2 * config.gait.stance_ms):
+        progress, half = stance_progress(config, index, config.gait.stand_ms + since)
+        made.append(Schedule(stance[half], progress, half))
+    return tuple(made)
+
+
+def _counted(
+    counters: Mapping[str, int], planned: Planned, solution: Solution
+) -> Mapping[str, int]:
+    """The counters with what was out of the ordinary at this tick."""
+    names = []
+    if planned.plan is not None and planned.plan.status != SOLVED:
+        names.append(f"plan_{planned.plan.status.partition(':')[0]}")
+    if solution.status != UNCONSTRAINED:
+        names.append("qp_constrained" if solution.solved else "qp_failed")
+    if not names:
+        return counters
+    return {**counters, **{name: counters.get(name, 0) + 1 for name in names}}

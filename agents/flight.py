@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from agents.planner.horizon import SAMPLE_MS
 from shared.config import PlannerConfig
+from shared.record import record
 from shared.robot import Array
 
 _NO_FORCE = np.zeros(12)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Flight:
     """One plan on its way: N samples from `plan_tick` on, in force from `start` on.
 
@@ -30,7 +31,7 @@ class Flight:
     outputs: Array
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Present:
     """What is applied at one tick.
 
@@ -41,6 +42,9 @@ class Present:
 
     deviation: Array = field(default_factory=_NO_FORCE.copy)
     velocity: Array | None = None
+
+
+_NOTHING = Present()
 
 
 def launched(flights: tuple[Flight, ...], new: Flight) -> tuple[Flight, ...]:
@@ -60,7 +64,7 @@ def present(flights: tuple[Flight, ...], tick: int, *, track_velocity: bool) -> 
             # Planned roll and pitch are not tracked: the reference would follow the error.
             velocity = flight.outputs[sample, 1:3] if track_velocity else None
             return Present(flight.deviation[sample], velocity)
-    return Present()
+    return _NOTHING
 
 
 def fading(config: PlannerConfig, error: Array) -> float:

@@ -5,8 +5,10 @@ stand → walk → stopping → stand (for good); damping and estop are latched 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
+
+from shared.record import record
 
 STAND: Final = "stand"
 WALK: Final = "walk"
@@ -17,7 +19,7 @@ ESTOP: Final = "estop"
 SLOW_DOWN_MS: Final = 500  # of a safe stop: speed goes to zero while the trot goes on
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Mode:
     """The present mode, since when, and the reason if it is not the normal course."""
 

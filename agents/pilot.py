@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final, Protocol
 
 from agents.flight import Flight, Present
@@ -12,9 +12,10 @@ from agents.planner.neighbours import PeerMemory
 from agents.planner.planner import PeerTerms, PlannerInputs, PlannerState
 from agents.planner.recursive import Correction
 from shared.messages import Measurement, Plan, Reference
+from shared.record import record
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Planned:
     """What one tick of planning gives.
 
@@ -33,7 +34,7 @@ class Planned:
     ages_ms: Mapping[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Heard:
     """What one tick brings to the planning part.
 
@@ -53,7 +54,7 @@ class Heard:
     plans: tuple[tuple[str, Plan], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Awaited:
     """What lock-step must have received before the step of a tick.
 
@@ -71,9 +72,10 @@ class Awaited:
 
 
 NOTHING: Final = Awaited()
+NOTHING_PLANNED: Final = Planned()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PilotState:
     """What the planning part remembers.
 

@@ -8,9 +8,10 @@ Every message carries `tick` (1 ms of world time) and `stamp_ns` (the world's ti
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, ClassVar
 
+from shared.record import record
 from shared.robot import Array
 
 Dim = int | str
@@ -26,7 +27,7 @@ def plain(kind: type, doc: str) -> Any:
     return field(metadata={"kind": kind, "doc": doc})
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Message:
     """Base of all wire messages."""
 
@@ -35,7 +36,7 @@ class Message:
     stamp_ns: int = plain(int, "world time of the content [ns]")
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class State(Message):
     """What one real robot measures at `tick`; nothing else may enter here."""
 
@@ -48,7 +49,7 @@ class State(Message):
     foot_force: Array = array(4, unit="N", frame="ground normal")
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Command(Message):
     """Motor command; the motor applies `tau + kp (q_des − q) + kd (v_des − v)`, limited."""
 
@@ -59,7 +60,7 @@ class Command(Message):
     kd: Array = array(12, unit="N·m·s/rad", frame="joint")
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Measurement(Message):
     """One 100 Hz sample: mean foot forces over the 10 ms that end at `tick`, outputs at `tick`."""
 
@@ -68,7 +69,7 @@ class Measurement(Message):
     stance: Array = array(4, unit="1 stance, 0 swing", frame="legs FL FR RL RR")
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Plan(Message):
     """The planner's solution of planning step `step`: N samples of 10 ms from `tick` on."""
 
@@ -85,7 +86,7 @@ class Plan(Message):
         return self.step, self.exchange
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Status(Message):
     """An agent's account of itself; wall-clock figures live here and nowhere else."""
 
@@ -98,7 +99,7 @@ class Status(Message):
     tick_us: Array = array("K", unit="µs wall clock per control tick since the last status")
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Consumed(Message):
     """What an agent took in at the step of `tick`, all of it: sent where no rule tells it.
 
@@ -114,7 +115,7 @@ class Consumed(Message):
     owed: tuple[str, ...] = plain(list, "in lock-step: topic/sender of what was not waited for")
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Reference(Message):
     """What the operator asks of the team; in force from `tick` on."""
 
@@ -124,14 +125,14 @@ class Reference(Message):
     height: float = plain(float, "trunk height above the ground [m]")
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class EStop(Message):
     """Latched stop for everyone who hears it."""
 
     reason: str = plain(str, "who stopped the team and why")
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Truth(Message):
     """The world as the simulator knows it; no agent may use it outside `--estimator truth`."""
 
@@ -145,7 +146,7 @@ class Truth(Message):
     yoke_force: Array = array("k", unit="N")
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Event(Message):
     """Something happened in the world."""
 

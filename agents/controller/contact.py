@@ -7,97 +7,62 @@ contact set and descends until it finds ground.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from shared.config import ControllerConfig
 from shared.jit import compiled
 from shared.robot import FOOT_RADIUS, Array
 
 _EARLIEST_TOUCHDOWN = 0.5  # of swing: before this a load is the foot still leaving the ground
 
 
-@dataclass(frozen=True, slots=True)
-class ContactState:
-    """What is remembered of each leg.
+@compiled
+def contacts_by_schedule(
+    ground0: Array, level0: float, stance: Array, foot_z: Array, rate: float
+) -> tuple[Array, float]:
+    """The paper's plain setting: contacts are the schedule's, the ground is flat and known.
 
-    Attributes:
-        contact: 1 where the QP may push, (4,).
-        early: 1 where the foot landed before its stance began, (4,).
-        unloaded: time without force during stance, (4,), s.
-        latched: 1 where the ground has been felt in this stance, (4,).
-        ground: height of the ground felt last under each foot, (4,), m, odometry frame.
-        level: filtered height of the ground under the stance feet, m.
-        half: number of the half period, to notice a switch.
+    Arguments and results as of `contacts_by_force`.
     """
-
-    contact: Array
-    early: Array
-    unloaded: Array
-    latched: Array
-    ground: Array
-    level: float
-    half: int
-
-
-def initial_contact() -> ContactState:
-    """All four feet on flat ground at height zero."""
-    return ContactState(
-        np.ones(4), np.zeros(4), np.zeros(4), np.ones(4), np.zeros(4), 0.0, -1
-    )  # fmt: skip
-
-
-def step_contact(
-    previous: ContactState, config: ControllerConfig, stance: Array, progress: float, half: int,
-    foot_force: Array, foot_z: Array, dt: float,
-) -> ContactState:  # fmt: skip
-    """Update the contacts of one robot.
-
-    Args:
-        previous: the contacts at the last tick.
-        config: the controller's section.
-        stance: scheduled stance, (4,), 1 or 0.
-        progress: progress of the half period in [0, 1).
-        half: its number; a change ends stances and swings.
-        foot_force: measured normal forces, (4,), N.
-        foot_z: heights of the foot centres, (4,), m, odometry frame.
-        dt: time since the last tick, s.
-    """
-    rate = dt / (1e-3 * config.ground_filter_ms + dt)
-    if not config.contact_detection:
-        return _scheduled_contact(previous, stance, half, foot_z, rate)
-    legs, level = _step(
-        previous.contact, previous.early, previous.unloaded, previous.latched, previous.ground,
-        previous.level, half != previous.half, stance, progress, foot_force, foot_z,
-        config.contact_force, 1e-3 * config.lost_contact_ms, rate, dt,
-    )  # fmt: skip
-    contact, early, unloaded, latched, ground = legs
-    return ContactState(contact, early, unloaded, latched, ground, level, half)
-
-
-def _scheduled_contact(
-    previous: ContactState, stance: Array, half: int, foot_z: Array, rate: float
-) -> ContactState:
-    """The paper's plain setting: contacts are the schedule's, the ground is flat and known."""
-    ground = np.where(stance > 0.5, foot_z - FOOT_RADIUS, previous.ground)
-    level = previous.level + rate * (float(ground[stance > 0.5].mean()) - previous.level)
-    return ContactState(
-        stance.copy(), np.zeros(4), np.zeros(4), stance.copy(), ground, level, half
-    )  # fmt: skip
+    legs = np.zeros((5, 4))
+    total, count = 0.0, 0
+    for leg in range(4):
+        legs[0, leg] = legs[3, leg] = stance[leg]
+        legs[4, leg] = ground0[leg]
+        if stance[leg] > 0.5:
+            legs[4, leg] = foot_z[leg] - FOOT_RADIUS
+            total += legs[4, leg]
+            count += 1
+    return legs, level0 + rate * (total / count - level0)
 
 
 @compiled
-def _step(
-    contact0: Array, early0: Array, unloaded0: Array, latched0: Array, ground0: Array,
-    level0: float, switched: bool, stance: Array, progress: float, foot_force: Array,
+def contacts_by_force(
+    legs0: Array, level0: float, switched: bool, stance: Array, progress: float, foot_force: Array,
     foot_z: Array, threshold: float, patience: float, rate: float, dt: float,
 ) -> tuple[Array, float]:  # fmt: skip
-    """The new contact, early, unloaded, latched, ground as rows of (5, 4), and the level."""
-    legs = np.empty((5, 4))
+    """Update the contacts of one robot.
+
+    Args:
+        legs0: at the last tick, (5, 4), of each leg: 1 where the QP may push (contact); 1 where
+            the foot landed before its stance began (early); time without force during stance, s
+            (unloaded); 1 where the ground has been felt in this stance (latched); height of the
+            ground felt last, m, odometry frame (ground).
+        level0: filtered height of the ground under the stance feet, m.
+        switched: whether stances and swings have just ended.
+        stance: scheduled stance, (4,), 1 or 0.
+        progress: progress of the half period in [0, 1).
+        foot_force: measured normal forces, (4,), N.
+        foot_z: heights of the foot centres, (4,), m, odometry frame.
+        threshold: force from which on a foot is loaded, N.
+        patience: time without load after which a stance foot is no contact, s.
+        rate: share of a tick in the filter of the ground's height.
+        dt: time since the last tick, s.
+
+    Returns:
+        The new legs and level.
+    """
+    legs = legs0.copy()
     contact, early, unloaded, latched, ground = legs
-    contact[:], early[:], unloaded[:] = contact0, early0, unloaded0
-    latched[:], ground[:] = latched0, ground0
     total, count = 0.0, 0
     for leg in range(4):
         loaded = foot_force[leg] >= threshold

@@ -1,45 +1,60 @@
-"""The 1 kHz controller of one robot: contacts, references, whole-body QP, motor command."""
+"""The 1 kHz controller of one robot: contacts, references, whole-body QP, motor command.
+
+A tick is two compiled calls with Pinocchio's terms of the rigid body between them. Between two
+ticks the processor's caches are lost, so that a tick costs what it goes through: flat arrays, few
+objects. All arithmetic is in the functions that these calls are made of.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from agents.controller import swing, whole_body_qp
-from agents.controller.contact import ContactState, initial_contact, step_contact
-from agents.controller.estimator import Estimate
-from agents.controller.model import RigidBody
-from agents.controller.references import (
-    Integrators,
-    initial_integrators,
-    trunk_acceleration,
-    trunk_gains,
+from agents.controller import whole_body_qp
+from agents.controller.estimator import (
+    Estimate,
+    mean_at,
+    noise_parameters,
+    standing_mean,
+    sure,
 )
-from agents.controller.whole_body_qp import Goal, Solution, Weights
+from agents.controller.feet import feet_demand
+from agents.controller.memory import (
+    COUNT,
+    HEIGHT,
+    LEVEL,
+    SIZE,
+    YAW,
+    Memory,
+    anchors_of,
+    blank,
+    filter_of,
+    forces_of,
+    legs_of,
+    speed_of,
+)
+from agents.controller.model import RigidBody
+from agents.controller.references import trunk_acceleration, trunk_gains
+from agents.controller.rotation import roll_pitch_yaw
+from agents.controller.sensing import (
+    SEEN_SIZE,
+    SWITCHED,
+    Seen,
+    coordinates_of,
+    feet_of,
+    place,
+    sense,
+    sensing_constants,
+    trunk_of,
+)
+from agents.controller.whole_body_qp import Goal, Solution, Weights, closed_form
 from shared.config import Config
 from shared.jit import compiled
-from shared.robot import Array
+from shared.messages import State
+from shared.record import record
+from shared.robot import GRAVITY, TOTAL_MASS, Array
 
 
-@dataclass(frozen=True, slots=True)
-class ControllerState:
-    """What the controller remembers from tick to tick.
-
-    Attributes:
-        contact: contacts and ground heights.
-        integrators: of height, speed, heading.
-        swing_start: where each foot left the ground, (4, 3), m, odometry frame.
-        foot_goal: where a foot that lost contact is being lowered to, (4, 3), m.
-    """
-
-    contact: ContactState
-    integrators: Integrators
-    swing_start: Array
-    foot_goal: Array
-
-
-@dataclass(frozen=True, slots=True)
+@record
 class Schedule:
     """The gait at one tick: scheduled stance (4,), progress of the half period, its number."""
 
@@ -48,186 +63,193 @@ class Schedule:
     half: int
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Task:
     """What the robot is asked to do at one tick (yaw frame).
 
     Attributes:
-        velocity: vx, vy, (2,), m/s.
+        vx: forward speed, m/s.
+        vy: speed to the left, m/s.
         wz: yaw rate, rad/s.
         height: trunk height above the ground, m.
-        deviation: planned deviation from the nominal forces, (12,), N.
+        deviation: planned deviation from the nominal forces, (12,), N; that of legs scheduled to
+            swing is not applied.
         feedforward: whether the deviation also becomes accelerations of the trunk.
     """
 
-    velocity: Array
+    vx: float
+    vy: float
     wz: float
     height: float
     deviation: Array
     feedforward: bool
 
 
+@record
+class Acted:
+    """What a tick comes to: the new memory, what the QP was asked for and its answer."""
+
+    memory: Memory
+    asked: Array
+    solution: Solution
+
+    @property
+    def goal(self) -> Goal:
+        """What the QP was asked for."""
+        return _goal(self.asked, self.memory.contact)
+
+
 class Controller:
-    """Fixed data of one robot's controller; `step` is a function of state and inputs alone."""
+    """Fixed data of one robot's controller; its functions depend on their arguments alone."""
 
     def __init__(self, config: Config) -> None:
-        self._config = config.controller
-        self._gains = trunk_gains(config.controller)
-        self.body = RigidBody()
         controller = config.controller
-        self._feet_constants = np.array(
+        self.body = RigidBody()
+        self._noise = noise_parameters(config.estimator)
+        self._sensing = sensing_constants(config)
+        self._gains = trunk_gains(controller)
+        self._feet = np.array(
             [
                 1e-3 * config.gait.stance_ms, controller.raibert_gain, controller.swing_height,
                 controller.descent_speed, controller.kp_swing, controller.kd_swing, self.body.mass,
             ]
         )  # fmt: skip
         self.weights = Weights(
-            config.controller.gamma_tau,
-            config.controller.gamma_force,
-            config.controller.gamma_defect,
-            config.controller.mu,
-            config.controller.force_min,
-        )
-
-    def initial(self, estimate: Estimate, yaw: float) -> ControllerState:
-        """Stand where the robot stands."""
-        return ControllerState(
-            initial_contact(), initial_integrators(yaw), estimate.p_foot, estimate.p_foot
-        )
-
-    def step(
-        self, state: ControllerState, estimate: Estimate, quat_wxyz: Array, schedule: Schedule,
-        task: Task, dt: float,
-    ) -> tuple[ControllerState, Solution]:  # fmt: skip
-        """One tick: returns the new state and the QP's solution."""
-        switched = schedule.half != state.contact.half
-        contact = step_contact(
-            state.contact, self._config, schedule.stance, schedule.progress, schedule.half,
-            estimate.foot_force, estimate.p_foot[:, 2], dt,
+            controller.gamma_tau, controller.gamma_force, controller.gamma_defect, controller.mu,
+            controller.force_min,
         )  # fmt: skip
-        terms = self.body.terms(estimate, quat_wxyz)
-        integrators, trunk, v_des = trunk_acceleration(
-            state.integrators, self._gains, self.body, estimate, task, contact.level,
-            schedule.stance, dt,
+        self._fixed = (
+            self._gains, self._feet, self.body.com, self.body.inertia_inverse,
+            self.weights.as_array(),
         )  # fmt: skip
-        swing_start, foot_goal, feet, force = _feet(
-            state.swing_start, state.foot_goal, contact.contact, schedule.stance,
-            schedule.progress, switched, contact.ground, estimate.position, estimate.velocity,
-            estimate.R, estimate.p_foot, terms.J, terms.v, v_des, task.wz, task.deviation, dt,
-            self._feet_constants,
+
+    def sense(self, memory: Memory | None, state: State, schedule: Schedule, dt: float) -> Seen:
+        """Where the robot is and on which feet it stands, by its own sensors.
+
+        Args:
+            memory: of the last tick; None: it stands still at the origin.
+            state: what it measures.
+            schedule: the gait.
+            dt: time since the last tick, s.
+        """
+        before = blank() if memory is None else memory.flat
+        if memory is None:
+            mean, covariance = filter_of(before)
+            mean[:], covariance[:] = standing_mean(state), sure()
+        new, seen = np.empty(SIZE), np.empty(SEEN_SIZE)
+        sense(
+            before, state.imu_quat_wxyz, state.imu_gyro, state.imu_accel, state.q_joint,
+            state.v_joint, state.foot_force, schedule.stance, schedule.progress, schedule.half,
+            dt, self._noise, self._sensing, new, seen,
         )  # fmt: skip
-        goal = Goal(contact.contact, trunk, feet, force)
-        solution = whole_body_qp.solve_goal(
-            terms, estimate.R, estimate.p_foot, goal, self.weights
+        return _begun(new, seen) if memory is None else Seen(Memory(new), seen)
+
+    def place(
+        self, memory: Memory | None, estimate: Estimate, quat_wxyz: Array, schedule: Schedule,
+        dt: float,
+    ) -> Seen:  # fmt: skip
+        """The same for a robot that knows where it is; its filter goes on from there."""
+        before = blank() if memory is None else memory.flat
+        new, seen = np.empty(SIZE), np.empty(SEEN_SIZE)
+        place(
+            before, mean_at(estimate), sure(), quat_wxyz, estimate.R, estimate.omega,
+            estimate.p_foot, estimate.q_joint, estimate.v_joint, estimate.foot_force,
+            schedule.stance, schedule.progress, schedule.half, dt, self._sensing, new, seen,
         )  # fmt: skip
-        return ControllerState(contact, integrators, swing_start, foot_goal), solution
+        return _begun(new, seen) if memory is None else Seen(Memory(new), seen)
 
+    def act(
+        self, seen: Seen, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
+    ) -> Acted:
+        """Torques for what the robot is asked to do.
 
-@compiled
-def _feet(
-    swing_start0: Array, foot_goal0: Array, contact: Array, stance: Array, progress: float,
-    switched: bool, ground: Array, position: Array, velocity: Array, R: Array, p_foot: Array,
-    J: Array, v: Array, v_des: Array, wz: float, deviation: Array, dt: float, constants: Array,
-) -> Array:  # fmt: skip
-    """New swing starts and foot goals, desired accelerations and forces, rows of (4, 4, 3)."""
-    duration, raibert_gain, height, descent_speed, kp, kd, mass = constants
-    swing_start, foot_goal = _feet_anchors(
-        swing_start0, foot_goal0, p_foot, contact, stance, switched, descent_speed * dt
-    )
-    out = np.empty((4, 4, 3))
-    out[0], out[1] = swing_start, foot_goal
-    out[2] = _feet_acceleration(
-        contact, stance, progress, swing_start, foot_goal, ground, position, velocity, R, p_foot,
-        _foot_velocities(J, v, p_foot), v_des, wz, duration, raibert_gain, height, descent_speed,
-        kp, kd,
-    )  # fmt: skip
-    out[3] = _desired_force(contact, deviation, R, mass)
-    return out
+        Where no limit of the QP is active, as at most ticks, all but Pinocchio's terms is one
+        compiled call; a singular problem is no solution.
 
-
-@compiled
-def _feet_anchors(
-    swing_start: Array, foot_goal: Array, p_foot: Array, contact: Array, stance: Array,
-    switched: bool, descent: float,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Where swings begin and where unloaded stance feet are being lowered to, (4, 3) each."""
-    start, goal = swing_start.copy(), foot_goal.copy()
-    for leg in range(4):
-        if switched and stance[leg] < 0.5:
-            start[leg] = p_foot[leg]
-        if contact[leg] > 0.5:
-            goal[leg] = p_foot[leg]
-        elif stance[leg] > 0.5:
-            goal[leg, 2] -= descent
-    return start, goal
-
-
-@compiled
-def _desired_force(contact: Array, deviation: Array, R: Array, mass: float) -> Array:
-    """Nominal weight on the feet in contact plus the planned deviation, (4, 3), N."""
-    count = max(1.0, np.sum(contact))
-    norm = np.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2)
-    c, s = R[0, 0] / norm, R[1, 0] / norm
-    force = np.zeros((4, 3))
-    for leg in range(4):
-        if contact[leg] > 0.5:
-            dx, dy, dz = deviation[3 * leg], deviation[3 * leg + 1], deviation[3 * leg + 2]
-            force[leg, 0] = c * dx - s * dy
-            force[leg, 1] = s * dx + c * dy
-            force[leg, 2] = mass * 9.81 / count + dz
-    return force
-
-
-@compiled
-def _foot_velocities(J: Array, v: Array, p_foot: Array) -> Array:
-    """Velocities of the foot centres, (4, 3), m/s, odometry frame."""
-    out = np.empty((4, 3))
-    for leg in range(4):
-        twist = np.zeros(6)
-        for k in range(9):
-            column = k if k < 6 else 3 * leg + k
-            for row in range(6):
-                twist[row] += J[row, column] * v[column]
-        p = p_foot[leg]
-        out[leg, 0] = twist[0] + twist[4] * p[2] - twist[5] * p[1]
-        out[leg, 1] = twist[1] + twist[5] * p[0] - twist[3] * p[2]
-        out[leg, 2] = twist[2] + twist[3] * p[1] - twist[4] * p[0]
-    return out
-
-
-@compiled
-def _feet_acceleration(
-    contact: Array, stance: Array, progress: float, swing_start: Array, foot_goal: Array,
-    ground: Array, position: Array, velocity: Array, R: Array, p_foot: Array, v_foot: Array,
-    v_des: Array, wz: float, duration: float, raibert_gain: float, height: float,
-    descent_speed: float, kp: float, kd: float,
-) -> Array:  # fmt: skip
-    """Desired accelerations of the feet not in contact, (4, 3), m/s²."""
-    out = np.zeros((4, 3))
-    expected = 0.0  # the ground at the foothold: what the feet now standing feel
-    count = 0.0
-    for leg in range(4):
-        if stance[leg] > 0.5:
-            expected += ground[leg]
-            count += 1.0
-    expected = expected / max(1.0, count)
-    highest = np.max(ground)
-    for leg in range(4):
-        if contact[leg] > 0.5:
-            continue
-        reference = np.zeros((3, 3))
-        if stance[leg] > 0.5:
-            reference[0] = foot_goal[leg]
-            reference[1, 2] = -descent_speed
-        else:
-            target = swing.foothold(
-                leg, position, velocity, R, v_des, wz, (1.0 - progress) * duration, duration,
-                raibert_gain,
+        Args:
+            seen: what `sense` gave for this tick.
+            schedule: the gait.
+            task: what is asked.
+            dt: time since the last tick, s.
+            new_sample: whether a sample of forces begins with this tick.
+        """
+        terms = self.body.terms(seen.flat[0:19], seen.flat[19:37])
+        new, asked, x = np.empty(SIZE), np.empty(_ASKED), np.zeros(42)
+        try:
+            rows = _act(
+                seen.memory.flat, seen.flat, schedule.stance, schedule.progress, task.vx, task.vy,
+                task.wz, task.height, task.deviation, task.feedforward, dt, new_sample,
+                terms.M_inverse, terms.nle, terms.J, terms.dJ, *self._fixed, new, asked, x,
             )  # fmt: skip
-            reference = swing.swing_reference(
-                swing_start[leg], target, expected, highest + height, progress, duration
-            )
-        out[leg] = (
-            reference[2] + kp * (reference[0] - p_foot[leg]) + kd * (reference[1] - v_foot[leg])
-        )
-    return out
+            if rows:
+                return Acted(Memory(new), asked, Solution(x, whole_body_qp.UNCONSTRAINED, rows))
+            goal = _goal(asked, legs_of(new)[0])
+            solution = whole_body_qp.solve_goal(terms, seen.R, seen.p_foot, goal, self.weights)
+        except np.linalg.LinAlgError:
+            solution = whole_body_qp.singular()
+        return Acted(Memory(new), asked, solution)
+
+
+_ASKED = 30  # desired acceleration of the trunk (6), of the feet (12), desired forces (12)
+
+
+def _goal(asked: Array, contact: Array) -> Goal:
+    return Goal(contact, asked[:6], asked[6:18].reshape(4, 3), asked[18:].reshape(4, 3))
+
+
+def _begun(flat: Array, seen: Array) -> Seen:
+    """The first tick: feet are anchored where they are, the heading is kept."""
+    start, goal = anchors_of(flat)
+    start[:] = goal[:] = feet_of(seen)
+    flat[YAW] = roll_pitch_yaw(trunk_of(seen)[2])[2]
+    return Seen(Memory(flat), seen)
+
+
+@compiled
+def note_forces(memory: Array, planned: Array, stance: Array, new_sample: bool) -> Array:
+    """The deviation of the legs scheduled to stand, (12,); counts the forces applied with it."""
+    total = forces_of(memory)
+    if new_sample:
+        total[:] = 0.0
+        memory[COUNT] = 0.0
+    memory[COUNT] += 1.0
+    weight = TOTAL_MASS * GRAVITY / max(1.0, np.sum(stance))
+    deviation = np.zeros(12)
+    for i in range(12):
+        deviation[i] = planned[i] * stance[i // 3]
+        nominal = weight * stance[i // 3] if i % 3 == 2 else 0.0
+        total[i] += nominal + deviation[i]
+    return deviation
+
+
+@compiled
+def _act(
+    memory0: Array, seen: Array, stance: Array, progress: float, vx: float, vy: float, wz: float,
+    height: float, planned: Array, feedforward: bool, dt: float, new_sample: bool,
+    M_inverse: Array, nle: Array, J: Array, dJ: Array, gains: Array, feet: Array, com: Array,
+    inertia_inverse: Array, weights: Array, memory: Array, asked: Array, x: Array,
+) -> int:  # fmt: skip
+    """Fill the new memory, what is asked and the answer `closed_form` gives, with its result."""
+    position, v_trunk, R, omega = trunk_of(seen)
+    _, v = coordinates_of(seen)
+    p_foot, mass = feet_of(seen), feet[6]
+    memory[:] = memory0
+    deviation = note_forces(memory, planned, stance, new_sample)
+    speed, lead = speed_of(memory)
+    memory[HEIGHT], speed[:], lead[:], memory[YAW], trunk, v_des = trunk_acceleration(
+        memory0[HEIGHT], speed, lead, memory0[YAW], gains, position, v_trunk, R, omega,
+        np.array([vx, vy]), wz, memory0[LEVEL] + height, dt, feedforward, deviation, stance,
+        p_foot, mass, com, inertia_inverse,
+    )  # fmt: skip
+    start, goal = anchors_of(memory)
+    legs = legs_of(memory)
+    contact, ground = legs[0], legs[4]
+    demand = feet_demand(
+        start, goal, contact, stance, progress, seen[SWITCHED] > 0.5, ground, position, v_trunk, R,
+        p_foot, J, v, v_des, wz, deviation, dt, feet,
+    )  # fmt: skip
+    start[:], goal[:] = demand[0], demand[1]
+    asked[:6], asked[6:18], asked[18:] = trunk, demand[2].ravel(), demand[3].ravel()
+    return closed_form(
+        M_inverse, nle, J, dJ, v, R, p_foot, contact, trunk, demand[2], demand[3], weights, x
+    )

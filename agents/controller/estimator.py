@@ -22,14 +22,6 @@ _SURE = (1e-6, 1e-4, 1e-5, 1e-5, 1e-5, 1e-5)  # variances of a state that is kno
 
 
 @dataclass(frozen=True, slots=True)
-class FilterState:
-    """Mean (6, 3): rows trunk position, trunk velocity, feet FL FR RL RR; covariance (6, 6)."""
-
-    mean: Array
-    covariance: Array
-
-
-@dataclass(frozen=True, slots=True)
 class Estimate:
     """The trunk and the feet as the controller sees them (odometry frame, z up).
 
@@ -67,43 +59,24 @@ def noise_parameters(config: EstimatorConfig) -> Array:
     )
 
 
-def initial_filter(state: State) -> FilterState:
-    """Stand still at the origin at the nominal height, feet where the joints say."""
+def standing_mean(state: State) -> Array:
+    """Mean of a robot that stands still at the origin, feet where the joints say. (6, 3)."""
     R = rotation_matrix(state.imu_quat_wxyz)
     p_foot, _, _ = leg_kinematics(state.q_joint, state.v_joint)
     mean = np.zeros((6, 3))
     mean[0, 2] = STAND_HEIGHT
     mean[2:] = mean[0] + p_foot @ R.T
-    return FilterState(mean, np.diag(_SURE))
+    return mean
 
 
-def filter_at(estimate: Estimate) -> FilterState:
-    """The filter that takes an estimate for right, to go on from it."""
-    mean = np.vstack([estimate.position, estimate.velocity, estimate.p_foot])
-    return FilterState(mean, np.diag(_SURE))
+def mean_at(estimate: Estimate) -> Array:
+    """The mean of a filter that takes an estimate for right, to go on from it. (6, 3)."""
+    return np.vstack([estimate.position, estimate.velocity, estimate.p_foot])
 
 
-def estimate_trunk(
-    previous: FilterState, state: State, trust: Array, noise: Array, dt: float
-) -> tuple[FilterState, Estimate]:
-    """Predict with the accelerometer over `dt`, correct with the leg kinematics.
-
-    Args:
-        previous: filter state at the last tick.
-        state: the robot's measurements at this tick.
-        trust: trust in each foot as an anchor, (4,), 0 (swing, unloaded) to 1.
-        noise: `noise_parameters`.
-        dt: time since the last tick, s.
-    """
-    mean, covariance, frame = _filter(
-        previous.mean, previous.covariance, state.imu_quat_wxyz, state.imu_gyro, state.imu_accel,
-        state.q_joint, state.v_joint, trust, noise, dt,
-    )  # fmt: skip
-    estimate = Estimate(
-        mean[0], mean[1], frame[:3], state.imu_gyro, frame[3:], state.q_joint, state.v_joint,
-        state.foot_force,
-    )  # fmt: skip
-    return FilterState(mean, covariance), estimate
+def sure() -> Array:
+    """Covariance of a state that is known, (6, 6), m², m²/s²."""
+    return np.diag(_SURE)
 
 
 @compiled
@@ -132,11 +105,20 @@ def _update(mean: Array, covariance: Array, h: Array, innovation: Array, varianc
 
 
 @compiled
-def _filter(
+def filter_step(
     mean0: Array, covariance0: Array, quat: Array, gyro: Array, accel: Array,
     q_joint: Array, v_joint: Array, trust: Array, noise: Array, dt: float,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
-    """The new mean and covariance; the trunk's R, (3, 3), over the feet's places, (4, 3)."""
+    """Predict with the accelerometer over `dt`, correct with the leg kinematics.
+
+    Rows of the mean (6, 3) are trunk position, trunk velocity, feet FL FR RL RR; the covariance
+    (6, 6) is the same for all axes. `quat` (wxyz) to `v_joint` are of `State`; `trust` (4,) is that
+    in each foot as an anchor, 0 (swing, unloaded) to 1; `noise` is `noise_parameters`; `dt` in s is
+    since the last tick.
+
+    Returns:
+        The new mean and covariance; the trunk's R, (3, 3), over the feet's places, (4, 3).
+    """
     R = rotation_matrix(quat)
     p_leg, v_leg, omega_leg = leg_kinematics(q_joint, v_joint)
     mean, covariance = mean0.copy(), covariance0.copy()

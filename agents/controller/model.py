@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pinocchio as pin
 
-from agents.controller.estimator import Estimate
 from shared.a1_model import build_pinocchio_model
+from shared.record import record
 from shared.robot import Array, q_stand
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Terms:
     """Terms of M(q) v̇ + h(q, v) = S τ + Jᵀ f at one instant (Pinocchio's coordinates).
 
@@ -48,18 +46,8 @@ class RigidBody:
         com = pin.centerOfMass(self.model, self._scratch, q)
         return np.linalg.inv(self._scratch.Ig.inertia), np.array(com)
 
-    def terms(self, estimate: Estimate, quat_wxyz: Array) -> Terms:
-        """Terms at an estimate; `quat_wxyz` is the attitude the estimate was made with."""
-        q = np.empty(19)
-        q[:3] = estimate.position
-        q[3:6] = quat_wxyz[1:]
-        q[6] = quat_wxyz[0]
-        q[3:7] /= np.sqrt(q[3:7] @ q[3:7])
-        q[7:] = estimate.q_joint
-        v = np.empty(18)
-        v[:3] = estimate.R.T @ estimate.velocity
-        v[3:6] = estimate.omega
-        v[6:] = estimate.v_joint
+    def terms(self, q: Array, v: Array) -> Terms:
+        """Terms at Pinocchio's coordinates, (19,) and (18,), quaternion normalised."""
         scratch = self._scratch
         M_inverse = pin.computeMinverse(self.model, scratch, q)
         nle = pin.nonLinearEffects(self.model, scratch, q, v)

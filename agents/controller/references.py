@@ -2,45 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from agents.controller.estimator import Estimate
-from agents.controller.model import RigidBody
 from agents.controller.rotation import cross, roll_pitch_yaw, wrap_angle
 from shared.config import ControllerConfig
 from shared.jit import compiled
 from shared.robot import Array
 
-if TYPE_CHECKING:
-    from agents.controller.controller import Task
-
 _Z_LIMIT = 0.05  # m·s, height integrator
 _SPEED_LIMIT = 0.15  # m, speed integrator
-
-
-@dataclass(frozen=True, slots=True)
-class Integrators:
-    """Slow states of the trunk's references.
-
-    Attributes:
-        height: integral of the height error, m·s.
-        speed: integral of the speed error, slowly forgotten, yaw frame, (2,), m.
-        lead: lead of the position reference over the trunk, yaw frame, (2,), m.
-        yaw: desired heading, rad.
-    """
-
-    height: float
-    speed: Array
-    lead: Array
-    yaw: float
-
-
-def initial_integrators(yaw: float) -> Integrators:
-    """All at rest, heading kept."""
-    return Integrators(0.0, np.zeros(2), np.zeros(2), yaw)
 
 
 def trunk_gains(config: ControllerConfig) -> Array:
@@ -54,33 +24,25 @@ def trunk_gains(config: ControllerConfig) -> Array:
     )  # fmt: skip
 
 
-def trunk_acceleration(
-    previous: Integrators, gains: Array, body: RigidBody, estimate: Estimate,
-    task: Task, level: float, stance: Array, dt: float,
-) -> tuple[Integrators, Array, Array]:  # fmt: skip
-    """Desired trunk acceleration: feedback on the outputs plus the planner's feed-forward.
-
-    Returns:
-        The new integrators, the linear and angular acceleration (6,) and the desired velocity
-        (3,), all in the odometry frame.
-    """
-    height, yaw, speed_lead, demand = _trunk_acceleration(
-        previous.height, previous.speed, previous.lead, previous.yaw, gains, estimate.position,
-        estimate.velocity, estimate.R, estimate.omega, task.velocity, task.wz,
-        level + task.height, dt, task.feedforward, task.deviation, stance, estimate.p_foot,
-        body.mass, body.com, body.inertia_inverse,
-    )  # fmt: skip
-    return Integrators(height, speed_lead[:2], speed_lead[2:], yaw), demand[:6], demand[6:]
-
-
 @compiled
-def _trunk_acceleration(
+def trunk_acceleration(
     height0: float, speed0: Array, lead0: Array, yaw0: float, gains: Array, position: Array,
     velocity: Array, R: Array, omega: Array, v_yaw_frame: Array, wz: float, z_des: float,
     dt: float, feedforward: bool, deviation: Array, stance: Array, p_foot: Array, mass: float,
     com: Array, inertia_inverse: Array,
-) -> tuple[float, float, Array, Array]:  # fmt: skip
-    """Height and yaw, speed and lead as one (4,), acceleration and desired velocity as (9,)."""
+) -> tuple[float, Array, Array, float, Array, Array]:  # fmt: skip
+    """Desired trunk acceleration: feedback on the outputs plus the planner's feed-forward.
+
+    The integrators are those of `Memory`, `gains` are `trunk_gains`. Position, velocity and R of
+    the trunk are in the odometry frame, `omega` in its own. Asked for are vx and vy (2,), the yaw
+    rate and a height in the odometry frame; with `feedforward` the planned force deviation, (12,),
+    of the scheduled stance feet also becomes accelerations of a single rigid body with mass, `com`
+    and `inertia_inverse` in the trunk frame.
+
+    Returns:
+        The new integrators, the linear and angular acceleration (6,) and the desired velocity
+        (3,), both in the odometry frame.
+    """
     height, speed, lead, yaw, trunk, v_des = _feedback(
         height0, speed0, lead0, yaw0, gains, position, velocity, R, omega, v_yaw_frame, wz, z_des,
         dt,
@@ -89,10 +51,7 @@ def _trunk_acceleration(
         trunk += single_rigid_body(
             deviation, stance, R, position, p_foot, mass, com, inertia_inverse
         )
-    speed_lead, demand = np.empty(4), np.empty(9)
-    speed_lead[:2], speed_lead[2:] = speed, lead
-    demand[:6], demand[6:] = trunk, v_des
-    return height, yaw, speed_lead, demand
+    return height, speed, lead, yaw, trunk, v_des
 
 
 @compiled

@@ -11,22 +11,31 @@ No slip makes the forces affine in the torques, f = A τ + a₀, and with them t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import daqp
 import numpy as np
 
 from agents.controller.model import Terms
 from agents.controller.rotation import cross
+from agents.controller.small import (
+    add_gram,
+    factorise,
+    mirror,
+    product,
+    solve_factorised,
+    times,
+    transposed_times,
+)
 from shared.jit import compiled
+from shared.record import record
 from shared.robot import TORQUE_LIMIT, Array
 
 UNCONSTRAINED: Final = "unconstrained"
 _TOLERANCE = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Goal:
     """What one tick asks of the QP (odometry frame).
 
@@ -43,7 +52,7 @@ class Goal:
     force: Array
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Weights:
     """γ₁, γ₂, γ₃ of the cost, friction coefficient and least normal force of the cone."""
 
@@ -53,8 +62,14 @@ class Weights:
     mu: float
     force_min: float
 
+    def as_array(self) -> Array:
+        """As the compiled assembly takes them. Shape (5,)."""
+        return np.array(
+            [self.gamma_tau, self.gamma_force, self.gamma_defect, self.mu, self.force_min]
+        )
 
-@dataclass(frozen=True, slots=True)
+
+@record
 class Problem:
     """min ½ τᵀ H τ + gᵀ τ  s.t. |τ| ≤ τ_max, C τ ≥ c; the forces are f = A τ + a₀."""
 
@@ -68,18 +83,35 @@ class Problem:
     defect0: Array
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Solution:
-    """Torques (12,) N·m, forces (4, 3) N, defect δ, and how they were obtained.
+    """What came of the QP and how.
 
-    `status` is "unconstrained" (closed form), "constrained" (active set) or, with `tau` zero,
-    "infeasible:<solver's flag>" or "infeasible:singular".
+    Attributes:
+        x: torques (12), forces (12), defect (6 + 3 for each foot not in contact), the rest zero.
+        status: "unconstrained" (closed form), "constrained" (active set) or, with x zero,
+            "infeasible:<solver's flag>" or "infeasible:singular".
+        rows: length of the defect.
     """
 
-    tau: Array
-    force: Array
-    defect: Array
+    x: Array
     status: str
+    rows: int = 18
+
+    @property
+    def tau(self) -> Array:
+        """Torques, (12,), N·m."""
+        return self.x[:12]
+
+    @property
+    def force(self) -> Array:
+        """Contact forces, (4, 3), N, odometry frame."""
+        return self.x[12:24].reshape(4, 3)
+
+    @property
+    def defect(self) -> Array:
+        """What the accelerations miss of the desired ones: δ."""
+        return self.x[24 : 24 + self.rows]
 
     @property
     def solved(self) -> bool:
@@ -87,34 +119,27 @@ class Solution:
         return not self.status.startswith("infeasible")
 
 
-def solve_goal(terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights) -> Solution:
-    """Build, solve, unpack; numbers beyond all bounds or a singular problem are no solution.
+def singular() -> Solution:
+    """Of a problem that has no answer."""
+    return Solution(np.zeros(42), "infeasible:singular")
 
-    Where no limit is active, as at most ticks, all of it is one compiled call.
-    """
+
+def solve_goal(terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights) -> Solution:
+    """Build, solve, unpack; numbers beyond all bounds or a singular problem are no solution."""
     try:
-        x, n_h, free = _closed_form(*_arguments(terms, R, p_foot, goal, weights))
-        if free:
-            return Solution(x[:12], x[12:24].reshape(4, 3), x[24 : 24 + n_h], UNCONSTRAINED)
         problem = build(terms, R, p_foot, goal, weights)
         return unpack(problem, goal.contact, *solve(problem))
     except np.linalg.LinAlgError:
-        return Solution(np.zeros(12), np.zeros((4, 3)), np.zeros(18), "infeasible:singular")
+        return singular()
 
 
 def build(terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights) -> Problem:
     """Assemble the reduced QP at one instant."""
-    return Problem(*_assemble(*_arguments(terms, R, p_foot, goal, weights)))
-
-
-def _arguments(
-    terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights
-) -> tuple[Any, ...]:
-    return (
-        terms.M_inverse, terms.nle, terms.J, terms.dJ, terms.v, R, p_foot,
-        goal.contact, goal.trunk, goal.swing, goal.force,
-        weights.gamma_tau, weights.gamma_force, weights.gamma_defect,
-        weights.mu, weights.force_min,
+    return Problem(
+        *_assemble(
+            terms.M_inverse, terms.nle, terms.J, terms.dJ, terms.v, R, p_foot,
+            goal.contact, goal.trunk, goal.swing, goal.force, weights.as_array(),
+        )
     )  # fmt: skip
 
 
@@ -141,30 +166,37 @@ def solve(problem: Problem) -> tuple[Array, str]:
 
 def unpack(problem: Problem, contact: Array, tau: Array, status: str) -> Solution:
     """Forces and defect that the torques imply."""
-    force, defect = _implied(problem.A, problem.a0, problem.B, problem.defect0, contact, tau)
-    return Solution(tau, force, defect, status)
+    x = np.zeros(42)
+    _imply(problem.A, problem.a0, problem.B, problem.defect0, contact, tau, x)
+    return Solution(x, status, len(problem.defect0))
 
 
 @compiled
-def _implied(
-    A: Array, a0: Array, B: Array, defect0: Array, contact: Array, tau: Array
-) -> tuple[Array, Array]:
-    force = np.zeros((4, 3))
-    stacked = A @ tau + a0
+def _imply(
+    A: Array, a0: Array, B: Array, defect0: Array, contact: Array, tau: Array, x: Array
+) -> None:
+    """Fill torques, forces and defect, see `Solution`."""
+    x[:12] = tau
     row = 0
     for leg in range(4):
         if contact[leg] > 0.5:
-            force[leg] = stacked[row : row + 3]
+            x[12 + 3 * leg : 15 + 3 * leg] = times(A[row : row + 3], tau) + a0[row : row + 3]
             row += 3
-    return force, B @ tau + defect0
+    x[24 : 24 + len(defect0)] = times(B, tau) + defect0
 
 
 @compiled
 def _unconstrained(H: Array, g: Array, C: Array, c: Array, limit: float) -> tuple[Array, bool]:
-    tau: Array = np.negative(np.linalg.solve(H, g))
-    feasible = bool(np.all(np.abs(tau) <= limit) and np.all(np.isfinite(tau)))
+    """The minimiser without limits, and whether it keeps them; NaN of a singular problem."""
+    step = np.negative(g).reshape(12, 1)
+    solve_factorised(factorise(H), step)
+    tau = step[:, 0].copy()
+    feasible = bool(np.all(np.abs(tau) <= limit))
     for row in range(C.shape[0]):
-        if np.sum(C[row] * tau) < c[row] - _TOLERANCE:
+        total = 0.0
+        for k in range(12):
+            total += C[row, k] * tau[k]
+        if not total >= c[row] - _TOLERANCE:
             feasible = False
     return tau, feasible
 
@@ -193,9 +225,10 @@ def _foot_jacobian(
 @compiled
 def _assemble(
     M_inverse: Array, nle: Array, J: Array, dJ: Array, v: Array, R: Array, p_foot: Array,
-    contact: Array, trunk: Array, swing: Array, force: Array,
-    gamma_tau: float, gamma_force: float, gamma_defect: float, mu: float, force_min: float,
+    contact: Array, trunk: Array, swing: Array, force: Array, weights: Array,
 ) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:  # fmt: skip
+    """H, g, C, c, A, a₀, B, b₀ − a_des of `Problem`; NaN where no slip cannot be had."""
+    gamma_tau, gamma_force, gamma_defect, mu, force_min = weights
     n_c = 0
     for leg in range(4):
         if contact[leg] > 0.5:
@@ -214,42 +247,46 @@ def _assemble(
             a_swing[i_s : i_s + 3] = swing[leg]
             i_s += 3
 
-    M_inverse = np.ascontiguousarray(M_inverse)
-    M_inverse_S = np.ascontiguousarray(M_inverse[:, 6:])
-    free = M_inverse @ nle
-    if n_c > 0:
-        M_inverse_Jt = M_inverse @ np.ascontiguousarray(J_c.T)
-        Lambda_inverse = J_c @ M_inverse_Jt
+    # v̇ = M⁻¹ (S τ + J_cᵀ f − h) with J_c v̇ + J̇_c v = 0 gives f = A τ + a₀.
+    free = times(M_inverse, nle)
+    reaction = product(J_c, M_inverse)  # its transpose is M⁻¹ J_cᵀ, M being symmetric
+    affine = np.empty((3 * n_c, 13))
+    affine[:, :12] = -reaction[:, 6:]
+    affine[:, 12] = times(J_c, free) - drift_c
+    Lambda_inverse = np.empty((3 * n_c, 3 * n_c))
+    for i in range(3 * n_c):
+        for j in range(i + 1):
+            Lambda_inverse[i, j] = np.sum(reaction[i] * J_c[j])
+        Lambda_inverse[i, i] *= 1.0 + 1e-9
+    solve_factorised(factorise(Lambda_inverse), affine)
+    acceleration = np.empty((18, 13))  # v̇ of each torque, and of none
+    for i in range(18):
+        acceleration[i, :12] = M_inverse[i, 6:]
+        acceleration[i, 12] = -free[i]
         for k in range(3 * n_c):
-            Lambda_inverse[k, k] *= 1.0 + 1e-9
-        right = np.empty((3 * n_c, 13))
-        right[:, :12] = -(J_c @ M_inverse_S)
-        right[:, 12] = J_c @ free - drift_c
-        affine = np.linalg.solve(Lambda_inverse, right)
-        A = np.ascontiguousarray(affine[:, :12])
-        a0 = np.ascontiguousarray(affine[:, 12])
-        acceleration = M_inverse_S + M_inverse_Jt @ A
-        acceleration0 = M_inverse_Jt @ a0 - free
-    else:
-        A, a0 = np.zeros((0, 12)), np.zeros(0)
-        acceleration, acceleration0 = M_inverse_S.copy(), -free
+            for j in range(13):
+                acceleration[i, j] += reaction[k, i] * affine[k, j]
+    A, a0 = affine[:, :12].copy(), affine[:, 12].copy()
 
-    n_h = 6 + 12 - 3 * n_c
-    B, b = np.empty((n_h, 12)), np.empty(n_h)
-    Rc = np.ascontiguousarray(R)
-    B[:3] = Rc @ acceleration[:3]
-    b[:3] = Rc @ (acceleration0[:3] + cross(v[3:6], v[:3])) - trunk[:3]
-    B[3:6] = Rc @ acceleration[3:6]
-    b[3:6] = Rc @ acceleration0[3:6] - trunk[3:]
-    B[6:] = J_s @ acceleration
-    b[6:] = J_s @ acceleration0 + drift_s - a_swing
+    outputs = np.empty((18 - 3 * n_c, 13))
+    outputs[:3] = product(R, acceleration[:3])
+    outputs[3:6] = product(R, acceleration[3:6])
+    outputs[6:] = product(J_s, acceleration)
+    outputs[:3, 12] += times(R, cross(v[3:6], v[:3])) - trunk[:3]
+    outputs[3:6, 12] -= trunk[3:]
+    outputs[6:, 12] += drift_s - a_swing
+    B, b = outputs[:, :12].copy(), outputs[:, 12].copy()
 
-    At, Bt = np.ascontiguousarray(A.T), np.ascontiguousarray(B.T)
-    H = gamma_force * (At @ A) + gamma_defect * (Bt @ B)
+    H = np.zeros((12, 12))
+    add_gram(gamma_force, A, H)
+    add_gram(gamma_defect, B, H)
+    trace = 0.0
     for k in range(12):
         H[k, k] += gamma_tau
-    g = gamma_force * (At @ (a0 - f_des)) + gamma_defect * (Bt @ b)
-    scale = 12.0 / np.trace(H)
+        trace += H[k, k]
+    mirror(H)
+    g = gamma_force * transposed_times(A, a0 - f_des) + gamma_defect * transposed_times(B, b)
+    scale = 12.0 / trace
 
     cone = mu / np.sqrt(2.0)
     C, c = np.empty((5 * n_c, 12)), np.empty(5 * n_c)
@@ -261,27 +298,18 @@ def _assemble(
         C[5 * i + 2], c[5 * i + 2] = cone * z + x, -x0 - cone * z0
         C[5 * i + 3], c[5 * i + 3] = cone * z - y, y0 - cone * z0
         C[5 * i + 4], c[5 * i + 4] = cone * z + y, -y0 - cone * z0
-    return 0.5 * scale * (H + H.T), scale * g, C, c, A, a0, B, b
+    return scale * H, scale * g, C, c, A, a0, B, b
 
 
 @compiled
-def _closed_form(
+def closed_form(
     M_inverse: Array, nle: Array, J: Array, dJ: Array, v: Array, R: Array, p_foot: Array,
-    contact: Array, trunk: Array, swing: Array, force: Array,
-    gamma_tau: float, gamma_force: float, gamma_defect: float, mu: float, force_min: float,
-) -> tuple[Array, int, bool]:  # fmt: skip
-    """The optimum without limits, and whether it keeps them.
-
-    Torques, forces and defect are one array (42,), whose last part is as long as is told.
-    """
+    contact: Array, trunk: Array, swing: Array, force: Array, weights: Array, x: Array,
+) -> int:  # fmt: skip
+    """Fill `x`, see `Solution`, with the optimum without limits; its rows, 0 if it breaks any."""
     H, g, C, c, A, a0, B, defect0 = _assemble(
-        M_inverse, nle, J, dJ, v, R, p_foot, contact, trunk, swing, force,
-        gamma_tau, gamma_force, gamma_defect, mu, force_min,
-    )  # fmt: skip
-    x = np.zeros(42)
+        M_inverse, nle, J, dJ, v, R, p_foot, contact, trunk, swing, force, weights
+    )
     tau, feasible = _unconstrained(H, g, C, c, TORQUE_LIMIT)
-    implied, defect = _implied(A, a0, B, defect0, contact, tau)
-    x[:12] = tau
-    x[12:24] = implied.ravel()
-    x[24 : 24 + len(defect)] = defect
-    return x, len(defect), feasible
+    _imply(A, a0, B, defect0, contact, tau, x)
+    return len(defect0) if feasible else 0

@@ -46,12 +46,10 @@ def fill_deviations(
     out: NDArray[np.float32], du_ini: Array, y_ini: Array, y_base: Array, known: NDArray[np.bool_],
     du: Array,
 ) -> None:  # fmt: skip
-    """Write a peer's [u_ini; y_ini; u], flat, as deviations; an unknown sample does not deviate.
+    """Write a peer's [u_ini; y_ini; u] as deviations, flat; an unknown sample does not deviate.
 
-    Args:
-        out: (18 T_ini + 12 N,).
-        du_ini, y_ini, known, du: of `PeerData`; forces are deviations already.
-        y_base: base of the outputs, (T_ini, 6).
+    `out` is (18 T_ini + 12 N,); the rest is of `PeerData`, where forces are deviations already, and
+    the base of the outputs, (T_ini, 6).
     """
     T_ini, at = len(du_ini), 0
     for k in range(T_ini):

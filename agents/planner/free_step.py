@@ -37,12 +37,11 @@ class FreeStep:
         self, u_ini: Array, y_ini: Array, stance_ini: NDArray[np.bool_], y_base_ini: Array,
         y_base: Array, y_des: Array, effect: Array | float,
     ) -> tuple[Array, Array, Array, Array] | None:  # fmt: skip
-        """Forces u and their deviation du, (N, 12), outputs y and, under nominal forces, y_nominal,
-        (N, 6), as in `PlanResult`; None where a bound is active or a number is not finite.
+        """The plan of `PlannerInputs` and the effect of `PeerTerms`.
 
-        Args:
-            u_ini, y_ini, stance_ini, y_base_ini, y_base, y_des: of `PlannerInputs`.
-            effect: of `PeerTerms`.
+        Returns:
+            u, du, y and y_nominal of `PlanResult`; None where a bound is active or a number is not
+            finite.
         """
         forces, outputs, inside = _free_step(
             u_ini, y_ini, stance_ini, y_base_ini, y_base, y_des, effect, *self._fixed

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final, TypeVar
 
 import numpy as np
@@ -19,6 +19,7 @@ from agents.gait import nominal_forces, scheduled_stance
 from agents.planner.horizon import SAMPLE_MS, horizon_stance, sample_starts, step_ms
 from shared.config import Config
 from shared.messages import Measurement, Message, Plan
+from shared.record import record
 from shared.robot import N_FORCES, N_OUTPUTS, Array, robot_names
 
 M = TypeVar("M", bound=Message)
@@ -30,7 +31,7 @@ HELD: Final = "held"  # too old: the peer's last terms stay in force
 LOST: Final = "lost"  # held long enough: the team stops
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PeerHistory:
     """What is remembered of one peer: measurements by tick and plans by step, both ascending."""
 
@@ -38,7 +39,7 @@ class PeerHistory:
     plans: tuple[Plan, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PeerMemory:
     """Recent messages of all peers by name, and how many were refused as foreign."""
 
@@ -46,7 +47,7 @@ class PeerMemory:
     refused: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PeerData:
     """One peer's part of eq. 11 at planning step k, its window ending at step k−1 (or as told).
 
@@ -78,7 +79,7 @@ class PeerData:
         return self.status in (FRESH, SHIFTED)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Selection:
     """Everything an agent takes from its peers at one planning step.
 

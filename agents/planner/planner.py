@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 import numpy as np
@@ -19,12 +19,13 @@ from agents.planner.predictor import Predictor
 from agents.planner.qp_solver import SOLVED, SOLVERS, Residuals, Solver, no_solution
 from shared.config import Config
 from shared.errors import PredictorError
+from shared.record import record
 from shared.robot import Array
 
 PEER_LOST: Final = "peer-lost"
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PeerTerms:
     """What the peers will do to an agent's outputs at one planning step (eq. 11).
 
@@ -43,7 +44,7 @@ class PeerTerms:
     ages: Mapping[str, int] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PlannerInputs:
     """What one planning step k consumes of the agent itself; its time is t_k = step · step_ms.
 
@@ -71,7 +72,7 @@ class PlannerInputs:
         return np.concatenate([du.ravel(), (self.y_ini - self.y_base_ini).ravel()])
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PlannerState:
     """The agent's own last plan.
 
@@ -86,7 +87,7 @@ class PlannerState:
     solves: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PlanResult:
     """A plan of N samples from t_k on, always usable.
 
@@ -114,7 +115,7 @@ class PlanResult:
     iterations: int
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Setup:
     """What one step of the gait's cycle needs; nominal forces of the horizon, (N, 12), N."""
 

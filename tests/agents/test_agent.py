@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from agents.agent import Agent, AgentState, Inputs, Outputs
-from agents.controller import whole_body_qp
+from agents.controller import controller, whole_body_qp
 from agents.controller.whole_body_qp import Problem
 from agents.gait import nominal_forces, scheduled_stance
 from agents.pilot import Awaited
@@ -274,10 +274,12 @@ def fail(monkeypatch: pytest.MonkeyPatch) -> None:
     def no_solution(problem: Problem) -> tuple[Array, str]:
         return np.zeros(12), "infeasible:-1"
 
-    def limits_matter(*_: object) -> tuple[Array, int, bool]:
-        return np.zeros(42), 0, False
+    def limits_matter(*arguments: Any) -> int:
+        act(*arguments)
+        return 0
 
-    monkeypatch.setattr(whole_body_qp, "_closed_form", limits_matter)
+    act = controller._act
+    monkeypatch.setattr(controller, "_act", limits_matter)
     monkeypatch.setattr(whole_body_qp, "solve", no_solution)
 
 

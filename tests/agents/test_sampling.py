@@ -1,4 +1,4 @@
-"""From ticks to samples: means of forces, outputs in the yaw frame."""
+"""Samples: outputs in the yaw frame, and what a measurement holds."""
 
 from __future__ import annotations
 
@@ -6,12 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.sampling import measured, no_force, outputs_of
+from agents.controller.estimator import Estimate
+from agents.controller.sensing import outputs_at
+from agents.sampling import measured
+from shared.robot import Array
 from tests.agents.controller.poses import random_pose, standing_pose
+
+
+def outputs_of(estimate: Estimate, ground: float) -> Array:
+    return outputs_at(estimate.position, estimate.velocity, estimate.R, estimate.omega, ground)
 
 
 @given(st.integers(0, 2**31), st.floats(-3.0, 3.0))
@@ -31,24 +37,9 @@ def test_turning_the_world_does_not_change_the_outputs() -> None:
     np.testing.assert_allclose(outputs_of(other, 0.0), outputs_of(estimate, 0.0), atol=1e-12)
 
 
-def test_a_sample_is_the_mean_of_its_ticks() -> None:
-    random = np.random.default_rng(1)
-    ticks = random.normal(size=(10, 12))
-    forces = no_force()
-    for force in ticks:
-        forces = forces.add(force)
-    y = outputs_of(standing_pose().estimate, 0.0)
-    sample = measured(420, forces, y, np.ones(4))
-    np.testing.assert_allclose(sample.u, ticks.mean(axis=0), atol=1e-12)
+def test_a_sample_says_when_it_ends() -> None:
+    y, force = outputs_of(standing_pose().estimate, 0.0), np.arange(12.0)
+    sample = measured(420, force, y, np.ones(4))
     assert (sample.tick, sample.stamp_ns) == (420, 420_000_000)
     assert sample.y is y
-
-
-def test_a_mean_over_nothing_is_no_force() -> None:
-    np.testing.assert_array_equal(no_force().mean(), np.zeros(12))
-
-
-def test_adding_a_tick_leaves_the_mean_so_far_alone() -> None:
-    first = no_force().add(np.ones(12))
-    first.add(np.full(12, 5.0))
-    assert first.mean() == pytest.approx(np.ones(12))
+    assert sample.u is force

@@ -47,10 +47,10 @@ def walk(config: Config, ticks: int, predictor: Predictor | None = None) -> Walk
     for _ in range(ticks):
         truth = rollout.world.truth()
         rollout.step()
-        filters = [rollout.states[name].filter for name in rollout.world.names]
+        memories = [rollout.states[name].low_level for name in rollout.world.names]
         position.append(truth.base_pos)
         velocity.append(truth.base_vel)
-        estimated.append([memory.mean[1] for memory in filters if memory is not None])
+        estimated.append([memory.mean[1] for memory in memories if memory is not None])
     return Walk(rollout.world.fallen(), *map(np.array, (position, velocity, estimated)))
 
 

@@ -28,7 +28,7 @@ class Pose:
 
     def terms(self) -> Terms:
         """What the controller computes of it."""
-        return BODY.terms(self.estimate, self.quat_wxyz)
+        return BODY.terms(self.q, self.v)
 
 
 def pose_of(q: Array, v: Array, foot_force: float = 30.0) -> Pose:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from agents.controller.contact import ContactState, initial_contact, step_contact
 from shared.config import ControllerConfig
 from shared.robot import FOOT_RADIUS, Array
+from tests.agents.controller.parts import ContactState, initial_contact, step_contact
 
 DETECTING = ControllerConfig()
 SCHEDULED = replace(DETECTING, contact_detection=False)

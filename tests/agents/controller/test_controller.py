@@ -10,17 +10,29 @@ import pinocchio as pin
 import pytest
 
 from agents.controller import whole_body_qp
-from agents.controller.controller import Controller, ControllerState, Schedule, Task
-from agents.controller.model import Terms
+from agents.controller.controller import Acted, Controller, Schedule, Task
+from agents.controller.estimator import foot_trust, noise_parameters
+from agents.controller.memory import Memory
+from agents.controller.references import trunk_gains
 from agents.controller.swing import foothold, swing_reference
-from agents.controller.whole_body_qp import Goal, Solution, Weights
+from agents.gait import nominal_forces
+from agents.rehearsal import standing
 from shared.config import Config
 from shared.robot import GRAVITY, STAND_HEIGHT, TOTAL_MASS, Array
+from tests.agents.controller.parts import (
+    estimate_trunk,
+    initial_contact,
+    initial_filter,
+    initial_integrators,
+    step_contact,
+    trunk_acceleration,
+)
 from tests.agents.controller.poses import FEET, MODEL, Pose, random_pose, standing_pose
 
+REST_INTEGRATORS = initial_integrators(0.0)
 STANDING = Schedule(np.ones(4), 0.5, -1)
 TROT = np.array([1.0, 0.0, 0.0, 1.0])
-REST = Task(np.zeros(2), 0.0, STAND_HEIGHT, np.zeros(12), feedforward=False)
+REST = Task(0.0, 0.0, 0.0, STAND_HEIGHT, np.zeros(12), feedforward=False)
 
 
 def controller_of(**settings: Any) -> Controller:
@@ -28,78 +40,66 @@ def controller_of(**settings: Any) -> Controller:
 
 
 def step(
-    controller: Controller, state: ControllerState, pose: Pose, schedule: Schedule,
+    controller: Controller, memory: Memory | None, pose: Pose, schedule: Schedule,
     task: Task = REST, load: Array | None = None,
-) -> tuple[ControllerState, Solution]:  # fmt: skip
+) -> Acted:  # fmt: skip
+    """One tick of a robot that knows its pose."""
     estimate = replace(pose.estimate, foot_force=np.full(4, 30.0) if load is None else load)
-    return controller.step(state, estimate, pose.quat_wxyz, schedule, task, 1e-3)
-
-
-@pytest.fixture
-def goals(monkeypatch: pytest.MonkeyPatch) -> list[Goal]:
-    """What the controller asks of its QP, tick by tick; the QP is solved all the same."""
-    asked: list[Goal] = []
-    real = whole_body_qp.solve_goal
-
-    def listen(terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights) -> Solution:
-        asked.append(goal)
-        return real(terms, R, p_foot, goal, weights)
-
-    monkeypatch.setattr(whole_body_qp, "solve_goal", listen)
-    return asked
+    seen = controller.place(memory, estimate, pose.quat_wxyz, schedule, 1e-3)
+    return controller.act(seen, schedule, task, 1e-3)
 
 
 def test_a_standing_robot_carries_its_weight() -> None:
     controller, pose = controller_of(), standing_pose(0.4)
-    state = controller.initial(pose.estimate, 0.4)
+    memory = None
     for _ in range(10):
-        state, solution = step(controller, state, pose, STANDING)
-    assert solution.status == "unconstrained"
+        acted = step(controller, memory, pose, STANDING)
+        memory = acted.memory
+    assert acted.solution.status == "unconstrained"
     np.testing.assert_allclose(
-        solution.force.sum(axis=0), [0.0, 0.0, TOTAL_MASS * GRAVITY], atol=0.5
+        acted.solution.force.sum(axis=0), [0.0, 0.0, TOTAL_MASS * GRAVITY], atol=0.5
     )
-    np.testing.assert_array_equal(state.contact.contact, np.ones(4))
+    np.testing.assert_array_equal(acted.memory.contact, np.ones(4))
+    assert acted.memory.yaw == pytest.approx(0.4)
 
 
-def test_a_stance_foot_that_lost_contact_is_lowered_at_the_descent_speed(
-    goals: list[Goal],
-) -> None:
+def test_a_stance_foot_that_lost_contact_is_lowered_at_the_descent_speed() -> None:
     controller, pose = controller_of(), standing_pose()
     config = Config().controller
-    state = controller.initial(pose.estimate, 0.0)
+    memory = step(controller, None, pose, STANDING).memory
     walking, load = Schedule(TROT, 0.3, 0), np.array([0.0, 0.0, 0.0, 30.0])
     for _ in range(config.lost_contact_ms - 1):
-        state, _ = step(controller, state, pose, walking, load=load)
-    assert state.contact.contact[0] == 1.0
-    np.testing.assert_array_equal(state.foot_goal[0], pose.estimate.p_foot[0])
+        memory = step(controller, memory, pose, walking, load=load).memory
+    assert memory.contact[0] == 1.0
+    np.testing.assert_array_equal(memory.foot_goal[0], pose.estimate.p_foot[0])
     for _ in range(22):
-        before = state
-        state, _ = step(controller, state, pose, walking, load=load)
-    assert state.contact.contact[0] == 0.0
-    descent = before.foot_goal[0] - state.foot_goal[0]
+        before = memory
+        acted = step(controller, memory, pose, walking, load=load)
+        memory = acted.memory
+    assert memory.contact[0] == 0.0
+    descent = before.foot_goal[0] - memory.foot_goal[0]
     np.testing.assert_allclose(descent, [0.0, 0.0, 1e-3 * config.descent_speed], atol=1e-12)
-    sunk = pose.estimate.p_foot[0, 2] - state.foot_goal[0, 2]
+    sunk = pose.estimate.p_foot[0, 2] - memory.foot_goal[0, 2]
     assert sunk == pytest.approx(21e-3 * config.descent_speed, abs=1.1e-3 * config.descent_speed)
     expected = -config.kp_swing * sunk - config.kd_swing * config.descent_speed
-    np.testing.assert_allclose(goals[-1].swing[0], [0.0, 0.0, expected], atol=1e-9)
-    state, _ = step(controller, state, pose, walking)  # it has found the ground
-    assert state.contact.contact[0] == 1.0
-    np.testing.assert_array_equal(state.foot_goal[0], pose.estimate.p_foot[0])
+    np.testing.assert_allclose(acted.goal.swing[0], [0.0, 0.0, expected], atol=1e-9)
+    memory = step(controller, memory, pose, walking).memory  # it has found the ground
+    assert memory.contact[0] == 1.0
+    np.testing.assert_array_equal(memory.foot_goal[0], pose.estimate.p_foot[0])
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_swing_feet_follow_their_reference(seed: int, goals: list[Goal]) -> None:
+def test_swing_feet_follow_their_reference(seed: int) -> None:
     """ẍ = ẍ_ref + Kp (x_ref − x) + Kd (ẋ_ref − ẋ), start at the switch, goal at the foothold."""
     random = np.random.default_rng(seed)
     controller, config = controller_of(), Config().controller
     before, pose = standing_pose(), random_pose(random)
-    state = controller.initial(before.estimate, 0.0)
     load = 30.0 * TROT
-    state, _ = step(controller, state, before, STANDING)
-    state, _ = step(controller, state, before, Schedule(TROT, 0.0, 0), load=load)
-    task = Task(np.array([0.4, 0.1]), 0.3, STAND_HEIGHT, np.zeros(12), feedforward=False)
-    state, _ = step(controller, state, pose, Schedule(TROT, 0.4, 0), task, load)
-    estimate, ground = pose.estimate, state.contact.ground
+    memory = step(controller, None, before, STANDING).memory
+    memory = step(controller, memory, before, Schedule(TROT, 0.0, 0), load=load).memory
+    task = Task(0.4, 0.1, 0.3, STAND_HEIGHT, np.zeros(12), feedforward=False)
+    acted = step(controller, memory, pose, Schedule(TROT, 0.4, 0), task, load)
+    estimate, ground = pose.estimate, acted.memory.ground
     yaw = np.arctan2(estimate.R[1, 0], estimate.R[0, 0])
     v_des = pin.utils.rotate("z", yaw) @ np.array([0.4, 0.1, 0.0])
     data = MODEL.createData()
@@ -117,8 +117,8 @@ def test_swing_feet_follow_their_reference(seed: int, goals: list[Goal]) -> None
         v_foot = pin.getFrameVelocity(MODEL, data, FEET[leg], world).linear
         expected = a + config.kp_swing * (x - estimate.p_foot[leg])
         expected += config.kd_swing * (v - v_foot)
-        np.testing.assert_allclose(goals[-1].swing[leg], expected, atol=1e-8)
-    assert not goals[-1].swing[[0, 3]].any()
+        np.testing.assert_allclose(acted.goal.swing[leg], expected, atol=1e-8)
+    assert not acted.goal.swing[[0, 3]].any()
 
 
 def test_planned_deviations_are_asked_of_the_stance_feet_in_the_yaw_frame() -> None:
@@ -127,29 +127,92 @@ def test_planned_deviations_are_asked_of_the_stance_feet_in_the_yaw_frame() -> N
     controller = controller_of(gamma_tau=1e-6, gamma_defect=1.0, gamma_force=1e6)
     deviation = np.arange(12.0)
     task = replace(REST, deviation=deviation)
-    state = controller.initial(pose.estimate, yaw)
-    _, solution = step(controller, state, pose, STANDING, task)
+    solution = step(controller, None, pose, STANDING, task).solution
     expected = deviation.reshape(4, 3) @ pin.utils.rotate("z", yaw).T
     expected[:, 2] += TOTAL_MASS * GRAVITY / 4
     np.testing.assert_allclose(solution.force, expected, atol=0.02)
 
 
+def test_nothing_is_asked_of_legs_scheduled_to_swing() -> None:
+    controller, pose = controller_of(), standing_pose()
+    walking, load = Schedule(TROT, 0.3, 0), 30.0 * TROT
+    swing = np.repeat(1.0 - TROT, 3)
+    plain = step(controller, None, pose, walking, replace(REST, feedforward=True), load)
+    task = replace(REST, deviation=50.0 * swing, feedforward=True)
+    acted = step(controller, None, pose, walking, task, load)
+    assert acted.solution.tau.tobytes() == plain.solution.tau.tobytes()
+
+
+def test_a_sample_of_forces_is_their_mean_over_its_ticks() -> None:
+    """Nominal weight on the scheduled feet plus the deviation, from the tick it begins with."""
+    controller, pose, random = controller_of(), standing_pose(), np.random.default_rng(1)
+    walking, memory, applied = Schedule(TROT, 0.3, 0), None, []
+    for tick in range(25):
+        task = replace(REST, deviation=random.normal(size=12))
+        estimate = replace(pose.estimate, foot_force=30.0 * TROT)
+        seen = controller.place(memory, estimate, pose.quat_wxyz, walking, 1e-3)
+        memory = controller.act(seen, walking, task, 1e-3, new_sample=tick == 15).memory
+        applied.append(nominal_forces(TROT > 0.5) + task.deviation * np.repeat(TROT, 3))
+        first = 15 if tick >= 15 else 0
+        np.testing.assert_allclose(memory.mean_force, np.mean(applied[first:], axis=0), atol=1e-12)
+
+
 def test_the_plain_setting_trusts_the_schedule_and_not_the_feet() -> None:
     controller, pose = controller_of(contact_detection=False), standing_pose()
-    state = controller.initial(pose.estimate, 0.0)
+    memory = None
     for _ in range(20):
-        state, solution = step(controller, state, pose, Schedule(TROT, 0.3, 0), load=np.zeros(4))
-    np.testing.assert_array_equal(state.contact.contact, TROT)
-    assert solution.force[0, 2] > 40.0
+        acted = step(controller, memory, pose, Schedule(TROT, 0.3, 0), load=np.zeros(4))
+        memory = acted.memory
+    np.testing.assert_array_equal(acted.memory.contact, TROT)
+    assert acted.solution.force[0, 2] > 40.0
 
 
-def test_the_state_handed_in_is_left_as_it_was() -> None:
+def test_the_memory_handed_in_is_left_as_it_was() -> None:
     controller, pose = controller_of(), random_pose(np.random.default_rng(3))
-    state = controller.initial(pose.estimate, 0.0)
-    arrays = (state.swing_start, state.foot_goal, state.contact.ground, state.integrators.speed)
-    copies = [array.copy() for array in arrays]
-    first = step(controller, state, pose, Schedule(TROT, 0.3, 0))[1]
-    second = step(controller, state, pose, Schedule(TROT, 0.3, 0))[1]
-    assert first.tau.tobytes() == second.tau.tobytes()
-    for array, copy in zip(arrays, copies, strict=True):
-        np.testing.assert_array_equal(array, copy)
+    memory = step(controller, None, standing_pose(), STANDING).memory
+    copy, walking = memory.flat.copy(), Schedule(TROT, 0.3, 0)
+    seen = controller.place(memory, pose.estimate, pose.quat_wxyz, walking, 1e-3)
+    placed = seen.memory.flat.copy()
+    first, second = (controller.act(seen, walking, REST, 1e-3) for _ in range(2))
+    assert first.solution.tau.tobytes() == second.solution.tau.tobytes()
+    np.testing.assert_array_equal(memory.flat, copy)
+    np.testing.assert_array_equal(seen.memory.flat, placed)
+
+
+def test_the_tick_in_one_piece_is_its_parts_one_by_one() -> None:
+    """Estimator, contacts, references and QP on their own come to what the compiled tick does."""
+    controller, config = controller_of(), Config()
+    noise, walking = noise_parameters(config.estimator), Schedule(TROT, 0.3, 0)
+    state, ramp = standing(0), config.estimator.trust_ramp
+    task = Task(0.3, 0.1, 0.2, STAND_HEIGHT + 0.01, np.arange(12.0), feedforward=True)
+    filtered, contacts, integrators = initial_filter(state), initial_contact(), REST_INTEGRATORS
+    memory = None
+    for _ in range(30):
+        acted = controller.act(controller.sense(memory, state, walking, 1e-3), walking, task, 1e-3)
+        memory = acted.memory
+        trust = foot_trust(TROT, 0.3, state.foot_force, ramp, config.estimator.contact_force)
+        filtered, estimate = estimate_trunk(filtered, state, trust, noise, 1e-3)
+        contacts = step_contact(
+            contacts, config.controller, TROT, 0.3, 0, state.foot_force, estimate.p_foot[:, 2],
+            1e-3,
+        )  # fmt: skip
+        integrators, trunk, _ = trunk_acceleration(
+            integrators, trunk_gains(config.controller), controller.body, estimate,
+            replace(task, deviation=task.deviation * np.repeat(TROT, 3)), contacts.level, TROT,
+            1e-3,
+        )  # fmt: skip
+        q = np.concatenate([estimate.position, [0.0, 0.0, 0.0, 1.0], estimate.q_joint])
+        v = np.concatenate([estimate.velocity, estimate.omega, estimate.v_joint])
+        solution = whole_body_qp.solve_goal(
+            controller.body.terms(q, v), estimate.R, estimate.p_foot, acted.goal,
+            controller.weights,
+        )  # fmt: skip
+    np.testing.assert_allclose(acted.memory.mean, filtered.mean, atol=1e-12)
+    np.testing.assert_allclose(acted.memory.contact, contacts.contact)
+    np.testing.assert_allclose(acted.memory.ground, contacts.ground, atol=1e-12)
+    np.testing.assert_allclose(acted.memory.speed, integrators.speed, atol=1e-12)
+    np.testing.assert_allclose(acted.memory.height, integrators.height, atol=1e-12)
+    np.testing.assert_allclose(acted.goal.trunk, trunk, atol=1e-9)
+    np.testing.assert_allclose(acted.solution.tau, solution.tau, atol=1e-8)
+    np.testing.assert_allclose(acted.solution.force, solution.force, atol=1e-6)
+    assert acted.solution.status == solution.status

@@ -13,16 +13,14 @@ from hypothesis import strategies as st
 
 from agents.controller.estimator import (
     Estimate,
-    estimate_trunk,
-    filter_at,
     foot_trust,
-    initial_filter,
     noise_parameters,
     trunk_from_truth,
 )
 from shared.config import EstimatorConfig
 from shared.messages import State, Truth
 from shared.robot import FOOT_RADIUS, GRAVITY, N_JOINTS, STAND_HEIGHT, Array, q_stand
+from tests.agents.controller.parts import estimate_trunk, filter_at, initial_filter
 from tests.agents.controller.poses import FEET, MODEL, pose_of
 
 NOISE = noise_parameters(EstimatorConfig())

@@ -12,21 +12,20 @@ from hypothesis import strategies as st
 
 from agents.controller.controller import Task
 from agents.controller.estimator import Estimate
-from agents.controller.references import (
-    Integrators,
-    initial_integrators,
-    single_rigid_body,
-    trunk_acceleration,
-    trunk_gains,
-)
+from agents.controller.references import single_rigid_body, trunk_gains
 from shared.config import ControllerConfig
 from shared.robot import STAND_HEIGHT, Array
+from tests.agents.controller.parts import (
+    Integrators,
+    initial_integrators,
+    trunk_acceleration,
+)
 from tests.agents.controller.poses import BODY, random_pose, standing_pose
 
 CONFIG = ControllerConfig(kp_xy=100.0)
 GAINS = trunk_gains(CONFIG)
 ALL = np.ones(4)
-NOTHING = Task(np.zeros(2), 0.0, STAND_HEIGHT, np.zeros(12), feedforward=False)
+NOTHING = Task(0.0, 0.0, 0.0, STAND_HEIGHT, np.zeros(12), feedforward=False)
 REST = initial_integrators(0.0)
 
 
@@ -124,7 +123,7 @@ def test_feedback_opposes_every_error(
 
 
 def test_the_operator_is_followed() -> None:
-    task = Task(np.array([0.2, -0.1]), 0.3, STAND_HEIGHT + 0.01, np.zeros(12), feedforward=False)
+    task = Task(0.2, -0.1, 0.3, STAND_HEIGHT + 0.01, np.zeros(12), feedforward=False)
     found = trunk(standing_pose().estimate, task, level=0.02)
     expected = [0.2 * CONFIG.kd_xy, -0.1 * CONFIG.kd_xy, 0.03 * CONFIG.kp_z, 0.0, 0.0]
     np.testing.assert_allclose(found[:5], expected, rtol=0.02, atol=1e-9)
@@ -139,7 +138,7 @@ def test_north_is_nowhere(seed: int, yaw: float) -> None:
     estimate = random_pose(random).estimate
     heading = np.arctan2(estimate.R[1, 0], estimate.R[0, 0]) + random.uniform(-0.2, 0.2)
     before = Integrators(0.01, random.normal(size=2) * 0.05, random.normal(size=2) * 0.02, heading)
-    task = Task(random.normal(size=2), 0.2, 0.25, random.normal(size=12) * 10.0, feedforward=True)
+    task = Task(random.normal(), random.normal(), 0.2, 0.25, random.normal(size=12) * 10.0, True)
     here = trunk(estimate, task, before)
     there = trunk(turned(estimate, yaw), task, replace(before, yaw=heading + yaw))
     Z = pin.utils.rotate("z", yaw)
@@ -150,7 +149,7 @@ def test_north_is_nowhere(seed: int, yaw: float) -> None:
 def test_integrators_take_standing_errors_out_but_never_wind_up() -> None:
     """Held 5 cm low and back for 10 s: every integral stops at its limit and is soon undone."""
     stuck = replace(standing_pose().estimate, position=np.array([0.0, 0.0, STAND_HEIGHT - 0.05]))
-    task = replace(NOTHING, velocity=np.array([0.5, -0.5]))
+    task = replace(NOTHING, vx=0.5, vy=-0.5)
     state, pushes = REST, []
     for _ in range(10_000):
         state, push, _ = trunk_acceleration(state, GAINS, BODY, stuck, task, 0.0, ALL, 1e-3)
@@ -177,7 +176,7 @@ def test_the_heading_is_integrated_around_the_circle() -> None:
 
 def test_the_speed_integral_forgets() -> None:
     """A standing error e leaves e · leak · (1 − exp(−t/leak)), so biases cannot wind it up."""
-    task = replace(NOTHING, velocity=np.array([0.004, 0.0]))
+    task = replace(NOTHING, vx=0.004)
     estimate, state = standing_pose().estimate, REST
     for tick in range(1, 20_001):
         state, _, _ = trunk_acceleration(state, GAINS, BODY, estimate, task, 0.0, ALL, 1e-3)

@@ -1,0 +1,176 @@
+"""The first half of a tick, compiled: from what the robot senses to where it is and stands."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from agents.controller.contact import contacts_by_force, contacts_by_schedule
+from agents.controller.estimator import filter_step, foot_trust
+from agents.controller.memory import HALF, LEVEL, Memory, filter_of, legs_of
+from agents.controller.rotation import roll_pitch_yaw
+from shared.config import Config
+from shared.jit import compiled
+from shared.record import record
+from shared.robot import Array
+
+SEEN_SIZE: Final = 68
+SWITCHED: Final = 67  # 1 if stances and swings have just ended
+
+
+@compiled
+def coordinates_of(flat: Array) -> tuple[Array, Array]:
+    """Views of Pinocchio's q, (19,), and v, (18,), in what was seen."""
+    return flat[0:19], flat[19:37]
+
+
+@compiled
+def trunk_of(flat: Array) -> tuple[Array, Array, Array, Array]:
+    """Views of the trunk's position, velocity (odometry frame), R (3, 3) and rate (trunk frame)."""
+    return flat[0:3], flat[58:61], flat[37:46].reshape(3, 3), flat[22:25]
+
+
+@compiled
+def feet_of(flat: Array) -> Array:
+    """View of the foot centres, (4, 3), m, odometry frame."""
+    return flat[46:58].reshape(4, 3)
+
+
+@record
+class Seen:
+    """What a robot sees of itself at one tick; `flat` is (68,) and not to be changed.
+
+    Attributes:
+        memory: the low level's memory, its estimator and contacts advanced to this tick.
+        flat: the rest.
+    """
+
+    memory: Memory
+    flat: Array
+
+    @property
+    def outputs(self) -> Array:
+        """The outputs y: z over the ground, vx, vy (yaw frame), roll, pitch, wz. (6,)."""
+        return self.flat[61:67]
+
+    @property
+    def upright(self) -> float:
+        """Cosine of the angle between the trunk's z axis and the vertical."""
+        return float(self.flat[45])
+
+    @property
+    def position(self) -> Array:
+        """Trunk origin, (3,), m, odometry frame."""
+        return self.flat[0:3]
+
+    @property
+    def velocity(self) -> Array:
+        """Of the trunk's origin, (3,), m/s, odometry frame."""
+        return self.flat[58:61]
+
+    @property
+    def R(self) -> Array:
+        """Trunk to odometry frame, (3, 3)."""
+        return self.flat[37:46].reshape(3, 3)
+
+    @property
+    def p_foot(self) -> Array:
+        """Foot centres, (4, 3), m, odometry frame."""
+        return self.flat[46:58].reshape(4, 3)
+
+
+def sensing_constants(config: Config) -> Array:
+    """What `sense` needs of the configuration beside the noise. Shape (6,)."""
+    controller, estimator = config.controller, config.estimator
+    return np.array(
+        [
+            estimator.trust_ramp, estimator.contact_force, float(controller.contact_detection),
+            controller.contact_force, 1e-3 * controller.lost_contact_ms,
+            1e-3 * controller.ground_filter_ms,
+        ]
+    )  # fmt: skip
+
+
+@compiled
+def sense(
+    memory0: Array, quat: Array, gyro: Array, accel: Array, q_joint: Array, v_joint: Array,
+    foot_force: Array, stance: Array, progress: float, half: int, dt: float, noise: Array,
+    constants: Array, memory: Array, seen: Array,
+) -> None:  # fmt: skip
+    """Estimate the trunk's state and the contacts.
+
+    From the memory at the last tick, what `State` holds, the gait's schedule (scheduled stance
+    (4,), progress of the half period, its number), and the time since the last tick, s, `memory`
+    and `seen` are filled: see `Memory` and `Seen`. `noise` is `noise_parameters`, `constants` are
+    `sensing_constants`.
+    """
+    trust = foot_trust(stance, progress, foot_force, constants[0], constants[1])
+    mean0, covariance0 = filter_of(memory0)
+    mean, covariance, frame = filter_step(
+        mean0, covariance0, quat, gyro, accel, q_joint, v_joint, trust, noise, dt
+    )
+    place(
+        memory0, mean, covariance, quat, frame[:3], gyro, frame[3:], q_joint, v_joint, foot_force,
+        stance, progress, half, dt, constants, memory, seen,
+    )  # fmt: skip
+
+
+@compiled
+def place(
+    memory0: Array, mean: Array, covariance: Array, quat: Array, R: Array, omega: Array,
+    p_foot: Array, q_joint: Array, v_joint: Array, foot_force: Array, stance: Array,
+    progress: float, half: int, dt: float, constants: Array, memory: Array, seen: Array,
+) -> None:  # fmt: skip
+    """The same once the trunk is known: `mean` and `covariance` of the filter, R, its rate."""
+    level0 = memory0[LEVEL]
+    position, velocity = mean[0], mean[1]
+    q, v = coordinates_of(seen)
+    q[:3] = position
+    norm = np.sqrt(np.sum(quat * quat))
+    q[3:6] = quat[1:] / norm
+    q[6] = quat[0] / norm
+    q[7:] = q_joint
+    v[:3] = R.T @ velocity
+    v[3:6] = omega
+    v[6:] = v_joint
+    _, seen_velocity, seen_R, _ = trunk_of(seen)
+    seen_R[:] = R
+    seen_velocity[:] = velocity
+    feet_of(seen)[:] = p_foot
+    seen[61:67] = outputs_at(position, velocity, R, omega, level0)
+
+    memory[:] = memory0
+    new_mean, new_covariance = filter_of(memory)
+    new_mean[:], new_covariance[:] = mean, covariance
+    switched = half != memory0[HALF]
+    seen[SWITCHED] = 1.0 if switched else 0.0
+    rate = dt / (constants[5] + dt)
+    if constants[2] > 0.5:
+        legs, level = contacts_by_force(
+            legs_of(memory0), level0, switched, stance, progress, foot_force, p_foot[:, 2],
+            constants[3], constants[4], rate, dt,
+        )  # fmt: skip
+    else:
+        legs, level = contacts_by_schedule(
+            legs_of(memory0)[4], level0, stance, p_foot[:, 2], rate
+        )  # fmt: skip
+    legs_of(memory)[:] = legs
+    memory[LEVEL], memory[HALF] = level, half
+
+
+@compiled
+def outputs_at(position: Array, velocity: Array, R: Array, omega: Array, ground: float) -> Array:
+    """The outputs y of the planner over ground at a height: z, vx, vy, roll, pitch, wz. (6,)."""
+    rpy = roll_pitch_yaw(R)
+    c, s = np.cos(rpy[2]), np.sin(rpy[2])
+    return np.array(
+        [
+            position[2] - ground,
+            c * velocity[0] + s * velocity[1],
+            -s * velocity[0] + c * velocity[1],
+            rpy[0],
+            rpy[1],
+            R[2, 0] * omega[0] + R[2, 1] * omega[1] + R[2, 2] * omega[2],
+        ]
+    )

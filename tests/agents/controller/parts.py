@@ -1,0 +1,120 @@
+"""The parts of a tick one by one, with named results: what `Controller` calls in one piece."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from agents.controller.contact import contacts_by_force, contacts_by_schedule
+from agents.controller.controller import Task
+from agents.controller.estimator import (
+    Estimate,
+    filter_step,
+    mean_at,
+    standing_mean,
+    sure,
+)
+from agents.controller.model import RigidBody
+from agents.controller.references import trunk_acceleration as compiled_trunk_acceleration
+from shared.config import ControllerConfig
+from shared.messages import State
+from shared.robot import Array
+
+
+@dataclass(frozen=True)
+class FilterState:
+    """Mean (6, 3) and covariance (6, 6) of the estimator."""
+
+    mean: Array
+    covariance: Array
+
+
+def initial_filter(state: State) -> FilterState:
+    """Of a robot that stands still."""
+    return FilterState(standing_mean(state), sure())
+
+
+def filter_at(estimate: Estimate) -> FilterState:
+    """That takes an estimate for right."""
+    return FilterState(mean_at(estimate), sure())
+
+
+def estimate_trunk(
+    previous: FilterState, state: State, trust: Array, noise: Array, dt: float
+) -> tuple[FilterState, Estimate]:
+    """One step of the estimator."""
+    mean, covariance, frame = filter_step(
+        previous.mean, previous.covariance, state.imu_quat_wxyz, state.imu_gyro, state.imu_accel,
+        state.q_joint, state.v_joint, trust, noise, dt,
+    )  # fmt: skip
+    estimate = Estimate(
+        mean[0], mean[1], frame[:3], state.imu_gyro, frame[3:], state.q_joint, state.v_joint,
+        state.foot_force,
+    )  # fmt: skip
+    return FilterState(mean, covariance), estimate
+
+
+@dataclass(frozen=True)
+class ContactState:
+    """Contacts: see `Memory`."""
+
+    contact: Array
+    early: Array
+    unloaded: Array
+    latched: Array
+    ground: Array
+    level: float
+    half: int
+
+
+def initial_contact() -> ContactState:
+    """All four feet on flat ground at height zero."""
+    return ContactState(np.ones(4), np.zeros(4), np.zeros(4), np.ones(4), np.zeros(4), 0.0, -1)
+
+
+def step_contact(
+    previous: ContactState, config: ControllerConfig, stance: Array, progress: float, half: int,
+    foot_force: Array, foot_z: Array, dt: float,
+) -> ContactState:  # fmt: skip
+    """One step of the contact detection."""
+    p, rate = previous, dt / (1e-3 * config.ground_filter_ms + dt)
+    before = np.array([p.contact, p.early, p.unloaded, p.latched, p.ground])
+    if config.contact_detection:
+        legs, level = contacts_by_force(
+            before, p.level, half != p.half, stance, progress, foot_force, foot_z,
+            config.contact_force, 1e-3 * config.lost_contact_ms, rate, dt,
+        )  # fmt: skip
+    else:
+        legs, level = contacts_by_schedule(p.ground, p.level, stance, foot_z, rate)
+    contact, early, unloaded, latched, ground = legs
+    return ContactState(contact, early, unloaded, latched, ground, level, half)
+
+
+@dataclass(frozen=True)
+class Integrators:
+    """Of height, speed, lead and heading: see `Memory`."""
+
+    height: float
+    speed: Array
+    lead: Array
+    yaw: float
+
+
+def initial_integrators(yaw: float) -> Integrators:
+    """All at rest, heading kept."""
+    return Integrators(0.0, np.zeros(2), np.zeros(2), yaw)
+
+
+def trunk_acceleration(
+    previous: Integrators, gains: Array, body: RigidBody, estimate: Estimate, task: Task,
+    level: float, stance: Array, dt: float,
+) -> tuple[Integrators, Array, Array]:  # fmt: skip
+    """One step of the trunk's references."""
+    p, e = previous, estimate
+    height, speed, lead, yaw, trunk, v_des = compiled_trunk_acceleration(
+        p.height, p.speed, p.lead, p.yaw, gains, e.position, e.velocity, e.R, e.omega,
+        np.array([task.vx, task.vy]), task.wz, level + task.height, dt, task.feedforward,
+        task.deviation, stance, e.p_foot, body.mass, body.com, body.inertia_inverse,
+    )  # fmt: skip
+    return replace(p, height=height, speed=speed, lead=lead, yaw=yaw), trunk, v_des
