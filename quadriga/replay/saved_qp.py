@@ -23,7 +23,10 @@ from typing import Any, Final
 import daqp
 import numpy as np
 
-from agents.controller import whole_body_qp
+from agents.controller.controller import Acted, Controller
+from agents.controller.sensing import Seen
+from agents.controller.whole_body_qp import build
+from agents.planner.free_step import FreeStep
 from agents.planner.qp_solver import SOLVERS
 from shared.errors import RecordingError
 from shared.robot import TORQUE_LIMIT, Array
@@ -96,20 +99,18 @@ def captured(about: str) -> Iterator[dict[str, SavedQp]]:
     """
     found: dict[str, SavedQp] = {}
 
-    def whole_body(solve: Callable[..., Any]) -> Callable[..., Any]:
-        def observed(*arguments: Any) -> whole_body_qp.Solution:
-            answer: whole_body_qp.Solution = solve(*arguments)
-            try:
-                problem = whole_body_qp.build(*arguments)
-            except np.linalg.LinAlgError:
-                return answer  # there is no problem to save
+    def whole_body(act: Callable[..., Acted]) -> Callable[..., Acted]:
+        def observed(low_level: Controller, seen: Seen, *arguments: Any, **named: Any) -> Acted:
+            acted = act(low_level, seen, *arguments, **named)
+            terms = low_level.body.terms(seen.flat[:19], seen.flat[19:37])
+            problem = build(terms, seen.R, seen.p_foot, acted.goal, low_level.weights)
             box = np.full(len(problem.H), TORQUE_LIMIT)
             found[WHOLE_BODY] = SavedQp(
                 problem.H, problem.g, problem.C, np.concatenate([-box, problem.c]),
-                np.concatenate([box, np.full(len(problem.c), _FAR)]), answer.tau,
-                f"whole-body QP of {about}, {answer.status}: x is the torques [N·m]",
+                np.concatenate([box, np.full(len(problem.c), _FAR)]), acted.solution.tau,
+                f"whole-body QP of {about}, {acted.solution.status}: x is the torques [N·m]",
             )  # fmt: skip
-            return answer
+            return acted
 
         return observed
 
@@ -130,7 +131,9 @@ def captured(about: str) -> Iterator[dict[str, SavedQp]]:
         return observed
 
     with ExitStack() as stack:
-        stack.enter_context(_instead(whole_body_qp, "solve_goal", whole_body))
+        stack.enter_context(_instead(Controller, "act", whole_body))
+        # Every step through a solver, also those that need none.
+        stack.enter_context(_instead(FreeStep, "plan", lambda _: lambda *_: None))
         for kind in SOLVERS.values():
             stack.enter_context(_instead(kind, "solve", planner))
         yield found
