@@ -23,6 +23,7 @@ from shared.config import Config
 from shared.errors import MessageError
 from shared.messages import Event, Measurement, Reference, Status
 from shared.robot import robot_names
+from shared.scheduling import take_priority
 from shared.signals import stop_on_signals
 from shared.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS
 
@@ -55,6 +56,7 @@ def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None
         gc.collect()
         gc.freeze()
         gc.disable()
+        take_priority(config)
         bus.declare(READY)
         shell.work(stopped)
 

@@ -19,6 +19,7 @@ from shared.clock import monotonic, monotonic_ns
 from shared.codec import encode
 from shared.config import Config
 from shared.messages import State
+from shared.scheduling import take_priority
 from shared.signals import stop_on_signals
 from shared.topics import COMMAND, INPUTS, MEASUREMENT, PLAN, STATUS
 
@@ -54,6 +55,7 @@ def run(
         gc.collect()
         gc.freeze()
         gc.disable()  # a collection in mid-step costs more than the step
+        take_priority(config)
         bus.declare(READY)
         shell.walk(stopped)
 

@@ -345,6 +345,18 @@ class RecorderConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class RuntimeConfig:
+    """How the operating system runs the processes."""
+
+    priority: str = key(
+        "realtime", "-",
+        "realtime: agents, planner and sim server go before ordinary processes (SCHED_RR) if the "
+        "user may do so; ordinary: they do not",
+        choices=("realtime", "ordinary"),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
 class Config:
     """The configuration of a team, one section per field."""
 
@@ -359,3 +371,4 @@ class Config:
     identification: IdentificationConfig = field(default_factory=IdentificationConfig)
     reference: ReferenceConfig = field(default_factory=ReferenceConfig)
     recorder: RecorderConfig = field(default_factory=RecorderConfig)
+    runtime: RuntimeConfig = field(default_factory=RuntimeConfig)

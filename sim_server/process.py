@@ -8,6 +8,7 @@ from collections.abc import Callable
 from shared.barrier import SIM, meet, start_together
 from shared.bus import Bus
 from shared.config import Config
+from shared.scheduling import take_priority
 from shared.signals import stop_on_signals
 from shared.topics import COMMAND
 from sim_server.lockstep import run_lockstep
@@ -37,5 +38,6 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
         if not (meet(bus, config, stopped) and start_together(bus, config, stopped)):
             return
         gc.freeze()
+        take_priority(config)
         loop = run_realtime if config.world.mode == "realtime" else run_lockstep
         stage.announce("stop", "", loop(stage, stopped))
