@@ -71,7 +71,7 @@ class _Shell:
             topic: bus.publisher(topic.key(team, agent.robot), droppable=realtime)
             for topic in (COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS)
         }
-        self._telemetry = Telemetry(config.estimator.kind)
+        self._telemetry = Telemetry(config.estimator.kind, paced=realtime)
         self._intake = Intake(config, arrivals)
         self._given_up: dict[Source, int] = {}  # what had been heard of whom when given up
 
@@ -99,6 +99,7 @@ class _Shell:
 
     def _answer(self, memory: AgentState, state: State) -> AgentState:
         begun = monotonic_ns()
+        self._telemetry.taken(state.tick, begun)
         awaited = self._agent.awaited(state.tick)
         inputs = self._complete(state, awaited)
         last = memory.tick

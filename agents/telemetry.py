@@ -9,15 +9,27 @@ import numpy as np
 
 from agents.agent import Outputs
 from shared.messages import Status
+from shared.spread import Spread
 
 PERIOD_MS: Final = 100
+_TICK_MS: Final = 1.0  # what a tick may take in real time
+_BIN_MS: Final = 0.02
 
 
 class Telemetry:
     """Collects what the next status message says; one is due at 10 Hz and on change of mode."""
 
-    def __init__(self, estimator: str) -> None:
-        self._estimator = estimator
+    def __init__(self, estimator: str, *, paced: bool = False) -> None:
+        """Begin.
+
+        Args:
+            estimator: its name.
+            paced: whether the walk is in real time, so that it matters when a tick is answered.
+        """
+        self._estimator, self._paced = estimator, paced
+        self._jitter = Spread(_BIN_MS)
+        self._missed = 0
+        self._taken = (-1, 0)  # tick and wall-clock time of the newest state
         self._mode = ("", "")
         self._planner_ms: list[float] = []
         self._tick_us: list[float] = []
@@ -32,9 +44,17 @@ class Telemetry:
             tick_ns: wall-clock time from taking the state to having sent the command.
         """
         self._tick_us.append(1e-3 * tick_ns)
+        self._missed += self._paced and tick_ns > _TICK_MS * 1e6
         self._ages_ms.update(outputs.ages_ms)
         if outputs.planner_ns is not None:
             self._planner_ms.append(1e-6 * outputs.planner_ns)
+
+    def taken(self, tick: int, wall_ns: int) -> None:
+        """A state of world time `tick` has been taken at `wall_ns` of a steady clock."""
+        last, before = self._taken
+        self._taken = tick, wall_ns
+        if self._paced and last >= 0:
+            self._jitter.add(abs(1e-6 * (wall_ns - before) - (tick - last)))
 
     def status(self, tick: int, outputs: Outputs, counters: Mapping[str, int]) -> Status | None:
         """The status message if one is due, with the agent's own counters and `counters`."""
@@ -42,9 +62,11 @@ class Telemetry:
         if mode == self._mode and tick < self._last + PERIOD_MS:
             return None
         self._mode, self._last = mode, tick - tick % PERIOD_MS
+        missed = {"deadlines_missed": self._missed} if self._paced else {}
         status = Status(
-            tick, tick * 1_000_000, *mode, self._estimator, dict(self._ages_ms),
-            {**outputs.counters, **counters},
+            tick, tick * 1_000_000, *mode, self._estimator,
+            {**self._ages_ms, **self._jitter.told("jitter")},
+            {**outputs.counters, **counters, **missed},
             np.array(self._planner_ms), np.array(self._tick_us),
         )  # fmt: skip
         self._planner_ms, self._tick_us = [], []

@@ -12,8 +12,10 @@ import numpy as np
 from quadriga.gaps import end_of_world, missing_ticks, repeated_ticks
 from quadriga.table import print_table
 from quadriga.traces import Traces, in_force, read_traces
+from shared.messages import Status
 from shared.recording import Recording
 from shared.robot import OUTPUTS, Array
+from shared.spread import QUANTILES
 from shared.topics import STATE
 
 __all__ = ["RECORDING", "SUMMARY", "print_table", "steady_from", "summarise", "summary_of"]
@@ -52,6 +54,7 @@ def summary_of(traces: Traces) -> dict[str, Any]:
         **_tracking(traces),
         **_estimator(traces),
         **_agents(traces),
+        **_deadlines(traces),
         **_traffic(traces),
         "team": config.team.name,
         "robots": config.team.robots,
@@ -147,6 +150,38 @@ def _agents(traces: Traces) -> dict[str, Any]:
         "tick_us_p99": _quantile(tick_us, 0.99),
         "counters": {robot: dict(status.counters) for robot, status in last.items()},
         "stop_reasons": {robot: status.reason for robot, status in last.items() if status.reason},
+    }
+
+
+def _deadlines(traces: Traces) -> dict[str, Any]:
+    """In real time what came late, by robot and of the world; else None."""
+    if not traces.world:
+        return {"realtime": None}
+    told = traces.world[-1]
+    ticks = told.counters.get("ticks", 0)
+    found: dict[str, Any] = {
+        "world": {"jitter_ms": _spread(told, "jitter"), "overruns": told.counters.get("overruns")}
+    }
+    for robot in traces.robots:
+        own = traces.statuses[robot]
+        late = told.counters.get(f"{robot}.late", 0)
+        found[robot] = {
+            "late": late,
+            "late_share": late / ticks if ticks else None,
+            "held": told.counters.get(f"{robot}.held", 0),
+            "damped": told.counters.get(f"{robot}.damped", 0),
+            "command_age_ms": _spread(told, f"{robot}.command"),
+            "deadlines_missed": own[-1].counters.get("deadlines_missed") if own else None,
+            "jitter_ms": _spread(own[-1], "jitter") if own else {},
+        }
+    return {"realtime": found}
+
+
+def _spread(status: Status, name: str) -> dict[str, float]:
+    return {
+        key: status.ages_ms[f"{name}.{key}"]
+        for key in (*QUANTILES, "max")
+        if f"{name}.{key}" in status.ages_ms
     }
 
 

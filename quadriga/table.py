@@ -47,6 +47,7 @@ def rows(s: Mapping[str, Any]) -> list[tuple[str, str]]:
         *_against_truth(s),
         ("planner", _planner(s)),
         ("control tick", _times(s, "tick_us", "µs", ".0f")),
+        *_late(s["realtime"]),
         ("real-time factor", _text(s["real_time_factor"], ".2f")),
         ("messages", f"{s['messages']:,} recorded, {s['gaps']} gaps, {s['invalid']} invalid"),
     ]
@@ -58,6 +59,28 @@ def rows(s: Mapping[str, Any]) -> list[tuple[str, str]]:
     if s["cut"]:
         shown.append(("recording", s["cut"]))
     return shown
+
+
+def _late(realtime: Mapping[str, Any] | None) -> list[tuple[str, str]]:
+    """In real time how late each robot's commands were, and the world itself."""
+    if realtime is None:
+        return []
+    shown = []
+    for name, told in realtime.items():
+        jitter = _spread("jitter", told["jitter_ms"])
+        if name == "world":
+            text = f"{told['overruns']:,} overruns, {jitter}"
+        else:
+            share = _text(told["late_share"], ".1f", 100)
+            age = _spread("age", told["command_age_ms"])
+            text = f"{share} % of commands, {told['held']} held, {told['damped']} damped; "
+            text += f"{age}; {jitter}"
+        shown.append((f"{name} late", text))
+    return shown
+
+
+def _spread(name: str, of: Mapping[str, float]) -> str:
+    return f"{name} " + " / ".join(f"{value:.3g}" for value in of.values()) + " ms" if of else name
 
 
 def _against_truth(s: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.truth_trace import Ticks, TruthTrace, build_truth_trace, stack, ticks_of
-from shared.barrier import PLANNER
+from shared.barrier import PLANNER, SIM
 from shared.codec import decode
 from shared.config import Config
 from shared.errors import MessageError, RecordingError
@@ -50,6 +50,7 @@ class Traces:
         ticks: ticks by key, in the order of the recording.
         log_times: log times of the first and the last state, ns, and None without states.
         references: ticks (R,) and values vx, vy, wz, height (R, 4), sorted.
+        world: what the world of a walk in real time says of itself (`sim_server.deadlines`).
     """
 
     config: Config
@@ -66,6 +67,7 @@ class Traces:
     plans: Mapping[str, tuple[Plan, ...]]
     statuses: Mapping[str, tuple[Status, ...]]
     events: tuple[Event, ...]
+    world: tuple[Status, ...] = ()
 
 
 def read_traces(recording: Recording, names: Container[str] | None = None) -> Traces:
@@ -128,6 +130,7 @@ def read_traces(recording: Recording, names: Container[str] | None = None) -> Tr
         plans={robot: tuple(decoded[Plan, robot]) for robot in robots},
         statuses={name: tuple(decoded[Status, name]) for name in (*robots, PLANNER)},
         events=tuple(decoded[Event, ""]),
+        world=tuple(decoded[Status, SIM]),
     )
 
 

@@ -221,7 +221,7 @@ class PlannerConfig:
         0.995, "1", "adaptation: what a planning step leaves of older knowledge", low=0.5, high=1.0
     )
     latency_ms: int = key(
-        0, "ms", "a plan made from data at t takes effect at t + this", low=0, high=100
+        8, "ms", "a plan made from data at t takes effect at t + this", low=0, high=100
     )
     lambda_g: float = key(1e5, "1", "deepc: weight of ‖g‖²", low=1e-9, high=1e12)
     lambda_sigma: float = key(1e5, "1", "deepc: weight of ‖σ‖²", low=1e-9, high=1e15)

@@ -37,7 +37,9 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
         stage = Stage(config, world, bus)
         if not (meet(bus, config, stopped) and start_together(bus, config, stopped)):
             return
+        gc.collect()
         gc.freeze()
+        gc.disable()  # a collection in mid-tick costs more than the tick
         take_priority(config)
         loop = run_realtime if config.world.mode == "realtime" else run_lockstep
         stage.announce("stop", "", loop(stage, stopped))

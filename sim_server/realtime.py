@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable
 from typing import Final
 
 from shared.clock import Rate
 from shared.messages import Command
+from sim_server.deadlines import PERIOD_MS, Deadlines
 from sim_server.late import FRESH, HOLD, grade, hold
 from sim_server.stage import Stage
 
@@ -22,25 +22,26 @@ def run_realtime(stage: Stage, stopped: Callable[[], bool]) -> str:
     reason = ""
     while not reason and not stopped():
         stage.publish()
-        rate.wait()  # the agents' time to answer
+        motors.deadlines.woke(rate.wait())  # meanwhile the agents answer
         for packet in stage.bus.drain():
             stage.commands.take(*packet, tick=stage.world.tick, oldest=0)
         reason = stage.step(motors.commands())
-    late = ", ".join(f"{name} {count}" for name, count in sorted(motors.late.items())) or "none"
+        if stage.world.tick % PERIOD_MS == 0 or reason:
+            stage.tell(motors.deadlines.status(stage.world.tick, rate.overruns))
+    late = (
+        ", ".join(f"{name} {count}" for name, count in sorted(motors.deadlines.late.items()))
+        or "none"
+    )
     return f"{reason or 'signal'}; late ticks: {late}; overruns of the world: {rate.overruns}"
 
 
 class _Motors:
-    """The command each motor follows now.
-
-    Attributes:
-        late: ticks of each robot without a command of that tick, held and damped ones by name.
-    """
+    """The command each motor follows now; `deadlines` counts how late they were."""
 
     def __init__(self, stage: Stage) -> None:
         self._stage = stage
         self._held: dict[str, Command] = {}
-        self.late: Counter[str] = Counter()
+        self.deadlines = Deadlines(stage.world.names)
 
     def commands(self) -> dict[str, Command]:
         """By robot; a damped robot is left out."""
@@ -50,15 +51,15 @@ class _Motors:
             command = stage.commands.latest.get(name)
             age = tick - stage.commands.tick_of(name)
             state = grade(age, stage.config.world)
-            self.late[name] += age > 0
+            self.deadlines.used(name, age)
             if command is not None and state == FRESH:
                 chosen[name] = command
                 self._held.pop(name, None)
             elif command is None or state == HOLD:
-                self.late[f"{name} held"] += 1
+                self.deadlines.late[f"{name} held"] += 1
                 if name not in self._held:
                     self._held[name] = hold(stage.world.states()[name])
                 chosen[name] = self._held[name]
             else:
-                self.late[f"{name} damped"] += 1
+                self.deadlines.late[f"{name} damped"] += 1
         return chosen

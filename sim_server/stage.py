@@ -6,11 +6,12 @@ import sys
 from collections.abc import Mapping
 from typing import Final
 
+from shared.barrier import SIM
 from shared.bus import Bus
 from shared.codec import encode
 from shared.config import Config
-from shared.messages import Command, Event
-from shared.topics import EVENT, STATE, TRUTH
+from shared.messages import Command, Event, Status
+from shared.topics import EVENT, STATE, STATUS, TRUTH
 from sim_server.commands import CommandBox
 from sim_server.world import World
 
@@ -39,6 +40,7 @@ class Stage:
             name: bus.publisher(STATE.key(team, name), droppable=True) for name in world.names
         }
         self._put_truth = bus.publisher(TRUTH.key(team), droppable=realtime)
+        self._put_status = bus.publisher(STATUS.key(team, SIM), droppable=True)
         self._put_event = bus.publisher(EVENT.key(team))
         self._truth_period = 1 if config.estimator.kind == "truth" else TRUTH_PERIOD_MS
         self._last_tick = round(config.world.seconds * 1000)
@@ -57,6 +59,10 @@ class Stage:
         """Publish an event of the present tick."""
         tick = self.world.tick
         self._send(Event(tick, tick * 1_000_000, kind, robot, detail))
+
+    def tell(self, status: Status) -> None:
+        """Publish the world's account of itself."""
+        self._put_status(encode(status))
 
     def step(self, commands: Mapping[str, Command]) -> str:
         """Advance the world by one tick; the reason to end the walk, or ""."""

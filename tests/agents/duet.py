@@ -11,11 +11,11 @@ from agents.agent import Agent, AgentState, Inputs, Outputs
 from agents.planner.predictor import Predictor, PredictorMeta
 from quadriga.rollout import Rollout
 from shared.codec import decode, encode
-from shared.config import Config, TeamConfig
+from shared.config import Config, PlannerConfig, TeamConfig
 from shared.messages import Reference, State
 from shared.robot import N_FORCES, N_OUTPUTS, Array
 
-CONFIG = Config(team=TeamConfig(robots=2))
+CONFIG = Config(team=TeamConfig(robots=2), planner=PlannerConfig(latency_ms=0))
 FIRST_PLAN = 320  # ms: the first multiple of 40 ms after the stand of 300 ms
 
 

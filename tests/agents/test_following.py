@@ -17,7 +17,7 @@ from shared.messages import Measurement, Plan
 from shared.robot import Array
 from tests.agents.duet import asked
 
-CONFIG = Config(team=TeamConfig(robots=2), planner=PlannerConfig(kind="centralised"))
+CONFIG = Config(team=TeamConfig(robots=2), planner=PlannerConfig(kind="centralised", latency_ms=0))
 WALKING, REFERENCE = Mode(WALK, 300), asked(0.3)
 ON_COURSE = np.array([0.26, 0.3, 0.0, 0.0, 0.0, 0.0])
 N = CONFIG.planner.N

@@ -12,12 +12,12 @@ from agents.gait import nominal_forces, scheduled_stance
 from agents.modes import STAND, STOPPING, WALK, Mode
 from agents.pilot import Heard, PilotState, Planned
 from agents.planning import LocalPilot
-from shared.config import Config, TeamConfig
+from shared.config import Config, PlannerConfig, TeamConfig
 from shared.messages import Measurement
 from shared.robot import Array
 from tests.agents.duet import asked, simple_predictor
 
-ALONE = Config(team=TeamConfig(robots=1))
+ALONE = Config(team=TeamConfig(robots=1), planner=PlannerConfig(latency_ms=0))
 REFERENCE = asked(0.3)
 WALKING = Mode(WALK, 300)
 ON_COURSE = np.array([0.26, 0.3, 0.0, 0.0, 0.0, 0.0])

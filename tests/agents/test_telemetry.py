@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from agents.agent import Outputs
 from agents.telemetry import Telemetry
@@ -51,3 +52,25 @@ def test_after_a_gap_in_the_ticks_the_next_is_due_on_the_grid() -> None:
     telemetry = Telemetry("truth")
     due = [tick for tick in (0, 99, 257, 299, 300) if telemetry.status(tick, outputs("walk"), {})]
     assert due == [0, 257, 300]
+
+
+def test_in_real_time_missed_deadlines_and_jitter_are_told() -> None:
+    telemetry = Telemetry("kalman", paced=True)
+    for tick in range(100):
+        late_ns = 700_000 if tick == 50 else 0
+        telemetry.taken(tick, 1_000_000 * tick + late_ns)
+        telemetry.note(outputs("walk"), 1_500_000 if tick % 10 == 0 else 300_000)
+    status = telemetry.status(100, outputs("walk"), {})
+    assert status is not None
+    assert status.counters["deadlines_missed"] == 10
+    assert status.ages_ms["jitter.median"] == 0.0
+    assert status.ages_ms["jitter.max"] == pytest.approx(0.7)
+
+
+def test_a_state_passed_over_is_no_jitter() -> None:
+    telemetry = Telemetry("kalman", paced=True)
+    for tick in (0, 1, 4, 5):
+        telemetry.taken(tick, 1_000_000 * tick)
+    status = telemetry.status(5, outputs("walk"), {})
+    assert status is not None
+    assert status.ages_ms["jitter.max"] == pytest.approx(0.0, abs=1e-9)
