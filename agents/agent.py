@@ -66,6 +66,12 @@ class Inputs:
     truth: Truth | None = None
     excitation: Array | None = None
 
+    @property
+    def bare(self) -> bool:
+        """Whether nothing but the state has come."""
+        others = self.measurements or self.plans or self.references
+        return not others and self.estop is None and self.truth is None
+
 
 @record
 class Outputs:

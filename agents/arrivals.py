@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from agents.agent import Inputs
-from agents.pilot import Awaited
+from agents.pilot import NOTHING, Awaited
 from shared.barrier import PLANNER
 from shared.codec import decode
 from shared.config import CENTRAL, Config
@@ -133,6 +133,8 @@ class Arrivals:
 
     def inputs(self, state: State, awaited: Awaited) -> Inputs:
         """All that is due at the step of `state`, sorted by robot, then tick."""
+        if self._lockstep and awaited is NOTHING and self._estop is None:
+            return Inputs(state)
         plans = self._due(PLAN, awaited.plan)
         measurements = self._due(MEASUREMENT, _tick(awaited.measurement_tick))
         references = self._due(REFERENCE, _tick(awaited.reference_tick))

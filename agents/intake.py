@@ -43,7 +43,10 @@ class Intake:
             inputs: what this step took in; nothing has been taken in since.
             awaited: what it awaited.
         """
-        tick, taken, owed = inputs.state.tick, taken_in(inputs), frozenset[Source]()
+        tick = inputs.state.tick
+        if tick == last + 1 and awaited is NOTHING and inputs.bare:
+            return None
+        taken, owed = taken_in(inputs), frozenset[Source]()
         unusual = bool(taken)
         if self._lockstep:
             if unusual:

@@ -7,13 +7,14 @@ objects. All arithmetic is in the functions that these calls are made of.
 
 from __future__ import annotations
 
+from dataclasses import field
+
 import numpy as np
 
 from agents.controller import whole_body_qp
 from agents.controller.estimator import (
     Estimate,
     mean_at,
-    noise_parameters,
     standing_mean,
     sure,
 )
@@ -61,6 +62,10 @@ class Schedule:
     stance: Array
     progress: float
     half: int
+    row: Array = field(init=False, repr=False, compare=False)  # all of it, for compiled code
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "row", np.array([*self.stance, self.progress, self.half]))
 
 
 @record
@@ -105,10 +110,8 @@ class Controller:
     def __init__(self, config: Config) -> None:
         controller = config.controller
         self.body = RigidBody()
-        self._noise = noise_parameters(config.estimator)
         self._sensing = sensing_constants(config)
-        self._gains = trunk_gains(controller)
-        self._feet = np.array(
+        feet = np.array(
             [
                 1e-3 * config.gait.stance_ms, controller.raibert_gain, controller.swing_height,
                 controller.descent_speed, controller.kp_swing, controller.kd_swing, self.body.mass,
@@ -118,9 +121,11 @@ class Controller:
             controller.gamma_tau, controller.gamma_force, controller.gamma_defect, controller.mu,
             controller.force_min,
         )  # fmt: skip
-        self._fixed = (
-            self._gains, self._feet, self.body.com, self.body.inertia_inverse,
-            self.weights.as_array(),
+        self._acting = np.concatenate(
+            [
+                trunk_gains(controller), feet, self.body.com, self.body.inertia_inverse.ravel(),
+                self.weights.as_array(),
+            ]
         )  # fmt: skip
 
     def sense(self, memory: Memory | None, state: State, schedule: Schedule, dt: float) -> Seen:
@@ -139,8 +144,7 @@ class Controller:
         new, seen = np.empty(SIZE), np.empty(SEEN_SIZE)
         sense(
             before, state.imu_quat_wxyz, state.imu_gyro, state.imu_accel, state.q_joint,
-            state.v_joint, state.foot_force, schedule.stance, schedule.progress, schedule.half,
-            dt, self._noise, self._sensing, new, seen,
+            state.v_joint, state.foot_force, schedule.row, dt, self._sensing, new, seen,
         )  # fmt: skip
         return _begun(new, seen) if memory is None else Seen(Memory(new), seen)
 
@@ -154,7 +158,7 @@ class Controller:
         place(
             before, mean_at(estimate), sure(), quat_wxyz, estimate.R, estimate.omega,
             estimate.p_foot, estimate.q_joint, estimate.v_joint, estimate.foot_force,
-            schedule.stance, schedule.progress, schedule.half, dt, self._sensing, new, seen,
+            schedule.row, dt, self._sensing, new, seen,
         )  # fmt: skip
         return _begun(new, seen) if memory is None else Seen(Memory(new), seen)
 
@@ -177,9 +181,9 @@ class Controller:
         new, asked, x = np.empty(SIZE), np.empty(_ASKED), np.zeros(42)
         try:
             rows = _act(
-                seen.memory.flat, seen.flat, schedule.stance, schedule.progress, task.vx, task.vy,
-                task.wz, task.height, task.deviation, task.feedforward, dt, new_sample,
-                terms.M_inverse, terms.nle, terms.J, terms.dJ, *self._fixed, new, asked, x,
+                seen.memory.flat, seen.flat, schedule.row, task.vx, task.vy, task.wz, task.height,
+                task.deviation, task.feedforward, dt, new_sample, terms.M_inverse, terms.nle,
+                terms.J, terms.dJ, self._acting, new, asked, x,
             )  # fmt: skip
             if rows:
                 return Acted(Memory(new), asked, Solution(x, whole_body_qp.UNCONSTRAINED, rows))
@@ -224,12 +228,14 @@ def note_forces(memory: Array, planned: Array, stance: Array, new_sample: bool) 
 
 @compiled
 def _act(
-    memory0: Array, seen: Array, stance: Array, progress: float, vx: float, vy: float, wz: float,
-    height: float, planned: Array, feedforward: bool, dt: float, new_sample: bool,
-    M_inverse: Array, nle: Array, J: Array, dJ: Array, gains: Array, feet: Array, com: Array,
-    inertia_inverse: Array, weights: Array, memory: Array, asked: Array, x: Array,
+    memory0: Array, seen: Array, schedule: Array, vx: float, vy: float, wz: float, height: float,
+    planned: Array, feedforward: bool, dt: float, new_sample: bool, M_inverse: Array, nle: Array,
+    J: Array, dJ: Array, constants: Array, memory: Array, asked: Array, x: Array,
 ) -> int:  # fmt: skip
     """Fill the new memory, what is asked and the answer `closed_form` gives, with its result."""
+    gains, feet, com = constants[0:12], constants[12:19], constants[19:22]
+    inertia_inverse, weights = constants[22:31].reshape(3, 3), constants[31:36]
+    stance, progress = schedule[0:4], schedule[4]
     position, v_trunk, R, omega = trunk_of(seen)
     _, v = coordinates_of(seen)
     p_foot, mass = feet_of(seen), feet[6]

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from agents.controller.contact import contacts_by_force, contacts_by_schedule
-from agents.controller.estimator import filter_step, foot_trust
+from agents.controller.estimator import filter_step, foot_trust, noise_parameters
 from agents.controller.memory import HALF, LEVEL, Memory, filter_of, legs_of
 from agents.controller.rotation import roll_pitch_yaw
 from shared.config import Config
@@ -81,13 +81,13 @@ class Seen:
 
 
 def sensing_constants(config: Config) -> Array:
-    """What `sense` needs of the configuration beside the noise. Shape (6,)."""
+    """What `sense` needs of the configuration. Shape (11,)."""
     controller, estimator = config.controller, config.estimator
     return np.array(
         [
             estimator.trust_ramp, estimator.contact_force, float(controller.contact_detection),
             controller.contact_force, 1e-3 * controller.lost_contact_ms,
-            1e-3 * controller.ground_filter_ms,
+            1e-3 * controller.ground_filter_ms, *noise_parameters(estimator),
         ]
     )  # fmt: skip
 
@@ -95,16 +95,15 @@ def sensing_constants(config: Config) -> Array:
 @compiled
 def sense(
     memory0: Array, quat: Array, gyro: Array, accel: Array, q_joint: Array, v_joint: Array,
-    foot_force: Array, stance: Array, progress: float, half: int, dt: float, noise: Array,
-    constants: Array, memory: Array, seen: Array,
+    foot_force: Array, schedule: Array, dt: float, constants: Array, memory: Array, seen: Array,
 ) -> None:  # fmt: skip
     """Estimate the trunk's state and the contacts.
 
-    From the memory at the last tick, what `State` holds, the gait's schedule (scheduled stance
-    (4,), progress of the half period, its number), and the time since the last tick, s, `memory`
-    and `seen` are filled: see `Memory` and `Seen`. `noise` is `noise_parameters`, `constants` are
+    From the memory at the last tick, what `State` holds, the gait's `Schedule.row` and the time
+    since the last tick, s, `memory` and `seen` are filled: see `Memory` and `Seen`. `constants` are
     `sensing_constants`.
     """
+    stance, progress, noise = schedule[0:4], schedule[4], constants[6:11]
     trust = foot_trust(stance, progress, foot_force, constants[0], constants[1])
     mean0, covariance0 = filter_of(memory0)
     mean, covariance, frame = filter_step(
@@ -112,17 +111,18 @@ def sense(
     )
     place(
         memory0, mean, covariance, quat, frame[:3], gyro, frame[3:], q_joint, v_joint, foot_force,
-        stance, progress, half, dt, constants, memory, seen,
+        schedule, dt, constants, memory, seen,
     )  # fmt: skip
 
 
 @compiled
 def place(
     memory0: Array, mean: Array, covariance: Array, quat: Array, R: Array, omega: Array,
-    p_foot: Array, q_joint: Array, v_joint: Array, foot_force: Array, stance: Array,
-    progress: float, half: int, dt: float, constants: Array, memory: Array, seen: Array,
+    p_foot: Array, q_joint: Array, v_joint: Array, foot_force: Array, schedule: Array,
+    dt: float, constants: Array, memory: Array, seen: Array,
 ) -> None:  # fmt: skip
     """The same once the trunk is known: `mean` and `covariance` of the filter, R, its rate."""
+    stance, progress, half = schedule[0:4], schedule[4], schedule[5]
     level0 = memory0[LEVEL]
     position, velocity = mean[0], mean[1]
     q, v = coordinates_of(seen)
