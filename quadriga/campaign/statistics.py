@@ -64,7 +64,7 @@ def mcnemar(pairs: Pairs) -> float:
     """
     differ, fewer = pairs.first + pairs.second, min(pairs.first, pairs.second)
     ways = sum(math.comb(differ, k) for k in range(fewer + 1))
-    return min(1.0, 2 * ways / 2**differ)
+    return min(1.0, ways / 2 ** (differ - 1)) if differ else 1.0
 
 
 def paired_difference(pairs: Pairs, confidence: float = CONFIDENCE) -> tuple[float, float, float]:

@@ -65,10 +65,7 @@ def test_mcnemar_is_what_scipy_says(pairs: Pairs) -> None:
 
 
 def test_the_paired_difference_is_as_published() -> None:
-    """Fagerland et al., Statistics in Medicine 33 (2014); Altman et al., Statistics with Confidence.
-
-    Airway reactivity before and after a transplantation, and table 6.2.
-    """
+    """Fagerland et al., Statistics in Medicine 33 (2014), and table 6.2 of Altman et al. (2000)."""
     found = paired_difference(Pairs(1, 1, 7, 12))
     assert found == pytest.approx((-6 / 21, -0.507, -0.026), abs=5e-4)
     found = paired_difference(Pairs(14, 5, 0, 22))
