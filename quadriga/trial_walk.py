@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -38,13 +38,17 @@ from sim_server.world import World
 _NEEDED: Final = {topic.name for topic in (TRUTH, REFERENCE, MEASUREMENT, PLAN, STATUS, EVENT)}
 
 
-def roll_out(config: Config, predictor: Predictor | None, planner: TeamPlanner | None) -> Walk:
+def roll_out(
+    config: Config, predictor: Predictor | None, planner: TeamPlanner | None,
+    watch: Callable[[Tick], None] | None = None,
+) -> Walk:  # fmt: skip
     """Walk in this process, until `world.seconds` are over or a robot has fallen.
 
     Args:
         config: the team's configuration.
         predictor: None without a planner.
         planner: of the whole team, for the kinds of planner that are one process.
+        watch: shown every tick.
     """
     timed = None if planner is None else _Timed(planner)
     rollout = Rollout(config, None, lambda tick: _reference(config, tick), planner=timed)
@@ -55,8 +59,11 @@ def roll_out(config: Config, predictor: Predictor | None, planner: TeamPlanner |
     while rollout.world.tick < last and not rollout.world.fallen():
         if rollout.world.tick % SAMPLE_MS == 0:
             seen.truth.append(rollout.world.truth())
-        seen.note(rollout.step())
+        tick = rollout.step()
+        seen.note(tick)
         meter.note()
+        if watch is not None:
+            watch(tick)
     if timed is not None:
         seen.planner_ms[PLANNER] = timed.ms
         seen.plans += timed.plans

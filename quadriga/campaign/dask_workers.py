@@ -110,7 +110,7 @@ def _client(stack: ExitStack, jobs: int, address: str) -> Client:
         stack.callback(cluster.close)
         address = cluster.scheduler_address
     try:
-        client = stack.enter_context(Client(address, timeout=_CONNECT))
+        client: Client = stack.enter_context(Client(address, timeout=_CONNECT))
     except (OSError, ValueError) as error:
         raise ConfigError("--dask", address, "a scheduler that answers", str(error)) from None
     try:
