@@ -125,7 +125,5 @@ def _in_file(path: Path) -> dict[str, Keys]:
     tables = read_toml(path)
     for name, keys in tables.items():
         if not _NAME.fullmatch(name) or not isinstance(keys, dict):
-            raise ConfigError(
-                f"{path}: {name}", "no table with a plain name", "[name] and its keys"
-            )
+            raise ConfigError(f"{path}: {name}", "no table of a plain name", "[name] and its keys")
     return {name: flattened(keys) for name, keys in tables.items()}

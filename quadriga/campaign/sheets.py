@@ -136,7 +136,7 @@ def _outcome(rows: Sequence[Outcome]) -> Iterator[str]:
     low, high = found.success
     yield str(found.trials)
     yield f"{100 * found.successes / found.trials:.1f} %"
-    yield f"{100 * low:.1f} … {100 * high:.1f}"
+    yield _unbroken(f"{100 * low:.1f} … {100 * high:.1f}")
     yield str(found.falls)
     yield str(found.stops)
     yield text(found.time_to_fall, ".2f")
@@ -164,7 +164,7 @@ def _falls(found: Against) -> Iterator[str]:
     yield str(pairs.first)
     yield str(pairs.second)
     yield f"{100 * difference:+.1f}"
-    yield f"{100 * low:+.1f} … {100 * high:+.1f}"
+    yield _unbroken(f"{100 * low:+.1f} … {100 * high:+.1f}")
     yield p_text(mcnemar(pairs))
 
 
@@ -183,10 +183,18 @@ def _ratio(values: Sequence[float]) -> str:
     middle, ends = median(values), median_interval(values)
     if middle is None:
         return NOTHING
-    return f"{middle:.2f}" + ("" if ends is None else f" [{ends[0]:.2f}, {ends[1]:.2f}]")
+    return f"{middle:.2f}" + (
+        "" if ends is None else " " + _unbroken(f"[{ends[0]:.2f}, {ends[1]:.2f}]")
+    )
+
+
+def _unbroken(text: str) -> str:
+    """A text that no line ends in."""
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _shares(found: Tally) -> str:
     total = sum(found.plans.values())
     ranked = sorted(found.plans.items(), key=lambda item: -item[1])
-    return ", ".join(f"{name} {100 * count / total:.3g} %" for name, count in ranked) or NOTHING
+    shares = (_unbroken(f"{name} {100 * count / total:.3g} %") for name, count in ranked)
+    return ", ".join(shares) or NOTHING

@@ -30,9 +30,10 @@ def campaign(arguments: argparse.Namespace, _config: Config, _given: dict[str, A
                               "none: it walks nothing")  # fmt: skip
         out = arguments.report
     else:
-        plan, dask = _plan(arguments), arguments.dask
+        dask = arguments.dask
         if dask not in (None, "local") and "://" not in dask:
             raise ConfigError("--dask", repr(dask), "tcp://HOST:PORT", "scenarios come before it")
+        plan = _plan(arguments)
         out = arguments.out or make_run_dir(None)
         run(plan, out, jobs=arguments.jobs, dask=dask, typed=arguments.typed, console=console)
     print(report(out, baseline=arguments.baseline, record_worst=worst, console=console))

@@ -58,7 +58,7 @@ def test_over_the_bus_a_trial_comes_to_the_same(tmp_path: Path) -> None:
         over_the_bus(config, run_dir, path, sha256)
 
 
-def test_the_motors_work_is_what_the_joints_were_moved_against(tmp_path: Path) -> None:
+def test_the_motors_work_is_that_of_a_trot() -> None:
     """The cost of transport of a trot; and robots that merely stand do next to nothing."""
     config = config_of(planner__kind="none", world__seconds=3.0)
     found = figures(roll_out(config, None, None))
