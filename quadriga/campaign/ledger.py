@@ -50,8 +50,9 @@ class Ledger:
         try:
             kept = read_manifest(folder) if (folder / FILE).is_file() else None
             self.manifest = manifest if kept is None else kept.merged(manifest, folder)
-            self.rows = _whole(folder / ROWS, self.manifest)
+            self.rows = read_rows(folder, self.manifest)
             write_text(folder / FILE, json.dumps(asdict(self.manifest), indent=1) + "\n")
+            _mend(folder / ROWS, self.manifest)
             self._file = (folder / ROWS).open("a", encoding="utf-8", newline="")
         except BaseException:
             self._lock.close()
@@ -131,15 +132,13 @@ def write_text(path: Path, text: str) -> None:
     partial.replace(path)
 
 
-def _whole(path: Path, manifest: Manifest) -> list[Outcome]:
-    """The rows of a file that ends with a whole line from now on, at least its head."""
-    rows = read_rows(path.parent, manifest)
+def _mend(path: Path, manifest: Manifest) -> None:
+    """Have the file end with a whole line, at least its head."""
     if path.exists():
         text = path.read_bytes()
         os.truncate(path, text.rfind(b"\n") + 1)
     if not path.exists() or not path.stat().st_size:
         write_text(path, _line(columns([sweep.key for sweep in manifest.sweeps])))
-    return rows
 
 
 def _line(cells: Sequence[str]) -> str:

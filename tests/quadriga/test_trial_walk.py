@@ -63,6 +63,8 @@ def test_the_motors_work_is_that_of_a_trot() -> None:
     config = config_of(planner__kind="none", world__seconds=3.0)
     found = figures(roll_out(config, None, None))
     assert found.work is not None
+    assert found.distance is not None
+    assert found.cost_of_transport is not None
     assert found.distance == pytest.approx(0.5 * 2.5, rel=0.1)
     weight = 2 * TOTAL_MASS * GRAVITY
     assert found.cost_of_transport == pytest.approx(found.work / (weight * found.distance))

@@ -57,7 +57,7 @@ def test_rows_are_there_after_every_kill(tmp_path: Path) -> None:
             assert len(ledger.rows) == kept
             ledger.append(row("none", 7))
         again = read_rows(tmp_path, read_manifest(tmp_path))
-        assert [r.seed for r in again] == [0, 0][:kept] + [7]
+        assert [r.seed for r in again] == [*[0, 0][:kept], 7]
     with path.open(encoding="utf-8", newline="") as file:
         assert next(csv.reader(file)) == columns([])
 
@@ -129,5 +129,5 @@ def test_rows_edited_by_hand_cost_one_line(tmp_path: Path, change: Any, message:
 def test_a_folder_of_something_else_is_no_campaign(tmp_path: Path) -> None:
     for text in ("", "{}", '{"format": 0}', "[]"):
         (tmp_path / "campaign.json").write_text(text, encoding="utf-8")
-        with pytest.raises(ConfigError, match="campaign.json"):
+        with pytest.raises(ConfigError, match=r"campaign\.json"):
             read_manifest(tmp_path)
