@@ -166,7 +166,7 @@ def _worst(campaign: Campaign) -> str:
             f"<p>{what}: seeds {span(seeds)}.</p>"
             for what, seeds in (
                 ("Fell where the baseline did not", beside.alone),
-                ("Walked where the baseline fell", beside.spared),
+                ("Did not fall where the baseline did", beside.spared),
             )
             if seeds
         )

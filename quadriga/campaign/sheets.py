@@ -24,7 +24,7 @@ def outcome_sheets(manifest: Manifest, rows: Rows) -> list[Sheet]:
                "cost of transport", "plan p50 [ms]", "p99 [ms]", "plans")  # fmt: skip
     notes = (
         "Success: every robot walked to the end; interval: Wilson, 95 %. Medians: time to fall "
-        "over the falls; mean vx and cost of transport (∑|τ q̇|dt / (m g d), payload included) over "
+        "over the falls; mean vx and cost of transport (∑|τ·q̇|dt / (m g d), payload included) over "
         "the walks to the end; plan times over the trials' own quantiles, on a loaded machine.",
     )
     return [

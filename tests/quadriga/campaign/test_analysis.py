@@ -20,6 +20,8 @@ from quadriga.campaign.statistics import Pairs
 from quadriga.sheet import Sheet
 from tests.quadriga.campaign.rows import manifest, row
 
+NARROW = "\N{NO-BREAK SPACE}"
+
 
 def rows() -> list[Outcome]:
     """Ten seeds: `none` falls in 0 … 3, `damped` in 3 and 4; its errors are half as large."""
@@ -31,8 +33,8 @@ def rows() -> list[Outcome]:
 
 
 def cells(sheet: Sheet, line: int = 0) -> dict[str, str]:
-    return dict(zip(sheet.columns, (c.replace("\N{NO-BREAK SPACE}", " ") for c in sheet.rows[line]),
-                    strict=True))  # fmt: skip
+    pairs = zip(sheet.columns, sheet.rows[line], strict=True)
+    return {name.replace(NARROW, " "): cell.replace(NARROW, " ") for name, cell in pairs}
 
 
 def of(variant: str, found: Iterable[Outcome]) -> list[Outcome]:

@@ -40,7 +40,7 @@ def test_the_page_says_what_the_rows_say(capsys: Said, tmp_path: Path) -> None:
     assert "3 are still to be walked" in found.text
     assert "success by variant" in found.figures
     assert "r2 fell at 2.50 s" in found.text
-    assert "Walked where the baseline fell: seeds 0 … 3." in found.text
+    assert "Did not fall where the baseline did: seeds 0 … 3." in found.text
     assert "c/configs/steps-none.toml --seed 0 --out" in found.text
     told = capsys.readouterr()
     assert "steps: falls against none" in told.out
