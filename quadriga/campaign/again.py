@@ -59,8 +59,7 @@ def record(folder: Path, manifest: Manifest, rows: Sequence[Outcome], console: C
                               shas[row.group][:12] or "none", "the cache was emptied, or the code "
                               "changed")  # fmt: skip
         console.print(f"recording {number}/{len(rows)}: {run_dir}", markup=False, highlight=False)
-        for cut in (RECORDING,):  # of a recording that was interrupted
-            (run_dir / cut).unlink(missing_ok=True)
+        (run_dir / RECORDING).unlink(missing_ok=True)  # of a walk that was interrupted
         walk = figures(over_the_bus(config, run_dir, fitted.path, fitted.sha256))
         if fitted.path is not None:
             keep(fitted.path, run_dir)
