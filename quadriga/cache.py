@@ -46,24 +46,12 @@ _CODE = (
 )
 # What a trial's figures depend on besides its configuration and predictor.
 _TRIAL_CODE = (
-    (
-        shared,
-        ("robot.py", "yokes.py", "a1_model.py", "jit.py", "config.py", "presets.py", "blas.py"),
-    ),
+    (shared, ("*.py",)),
     (agents, ("*.py", "controller/*", "planner/*")),
     (sim_server, ("*.py",)),
     (
         quadriga,
-        (
-            "rollout.py",
-            "trial.py",
-            "trial_job.py",
-            "trial_walk.py",
-            "operator.py",
-            "summary.py",
-            "traces.py",
-            "truth_trace.py",
-        ),
+        ("rollout.py", "trial*.py", "operator.py", "summary.py", "traces.py", "truth_trace.py"),
     ),
 )
 _FIT_CODE = ((agents, ("planner/*",)),)

@@ -14,8 +14,7 @@ from quadriga.campaign.choice import Sweep, Variant
 from shared.config import Config
 from shared.config_file import build, flattened, layers, overlaid, read_toml
 from shared.errors import ConfigError
-from shared.robot import robot_names
-from sim_server.scenario import parse_pushes
+from sim_server.world import World
 
 _OURS: Final = ("world.seed", "world.mode")  # keys that a campaign sets itself
 
@@ -68,11 +67,11 @@ def build_plan(
 ) -> Plan:  # fmt: skip
     """The plan of a campaign.
 
-    A later one of these wins: the defaults, `file`, the scenario, `overrides`, the variant, what
+    A later one of these wins: the defaults, the scenario, `file`, `overrides`, the variant, what
     is swept.
 
     Raises:
-        ConfigError: an unknown scenario or baseline, or a configuration that cannot be walked.
+        ConfigError: an unknown scenario or baseline, or a world that cannot be built.
     """
     if not names:
         raise ConfigError("scenarios", "none", "at least one name or TOML file")
@@ -87,10 +86,8 @@ def build_plan(
         raise ConfigError("--baseline", repr(baseline), "one of the variants compared")
     if len({sweep.key for sweep in sweeps}) < len(sweeps):
         raise ConfigError("--sweep", "a key twice", "different keys")
-    given = {
-        name: overlaid(_over(layers(file, {}), flattened(read_toml(path))), overrides)
-        for name, path in files.items()
-    }
+    mine = {} if file is None else flattened(read_toml(file))
+    given = {name: overlaid(layers(path, mine), overrides) for name, path in files.items()}
     configs = {}
     for name, points, variant in product(files, _points(sweeps), variants):
         keys = dict(zip((sweep.key for sweep in sweeps), points, strict=True))
@@ -100,8 +97,9 @@ def build_plan(
         changes = {key: value for key, (_, value) in keys.items()}
         changes |= {"world.seed": 0, "world.mode": "lockstep"}
         config = build(_over(_over(given[name], variant.keys), changes))
-        parse_pushes(config.world.push, robot_names(config.team.robots))
         configs[Group(name, variant.name, tuple(label for label, _ in points))] = config
+    for config in {(c.team, c.world): c for c in configs.values()}.values():
+        World(config)  # its errors are better known before anything is collected and fitted
     return Plan(files, variants, sweeps, seeds, baseline, configs)
 
 

@@ -78,9 +78,7 @@ def test_a_campaign_survives_ctrl_c_and_kill_and_walks_nothing_twice(
     assert config.controller.kp_tilt == 500.0
     job = Job(Group("steps", "soft", ()), 5, config, Fitted(), origin())
     assert untimed(walk(job)) == done[job.group, 5], "as walked in this process"
-    with pytest.raises(
-        ProcessError, match="a worker's code and libraries: got .*, expected code 0"
-    ):
+    with pytest.raises(ProcessError, match="a worker's code and libraries: got python"):
         walk(replace(job, versions="code 0"))
     table = pq.read_table(out / "trials.parquet").to_pylist()
     assert {(row["variant"], row["seed"]): row["energy_j"] for row in table} == {

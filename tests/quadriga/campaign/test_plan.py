@@ -57,7 +57,8 @@ def test_later_values_of_a_key_win(scenario: str, tmp_path: Path) -> None:
     plan = build_plan([scenario], variants, (), (0,), "plain", file, {"world.friction": 0.6})
     config = plan.configs[Group("steps", "plain", ())]
     assert config.team.robots == 2
-    assert config.world.seconds == 8.0, "the scenario's, not the file's"
+    assert config.world.terrain == "boxes", "the scenario's"
+    assert config.world.seconds == 5.0, "the file's, not the scenario's"
     assert config.reference.vx == 0.3, "the file's"
     assert config.world.friction == 0.6, "the option's"
     assert config.controller.kp_tilt == 400.0, "the preset's"
@@ -72,6 +73,7 @@ def test_later_values_of_a_key_win(scenario: str, tmp_path: Path) -> None:
         ("none", ["a.b=1", "a.b=2"], {}, "a key twice"),
         ("none", [], {"world__seed": 4}, "expected --seeds"),
         ("none", [], {"world__push": "r9:80:90:3:0.2"}, "r9"),
+        ("none", ["world.payload_on=team,r7"], {"world__payload": 2.0}, "r7"),
         ("later:world.seed=3", [], {}, "variant later: world.seed"),
     ],
 )
