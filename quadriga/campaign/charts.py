@@ -61,7 +61,7 @@ def against_swept(manifest: Manifest, rows: Rows) -> Iterator[tuple[str, str]]:
             panels.append(Panel(f"{' · '.join(_but(world, k))}: {_SUCCESS}", curves, floor=0.0,
                                 span=100.0))  # fmt: skip
         margin = 0.04 * (values[-1] - values[0])
-        svg = draw(panels, values[0] - margin, values[-1] + margin, height=150.0,
+        svg = draw(panels, values[0] - margin, values[-1] + margin, height=220.0,
                    across=sweep.name, name=f"success against {sweep.name}")  # fmt: skip
         legend = "".join(key(f"r{i % 10}", name) for i, name in enumerate(manifest.variants))
         yield sweep.name, figure(svg, f"{legend} bars: Wilson's 95 % intervals")

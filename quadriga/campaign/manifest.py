@@ -12,6 +12,7 @@ from shared.errors import ConfigError
 
 FILE: Final = "campaign.json"
 FORMAT: Final = 1
+_REMEDY: Final = "trials of both must not be mixed: use a new folder"
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,20 +82,29 @@ class Manifest:
         """Trials to be walked in all."""
         return sum(len(entry.seeds) for entry in self.groups)
 
+    def check_versions(self, versions: str, folder: Path) -> None:
+        """Refuse to go on with other code or libraries.
+
+        Raises:
+            ConfigError: they are not those that the folder's trials were walked with.
+        """
+        if versions != self.versions:
+            raise ConfigError(
+                f"--out {folder}", f"trials with code and versions {self.versions}", versions,
+                _REMEDY,
+            )  # fmt: skip
+
     def merged(self, more: Manifest, folder: Path) -> Manifest:
         """This one with more to walk.
 
         Raises:
             ConfigError: trials of the two would not belong together.
         """
-        remedy = "trials of both must not be mixed: use a new folder"
         name = f"--out {folder}"
-        for what, mine, theirs in (
-            ("swept keys", [s.name for s in self.sweeps], [s.name for s in more.sweeps]),
-            ("code and versions", self.versions, more.versions),
-        ):
-            if mine != theirs:
-                raise ConfigError(name, f"trials with {what} {mine}", f"{theirs}", remedy)
+        self.check_versions(more.versions, folder)
+        mine, theirs = ([sweep.name for sweep in one.sweeps] for one in (self, more))
+        if mine != theirs:
+            raise ConfigError(name, f"trials with swept keys {mine}", f"{theirs}", _REMEDY)
         groups = {entry.group: entry for entry in self.groups}
         for entry in more.groups:
             kept = groups.setdefault(entry.group, entry)
@@ -104,7 +114,7 @@ class Manifest:
             ):
                 if old != new:
                     raise ConfigError(f"{name}: {entry.group.name}", f"trials of {what} {old[:12]}",
-                                      f"of {new[:12]}", remedy)  # fmt: skip
+                                      f"of {new[:12]}", _REMEDY)  # fmt: skip
             groups[entry.group] = replace(kept, seeds=_union(kept.seeds, entry.seeds))
         return replace(
             more, typed=(*self.typed, *(t for t in more.typed if t not in self.typed)),

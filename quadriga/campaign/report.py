@@ -45,7 +45,7 @@ class Campaign:
 
 
 def report(folder: Path, *, baseline: str | None, record_worst: int, console: Console) -> Path:
-    """Write the page and the tables of a campaign; show the tables.
+    """Write the page and the tables of a campaign; show success and falls.
 
     Args:
         folder: of the campaign.
@@ -71,21 +71,21 @@ def report(folder: Path, *, baseline: str | None, record_worst: int, console: Co
     if record_worst:
         wanted = [row for found in rows.values() for row in worst(found, record_worst)]
         record(folder, manifest, wanted, console)
-    tables = _tables(campaign)
+    first, rest = _tables(campaign)
     write_text(folder / PAGE, _page(campaign))
-    write_text(folder / TABLES, _markdown(campaign, tables))
-    show(tables)
+    write_text(folder / TABLES, _markdown(campaign, [*first, *rest]))
+    show(first)
     return folder / PAGE
 
 
-def _tables(campaign: Campaign) -> list[Sheet]:
+def _tables(campaign: Campaign) -> tuple[list[Sheet], list[Sheet]]:
+    """Tables that are shown at once, and those that are for the files alone."""
     manifest, rows = campaign.manifest, campaign.rows
-    return [
-        *sheets.outcome_sheets(manifest, rows),
-        *sheets.fall_sheets(manifest, rows, campaign.baseline),
-        *sheets.tracking_sheets(manifest, rows),
-        *sheets.ratio_sheets(manifest, rows, campaign.baseline),
-    ]
+    falls = sheets.fall_sheets(manifest, rows, campaign.baseline)
+    errors = sheets.ratio_sheets(manifest, rows, campaign.baseline)
+    return [*sheets.outcome_sheets(manifest, rows), *falls], [
+        *sheets.tracking_sheets(manifest, rows), *errors,
+    ]  # fmt: skip
 
 
 def _markdown(campaign: Campaign, tables: Sequence[Sheet]) -> str:

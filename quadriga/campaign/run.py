@@ -12,8 +12,8 @@ from rich.console import Console
 
 from quadriga.campaign.bar import Bar
 from quadriga.campaign.job import Job, origin, walk
-from quadriga.campaign.ledger import Ledger, write_text
-from quadriga.campaign.manifest import GroupEntry, Manifest, SweepEntry
+from quadriga.campaign.ledger import Ledger, read_manifest, write_text
+from quadriga.campaign.manifest import FILE, GroupEntry, Manifest, SweepEntry
 from quadriga.campaign.outcome import Outcome, to_columns
 from quadriga.campaign.plan import Group, Plan
 from quadriga.campaign.predictors import Fitted, prepared
@@ -47,6 +47,8 @@ def run(
         ProcessError: a worker died, or is not of this version.
     """
     walks = each_walk if dask is None else _dask()
+    if (out / FILE).is_file():  # before anything is collected and fitted with other code
+        read_manifest(out).check_versions(origin(), out)
     warm_up(next(iter(plan.configs.values())), console)
     fitted = prepared(plan.configs.values(), console)
     manifest = _manifest(plan, fitted, typed)

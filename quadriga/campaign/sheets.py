@@ -14,6 +14,10 @@ from quadriga.sheet import LABELS, NOTHING, Sheet, output_text, text
 from shared.robot import OUTPUTS
 
 ALL: Final = "all worlds"
+_POOLED: Final = (
+    f"{ALL.capitalize()}: pairs of every world together. Where one seed gives similar worlds (the "
+    "same boxes, higher) they are not independent, and intervals and p say too much."
+)
 Rows = Mapping[Group, Sequence[Outcome]]
 Line = tuple[str, tuple[str, ...], list[Outcome]]  # variant, swept values, its rows
 
@@ -83,7 +87,8 @@ def _beside(
         ]))  # fmt: skip
     return [
         _sheet(f"{scenario}: {what} against {baseline}", manifest, columns, lines,
-               lambda mine: cells(against(mine, theirs)), notes)
+               lambda mine: cells(against(mine, theirs)),
+               (*notes, _POOLED) if scenario == ALL else notes)
         for scenario, lines in scenarios if lines
     ]  # fmt: skip
 

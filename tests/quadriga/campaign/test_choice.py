@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.campaign.choice import Sweep, Variant, parted, sweep_of, variants_of
@@ -77,6 +77,7 @@ def test_mistakes_in_sweeps_are_named(option: str) -> None:
         sweep_of(option)
 
 
+@settings(deadline=None)  # a busy machine is not the subject
 @given(st.lists(st.from_regex(r"[a-z]{1,5}(\[[a-z,]{0,5}\])?", fullmatch=True), min_size=1))
 def test_parts_are_split_at_marks_outside_of_brackets_alone(parts: list[str]) -> None:
     assert parted(",".join(parts), ",") == parts

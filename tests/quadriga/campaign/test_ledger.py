@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.campaign.ledger import ROWS, Ledger, read_manifest, read_rows
@@ -21,6 +21,7 @@ TEXT = st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=20)
 NUMBER = st.none() | st.floats(allow_nan=False)
 
 
+@settings(deadline=None)  # a busy machine is not the subject
 @given(TEXT, TEXT, NUMBER, st.floats(allow_nan=False), st.booleans())
 def test_a_row_is_read_back_as_it_was(
     name: str, reason: str, cost: float | None, wall: float, success: bool

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -34,6 +34,7 @@ def test_wilson_is_as_published() -> None:
     assert wilson(0, 0) == (0.0, 1.0)
 
 
+@settings(deadline=None)  # a busy machine is not the subject
 @given(st.integers(1, 500), st.data())
 def test_wilson_solves_its_equation(total: int, data: st.DataObject) -> None:
     """At both ends the count lies z standard deviations of that end from it; as scipy has it."""
@@ -55,6 +56,7 @@ def test_mcnemar_is_the_binomial_test_of_the_pairs_that_differ() -> None:
     assert mcnemar(Pairs(3, 4, 4, 3)) == 1.0
 
 
+@settings(deadline=None)  # a busy machine is not the subject
 @given(PAIRS)
 def test_mcnemar_is_what_scipy_says(pairs: Pairs) -> None:
     differ = pairs.first + pairs.second
@@ -82,6 +84,7 @@ def test_independent_pairs_add_the_squares_of_their_intervals() -> None:
     assert high == pytest.approx(0.3 + math.hypot(b - 0.8, 0.5 - c))
 
 
+@settings(deadline=None)  # a busy machine is not the subject
 @given(PAIRS)
 def test_the_paired_difference_is_in_its_interval_and_turns_with_the_pairs(pairs: Pairs) -> None:
     difference, low, high = paired_difference(pairs)
@@ -111,6 +114,7 @@ def test_the_median_interval_is_the_tables_order_statistics() -> None:
     assert median([]) is None
 
 
+@settings(deadline=None)  # a busy machine is not the subject
 @given(st.lists(st.floats(0.01, 100.0), min_size=6, max_size=80))
 def test_the_median_lies_in_its_interval(values: list[float]) -> None:
     found, middle = median_interval(values), median(values)
