@@ -8,6 +8,7 @@ import json
 import os
 from collections.abc import Iterable
 from dataclasses import asdict
+from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -42,6 +43,16 @@ _CODE = (
         ("team_model.py", "a1_body.py", "sensors.py", "world.py", "scenario.py", "terrain.py"),
     ),
     (quadriga, ("collect.py", "rollout.py")),
+)
+# What a trial's figures depend on besides its configuration and predictor.
+_TRIAL_CODE = (
+    (shared, ("*.py",)),
+    (agents, ("*.py", "controller/*", "planner/*")),
+    (sim_server, ("*.py",)),
+    (
+        quadriga,
+        ("rollout.py", "trial*.py", "operator.py", "summary.py", "traces.py", "truth_trace.py"),
+    ),
 )
 _FIT_CODE = ((agents, ("planner/*",)),)
 # Keys of the identification that the walks do not depend on, only what is made of them.
@@ -112,6 +123,12 @@ def await_predictor(path: Path, timeout: float) -> None:
                 "it has another name",
             )  # fmt: skip
         sleep(_LOOK)
+
+
+@lru_cache(maxsize=1)
+def trial_code() -> str:
+    """Digest of the code that a trial's figures depend on."""
+    return _code_digest(_TRIAL_CODE)[:16]
 
 
 def _digest(parts: dict[str, Any]) -> str:

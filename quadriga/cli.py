@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from quadriga import recording_cli, verbs
+from quadriga.campaign.options import add_campaign
 from shared.config import Config
 from shared.config_file import build, layers, parse_assignment
 from shared.errors import ProcessError, QuadrigaError
@@ -33,7 +35,9 @@ KEYS: Final = {
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; its exit status. A user's mistake costs one line, not a traceback."""
-    arguments = parser().parse_args(argv)
+    typed = sys.argv[1:] if argv is None else list(argv)
+    arguments = parser().parse_args(typed)
+    arguments.typed = shlex.join(["quadriga", *typed])
     try:
         interrupt_on_sigterm()
         if arguments.parent:
@@ -113,6 +117,7 @@ def parser() -> argparse.ArgumentParser:
                      help="every predictor there is, on the same data, in one table")  # fmt: skip
     _add_comparison(add("compare", verbs.compare,
                         "compare planners and predictors in the same worlds"))  # fmt: skip
+    add_campaign(add)
     estop = add("estop", verbs.estop, "stop the team at once: every joint is damped")
     estop.add_argument("--reason", default="operator", help="told to every agent")
     config = add("config", verbs.show_config, "print the configuration in force as TOML")
@@ -200,6 +205,7 @@ def _configuration(arguments: argparse.Namespace) -> tuple[Config, dict[str, Any
     for name in KEYS.values():
         if (value := getattr(arguments, name)) is not None:
             overrides[name] = value
+    arguments.overrides = overrides
     given = layers(arguments.config, overrides)
     return build(given), given
 

@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from contextlib import closing
 from dataclasses import astuple, dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from agents.planner.central import TeamPlanner
-from agents.planner.predictor import Predictor
-from agents.planner.store import load, versions
+from agents.planner.store import versions
 from quadriga.cache import predictor_path
 from quadriga.collect import Dataset
 from quadriga.compare_figure import draw
@@ -22,15 +19,16 @@ from quadriga.compare_sheets import comparison_sheets
 from quadriga.fit import fitted, write_json
 from quadriga.fit_report import FitReport, Unfit, reason, refusal
 from quadriga.fit_sheets import comparison as predictor_sheet
-from quadriga.identify import ensure_data, team_planner
+from quadriga.identify import ensure_data
 from quadriga.sheet import Sheet, show
 from quadriga.trial import Row, figures
-from quadriga.trial_walk import over_the_bus, roll_out
+from quadriga.trial_job import walked
+from quadriga.trial_walk import over_the_bus
 from quadriga.trials import Choice, Trial, config_of, trials
 from quadriga.variants import PREDICTORS, with_keys
 from quadriga.warm_up import warm_up
 from quadriga.workers import each_done
-from shared.config import CENTRAL, Config, WorldConfig
+from shared.config import CENTRAL, Config
 from shared.config_text import config_sha256, to_toml
 from shared.errors import ConfigError, QuadrigaError
 
@@ -77,10 +75,10 @@ def run(
     with console.status(f"fitting the predictors {', '.join(names)}"):
         reports = {name: _fitted(config, dataset, name) for name in names}
     rows, jobs_left = _split(config, wanted, reports)
-    walked = _one_by_one(jobs_left, out) if bus else _side_by_side(jobs_left, jobs)
+    found = _one_by_one(jobs_left, out) if bus else _side_by_side(jobs_left, jobs)
     try:
-        with closing(walked), _progress(console) as progress:
-            for row in progress.track(walked, len(jobs_left), description="walking"):
+        with closing(found), _progress(console) as progress:
+            for row in progress.track(found, len(jobs_left), description="walking"):
                 rows.append(row)
     finally:  # an interrupt must not cost what has been walked
         order = {trial: k for k, trial in enumerate(wanted)}
@@ -142,23 +140,10 @@ def _side_by_side(todo: Sequence[Job], jobs: int) -> Generator[Row, None, None]:
 
 def walk_alone(job: Job) -> Row:
     """Walk a trial in this process."""
-    fixed = replace(job.config, world=WorldConfig())  # what planners are made of: not the world
     try:
-        predictor = _predictor(fixed, job.predictor) if job.predictor else None
-        team = _team_planner(fixed, job.predictor) if job.config.planner.kind in CENTRAL else None
-        return Row(job.trial, figures(roll_out(job.config, predictor, team)))
+        return Row(job.trial, walked(job.config, job.predictor))
     except QuadrigaError as error:
         return Row(job.trial, refused=reason(error))
-
-
-@lru_cache(maxsize=4)
-def _predictor(config: Config, path: Path) -> Predictor:
-    return load(path, config)[0]
-
-
-@lru_cache(maxsize=2)
-def _team_planner(config: Config, path: Path) -> TeamPlanner:
-    return team_planner(config, _predictor(config, path))
 
 
 def _one_by_one(todo: Sequence[Job], out: Path) -> Generator[Row, None, None]:

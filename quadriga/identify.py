@@ -178,8 +178,10 @@ def _episode(arrays: dict[str, Array], name: str) -> Episode:
     return Episode(**signals, first_tick=int(arrays[f"{name}.first_tick"]))
 
 
-def team_planner(config: Config, predictor: Predictor) -> TeamPlanner:
+def team_planner(config: Config, predictor: Predictor, data: Path | None = None) -> TeamPlanner:
     """The planner of the whole team for a `planner.kind` that is one process for all.
+
+    `data` is the file of what was collected, which DeePC plans with; None takes the cache's.
 
     Raises:
         PredictorError: the predictor is of another team; there are no collected data for DeePC.
@@ -188,5 +190,5 @@ def team_planner(config: Config, predictor: Predictor) -> TeamPlanner:
     if config.planner.kind == "centralised":
         return centralised(config, predictor)
     planner = config.planner
-    reduction = reduce(read_data(data_path(config)).training, planner.T_ini, planner.N)
+    reduction = reduce(read_data(data or data_path(config)).training, planner.T_ini, planner.N)
     return deepc(config, build_model(reduction, planner, planner.lambda_g, planner.lambda_sigma))

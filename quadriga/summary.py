@@ -12,6 +12,7 @@ import numpy as np
 from quadriga.gaps import end_of_world, missing_ticks, repeated_ticks
 from quadriga.table import print_table
 from quadriga.traces import Traces, in_force, read_traces
+from quadriga.truth_trace import distance
 from shared.messages import Status
 from shared.recording import Recording
 from shared.robot import OUTPUTS, Array
@@ -89,14 +90,10 @@ def _world(traces: Traces) -> dict[str, Any]:
         told |= {
             r for r, found in traces.statuses.items() if any(s.reason == "fall" for s in found)
         }
-    # The length of the way, sampled once a stride so that sway within it does not count.
-    strides = truth.base_pos[truth.tick % (2 * traces.config.gait.stance_ms) == 0]
-    way = np.concatenate([strides, truth.base_pos[-1:]])[..., :2]
-    legs = np.linalg.norm(np.diff(way, axis=0), axis=-1)
     return {
         "fell": bool(seen | told),
         "fallen": sorted(seen | told),
-        "distance": _mean(legs.sum(axis=0)) if len(truth.tick) else None,
+        "distance": distance(truth, 2 * traces.config.gait.stance_ms),
         "end": next((e.detail for e in reversed(traces.events) if e.kind == "stop"), ""),
         "yoke_drift_max": float(np.abs(truth.yoke_error).max(initial=0.0)),
         "events": [

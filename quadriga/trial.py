@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,12 @@ from agents.gait import nominal_forces
 from quadriga.summary import FALL_HEIGHT, FALL_TILT, steady_from
 from quadriga.traces import Traces, in_force
 from quadriga.trials import Trial
+from quadriga.truth_trace import distance
+from shared.config import Config
 from shared.messages import Measurement
-from shared.robot import N_LEGS, OUTPUTS, Array
+from shared.robot import GRAVITY, N_LEGS, OUTPUTS, TOTAL_MASS, Array
+
+_SHORTEST: Final = 0.5  # m; over a shorter way a cost of transport is that of starting
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,11 +29,14 @@ class Walk:
         traces: truth, references, statuses and events.
         samples: what each robot measured, with the forces it applied.
         plans: how many plans had which status, all robots together.
+        work: what all motors did or took up, ∑ |τ q̇| dt, J; None of a recording, whose torques and
+            rates are those of noisy sensors.
     """
 
     traces: Traces
     samples: Mapping[str, tuple[Measurement, ...]]
     plans: Mapping[str, int]
+    work: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +55,9 @@ class Figures:
         planner_ms_median, planner_ms_p99: time of one planning step, ms.
         solves: planning steps timed.
         plans: how many plans had which status.
+        distance: length of the way, mean over the robots, m.
+        work: of all motors, ∑ |τ q̇| dt over the whole walk, J.
+        cost_of_transport: work over weight (robots and payload) and distance.
     """
 
     seconds: float
@@ -62,6 +72,9 @@ class Figures:
     planner_ms_p99: float | None
     solves: int
     plans: Mapping[str, int]
+    distance: float | None = None
+    work: float | None = None
+    cost_of_transport: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """A form that JSON can carry."""
@@ -119,7 +132,17 @@ def figures(walk: Walk) -> Figures:
         planner_ms_p99=_quantile(planner_ms, 0.99),
         solves=len(planner_ms),
         plans=dict(sorted(walk.plans.items())),
+        distance=(way := distance(truth, 2 * traces.config.gait.stance_ms)),
+        work=walk.work,
+        cost_of_transport=_cost_of_transport(traces.config, walk.work, way),
     )
+
+
+def _cost_of_transport(config: Config, work: float | None, way: float | None) -> float | None:
+    if work is None or way is None or way < _SHORTEST:
+        return None
+    mass = config.team.robots * TOTAL_MASS + config.world.payload
+    return work / (mass * GRAVITY * way)
 
 
 def _fallen(traces: Traces) -> dict[str, float]:

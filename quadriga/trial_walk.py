@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -32,32 +32,42 @@ from shared.messages import Event, Measurement, Reference, Status, Truth
 from shared.recording import Recording
 from shared.robot import robot_names
 from shared.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS, TRUTH
+from sim_server.team_model import NV
+from sim_server.world import World
 
 _NEEDED: Final = {topic.name for topic in (TRUTH, REFERENCE, MEASUREMENT, PLAN, STATUS, EVENT)}
 
 
-def roll_out(config: Config, predictor: Predictor | None, planner: TeamPlanner | None) -> Walk:
+def roll_out(
+    config: Config, predictor: Predictor | None, planner: TeamPlanner | None,
+    watch: Callable[[Tick], None] | None = None,
+) -> Walk:  # fmt: skip
     """Walk in this process, until `world.seconds` are over or a robot has fallen.
 
     Args:
         config: the team's configuration.
         predictor: None without a planner.
         planner: of the whole team, for the kinds of planner that are one process.
+        watch: shown every tick.
     """
     timed = None if planner is None else _Timed(planner)
     rollout = Rollout(config, None, lambda tick: _reference(config, tick), planner=timed)
     if config.planner.kind not in (*CENTRAL, "none"):
         rollout.agents = {n: Agent(config, n, predictor, monotonic_ns) for n in rollout.agents}
-    seen = _Seen(config)
+    seen, meter = _Seen(config), _Meter(rollout.world)
     last = round(1000 * config.world.seconds)
     while rollout.world.tick < last and not rollout.world.fallen():
         if rollout.world.tick % SAMPLE_MS == 0:
             seen.truth.append(rollout.world.truth())
-        seen.note(rollout.step())
+        tick = rollout.step()
+        seen.note(tick)
+        meter.note()
+        if watch is not None:
+            watch(tick)
     if timed is not None:
         seen.planner_ms[PLANNER] = timed.ms
         seen.plans += timed.plans
-    return seen.walk()
+    return replace(seen.walk(), work=meter.work)
 
 
 def over_the_bus(config: Config, run_dir: Path, predictor: Path | None, sha256: str) -> Walk:
@@ -115,6 +125,25 @@ class _Timed(TeamPlanner):
         self.ms.append(1e-6 * (monotonic_ns() - begun))
         self.plans[result.status] += len(inputs)
         return result
+
+
+class _Meter:
+    """Sums up what the motors do.
+
+    A tick moves the joints by their rates at its end under the torques that acted in it, so that
+    the sum is the work itself, not an approximation of it.
+    """
+
+    def __init__(self, world: World) -> None:
+        n, physics = len(world.names), world.physics
+        # Views of MuJoCo's own memory.
+        self._torque = physics.qfrc_applied[: n * NV].reshape(n, NV)[:, 6:]
+        self._rate = physics.qvel[: n * NV].reshape(n, NV)[:, 6:]
+        self.work = 0.0
+
+    def note(self) -> None:
+        """Add the tick that has just been walked."""
+        self.work += 1e-3 * float(np.abs(self._torque * self._rate).sum())
 
 
 class _Seen:

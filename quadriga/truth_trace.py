@@ -75,6 +75,18 @@ def build_truth_trace(messages: Sequence[Truth], config: Config) -> TruthTrace:
     )  # fmt: skip
 
 
+def distance(truth: TruthTrace, stride_ms: int) -> float | None:
+    """Length of the trunks' ways, mean over the robots, m; None without a sample.
+
+    Sampled once a stride, so that sway within it does not count.
+    """
+    if not len(truth.tick):
+        return None
+    strides = truth.base_pos[truth.tick % stride_ms == 0]
+    way = np.concatenate([strides, truth.base_pos[-1:]])[..., :2]
+    return float(np.linalg.norm(np.diff(way, axis=0), axis=-1).sum(axis=0).mean())
+
+
 def _ground(config: Config, pos: Array, cos: Array, sin: Array) -> Array:
     """Mean terrain height where the four feet stand under the hips. Shape (T, n), m."""
     terrain = build_terrain(config, formation(config.team.robots, config.team.spacing))

@@ -6,9 +6,11 @@ import multiprocessing
 import os
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import resource_tracker
 from typing import TypeVar
 
+from shared.errors import ProcessError
 from shared.signals import die_with_parent, interrupts_held
 
 A = TypeVar("A")
@@ -24,6 +26,9 @@ def each_done(
         call: a function of a module, so that another process finds it.
         arguments: what to call it with.
         jobs: processes at a time.
+
+    Raises:
+        ProcessError: a process died.
     """
     # Spawn: a forked child would share the parent's threads' locks.
     context = multiprocessing.get_context("spawn")
@@ -34,6 +39,9 @@ def each_done(
                 futures = {pool.submit(call, argument): argument for argument in arguments}
             for future in as_completed(futures):
                 yield futures[future], future.result()
+        except BrokenProcessPool:
+            raise ProcessError("a worker process", "its death", "an answer",
+                               "killed, perhaps because memory was short") from None  # fmt: skip
         except BaseException:  # an interrupt: the pool would first finish every call
             for worker in multiprocessing.active_children():
                 worker.terminate()

@@ -42,7 +42,7 @@ def layers(path: Path | None, overrides: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         ConfigError: the file cannot be read or parsed, or an override names no key.
     """
-    return overlaid(_read(path) if path else {}, overrides)
+    return overlaid(read_toml(path) if path else {}, overrides)
 
 
 def overlaid(given: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
@@ -83,7 +83,7 @@ def build(given: Mapping[str, Any]) -> Config:
     return config
 
 
-def parse_assignment(text: str) -> tuple[str, Any]:
+def parse_assignment(text: str, option: str = "--set") -> tuple[str, Any]:
     """`section.key=value` with a TOML value; a bare word counts as text.
 
     Raises:
@@ -91,14 +91,28 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     """
     name, found, value = text.partition("=")
     if not found:
-        raise ConfigError("--set", repr(text), "section.key=value")
+        raise ConfigError(option, repr(text), "section.key=value")
     try:
         return name.strip(), tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         return name.strip(), value.strip()
 
 
-def _read(path: Path) -> dict[str, Any]:
+def flattened(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by `section.key` of tables by section; what is no table keeps its name."""
+    return {
+        f"{section}.{key}" if key else section: value
+        for section, keys in tables.items()
+        for key, value in (keys.items() if isinstance(keys, dict) else [("", keys)])
+    }
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """What a TOML file says.
+
+    Raises:
+        ConfigError: it cannot be read, or is no TOML.
+    """
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Figures over world time as inline SVG whose colours follow the page's light or dark style."""
+"""Figures, mostly over world time, as inline SVG in the colours of the page's style."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from quadriga.report.axis import decades, grid, logarithm, same
 from quadriga.report.panel import Box, Curve, Mark, Panel
 
 WIDTH: Final = 1000.0  # px of the drawing; the page scales it
+TIME: Final = "time [s]"
 _LEFT, _RIGHT, _ABOVE, _BETWEEN, _BELOW = 58.0, 14.0, 20.0, 8.0, 36.0
 _LINE, _NARROW, _WIDE = 15.0, 40.0, 60.0  # px between values of an axis, at least
 
@@ -21,8 +22,11 @@ _LINE, _NARROW, _WIDE = 15.0, 40.0, 60.0  # px between values of an axis, at lea
 def draw(
     panels: Sequence[Panel], begin: float, end: float, *, marks: Sequence[Mark] = (),
     columns: int = 1, height: float = 90.0, points: int = 1600, name: str = "",
+    across: str = TIME, left: float = _LEFT,
 ) -> str:  # fmt: skip
     """An SVG of panels that share the time from `begin` to `end`, s, row by row.
+
+    Or anything else that `across` names: what is said of times here is then said of that.
 
     Args:
         panels: the panels; `columns` of them stand side by side.
@@ -33,48 +37,55 @@ def draw(
         height: of a panel of curves, px; rows of bars take 15 px each.
         points: that a curve may have at most.
         name: what the figure shows, for who does not see it.
+        across: what the panels share, with its unit.
+        left: room for names of rows and values, px.
     """
     end = max(end, begin + 1e-3)
-    width = (WIDTH - columns * (_LEFT + _RIGHT)) / columns
+    width = (WIDTH - columns * (left + _RIGHT)) / columns
     parts, places, y = [], [], 0.0
     for first in range(0, len(panels), columns):
         row = panels[first : first + columns]
         tall = max(15.0 * len(panel.rows) if panel.rows else height for panel in row)
         for k, panel in enumerate(row):
-            box = Box(_LEFT + k * WIDTH / columns, y + _ABOVE, width, tall, begin, end)
+            box = Box(left + k * WIDTH / columns, y + _ABOVE, width, tall, begin, end)
             bottom = first + k + columns >= len(panels)
-            parts.append(_panel(panel, box, marks, points, bottom=bottom, top=first == 0))
+            below = across if bottom else ""
+            parts.append(_panel(panel, box, marks, points, below=below, top=first == 0))
             places.append(f"{box.x:.0f} {box.w:.0f} {box.y:.0f} {box.h:.0f}")
         y += _ABOVE + tall + _BETWEEN
     y += _BELOW - _BETWEEN
+    style = "time" if across == TIME else "other"
     return (
-        f'<svg class="time" viewBox="0 0 {WIDTH:.0f} {y:.0f}" role="img" '
+        f'<svg class="{style}" viewBox="0 0 {WIDTH:.0f} {y:.0f}" role="img" '
         f'aria-label="{escape(name)}" data-t="{begin:.4f} {end:.4f}" '
         f'data-p="{",".join(places)}">{"".join(parts)}</svg>'
     )
 
 
 def _panel(
-    panel: Panel, box: Box, marks: Sequence[Mark], points: int, *, bottom: bool, top: bool
+    panel: Panel, box: Box, marks: Sequence[Mark], points: int, *, below: str, top: bool
 ) -> str:
     inside = "".join(_bars(panel, box)) if panel.rows else "".join(_curves(panel, box, points))
     title = f'<text class="title" x="{box.x:.0f}" y="{box.y - 6:.0f}">{escape(panel.title)}</text>'
     frame = f'<path class="axis" d="M{box.x:.0f} {box.y:.0f}v{box.h:.0f}h{box.w:.0f}"/>'
     free = box.x + 7.0 * len(panel.title) if top else math.inf
-    return title + inside + _marks(box, marks, free) + frame + _time_axis(box, named=bottom)
+    return title + inside + _marks(box, marks, free) + frame + _across(box, below)
 
 
-def _time_axis(box: Box, *, named: bool) -> str:
+def _across(box: Box, name: str) -> str:
+    """The axis at the foot of a panel; with values and a name if there is one."""
     ticks = grid(box.begin, box.end, box.w, _NARROW if box.w < 300.0 else _WIDE)
     foot, parts = box.y + box.h, []
     for tick in ticks:
         x = float(box.at(np.array(tick)))
         parts.append(f'<path class="axis" d="M{x:.1f} {foot:.0f}v4"/>')
-        if named:
+        if name:
             parts.append(f'<text class="tick mid" x="{x:.1f}" y="{foot + 16:.0f}">{tick:g}</text>')
-    if named:
+    if name:
         middle = box.x + box.w / 2
-        parts.append(f'<text class="tick mid" x="{middle:.0f}" y="{foot + 31:.0f}">time [s]</text>')
+        parts.append(
+            f'<text class="tick mid" x="{middle:.0f}" y="{foot + 31:.0f}">{escape(name)}</text>'
+        )
     return "".join(parts)
 
 

@@ -5,6 +5,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
+from quadriga.report.look import style_sheet
+
+
+def document(title: str, head: str, sections: Sequence[tuple[str, str, str]], script: str) -> str:
+    """A whole page that loads nothing from anywhere.
+
+    Args:
+        title: of the page.
+        head: HTML between the title and the links to the sections.
+        sections: anchor, title and HTML of each.
+        script: at the page's end; may be empty.
+    """
+    links = "".join(f'<a href="#{name}">{escape(text)}</a>' for name, text, _ in sections)
+    body = "".join(section(*part) for part in sections)
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{style_sheet()}</style></head><body>"
+        f"<h1>{escape(title)}</h1>{head}<nav>{links}</nav>{body}"
+        + (f'<div id="clock"></div><script>{script}</script>' if script else "")
+        + "</body></html>\n"
+    )
+
 
 def section(anchor: str, title: str, content: str) -> str:
     """A section that links can lead to."""

@@ -9,8 +9,8 @@ from typing import Final
 
 from quadriga.report import about, feet, machine, tracks
 from quadriga.report.account import COLUMNS
-from quadriga.report.html import cells, details, figure, key, keys, section, table, time_link
-from quadriga.report.look import SCRIPT, style_sheet
+from quadriga.report.html import cells, details, document, figure, key, keys, table, time_link
+from quadriga.report.look import SCRIPT
 from quadriga.report.look_at import Episode, episodes
 from quadriga.report.moments import Moment
 from quadriga.report.run import Run
@@ -41,21 +41,9 @@ def write_page(run: Run, path: Path) -> Path:
 
 def build_page(run: Run) -> str:
     """The whole page as HTML; it loads nothing from anywhere."""
-    sections = [part for part in _sections(run) if part]
-    links = "".join(
-        f'<a href="#{name}">{escape(title)}</a>' for name, title, _ in (part for part in sections)
-    )
     text, good = about.verdict(run)
-    body = "".join(section(*part) for part in sections)
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(about.title(run))}</title><style>{style_sheet()}</style></head><body>"
-        f"<h1>{escape(about.title(run))}</h1>"
-        f'<p class="verdict {"good" if good else "bad"}">{escape(text)}</p>'
-        f"{_absent(run)}<nav>{links}</nav>{body}"
-        f'<div id="clock"></div><script>{SCRIPT}</script></body></html>\n'
-    )
+    head = f'<p class="verdict {"good" if good else "bad"}">{escape(text)}</p>{_absent(run)}'
+    return document(about.title(run), head, list(_sections(run)), SCRIPT)
 
 
 Section = tuple[str, str, str]  # anchor, title, HTML

@@ -1,0 +1,75 @@
+"""Trials once more over the bus: the command of each, and their recordings on demand."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from rich.console import Console
+
+from quadriga.campaign.manifest import Manifest
+from quadriga.campaign.outcome import Outcome
+from quadriga.campaign.plan import seeded
+from quadriga.campaign.predictors import prepared
+from quadriga.campaign.run import config_file
+from quadriga.replay.recorded_predictor import keep
+from quadriga.report.page import PAGE
+from quadriga.run_folder import report
+from quadriga.summary import RECORDING
+from quadriga.trial import figures
+from quadriga.trial_walk import over_the_bus
+from shared.config_file import load
+from shared.errors import ConfigError, ProcessError
+
+RECORDINGS: Final = "recordings"
+
+
+def command(folder: Path, row: Outcome) -> str:
+    """What walks a trial again over the bus and records it."""
+    return shlex.join([
+        "quadriga", "walk", "--config", str(config_file(folder, row.group)),
+        "--seed", str(row.seed), "--out", str(_run_dir(folder, row)),
+    ])  # fmt: skip
+
+
+def recorded(folder: Path, row: Outcome) -> Path | None:
+    """The page of a trial's recording, as a path from `folder`, if it has been recorded."""
+    run_dir = _run_dir(folder, row)
+    return (run_dir / PAGE).relative_to(folder) if (run_dir / PAGE).is_file() else None
+
+
+def record(folder: Path, manifest: Manifest, rows: Sequence[Outcome], console: Console) -> None:
+    """Walk trials again over the bus, unless they are recorded; each with its page.
+
+    Raises:
+        ConfigError: the predictor, or the code, is no longer the one they were walked with.
+        ProcessError: a process failed, or the walk came to something else.
+    """
+    shas = {entry.group: entry.predictor_sha256 for entry in manifest.groups}
+    for number, row in enumerate(rows, 1):
+        run_dir = _run_dir(folder, row)
+        if (run_dir / PAGE).is_file():
+            continue
+        config = seeded(load(config_file(folder, row.group)), row.seed)
+        (fitted,) = prepared([config], console).values()
+        if fitted.sha256 != shas[row.group]:
+            raise ConfigError(f"predictor of {row.group.name}", fitted.sha256[:12] or "none",
+                              shas[row.group][:12] or "none", "the cache was emptied, or the code "
+                              "changed")  # fmt: skip
+        console.print(f"recording {number}/{len(rows)}: {run_dir}", markup=False, highlight=False)
+        (run_dir / RECORDING).unlink(missing_ok=True)  # of a walk that was interrupted
+        walk = figures(over_the_bus(config, run_dir, fitted.path, fitted.sha256))
+        if fitted.path is not None:
+            keep(fitted.path, run_dir)
+        fell = min(walk.fallen.values(), default=None)
+        if fell != row.time_to_fall_s:
+            raise ProcessError(f"{run_dir}", f"a fall at {fell} s",
+                               f"{row.time_to_fall_s} s, as in the campaign",
+                               "other code or libraries than those it was walked with")  # fmt: skip
+        report(run_dir, pictures=False, console=Console(quiet=True))
+
+
+def _run_dir(folder: Path, row: Outcome) -> Path:
+    return folder / RECORDINGS / f"{row.group.name}-{row.seed}"

@@ -1,0 +1,147 @@
+"""The folder of a campaign: what it consists of, and a row for each trial that is finished."""
+
+from __future__ import annotations
+
+import csv
+import fcntl
+import io
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+from quadriga.campaign.manifest import FILE, Manifest
+from quadriga.campaign.outcome import Outcome, columns, from_cells, to_cells
+from shared.errors import ConfigError
+
+ROWS: Final = "trials.csv"
+
+
+class Ledger:
+    """A campaign's folder, open for one process alone; a context that must be entered.
+
+    A row is on the disk before the next one is written, so that a kill costs no finished trial:
+    what it may leave is part of a last line, which is cut off when the folder is opened again.
+
+    Args:
+        folder: new, or of a campaign that this one goes on with.
+        manifest: what is to be walked; merged with what the folder's own says.
+
+    Raises:
+        ConfigError: the folder cannot be made, is in use, or holds another campaign's trials.
+    """
+
+    def __init__(self, folder: Path, manifest: Manifest) -> None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._lock = (folder / ".lock").open("wb")
+        except OSError as error:
+            raise ConfigError(f"--out {folder}", error.strerror or str(error),
+                              "a folder that can be made") from None  # fmt: skip
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            self._lock.close()
+            raise ConfigError(f"--out {folder}", "a folder in use", "one of no running campaign"
+                              ) from None  # fmt: skip
+        try:
+            kept = read_manifest(folder) if (folder / FILE).is_file() else None
+            self.manifest = manifest if kept is None else kept.merged(manifest, folder)
+            self.rows = read_rows(folder, self.manifest)
+            write_text(folder / FILE, json.dumps(asdict(self.manifest), indent=1) + "\n")
+            _mend(folder / ROWS, self.manifest)
+            self._file = (folder / ROWS).open("a", encoding="utf-8", newline="")
+        except BaseException:
+            self._lock.close()
+            raise
+
+    def append(self, row: Outcome) -> None:
+        """Keep a row; it is on the disk when this returns."""
+        self._file.write(_line(to_cells(row)))
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self.rows.append(row)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._file.close()
+        self._lock.close()
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """What a campaign's folder consists of.
+
+    Raises:
+        ConfigError: it is no campaign's folder, or another version's.
+    """
+    try:
+        body: Mapping[str, Any] = json.loads((folder / FILE).read_text(encoding="utf-8"))
+        return Manifest.from_dict(body)
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        raise ConfigError(
+            str(folder / FILE), str(error) or type(error).__name__, "what a campaign wrote there"
+        ) from None
+
+
+def read_rows(folder: Path, manifest: Manifest) -> list[Outcome]:
+    """The rows that are finished, each once; a torn last line is none.
+
+    Raises:
+        ConfigError: a line is no row, or a trial stands there twice.
+    """
+    path = folder / ROWS
+    try:
+        text = path.read_bytes() if path.exists() else b""
+    except OSError as error:
+        raise ConfigError(str(path), error.strerror or str(error), "a readable file") from None
+    whole = text[: text.rfind(b"\n") + 1].decode("utf-8", errors="replace")
+    found: dict[tuple[object, int], Outcome] = {}
+    for number, cells in enumerate(csv.reader(io.StringIO(whole)), 1):
+        try:
+            if number == 1:
+                if cells != columns([sweep.key for sweep in manifest.sweeps]):
+                    raise ValueError("other columns")
+                continue
+            row = from_cells(cells)
+            if (row.group, row.seed) in found:
+                raise ValueError(f"a second row of {row.group.name}, seed {row.seed}")
+            found[row.group, row.seed] = row
+        except ValueError as error:
+            raise ConfigError(f"{path}, line {number}", str(error), "a row of this campaign",
+                              "edited by hand?") from None  # fmt: skip
+    return list(found.values())
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file that is there whole or not at all."""
+    partial = path.with_name(f"{path.name}.partial")
+    with partial.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    partial.replace(path)
+
+
+def _mend(path: Path, manifest: Manifest) -> None:
+    """Have the file end with a whole line, at least its head."""
+    if path.exists():
+        text = path.read_bytes()
+        os.truncate(path, text.rfind(b"\n") + 1)
+    if not path.exists() or not path.stat().st_size:
+        write_text(path, _line(columns([sweep.key for sweep in manifest.sweeps])))
+
+
+def _line(cells: Sequence[str]) -> str:
+    line = io.StringIO()
+    csv.writer(line, lineterminator="\n").writerow(cells)
+    return line.getvalue()

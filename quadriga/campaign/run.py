@@ -1,0 +1,132 @@
+"""SHELL of `quadriga campaign`: predictors, then trials side by side, then the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import closing
+from importlib import import_module
+from pathlib import Path
+from typing import Final
+
+from rich.console import Console
+
+from quadriga.campaign.bar import Bar
+from quadriga.campaign.job import Job, origin, walk
+from quadriga.campaign.ledger import Ledger, read_manifest, write_text
+from quadriga.campaign.manifest import FILE, GroupEntry, Manifest, SweepEntry
+from quadriga.campaign.outcome import Outcome, to_columns
+from quadriga.campaign.plan import Group, Plan
+from quadriga.campaign.predictors import Fitted, prepared
+from quadriga.warm_up import warm_up
+from quadriga.workers import each_done
+from shared.config import Config
+from shared.config_text import config_sha256, to_toml
+from shared.errors import ConfigError
+
+Walks = Callable[[Sequence[Job], int, str], Generator[tuple[Job, Outcome], None, None]]
+
+CONFIGS: Final = "configs"
+PARQUET: Final = "trials.parquet"
+
+
+def run(
+    plan: Plan, out: Path, *, jobs: int, dask: str | None, typed: str, console: Console
+) -> None:
+    """Walk every trial of a plan that the folder does not hold yet.
+
+    Args:
+        plan: what to walk.
+        out: a new folder, or one of a campaign to go on with.
+        jobs: processes that walk side by side.
+        dask: address of a scheduler whose workers walk; None walks in processes of this machine.
+        typed: the command, for the report.
+        console: for progress.
+
+    Raises:
+        ConfigError: the folder is in use or holds trials that do not belong to these.
+        ProcessError: a worker died, or is not of this version.
+    """
+    walks = each_walk if dask is None else _dask()
+    if (out / FILE).is_file():  # before anything is collected and fitted with other code
+        read_manifest(out).check_versions(origin(), out)
+    warm_up(next(iter(plan.configs.values())), console)
+    fitted = prepared(plan.configs.values(), console)
+    manifest = _manifest(plan, fitted, typed)
+    with Ledger(out, manifest) as ledger:
+        _write_configs(out, plan.configs)
+        done = {(row.group, row.seed) for row in ledger.rows}
+        todo = [
+            Job(group, seed, plan.configs[group], fitted[plan.configs[group]], manifest.versions)
+            for group, seed in plan.trials()
+            if (group, seed) not in done
+        ]
+        wanted = len(plan.seeds) * len(plan.configs)
+        if todo:
+            with (
+                Bar(console, wanted, wanted - len(todo)) as bar,
+                closing(walks(todo, min(jobs, len(todo)), dask or "")) as found,
+            ):
+                for _, row in found:
+                    ledger.append(row)
+                    bar.advance(row)
+        write_parquet(out / PARQUET, ledger.rows, ledger.manifest)
+
+
+def each_walk(
+    todo: Sequence[Job], jobs: int, _address: str
+) -> Generator[tuple[Job, Outcome], None, None]:
+    """Jobs with their outcomes, walked in processes of this machine."""
+    return each_done(walk, todo, jobs)
+
+
+def write_parquet(path: Path, rows: Sequence[Outcome], manifest: Manifest) -> None:
+    """The rows as Parquet too, where pyarrow is installed; sorted, so that equal rows are equal."""
+    try:
+        arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
+    except ImportError:
+        return
+    ordered = sorted(rows, key=lambda row: (row.group, row.seed))
+    table = arrow.table(to_columns(ordered, [sweep.key for sweep in manifest.sweeps]))
+    partial = path.with_name(f"{path.name}.partial")
+    parquet.write_table(table, partial, compression="zstd")
+    partial.replace(path)
+
+
+def config_file(folder: Path, group: Group) -> Path:
+    """The whole configuration of a group; `--seed` makes it that of a trial."""
+    return folder / CONFIGS / f"{group.name}.toml"
+
+
+def _write_configs(out: Path, configs: Mapping[Group, Config]) -> None:
+    (out / CONFIGS).mkdir(exist_ok=True)
+    for group, config in configs.items():
+        write_text(config_file(out, group), to_toml(config))
+
+
+def _manifest(plan: Plan, fitted: Mapping[Config, Fitted], typed: str) -> Manifest:
+    return Manifest(
+        typed=(typed,),
+        baseline=plan.baseline,
+        variants={variant.name: dict(variant.keys) for variant in plan.variants},
+        sweeps=tuple(SweepEntry(sweep.key, sweep.name) for sweep in plan.sweeps),
+        groups=tuple(
+            GroupEntry(
+                group.scenario, group.variant, group.swept, config_sha256(config),
+                fitted[config].sha256, tuple(sorted(plan.seeds)),
+            )
+            for group, config in plan.configs.items()
+        ),
+        versions=origin(),
+    )  # fmt: skip
+
+
+def _dask() -> Walks:
+    try:
+        module = import_module("quadriga.campaign.dask_workers")
+    except ModuleNotFoundError as error:
+        raise ConfigError(
+            "--dask", f"no package {error.name!r}", "the extra 'campaign'",
+            "pip install 'quadriga[campaign]', or leave --dask out",
+        ) from None  # fmt: skip
+    found: Walks = module.each_done
+    return found
