@@ -252,3 +252,31 @@ def test_without_truth_a_fall_is_told_by_the_robot_and_no_figure_is_made_up(
     assert "without truth" in text
     assert "yoke drift" not in text
     assert "RMSE" not in text
+
+
+def test_what_came_late_in_real_time(write_run: WriteRun) -> None:
+    ages = {"r1.command.median": 0.0, "r1.command.p99": 2.0, "r1.command.max": 5.0}
+    ages |= {"jitter.median": 0.02, "jitter.p99": 0.2, "jitter.max": 3.0}
+    counters = {"ticks": 6000, "overruns": 4, "r1.late": 300, "r1.held": 7, "r2.late": 0}
+    nothing = np.zeros(0)
+    told = msg.Status(6000, 0, "realtime", "", "", ages, counters, nothing, nothing)
+    own = msg.Status(
+        6001, 0, "walk", "", "kalman", {"jitter.max": 1.5}, {"deadlines_missed": 9}, nothing,
+        nothing,
+    )  # fmt: skip
+    run = write_run(run_config(), extra=[("team/sim/status", told), ("team/r1/status", own)])
+    summary = summarise(run)
+    late = summary["realtime"]
+    assert late["world"]["overruns"] == 4
+    assert late["world"]["jitter_ms"] == {"median": 0.02, "p99": 0.2, "max": 3.0}
+    assert late["r1"]["late_share"] == pytest.approx(0.05)
+    assert (late["r1"]["held"], late["r1"]["damped"]) == (7, 0)
+    assert late["r1"]["command_age_ms"] == {"median": 0.0, "p99": 2.0, "max": 5.0}
+    assert late["r1"]["deadlines_missed"] == 9
+    assert late["r1"]["jitter_ms"] == {"max": 1.5}
+    assert late["r2"]["late"] == 0
+    assert "5.0 % of commands, 7 held, 0 damped" in table(summary)
+
+
+def test_in_lock_step_nothing_is_late(known_run: Path) -> None:
+    assert summarise(known_run)["realtime"] is None
