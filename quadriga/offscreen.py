@@ -62,6 +62,8 @@ def frames(poses: Poses, quality: tuple[int, int]) -> Iterator[Image.Image]:
             team.physics.light_xpos[0, :2] = centre[:2]
             camera.lookat[:] = [*centre[:2], 0.15]
             renderer.update_scene(team.physics, camera)
+            if team.team.terrain.pebbles is not None:
+                team.team.terrain.pebbles.draw(renderer.scene, centre, 1.5 * camera.distance)
             _add_forces(renderer.scene, team.feet(), grf)
             yield Image.fromarray(renderer.render())
     finally:
