@@ -15,7 +15,7 @@ from shared.robot import FOOT_RADIUS, Array
 from sim_server.pebbles import SIZES, Pebbles
 
 PERIOD: Final = 4  # ms between two looks
-_MARGIN: Final = 0.015  # m around foot and stone: what a foot covers until the next look, and more
+_MARGIN: Final = 0.01  # m around foot and stone: what a foot covers until the next look, and more
 _LOW: Final = 0.03  # m from the top of the largest stone to a foot that comes near
 _LEAVE: Final = 0.02  # m farther away than where it woke, a stone may fall asleep
 _STILL: Final = (0.02, 1.0)  # m/s, rad/s

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.robot import N_LEGS, Array
-from sim_server.course import Course
+from sim_server.course import Course, Rectangle
 
-SIZES: Final = (0.4, 0.6, 0.8, 1.0)  # of the largest
-_AXES: Final = (1.5, 1.2, 1.0)  # half axes of a stone over half its height: flat, hardly rolling
-_CELL: Final = 2.4  # half lengths of the largest stone; one stone per square of this size
+SIZES: Final = (0.5, 0.67, 0.83, 1.0)  # of the largest
+_AXES: Final = (1.3, 1.1, 1.0)  # half axes of a stone over half its height
+_CELL: Final = 2.1  # half lengths of the largest stone; one stone per square of this size
 _DENSITY: Final = 2600.0  # kg/m³
 _ROLLING: Final = 0.004  # m, rolling friction: a real stone has edges
-_PER_LEG: Final = 8  # stones that can move, of all sizes
+_PER_LEG: Final = 9  # stones that can move, of all sizes
 # Hard: a light stone between foot and ground must not be pressed into either.
 _SOLREF: Final = (0.004, 1.0)  # s, damping ratio
 _SOLIMP: Final = (0.99, 0.999, 0.001, 0.5, 2.0)
@@ -73,8 +73,9 @@ class Pebbles:
 
     def draw(self, scene: mujoco.MjvScene, centre: Array, reach: float) -> None:
         """Add the stones around a place to a picture, as they lay at the start."""
-        near = np.abs(self.pose[:, :2] - centre[:2]).max(axis=1) <= reach
-        for k in np.flatnonzero(near)[: scene.maxgeom - scene.ngeom].tolist():
+        away = np.linalg.norm(self.pose[:, :2] - centre[:2], axis=1)
+        nearest = np.argsort(away, kind="stable")[: scene.maxgeom - scene.ngeom]
+        for k in nearest[away[nearest] <= reach].tolist():
             turn = np.zeros(9)
             mujoco.mju_quat2Mat(turn, self.pose[k, 3:])
             mujoco.mjv_initGeom(
@@ -94,14 +95,14 @@ def build_pebbles(course: Course, height: float, random: np.random.Generator) ->
         random: the terrain's random stream.
     """
     half = 0.5 * height * np.outer(SIZES, _AXES)
-    extent, cell, longest = course.extent, _CELL * float(half.max()), float(half.max())
-    x, y = np.meshgrid(
-        np.arange(extent.x_low, extent.x_high, cell), np.arange(extent.y_low, extent.y_high, cell)
-    )
-    centre = np.stack([x.ravel(), y.ravel()], axis=1) + 0.5 * cell
-    free = 0.5 * cell - longest
+    longest = float(half.max())
+    centre = _lattice(course.extent, _CELL * longest, random)
+    free = (0.5 * _CELL - 1.0) * longest
     size = random.integers(len(SIZES), size=len(centre))
-    centre += random.uniform(-1.0, 1.0, centre.shape) * (free + longest - half[size, :1])
+    # In its square; what a stone is smaller than the largest, it may lie farther off the middle.
+    turn, away = random.uniform(0.0, 2.0 * np.pi, len(centre)), random.uniform(size=len(centre))
+    away *= free + longest - half[size, 0]
+    centre += np.stack([away * np.cos(turn), away * np.sin(turn)], axis=1)
     yaw = random.uniform(0.0, np.pi, len(centre))
     keep = -course.flat.depth(centre[:, 0], centre[:, 1]) > longest
     keep &= course.needs(centre[:, 0], centre[:, 1])
@@ -109,3 +110,19 @@ def build_pebbles(course: Course, height: float, random: np.random.Generator) ->
     pose[:, :2], pose[:, 2] = centre, half[size, 2]
     pose[:, 3], pose[:, 6] = np.cos(yaw / 2.0), np.sin(yaw / 2.0)
     return Pebbles(pose=pose[keep], size=size[keep], half=half)
+
+
+def _lattice(extent: Rectangle, cell: float, random: np.random.Generator) -> Array:
+    """Middles of squares that fill a rectangle. Shape (s, 2), m, world.
+
+    The rows are turned and shifted against each other by chance, so that nobody walks along them.
+    """
+    (x_low, x_high), (y_low, y_high) = extent.sides
+    reach = 0.5 * float(np.hypot(x_high - x_low, y_high - y_low))
+    u, v = np.meshgrid(np.arange(-reach, reach, cell), np.arange(-reach, reach, cell))
+    u = u + random.uniform(0.0, cell, (len(u), 1))
+    heading = random.uniform(0.0, np.pi)
+    x = 0.5 * (x_low + x_high) + (u * np.cos(heading) - v * np.sin(heading)).ravel()
+    y = 0.5 * (y_low + y_high) + (u * np.sin(heading) + v * np.cos(heading)).ravel()
+    inside = extent.depth(x, y) > 0.0
+    return np.stack([x[inside], y[inside]], axis=1)
