@@ -1,5 +1,6 @@
 import math
 from collections import Counter
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,7 +54,7 @@ def test_any_text_is_parsed_or_refused(text: str) -> None:
     assert len(pushes) == (text.count(",") + 1 if text else 0)
 
 
-def series(seed: int = 0, **world: float) -> tuple[Push, ...]:
+def series(seed: int = 0, **world: Any) -> tuple[Push, ...]:
     config = configured(3, **{"push_force": 80.0, "seconds": 20.0} | world)
     return push_series(config, np.random.default_rng(seed))
 
