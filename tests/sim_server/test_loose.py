@@ -122,3 +122,18 @@ def test_equal_seeds_give_equal_stones_and_bytes() -> None:
 
     assert walked(3) == walked(3)
     assert walked(3)[0] != walked(4)[0]
+
+
+@pytest.mark.parametrize("room", [5000, 40])
+def test_the_stones_around_a_place_are_drawn_the_nearest_first(room: int) -> None:
+    pebbles, model = parts(strewn())[0], strewn().team.model
+    scene = mujoco.MjvScene(model, maxgeom=room)
+    centre = np.array([2.0, 0.1, 0.3])
+    pebbles.draw(scene, centre, 0.5)
+    away = np.sort(np.linalg.norm(pebbles.pose[:, :2] - centre[:2], axis=1))
+    count = min(room, int((away <= 0.5).sum()))
+    drawn = np.array([scene.geoms[i].pos for i in range(scene.ngeom)])
+    assert len(drawn) == count > 10
+    np.testing.assert_allclose(
+        np.linalg.norm(drawn[:, :2] - centre[:2], axis=1), away[:count], atol=1e-6
+    )
