@@ -28,21 +28,22 @@ class LooseStones:
     Attributes:
         pose: of every stone, as of when it last lay still, shape (s, 7), m, world.
         stone_of: the stone that each body is lent to, −1 for none, shape (p,).
-        without: how often a stone near a foot found no body.
+        without: how often a stone near a foot found no body. It then is not there for that foot:
+            to appear inside a foot would throw it away.
     """
 
     def __init__(self, pebbles: Pebbles, model: Any, physics: Any, robots: int) -> None:
         """Take over the bodies that `Pebbles.add_to` has added last."""
         self._parked = pebbles.parked(robots)
         count = len(self._parked)
-        self._model, self._physics = model, physics
         self._q = physics.qpos[-7 * count :].reshape(count, 7)
         self._v = physics.qvel[-6 * count :].reshape(count, 6)
         self._warm = physics.qacc_warmstart[-6 * count :].reshape(count, 6)
         self._weightless = model.body_gravcomp[-count:]
         self._size, self._of_size = pebbles.size, np.arange(count) * len(SIZES) // count
-        self._near = FOOT_RADIUS + pebbles.reach + _MARGIN
-        self._low = 2.0 * float(pebbles.half[:, 2].max()) + FOOT_RADIUS + _LOW
+        self._touching = FOOT_RADIUS + pebbles.reach
+        self._near = self._touching + _MARGIN
+        self._on_top = 2.0 * float(pebbles.half[:, 2].max()) + FOOT_RADIUS
         self.pose = pebbles.pose.copy()
         self.stone_of = np.full(count, _NOBODY)
         self.without = 0
@@ -58,8 +59,8 @@ class LooseStones:
         Args:
             feet: centres of all feet, shape (f, 3), m, world.
         """
-        low = feet[feet[:, 2] < self._low, :2]
-        self._put_to_rest(low)
+        low = feet[feet[:, 2] < self._on_top + _LOW]
+        self._put_to_rest(low[:, :2])
         for stone in self._asleep_near(low):
             self._wake(stone)
 
@@ -67,15 +68,18 @@ class LooseStones:
         return int(place[0] // self._near), int(place[1] // self._near)
 
     def _asleep_near(self, feet: Array) -> list[int]:
-        """Stones without a body that a foot is near to, in order."""
+        """Stones without a body that a foot is near to and cannot be inside of, in order."""
         found: set[int] = set()
-        for x, y in feet.tolist():
+        for x, y, z in feet.tolist():
             i, j = self._cell(np.array((x, y)))
             around = [s for a in (-1, 0, 1) for b in (-1, 0, 1)
                       for s in self._cells.get((i + a, j + b), ())]  # fmt: skip
             if around:
                 places = self.pose[around, :2]
-                close = (places[:, 0] - x) ** 2 + (places[:, 1] - y) ** 2 < self._near**2
+                square = (places[:, 0] - x) ** 2 + (places[:, 1] - y) ** 2
+                close = square < self._near**2
+                if z < self._on_top:
+                    close &= square > self._touching**2
                 found.update(np.array(around)[close].tolist())
         return sorted(found)
 

@@ -62,9 +62,7 @@ def _parse(
     if len(fields) != 3:
         raise ConfigError(_KEY, repr(part), _GRAMMAR)
     robots = [i for i, name in enumerate(names) if fields[0] in (name, _ANY)]
-    joints = [
-        i for i, name in enumerate(_JOINTS) if fields[1] in (name, *name.split("_"), _ANY)
-    ]  # fmt: skip
+    joints = [i for i, name in enumerate(_JOINTS) if fields[1] in (name, *name.split("_"), _ANY)]
     if not robots:
         raise ConfigError(_KEY, f"robot {fields[0]!r}", f"'any' or one of {', '.join(names)}")
     if not joints:

@@ -17,7 +17,7 @@ _AXES: Final = (1.3, 1.1, 1.0)  # half axes of a stone over half its height
 _CELL: Final = 2.1  # half lengths of the largest stone; one stone per square of this size
 _DENSITY: Final = 2600.0  # kg/m³
 _ROLLING: Final = 0.004  # m, rolling friction: a real stone has edges
-_PER_LEG: Final = 9  # stones that can move, of all sizes
+_PER_LEG: Final = 10  # stones that can move, of all sizes
 # Hard: a light stone between foot and ground must not be pressed into either.
 _SOLREF: Final = (0.004, 1.0)  # s, damping ratio
 _SOLIMP: Final = (0.99, 0.999, 0.001, 0.5, 2.0)
