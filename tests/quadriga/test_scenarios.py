@@ -13,11 +13,14 @@ from quadriga.cache import predictor_key
 from quadriga.cli import main
 from quadriga.operator import reference_at
 from quadriga.scenarios import description, label, names, path
+from quadriga.summary import summarise
 from shared.codec import encode
 from shared.config import Config
 from shared.config_file import build, layers, load
 from shared.errors import ConfigError
+from shared.recording import Recording
 from sim_server.world import World
+from tests.quadriga.conftest import WriteRun, run_config
 from tests.sim_server.standing import SILENT
 
 PROMISED = {
@@ -124,3 +127,14 @@ def test_the_list_says_what_each_is(capsys: pytest.CaptureFixture[str]) -> None:
     for name in PROMISED:
         assert f"{name} " in out
     assert "60 %" in " ".join(out.split())
+
+
+def test_a_walk_is_labelled_with_its_scenario(
+    write_run: WriteRun, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = run_config(2, 0.5)
+    folder = write_run(replace(config, world=replace(config.world, scenario="turn")))
+    assert Recording(folder / "run.mcap").metadata["scenario"] == "turn"
+    assert summarise(folder)["scenario"] == "turn"
+    assert run(capsys, "info", str(folder / "run.mcap"))[0] == 0
+    assert run(capsys, "report", str(folder / "run.mcap"))[1].count("robots, turn, seed") == 1
