@@ -40,7 +40,7 @@ _CODE = (
     ),
     (
         sim_server,
-        ("team_model.py", "a1_body.py", "sensors.py", "world.py", "scenario.py", "terrain.py"),
+        ("team_model.py", "a1_body.py", "sensors.py", "world.py", "terrain.py"),
     ),
     (quadriga, ("collect.py", "rollout.py")),
 )
@@ -75,7 +75,7 @@ def data_key(config: Config) -> str:
         del ident[fitted]
     parts: dict[str, Any] = {
         "robots": config.team.robots, "yokes": config.team.yokes, "spacing": config.team.spacing,
-        "alternate_phase": config.team.alternate_phase, "friction": config.world.friction,
+        "alternate_phase": config.team.alternate_phase,
         "sensors": asdict(config.sensors), "estimator": asdict(config.estimator),
         "gait": asdict(config.gait), "controller": asdict(config.controller),
         "height": config.reference.height, "interface": config.planner.interface,

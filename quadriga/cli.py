@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from quadriga import recording_cli, verbs
 from quadriga.campaign.options import add_campaign
+from quadriga.scenarios import LABEL, label, path
 from shared.config import Config
 from shared.config_file import build, layers, parse_assignment
 from shared.errors import ProcessError, QuadrigaError
@@ -60,7 +61,8 @@ def parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
     top = argparse.ArgumentParser(
         prog="quadriga", description="A team of yoked quadrupeds that walk as one.",
-        epilog="Every command reads one configuration: defaults, then --config, then options.",
+        epilog="Every command reads one configuration: defaults, then --scenario, then --config, "
+               "then options.",
     )  # fmt: skip
     commands = top.add_subparsers(metavar="command", required=True)
     shared_options = _config_options()
@@ -75,6 +77,7 @@ def parser() -> argparse.ArgumentParser:
     walk = add("walk", verbs.walk, "start all processes, walk, and show what came of it")
     walk.add_argument("--out", type=Path, metavar="DIR", help="run folder (runs/<date>-<time>)")
     walk.add_argument("--no-render", action="store_true", help="no pictures of the walk")
+    add("scenarios", verbs.scenarios, "list the scenarios that can be walked, and what they are")
     add("sim", verbs.sim, "the sim server alone")
     agent = add("agent", verbs.agent, "the agent of one robot")
     agent.add_argument("--robot", required=True, metavar="NAME", help="r1 … rn")
@@ -183,6 +186,9 @@ def _config_options() -> argparse.ArgumentParser:
     options = argparse.ArgumentParser(add_help=False)
     options.add_argument("--parent", type=int, default=0, help=argparse.SUPPRESS)
     group = options.add_argument_group("configuration")
+    group.add_argument("--scenario", metavar="NAME",
+                       help="start from a scenario's keys; see `quadriga scenarios`; --config and "
+                            "all other options win over it; a TOML file will do, too")  # fmt: skip
     group.add_argument("--config", type=Path, metavar="FILE", help="TOML; see `quadriga config`")
     group.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE",
                        dest="assignments", help="set any key; may be repeated")  # fmt: skip
@@ -206,7 +212,12 @@ def _configuration(arguments: argparse.Namespace) -> tuple[Config, dict[str, Any
         if (value := getattr(arguments, name)) is not None:
             overrides[name] = value
     arguments.overrides = overrides
-    given = layers(arguments.config, overrides)
+    scenario = arguments.scenario
+    if scenario is None:
+        given = layers(arguments.config, overrides)
+    else:
+        named = {LABEL: label(scenario)} | overrides
+        given = layers(arguments.config, named, beneath=path(scenario))
     return build(given), given
 
 

@@ -18,7 +18,7 @@ from agents.planner.episode import SIGNALS, Episode, output_base
 from agents.planner.hankel import required_samples
 from agents.sampling import SAMPLE_MS
 from quadriga.rollout import Rollout
-from shared.config import Config
+from shared.config import Config, WorldConfig
 from shared.errors import PredictorError
 from shared.messages import Reference
 from shared.robot import N_FORCES, Array, robot_names
@@ -56,9 +56,12 @@ def training_seconds(config: Config) -> float:
 
 
 def collection_config(config: Config, seed: int) -> Config:
-    """The same team on flat, empty ground, without a planner."""
-    world = replace(config.world, terrain="flat", payload=0.0, push="", seed=seed, mode="lockstep")
-    return replace(config, world=world, planner=replace(config.planner, kind="none"))
+    """The same team on flat, empty ground as it is by default, without a planner.
+
+    So what is learnt does not depend on the world that is walked in later, which nobody knows.
+    """
+    planner = replace(config.planner, kind="none")
+    return replace(config, world=WorldConfig(seed=seed), planner=planner)
 
 
 def collect(config: Config, jobs: int, progress: Progress) -> Dataset:

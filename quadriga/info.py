@@ -50,7 +50,8 @@ def _about(s: Survey) -> Iterator[tuple[str, str]]:
     if s.config is not None:
         c = s.config
         robots = "1 robot" if c.team.robots == 1 else f"{c.team.robots} robots"
-        yield "team", f"{c.team.name}, {robots}, {c.world.mode}, {c.world.terrain}, " \
+        yield "team", f"{c.team.name}, {robots}, {c.world.mode}, " \
+            f"{c.world.scenario or c.world.terrain}, " \
             f"seed {c.world.seed}"  # fmt: skip
         yield "planner", c.planner.kind
     yield "falls", ", ".join(e.robot for e in s.events if e.kind == "fall") or "none"

@@ -26,6 +26,8 @@ _ELEVATION: Final = -24.0  # deg
 _FORCE_SCALE: Final = 0.005  # m per N
 _FORCE_RADIUS: Final = 0.008  # m
 _FORCE_RGBA: Final = np.array([0.95, 0.75, 0.1, 0.9], dtype=np.float32)
+_STREWN: Final = 0.3  # m around the team in which loose stones are drawn
+_COARSE: Final = (10, 6)  # facets around and along a round body
 # Shadow map [texels] and samples per pixel: what a frame's time goes into.
 _SHEET_QUALITY: Final = (1024, 4)
 _CLIP_QUALITY: Final = (512, 0)
@@ -51,6 +53,9 @@ def frames(poses: Poses, quality: tuple[int, int]) -> Iterator[Image.Image]:
     """One picture of the team for each pose, the camera moving along."""
     team = PosedTeam(poses.config)
     team.model.vis.quality.shadowsize, team.model.vis.quality.offsamples = quality
+    pebbles = team.team.terrain.pebbles
+    if pebbles is not None:  # thousands of them
+        team.model.vis.quality.numslices, team.model.vis.quality.numstacks = _COARSE
     _light(team.model, 3.0 + 2.0 * poses.radius())
     camera = mujoco.MjvCamera()
     camera.azimuth, camera.elevation = _AZIMUTH, _ELEVATION
@@ -62,6 +67,8 @@ def frames(poses: Poses, quality: tuple[int, int]) -> Iterator[Image.Image]:
             team.physics.light_xpos[0, :2] = centre[:2]
             camera.lookat[:] = [*centre[:2], 0.15]
             renderer.update_scene(team.physics, camera)
+            if pebbles is not None:
+                pebbles.draw(renderer.scene, centre, poses.radius() + _STREWN)
             _add_forces(renderer.scene, team.feet(), grf)
             yield Image.fromarray(renderer.render())
     finally:

@@ -15,6 +15,7 @@ from shared.messages import EStop, Event, Reference, Truth
 from shared.robot import robot_names
 from shared.signals import stop_on_signals
 from shared.topics import ESTOP, EVENT, REFERENCE, TRUTH
+from shared.trace import trace_of
 
 EPOCH_MS: Final = 100  # a reference is published for every epoch
 _AHEAD: Final = 4  # epochs; agents in lock-step wait for the one in force
@@ -22,14 +23,22 @@ _ESTOP_WAIT: Final = 5.0  # s, longest search for the team
 
 
 def reference_at(config: Config, tick: int) -> Reference:
-    """The reference for `tick`: nothing while the team stands, then a linear ramp to full speed."""
-    asked = config.reference
+    """The reference for `tick`: nothing while the team stands, then a linear ramp to full speed.
+
+    Full speed is the configured one, or what the configured trace asks for at that time.
+
+    Raises:
+        ConfigError: the trace cannot be read, or is none.
+    """
+    asked, trace = config.reference, trace_of(config)
     walked = tick - config.gait.stand_ms
     ramp_ms = 1000 * asked.ramp
     factor = min(1.0, max(0, walked) / ramp_ms) if ramp_ms else float(walked >= 0)
+    vx, vy, wz = asked.vx, asked.vy, asked.wz
+    if trace is not None:
+        vx, vy, wz = trace.at(1e-3 * max(0, walked))
     return Reference(
-        tick, tick * 1_000_000, factor * asked.vx, factor * asked.vy, factor * asked.wz,
-        asked.height,
+        tick, tick * 1_000_000, factor * vx, factor * vy, factor * wz, asked.height
     )  # fmt: skip
 
 

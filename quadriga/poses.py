@@ -117,8 +117,8 @@ class PosedTeam:
         self.names = robot_names(config.team.robots)
 
     def set(self, qpos: Array) -> None:
-        """Put all bodies where positions (19 n,) have them."""
-        self.physics.qpos[:] = qpos
+        """Put all bodies where positions (19 n,) have them; loose stones have none recorded."""
+        self.physics.qpos[: len(qpos)] = qpos
         mujoco.mj_forward(self.model, self.physics)
 
     def feet(self) -> Array:

@@ -104,6 +104,7 @@ def metadata(config: Config, predictor_sha256: str) -> dict[str, str]:
     """What a recording says of itself; `Recording.metadata` hands it back."""
     return {
         "team": config.team.name,
+        "scenario": config.world.scenario,
         "config_json": json.dumps(asdict(config), sort_keys=True),
         "config_sha256": config_sha256(config),
         "predictor_sha256": predictor_sha256,

@@ -18,6 +18,7 @@ from shared.messages import Command, Event, Message
 from shared.recording import Entry, Recording
 from shared.topics import COMMAND, EVENT, STATE, TRUTH, topic_of
 from sim_server.lockstep import ANSWERS
+from sim_server.motors import WEAKENED
 from sim_server.world import World
 
 _NAMES: Final = frozenset(topic.name for topic in (STATE, COMMAND, TRUTH, EVENT))
@@ -121,7 +122,7 @@ class _Silent:
 
     def hear(self, entries: Iterable[Entry]) -> None:
         for event in _valid(self._key, entries):
-            if event.kind != "fault" or not event.robot:
+            if event.kind != "fault" or not event.robot or event.detail.endswith(WEAKENED):
                 continue
             if event.detail.endswith(ANSWERS):
                 self.robots.discard(event.robot)

@@ -61,6 +61,7 @@ def summary_of(traces: Traces) -> dict[str, Any]:
         "robots": config.team.robots,
         "seed": config.world.seed,
         "mode": config.world.mode,
+        "scenario": config.world.scenario,
         "terrain": config.world.terrain,
         "planner": config.planner.kind,
         "estimator": config.estimator.kind,
@@ -77,7 +78,7 @@ def steady_from(traces: Traces) -> int:
     target = [config.reference.vx, config.reference.vy, config.reference.wz]
     full = starts[np.abs(values[:, :3] - target).max(axis=1, initial=0.0) < 1e-6]
     ramp_end = config.gait.stand_ms + round(1000 * config.reference.ramp)
-    begin = int(full[0]) if len(full) else ramp_end
+    begin = int(full[0]) if len(full) and not config.reference.trace else ramp_end
     return max(begin, config.gait.stand_ms) + SETTLING_MS
 
 

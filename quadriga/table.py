@@ -37,7 +37,8 @@ def _is_bad(name: str, text: str) -> bool:
 def _title(summary: dict[str, Any]) -> str:
     robots = summary["robots"]
     team = f"{robots} yoked robots" if robots > 1 else "1 robot"
-    return f"{team}, {summary['terrain']}, seed {summary['seed']}, {summary['mode']}"
+    where = summary["scenario"] or summary["terrain"]
+    return f"{team}, {where}, seed {summary['seed']}, {summary['mode']}"
 
 
 def rows(s: Mapping[str, Any]) -> list[tuple[str, str]]:

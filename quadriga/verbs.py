@@ -30,6 +30,21 @@ def walk(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     return walk(config, arguments.out, pictures=not arguments.no_render, console=Console())
 
 
+def scenarios(_arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
+    """The scenarios and what they are."""
+    from rich.table import Table
+
+    from quadriga.scenarios import description, names
+
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    table.add_column(no_wrap=True, style="bold")
+    table.add_column()
+    for name in names():
+        table.add_row(name, description(name))
+    Console().print(table)
+    return 0
+
+
 def sim(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """The sim server's process."""
     from sim_server.process import run

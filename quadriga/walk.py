@@ -17,9 +17,10 @@ from quadriga.run_folder import make_run_dir, report, went_wrong
 from quadriga.warm_up import warm_up
 from shared.config import Config
 from shared.config_text import to_toml
-from shared.robot import robot_names
 from shared.signals import stop_flag
-from sim_server.scenario import parse_pushes
+from shared.trace import trace_of
+from sim_server.load import loads
+from sim_server.scenario import build_scenario
 
 OK: Final = 0
 FELL: Final = 1
@@ -39,7 +40,8 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
         ProcessError: a process failed or left too early, or the walk did not come to its end.
         QuadrigaError: anything a user can put right before the walk begins.
     """
-    parse_pushes(config.world.push, robot_names(config.team.robots))
+    build_scenario(config, loads(config))
+    trace_of(config)
     run_dir = make_run_dir(out)
     warm_up(config, console)
     predictor, sha256 = None, ""

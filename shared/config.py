@@ -64,20 +64,59 @@ class WorldConfig:
     )  # fmt: skip
     seed: int = key(0, "-", "seed of terrain, noise and everything else random", low=0, high=2**31)
     seconds: float = key(20.0, "s", "world time to walk", low=0.5, high=3600.0)
+    scenario: str = key("", "-", "name of the scenario these keys come from: a label only")
+    scatter: float = key(
+        0.0, "m", "how far a robot may start off its place along x and y, drawn from the seed",
+        low=0.0, high=0.1,
+    )  # fmt: skip
     terrain: str = key(
-        "flat", "-", "what is under the feet", choices=("flat", "boxes", "gravel", "heightfield")
-    )
-    terrain_height: float = key(0.05, "m", "greatest height of the terrain", low=0.0, high=0.3)
+        "flat", "-",
+        "what is under the feet; gravel: stones that lie fixed; pebbles: a layer of stones that "
+        "lie loose; slope: ramps up and down",
+        choices=("flat", "boxes", "gravel", "heightfield", "pebbles", "slope"),
+    )  # fmt: skip
+    terrain_height: float = key(
+        0.05, "m", "greatest height of the terrain; of pebbles: height of the largest",
+        low=0.0, high=0.3,
+    )  # fmt: skip
+    slope: float = key(8.0, "deg", "terrain slope: grade of the ramps", low=0.5, high=25.0)
     friction: float = key(0.8, "1", "friction coefficient of feet on ground", low=0.05, high=2.0)
     payload: float = key(0.0, "kg", "load unknown to the agents", low=0.0, high=60.0)
     payload_on: str = key(
-        "team", "-", "'team' shares the load equally, or one robot's name carries it all"
-    )
+        "team", "-",
+        "who carries the load: 'team' (equal shares), or names separated by commas, each with a "
+        "share if they are not equal: 'r1:6,r3:4'",
+    )  # fmt: skip
+    payload_scatter: float = key(
+        0.0, "m",
+        "how far a load may lie off the trunk's centre along x and y, drawn from the seed",
+        low=0.0, high=0.15,
+    )  # fmt: skip
     push: str = key(
         "", "-",
         "pushes 'robot:force[N]:direction[deg]:start[s]:duration[s]' separated by commas; "
         "robot may be 'all'; direction 0 is forward, 90 is left",
     )  # fmt: skip
+    push_force: float = key(
+        0.0, "N",
+        "a series of sideways pushes on the robots in turn; side, exact times and who is first "
+        "are drawn from the seed; 0: none",
+        low=0.0, high=5000.0,
+    )  # fmt: skip
+    push_spread: float = key(
+        0.0, "1", "share of push_force by which a push may be weaker or stronger, drawn",
+        low=0.0, high=1.0,
+    )  # fmt: skip
+    push_every: float = key(3.0, "s", "from push to push, and until the first", low=0.1, high=600.0)
+    push_duration: float = key(0.2, "s", "of each push of the series", low=1e-3, high=10.0)
+    weak_motor: str = key(
+        "", "-",
+        "motors that weaken: 'robot:joint:start[s]' separated by commas; joint as FL_calf, calf or "
+        "FL, either may be 'any', and what is left open is drawn from the seed",
+    )  # fmt: skip
+    weak_share: float = key(
+        0.6, "1", "share of its torque that a weak motor still gives", low=0.0, high=1.0
+    )
     command_timeout: float = key(
         10.0,
         "s wall",
@@ -332,6 +371,15 @@ class ReferenceConfig:
     wz: float = key(0.0, "rad/s", "yaw rate", low=-1.0, high=1.0)
     height: float = key(0.26, "m", "trunk height above the ground", low=0.2, high=0.32)
     ramp: float = key(1.0, "s", "time from standing to full speed", low=0.0, high=20.0)
+    trace: str = key(
+        "", "-",
+        "CSV with columns t [s], vx, vy, wz that replaces these three, over and over: a path with "
+        "a '/', or the name of a file beside the scenarios",
+    )  # fmt: skip
+    trace_shift: float = key(
+        0.0, "s", "the trace begins at a time from 0 to this, drawn from world.seed",
+        low=0.0, high=3600.0,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from shared.config import Config
 from shared.errors import ConfigError
+from shared.payload import carriers
 from shared.presets import CONTROLLER
 from shared.robot import robot_names
 
@@ -36,13 +37,18 @@ def load(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -
     return build(layers(path, overrides or {}))
 
 
-def layers(path: Path | None, overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """What is given explicitly, by section and key: the file, then `overrides` on top.
+def layers(
+    path: Path | None, overrides: Mapping[str, Any], beneath: Path | None = None
+) -> dict[str, Any]:
+    """What is given explicitly, by section and key: `beneath`, the file, then `overrides` on top.
 
     Raises:
-        ConfigError: the file cannot be read or parsed, or an override names no key.
+        ConfigError: a file cannot be read or parsed, or an override names no key.
     """
-    return overlaid(read_toml(path) if path else {}, overrides)
+    given = read_toml(beneath) if beneath else {}
+    if path:
+        given = overlaid(given, flattened(read_toml(path))) if given else read_toml(path)
+    return overlaid(given, overrides)
 
 
 def overlaid(given: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
@@ -199,10 +205,7 @@ def _check_together(config: Config) -> None:
             raise ConfigError(f"gait.{name}", str(value), f"a multiple of {_SAMPLE_MS} ms",
                               "the planner's samples")  # fmt: skip
     names = robot_names(config.team.robots)
-    if config.world.payload_on not in ("team", *names):
-        raise ConfigError(
-            "world.payload_on", repr(config.world.payload_on), f"team or one of {', '.join(names)}"
-        )
+    carriers(config.world.payload_on, names)
     for push in filter(None, config.world.push.split(",")):
         robot = push.partition(":")[0].strip()
         if robot not in ("all", *names):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from shared.config import Config
 from shared.robot import Array
+from shared.trace import trace_of
 
 _HALF_BODY: Final = (0.25, 0.2)  # m, trunk origin to the farthest foot, along x and y
 _FLAT_MARGIN: Final = 0.4  # m, flat ground around the feet of the spawned team …
@@ -30,6 +31,11 @@ class Rectangle:
     x_high: float
     y_low: float
     y_high: float
+
+    @property
+    def sides(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Its limits along x and along y, m."""
+        return (self.x_low, self.x_high), (self.y_low, self.y_high)
 
     def depth(self, x: Array, y: Array) -> Array:
         """Distance to the border, positive inside and negative outside, m."""
@@ -51,8 +57,11 @@ class Course:
     def rise(self, x: Array, y: Array) -> Array:
         """Factor in [0, 1] by which a height field rises smoothly from its borders."""
         into = np.minimum(-self.flat.depth(x, y), self.extent.depth(x, y))
-        s = np.clip(into / _RAMP, 0.0, 1.0)
-        return s * s * (3.0 - 2.0 * s)
+        return _smooth(into / _RAMP)
+
+    def edge(self, x: Array, y: Array) -> Array:
+        """Factor in [0, 1] by which ground that begins by itself ends at its outer borders."""
+        return _smooth(self.extent.depth(x, y) / _RAMP)
 
     def needs(self, x: Array, y: Array) -> NDArray[np.bool_]:
         """Whether points lie within `reach` of the way."""
@@ -60,6 +69,12 @@ class Course:
         for px, py in self.way.tolist():
             square = np.minimum(square, (x - px) ** 2 + (y - py) ** 2)
         return square <= self.reach**2
+
+
+def _smooth(s: Array) -> Array:
+    """From 0 to 1 as s goes from 0 to 1, without an edge."""
+    s = np.clip(s, 0.0, 1.0)
+    return s * s * (3.0 - 2.0 * s)
 
 
 def build_course(config: Config, places: Array) -> Course:
@@ -79,7 +94,7 @@ def build_course(config: Config, places: Array) -> Course:
     )
     way = (low + high) / 2.0 + _way(config)
     # A team that turns sweeps a circle; one that walks straight, the width of its formation.
-    turning = config.reference.wz != 0.0
+    turning = config.reference.wz != 0.0 or bool(config.reference.trace)
     half = (high - low) / 2.0
     half = np.full(2, np.hypot(*half)) if turning else half
     half = half + _BESIDE
@@ -92,15 +107,19 @@ def build_course(config: Config, places: Array) -> Course:
 
 def _way(config: Config) -> Array:
     """Nominal way of the formation's centre from the origin. Shape (m, 2), m."""
-    ref = config.reference
-    speed = math.hypot(ref.vx, ref.vy)
-    seconds = min(config.world.seconds, _LONGEST_WAY / max(speed, 0.1))
-    yaw = ref.wz * np.arange(0.0, seconds, _STEP)
+    ref, trace = config.reference, trace_of(config)
+    longest = _LONGEST_WAY / max(math.hypot(ref.vx, ref.vy), 0.1)
+    times = np.arange(0.0, min(config.world.seconds, longest), _STEP)
+    if trace is None:
+        vx, vy, yaw = ref.vx, ref.vy, ref.wz * times
+    else:
+        vx, vy, wz = np.array([trace.at(t) for t in times.tolist()]).T
+        yaw = np.cumsum(_STEP * wz)
     step = _STEP * np.stack(
-        [ref.vx * np.cos(yaw) - ref.vy * np.sin(yaw), ref.vx * np.sin(yaw) + ref.vy * np.cos(yaw)],
-        axis=1,
+        [vx * np.cos(yaw) - vy * np.sin(yaw), vx * np.sin(yaw) + vy * np.cos(yaw)], axis=1
     )
-    heading = step[-1] / np.linalg.norm(step[-1]) if speed > 0.0 else np.array([1.0, 0.0])
+    speed = float(np.linalg.norm(step[-1]))
+    heading = step[-1] / speed if speed > 0.0 else np.array([1.0, 0.0])
     ahead = np.arange(0.0, _AHEAD, 0.2)[:, None] * heading
     walked = np.cumsum(step, axis=0)
     way: Array = np.concatenate([np.zeros((1, 2)), walked, walked[-1] + ahead])

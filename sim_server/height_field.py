@@ -1,8 +1,10 @@
-"""Ground given by its height over a grid: smooth hills, or gravel of stones that lie fixed."""
+"""Ground given by its height over a grid: hills, ramps, or gravel of stones that lie fixed."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from itertools import product
 from typing import Final
 
 import mujoco
@@ -17,6 +19,12 @@ _BASE: Final = 0.05  # m, thickness below the lowest point
 
 _SMOOTH_CELL: Final = 0.05  # m, grid of the smooth field
 _SMOOTH_LENGTH: Final = 0.35  # m, distance at which its heights' correlation falls to 1/e
+
+_RAMP_CELL: Final = 0.04  # m, grid of the ramps
+_LEAST_CREST: Final = 0.5  # of the highest
+_RAMP_TURN: Final = math.radians(20.0)  # greatest angle between x and the way the ramps face
+_ROUNDED: Final = 0.08  # m, deviation of the filter that takes the edge off each crest
+_FILTER: Final = 3.0  # deviations that it reaches
 
 _GRAVEL_CELL: Final = 0.015  # m, grid of the gravel
 _STONE_CELL: Final = 0.035  # m, one stone per square of this size
@@ -94,6 +102,34 @@ def build_gravel(course: Course, height: float, random: np.random.Generator) -> 
     bed = _hills(x.shape, _BED_LENGTH / _GRAVEL_CELL, random)
     z = (height - stand_out) * bed + stand_out * _stones(course.extent, x, y, random)
     return _field(course, x, y, z, height)
+
+
+def build_ramps(
+    course: Course, height: float, random: np.random.Generator, *, slope: float
+) -> HeightField:
+    """Ramps up and down again, one after the other, as wide as the ground.
+
+    Args:
+        course: where the team starts and walks.
+        height: of the highest crest, m; the others are drawn, down to half of it.
+        random: the terrain's random stream.
+        slope: grade of every ramp, rad.
+    """
+    x, y = _grid(course.extent, _RAMP_CELL)
+    heading = random.uniform(-_RAMP_TURN, _RAMP_TURN)
+    way = np.array([np.cos(heading), np.sin(heading)])
+    corners = np.array(list(product(*course.flat.sides)))
+    along, grade = way[0] * x + way[1] * y, np.tan(slope)
+    profile = np.zeros_like(along)
+    for side in (1.0, -1.0):  # ramps at both ends: a team may walk backwards
+        foot = float((side * corners @ way).max()) + _FILTER * _ROUNDED
+        while foot < float((side * along).max()):
+            crest = _SUNK + height * random.uniform(_LEAST_CREST, 1.0)
+            half = crest / grade
+            profile = np.maximum(profile, crest - grade * np.abs(side * along - foot - half))
+            foot += 2.0 * half
+    z = ndimage.gaussian_filter(profile, _ROUNDED / _RAMP_CELL, mode="nearest", truncate=_FILTER)
+    return HeightField(course.extent, course.edge(x, y) * z - _SUNK)
 
 
 def _stones(extent: Rectangle, x: Array, y: Array, random: np.random.Generator) -> Array:

@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 
 from shared.config import Config
-from shared.errors import ConfigError
 from shared.robot import FOOT_FRAMES, GRAVITY, STAND_HEIGHT, Array, q_stand, robot_names
 from shared.yokes import yoke_pairs
 from sim_server.a1_body import NO_CONTACT, VISUAL_GROUP, A1Body
+from sim_server.load import Load, loads
 from sim_server.terrain import Terrain, build_terrain
 
 TIMESTEP: Final = 1e-3  # s, one tick
@@ -20,6 +20,7 @@ NQ: Final = 19  # positions of one robot: trunk xyz, trunk quaternion wxyz, 12 j
 NV: Final = 18  # velocities: trunk linear (world), trunk angular (trunk frame), 12 joints
 N_SENSORS: Final = 22  # of one robot: gyro (3), specific force (3), touch (4), contact force (4, 3)
 
+_STREAM: Final = 7  # of the seed
 _ANCHOR: Final = (0.0, 0.0, 0.08)  # m, of the yokes' ball joints and of the payload, trunk frame
 _YOKE_SOLREF: Final = (0.02, 1.0)  # s, damping ratio
 _YOKE_SOLIMP: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
@@ -47,8 +48,8 @@ class TeamModel:
         trunks: body id of each trunk, shape (n,).
         yokes: the pairs of robot indices that are yoked.
         rest_length: length of each yoke at the spawn, shape (k,), m.
-        payload: load on each robot, shape (n,), kg.
-        q_spawn: positions at the spawn, shape (19 n,).
+        payload: load on each robot.
+        q_spawn: positions at the spawn, shape (19 n,); loose stones follow after the robots.
     """
 
     model: mujoco.MjModel
@@ -56,7 +57,7 @@ class TeamModel:
     trunks: np.ndarray[tuple[int], np.dtype[np.intp]]
     yokes: tuple[tuple[int, int], ...]
     rest_length: Array
-    payload: Array
+    payload: tuple[Load, ...]
     q_spawn: Array
 
 
@@ -73,31 +74,27 @@ def formation(n: int, spacing: float) -> Array:
     return np.stack([-spacing * (index // 2), spacing * side], axis=1)
 
 
-def payload_shares(config: Config) -> Array:
-    """Load on each robot. Shape (n,), kg.
+def scattered(config: Config) -> Array:
+    """Spawn positions off the formation by up to `world.scatter`. Shape (n, 2), m, world.
 
-    Raises:
-        ConfigError: `world.payload_on` names no robot of the team.
+    Each robot's draw is the same however many others there are.
     """
-    names = robot_names(config.team.robots)
-    payload, carrier = config.world.payload, config.world.payload_on
-    if carrier == "team":
-        return np.full(len(names), payload / len(names))
-    if carrier not in names:
-        raise ConfigError("world.payload_on", repr(carrier), f"'team' or one of {list(names)}")
-    return np.array([payload if name == carrier else 0.0 for name in names])
+    places, reach = formation(config.team.robots, config.team.spacing), config.world.scatter
+    random = np.random.default_rng((config.world.seed, _STREAM))
+    return places + random.uniform(-reach, reach, places.shape)
 
 
 def build_team_model(config: Config) -> TeamModel:
     """Build and compile the world of a configuration; equal configurations give equal models.
 
     Raises:
-        ConfigError: the payload names no robot, or the robot's URDF is missing.
+        ConfigError: the payload names no robot, the reference's trace is no trace, or the robot's
+            URDF is missing.
     """
     names = robot_names(config.team.robots)
-    places = formation(len(names), config.team.spacing)
-    payload = payload_shares(config)
-    terrain = build_terrain(config, places)
+    places, payload = scattered(config), loads(config)
+    # Where it is flat must not depend on where exactly the robots stand.
+    terrain = build_terrain(config, formation(len(names), config.team.spacing))
     spec = mujoco.MjSpec()
     _set_physics(spec)
     _set_visuals(spec)
@@ -109,15 +106,17 @@ def build_team_model(config: Config) -> TeamModel:
         if i == 0:
             _add_sun(trunk)
         trunk.add_site(name=f"{name}/yoke", pos=_ANCHOR, group=4)
-        if payload[i] > 0.0:
-            _add_payload(trunk, f"{name}/payload", float(payload[i]))
+        if payload[i].mass > 0.0:
+            _add_payload(trunk, f"{name}/payload", payload[i])
         _add_sensors(spec, f"{name}/")
     pairs = yoke_pairs(len(names), config.team.yokes)
     for i, j in pairs:
         _add_yoke(spec, names[i], names[j])
+    if terrain.pebbles is not None:
+        terrain.pebbles.add_to(spec, len(names), config.world.friction)
     model = spec.compile()
     q_spawn = model.qpos0.copy()
-    q_spawn.reshape(len(names), NQ)[:, 7:] = q_stand()
+    q_spawn[: len(names) * NQ].reshape(len(names), NQ)[:, 7:] = q_stand()
     return TeamModel(
         model=model,
         terrain=terrain,
@@ -162,12 +161,13 @@ def _add_sun(trunk: mujoco.MjsBody) -> None:
     )  # fmt: skip
 
 
-def _add_payload(trunk: mujoco.MjsBody, name: str, mass: float) -> None:
+def _add_payload(trunk: mujoco.MjsBody, name: str, load: Load) -> None:
     """A homogeneous box welded on top of the trunk."""
-    body = trunk.add_body(name=name, pos=_ANCHOR)
+    x, y = load.offset
+    body = trunk.add_body(name=name, pos=(_ANCHOR[0] + x, _ANCHOR[1] + y, _ANCHOR[2]))
     body.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_BOX, size=[length / 2 for length in _PAYLOAD_BOX], mass=mass,
-        rgba=_PAYLOAD_RGBA, group=VISUAL_GROUP, **NO_CONTACT,
+        type=mujoco.mjtGeom.mjGEOM_BOX, size=[length / 2 for length in _PAYLOAD_BOX],
+        mass=load.mass, rgba=_PAYLOAD_RGBA, group=VISUAL_GROUP, **NO_CONTACT,
     )  # fmt: skip
 
 

@@ -1,9 +1,11 @@
-"""What is under the feet: flat ground, wooden blocks, gravel or a smooth height field."""
+"""What is under the feet: flat ground, wooden blocks, stones, ramps or a smooth height field."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import mujoco
@@ -14,7 +16,8 @@ from shared.robot import Array
 from sim_server.a1_body import TERRAIN_CONTACT
 from sim_server.blocks import Blocks, build_blocks
 from sim_server.course import Course, build_course
-from sim_server.height_field import HeightField, build_gravel, build_smooth_field
+from sim_server.height_field import HeightField, build_gravel, build_ramps, build_smooth_field
+from sim_server.pebbles import GROUND_CONTACT, Pebbles, build_pebbles
 
 _STREAM: Final = 1  # of the seed: the sensors draw from another one
 _PLANE: Final = "plane"  # materials
@@ -24,13 +27,15 @@ _Colour = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Terrain:
-    """The ground of a world: a plane at z = 0 and what lies on it; it never moves.
+    """The ground of a world: a plane at z = 0 and what lies on it.
 
     Attributes:
-        relief: the blocks or the height field on the plane, or None.
+        relief: the blocks or the height field on the plane, or None; it never moves.
+        pebbles: stones that lie loose, or None. They do not count as height of the ground.
     """
 
     relief: Blocks | HeightField | None
+    pebbles: Pebbles | None = None
 
     @property
     def top(self) -> float:
@@ -49,7 +54,7 @@ class Terrain:
         _add_checker(spec, _PLANE, (0.80, 0.82, 0.80), (0.70, 0.73, 0.71), 0.5)
         spec.worldbody.add_geom(
             name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0],
-            material=_PLANE, **TERRAIN_CONTACT,
+            material=_PLANE, **(TERRAIN_CONTACT if self.pebbles is None else GROUND_CONTACT),
         )  # fmt: skip
         if isinstance(self.relief, Blocks):
             self.relief.add_to(spec, TERRAIN_CONTACT)
@@ -69,9 +74,14 @@ def build_terrain(config: Config, places: Array) -> Terrain:
     if world.terrain == "flat" or world.terrain_height == 0.0:
         return Terrain(None)
     build: Mapping[str, Callable[[Course, float, np.random.Generator], Blocks | HeightField]]
-    build = {"boxes": build_blocks, "gravel": build_gravel, "heightfield": build_smooth_field}
+    build = {
+        "boxes": build_blocks, "gravel": build_gravel, "heightfield": build_smooth_field,
+        "slope": partial(build_ramps, slope=math.radians(world.slope)),
+    }  # fmt: skip
     random = np.random.default_rng((world.seed, _STREAM))
     course = build_course(config, places)
+    if world.terrain == "pebbles":
+        return Terrain(None, build_pebbles(course, world.terrain_height, random))
     return Terrain(build[world.terrain](course, world.terrain_height, random))
 
 

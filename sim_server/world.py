@@ -11,7 +11,8 @@ import numpy as np
 
 from shared.config import Config
 from shared.messages import Command, Event, State, Truth
-from shared.robot import N_JOINTS, N_LEGS, TORQUE_LIMIT, Array, robot_names
+from shared.robot import FOOT_FRAMES, N_JOINTS, N_LEGS, TORQUE_LIMIT, Array, robot_names
+from sim_server.loose import PERIOD, LooseStones
 from sim_server.scenario import build_scenario, event
 from sim_server.sensors import Sensors
 from sim_server.team_model import N_SENSORS, NQ, NV, build_team_model
@@ -37,8 +38,8 @@ class World:
     The forces of tick 0 are those of motors without torque.
 
     Raises:
-        ConfigError: the payload or a push names no robot, `world.push` does not parse, or the
-            robot's URDF is missing.
+        ConfigError: the payload, a push or a weak motor names no robot or does not parse, the
+            reference's trace is no trace, or the robot's URDF is missing.
     """
 
     def __init__(self, config: Config) -> None:
@@ -48,24 +49,31 @@ class World:
         self.physics = mujoco.MjData(self.team.model)
         self._scenario = build_scenario(config, self.team.payload)
         self._push_changes = self._scenario.changes()
+        self._weakenings = self._scenario.weakenings()
         self._events = {
             tick: tuple(event for event in self._scenario.events if event.tick == tick)
             for tick in {event.tick for event in self._scenario.events}
         }
         n = len(self.names)
-        self._q = self.physics.qpos.reshape(n, NQ)  # views of MuJoCo's own memory, as all below
-        self._v = self.physics.qvel.reshape(n, NV)
-        self._motor = self.physics.qfrc_applied.reshape(n, NV)[:, 6:]
+        # Views of MuJoCo's own memory; behind the robots come the loose stones.
+        self._q = self.physics.qpos[: n * NQ].reshape(n, NQ)
+        self._v = self.physics.qvel[: n * NV].reshape(n, NV)
+        self._motor = self.physics.qfrc_applied[: n * NV].reshape(n, NV)[:, 6:]
         self._sensed = self.physics.sensordata.reshape(n, N_SENSORS)
         self._rows = np.zeros(5 * n * N_JOINTS)
         self._commanded = tuple(self._rows.reshape(5, n, N_JOINTS))  # tau, q_des, v_des, kp, kd
         self._tau = np.zeros((n, N_JOINTS))
+        self._strength: Array | None = None  # while all motors are sound
         self._fallen = [False] * n
         self._surely_up = _FALL_HEIGHT + self.team.terrain.top
         self._sensors = Sensors(config.sensors, config.world.seed, self.names)
 
         self.physics.qpos[:] = self.team.q_spawn
         mujoco.mj_forward(self.team.model, self.physics)
+        pebbles, model = self.team.terrain.pebbles, self.team.model
+        feet = (f"{name}/{foot}" for name in self.names for foot in FOOT_FRAMES)
+        self._feet = [model.geom(foot).id for foot in feet]
+        self._stones = None if pebbles is None else LooseStones(pebbles, model, self.physics, n)
         self._yoke_force = self._read_yoke_force()
         self._states = self._measure()
 
@@ -76,16 +84,21 @@ class World:
     def step(self, commands: Mapping[str, Command]) -> tuple[Event, ...]:
         """Advance by one tick under the motors' torques and return what happened.
 
-        Each motor applies tau + kp (q_des − q) + kd (v_des − v), limited to ±`TORQUE_LIMIT`; those
-        of a robot without a command damp their joints with `MOTOR_DAMPING`.
+        Each motor applies tau + kp (q_des − q) + kd (v_des − v), limited to ±`TORQUE_LIMIT`, and
+        a weak one its share of that; those of a robot without a command damp their joints with
+        `MOTOR_DAMPING`.
         """
         events = list(self._events.get(self.tick, ()))
         if self.tick in self._push_changes:
             self.physics.xfrc_applied[self.team.trunks, :3] = self._scenario.forces(self.tick)
+        if self.tick in self._weakenings:
+            self._strength = self._scenario.strength(self.tick)
         self._tau = self._torques(commands)
         self._motor[:] = self._tau
         mujoco.mj_step2(self.team.model, self.physics)
         self._yoke_force = self._read_yoke_force()
+        if self._stones is not None and self.tick % PERIOD == 0:
+            self._stones.follow(self.physics.geom_xpos[self._feet])
         mujoco.mj_step1(self.team.model, self.physics)
         self.tick += 1
         self._states = self._measure()
@@ -127,6 +140,8 @@ class World:
         torque += tau
         np.minimum(torque, TORQUE_LIMIT, out=torque)
         np.maximum(torque, -TORQUE_LIMIT, out=torque)
+        if self._strength is not None:
+            torque *= self._strength
         return torque
 
     def _measure(self) -> dict[str, State]:

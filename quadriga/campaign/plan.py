@@ -12,7 +12,7 @@ from typing import Any, Final
 from quadriga import scenarios
 from quadriga.campaign.choice import Sweep, Variant
 from shared.config import Config
-from shared.config_file import build, flattened, layers, overlaid, read_toml
+from shared.config_file import build, layers, overlaid
 from shared.errors import ConfigError
 from sim_server.world import World
 
@@ -86,8 +86,10 @@ def build_plan(
         raise ConfigError("--baseline", repr(baseline), "one of the variants compared")
     if len({sweep.key for sweep in sweeps}) < len(sweeps):
         raise ConfigError("--sweep", "a key twice", "different keys")
-    mine = {} if file is None else flattened(read_toml(file))
-    given = {name: overlaid(layers(path, mine), overrides) for name, path in files.items()}
+    given = {
+        name: layers(file, {scenarios.LABEL: name, **overrides}, beneath=path)
+        for name, path in files.items()
+    }
     configs = {}
     for name, points, variant in product(files, _points(sweeps), variants):
         keys = dict(zip((sweep.key for sweep in sweeps), points, strict=True))

@@ -31,8 +31,10 @@ class Scene:
     def __init__(self, config: Config) -> None:
         self._posed = PosedTeam(config)
         self._model = self._posed.model
-        # Body 0 is the world itself; the others are the robots' links, named r1/trunk and so on.
-        self._links = [self._model.body(i).name for i in range(1, self._model.nbody)]
+        # Body 0 is the world itself; then come the robots' links, named r1/trunk and so on; then
+        # loose stones, if any, of which nothing is recorded.
+        names = [self._model.body(i).name for i in range(1, self._model.nbody)]
+        self._links = [name for name in names if "/" in name]
         self._trunks = self._posed.team.trunks
         self._yokes = self._posed.team.yokes
 
@@ -43,7 +45,9 @@ class Scene:
     def frames(self, tick: int) -> fox.FrameTransforms:
         """Pose of every link in the world."""
         physics, stamp = self._posed.physics, stamp_of(tick)
-        poses = zip(self._links, physics.xpos[1:].tolist(), physics.xquat[1:].tolist(), strict=True)
+        of_links = slice(1, 1 + len(self._links))
+        places, turns = physics.xpos[of_links].tolist(), physics.xquat[of_links].tolist()
+        poses = zip(self._links, places, turns, strict=True)
         return fox.FrameTransforms(
             transforms=[
                 fox.FrameTransform(

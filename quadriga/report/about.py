@@ -49,13 +49,22 @@ def facts(run: Run) -> Iterator[tuple[str, str]]:
         yield "recorded", run.path.name
     yield "world time", f"{run.begin / 1000:.2f} … {run.end / 1000:.2f} s, {config.world.mode}"
     yield "team", f"{config.team.name}: {', '.join(traces.robots)}; yokes {config.team.yokes}"
-    yield "ground", f"{_ground(config)}, friction {config.world.friction:g}"
-    if config.world.payload:
-        yield "payload", f"{config.world.payload:g} kg on {config.world.payload_on}"
-    if config.world.push:
-        yield "pushes", config.world.push
+    world = config.world
+    if world.scenario:
+        yield "scenario", world.scenario
+    yield "ground", f"{_ground(config)}, friction {world.friction:g}"
+    if world.payload:
+        yield "payload", f"{world.payload:g} kg on {world.payload_on}"
+    if world.push:
+        yield "pushes", world.push
+    if world.push_force:
+        yield "pushes in turn", f"{world.push_force:g} N for {world.push_duration:g} s every " \
+            f"{world.push_every:g} s"  # fmt: skip
+    if world.weak_motor:
+        yield "weak motors", f"{world.weak_motor} at {100 * world.weak_share:g} %"
     asked = config.reference
-    yield "asked for", f"vx {asked.vx:g} m/s, vy {asked.vy:g} m/s, wz {asked.wz:g} rad/s"
+    speeds = f"vx {asked.vx:g} m/s, vy {asked.vy:g} m/s, wz {asked.wz:g} rad/s"
+    yield "asked for", asked.trace or speeds
     yield "planner", f"{config.planner.kind}, {config.planner.interface}"
     digest = traces.metadata.get("predictor_sha256", "")
     kind = config.identification.predictor
@@ -138,6 +147,8 @@ def _ground(config: Config) -> str:
     world = config.world
     if world.terrain == "flat":
         return "flat ground"
+    if world.terrain == "slope":
+        return f"ramps of {world.slope:g}° up to {1000 * world.terrain_height:.0f} mm"
     return f"{world.terrain} up to {1000 * world.terrain_height:.0f} mm"
 
 

@@ -133,12 +133,14 @@ def test_one_image_on_a_base_of_ones_choice() -> None:
     assert len({service["image"] for service in SERVICES.values()}) == 1
 
 
-def test_the_build_gets_every_package() -> None:
+def test_the_build_gets_every_package_and_the_scenarios() -> None:
     project = tomllib.loads((TOP / "pyproject.toml").read_text(encoding="utf-8"))
-    packages = {name.split(".")[0] for name in project["tool"]["setuptools"]["packages"]}
+    setup = project["tool"]["setuptools"]
+    packages = {name.split(".")[0] for name in setup["packages"]}
+    files = {str(Path(name).parent) for names in setup["data-files"].values() for name in names}
     ignore = (TOP / ".dockerignore").read_text(encoding="utf-8").splitlines()
     let_through = {line[1:] for line in ignore if line.startswith("!")}
     copied = {name for line in re.findall(r"^COPY (?!--)(.*) \S+$", DOCKERFILE, re.M)
               for name in line.split()}  # fmt: skip
-    assert copied == let_through == packages | {"pyproject.toml", "requirements.lock"}
+    assert copied == let_through == packages | files | {"pyproject.toml", "requirements.lock"}
     assert all((TOP / name).exists() for name in copied)

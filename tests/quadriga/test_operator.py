@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from quadriga.operator import reference_at
@@ -25,3 +27,13 @@ def test_without_a_ramp_full_speed_starts_with_the_first_step() -> None:
 
 def test_height_is_asked_for_from_the_start() -> None:
     assert reference_at(Config(), 0).height == Config().reference.height
+
+
+def test_a_trace_is_followed_from_the_first_step_on(tmp_path: Path) -> None:
+    path = tmp_path / "trace.csv"
+    path.write_text("t,vx,vy,wz\n0,0,0,0\n2,0.4,0.2,-0.2\n4,0,0,0\n", encoding="utf-8")
+    config = load(None, {"reference.trace": str(path), "reference.ramp": 1.0})
+    asked = [reference_at(config, tick) for tick in (0, 300, 800, 2300, 4300, 6300)]
+    assert [r.vx for r in asked] == pytest.approx([0.0, 0.0, 0.05, 0.4, 0.0, 0.4])
+    assert (asked[3].vy, asked[3].wz) == pytest.approx((0.2, -0.2))
+    assert asked[3].height == Config().reference.height

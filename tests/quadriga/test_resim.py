@@ -43,6 +43,17 @@ def test_a_world_with_pushes_payload_blocks_and_a_silent_robot_comes_out_equal(
     assert "× real time" in said
 
 
+def test_loose_stones_and_weak_motors_come_out_equal(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """A weak motor is a fault, but not that of a robot that has fallen silent."""
+    scene = config(world__terrain="pebbles", world__weak_motor="r1:any:0.05,r2:calf:0",
+                   world__push_force=60.0, world__push_every=0.1)  # fmt: skip
+    status, said = resim(capsys, write_lockstep(tmp_path / "run.mcap", scene))
+    assert status == 0, said
+    assert f"equal to the byte: {2 * TICKS + TICKS // 10} states and truths" in said
+
+
 def flipped(
     kind: type[State] | type[Truth] | type[Command], at: int, name: str, place: int, bit: int = 0
 ) -> Change:

@@ -109,7 +109,7 @@ def test_every_key_keeps_its_range_and_has_a_plausible_default(section: str, ite
         ('[world]\nterrain = "boxs"\n', "did you mean 'boxes'"),
         ("[gait]\nstance_ms = 205\n", r"gait\.stance_ms: got 205, expected a multiple of 10 ms"),
         ("[gait]\nstand_ms = 333\n", r"gait\.stand_ms"),
-        ('[world]\npayload_on = "r4"\n', r"world\.payload_on: got 'r4', expected team or one of"),
+        ('[world]\npayload_on = "r4"\n', r"world\.payload_on: got 'r4', expected 'team' or one of"),
         ('[world]\npush = "all:9:0:1:1,r7:9:0:1:1"\n', r"world\.push: got a push on 'r7'"),
         ("[world]\ncommand_hold_ms = 300\n", r"world\.command_damp_ms"),
         ("[planner]\nN = 4\napplied = 5\n", r"planner\.applied"),

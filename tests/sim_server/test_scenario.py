@@ -1,61 +1,13 @@
-import math
-
 import numpy as np
-import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from shared.errors import ConfigError
-from shared.robot import robot_names
-from sim_server.scenario import build_scenario, parse_pushes
-from sim_server.team_model import payload_shares
+from sim_server.load import loads
+from sim_server.scenario import build_scenario
 from tests.sim_server.standing import configured
-
-NAMES = robot_names(3)
-
-
-def test_pushes_are_parsed() -> None:
-    first, second = parse_pushes("r2:80:90:1:0.2, all:-0:0:0:0.001", NAMES)
-    assert (first.robots, first.force, first.start, first.stop) == ((1,), 80.0, 1000, 1200)
-    assert first.direction == pytest.approx(math.pi / 2)
-    assert second.robots == (0, 1, 2)
-    assert parse_pushes("", NAMES) == ()
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("r1:80:0:1", "robot:force"),
-        ("r1:80:0:1:0.2:3", "robot:force"),
-        ("r9:80:0:1:0.2", "robot 'r9'"),
-        ("r1:strong:0:1:0.2", "robot:force"),
-        ("r1:-5:0:1:0.2", "force -5"),
-        ("r1:nan:0:1:0.2", "force nan"),
-        ("r1:1e9:0:1:0.2", r"force 1e\+09"),
-        ("r1:80:inf:1:0.2", "direction inf"),
-        ("r1:80:0:-1:0.2", "start -1"),
-        ("r1:80:0:1:0", "duration 0"),
-        ("r1:80:0:1:0.2,", "robot:force"),
-        (",", "robot:force"),
-    ],
-)
-def test_a_wrong_push_names_the_key_and_what_is_wrong(text: str, said: str) -> None:
-    with pytest.raises(ConfigError, match=rf"^world\.push: .*{said}"):
-        parse_pushes(text, NAMES)
-
-
-@given(st.text(alphabet="rall0123:.,- e", max_size=30))
-def test_any_text_is_parsed_or_refused(text: str) -> None:
-    try:
-        pushes = parse_pushes(text, NAMES)
-    except ConfigError:
-        return  # anything else fails the test
-    assert len(pushes) == (text.count(",") + 1 if text else 0)
 
 
 def test_forces_add_up_and_end() -> None:
     config = configured(3, push="all:10:0:1:1,r2:20:90:1.5:1")
-    scenario = build_scenario(config, payload_shares(config))
+    scenario = build_scenario(config, loads(config))
     assert scenario.changes() == {1000, 2000, 1500, 2500}
     along, left, none = np.array([10.0, 0.0, 0.0]), np.array([0.0, 20.0, 0.0]), np.zeros(3)
     expected = {
@@ -73,7 +25,7 @@ def test_events_announce_what_was_configured() -> None:
     config = configured(
         3, push="r3:80:90:2:0.2,all:5:0:1:1", payload=9.0, payload_on="r2", terrain="boxes"
     )
-    events = build_scenario(config, payload_shares(config)).events
+    events = build_scenario(config, loads(config)).events
     assert [(event.tick, event.kind, event.robot) for event in events] == [
         (0, "start", ""), (0, "terrain", ""), (0, "payload", "r2"),
         (1000, "push", "r1"), (1000, "push", "r2"), (1000, "push", "r3"), (2000, "push", "r3"),
@@ -81,3 +33,33 @@ def test_events_announce_what_was_configured() -> None:
     assert events[2].detail == "9 kg"
     assert events[-1].detail == "80 N towards 90 deg for 0.2 s"
     assert events[-1].stamp_ns == 2_000_000_000
+
+
+def test_what_is_drawn_is_announced() -> None:
+    config = configured(
+        3, payload=6.0, payload_on="r1:2,r3", payload_scatter=0.05, push_force=90.0,
+        weak_motor="r2:FL_calf:1.5", weak_share=0.3, terrain="slope", seconds=5.0,
+    )  # fmt: skip
+    scenario = build_scenario(config, loads(config))
+    (_, ground, *payloads, fault, push) = scenario.events
+    assert ground.detail == "slope of 8 deg up to 0.05 m, seed 0"
+    assert [(event.robot, event.detail.split(",")[0]) for event in payloads] == [
+        ("r1", "4 kg"), ("r3", "2 kg"),
+    ]  # fmt: skip
+    assert all("mm ahead" in event.detail for event in payloads)
+    assert (fault.tick, fault.kind, fault.robot) == (1500, "fault", "r2")
+    assert fault.detail == "FL_calf gives 30 % of its torque"
+    assert push.kind == "push"
+    assert push.tick == scenario.pushes[0].start
+    assert push.detail.startswith("90 N towards ")
+
+
+def test_a_motor_is_weak_from_its_tick_on() -> None:
+    config = configured(2, weak_motor="r2:FR_hip:1,r2:FR_hip:2", weak_share=0.5)
+    scenario = build_scenario(config, loads(config))
+    assert scenario.weakenings() == {1000, 2000}
+    assert (scenario.strength(999) == 1.0).all()
+    for tick, share in ((1000, 0.5), (1999, 0.5), (2000, 0.25)):
+        strength = scenario.strength(tick)
+        assert strength[1, 3] == share
+        assert strength.sum() == 23 + share

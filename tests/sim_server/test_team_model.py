@@ -8,10 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shared.a1_model import build_pinocchio_model
-from shared.errors import ConfigError
 from shared.robot import FOOT_FRAMES, JOINT_NAMES, N_JOINTS, TORQUE_LIMIT, TOTAL_MASS, TRUNK_MASS
 from shared.yokes import yoke_pairs
-from sim_server.team_model import NQ, build_team_model, formation, payload_shares
+from sim_server.team_model import NQ, build_team_model, formation, scattered
 from tests.sim_server.standing import configured
 
 GRAPHS = ("complete", "chain", "ring")
@@ -111,13 +110,15 @@ def test_robots_start_at_least_their_spacing_apart_along_the_columns(
         assert not places.any()
 
 
-def test_payload_is_shared_or_carried_by_one() -> None:
-    np.testing.assert_allclose(payload_shares(configured(4, payload=10.0)), 2.5)
-    np.testing.assert_allclose(
-        payload_shares(configured(3, payload=9.0, payload_on="r2")), [0.0, 9.0, 0.0]
-    )
-    with pytest.raises(ConfigError, match=r"world\.payload_on.*'r4'"):
-        payload_shares(configured(3, payload=9.0, payload_on="r4"))
+def test_robots_are_scattered_around_their_places_by_the_seed() -> None:
+    places = np.array([scattered(configured(3, scatter=0.05, seed=s)) for s in range(40)])
+    off = places - formation(3, 0.9)
+    assert np.abs(off).max() <= 0.05
+    assert off.std(axis=0).min() > 0.02
+    np.testing.assert_array_equal(scattered(configured(3, seed=5)), formation(3, 0.9))
+    team = build_team_model(configured(3, scatter=0.05, seed=7))
+    np.testing.assert_allclose(team.q_spawn.reshape(3, NQ)[:, :2], places[7])
+    assert len(set(team.rest_length.round(6))) == 3
 
 
 def test_payload_adds_its_mass_above_the_trunk() -> None:

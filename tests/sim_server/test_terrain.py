@@ -1,4 +1,5 @@
 from dataclasses import replace
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -6,17 +7,18 @@ import pytest
 
 from shared.config import Config, ReferenceConfig
 from shared.robot import Array
+from shared.trace import trace_of
 from sim_server.course import build_course
 from sim_server.height_field import HeightField
 from sim_server.team_model import build_team_model, formation
 from sim_server.terrain import Terrain, build_terrain
 from tests.sim_server.standing import configured
 
-KINDS = ("boxes", "gravel", "heightfield")
+KINDS = ("boxes", "gravel", "heightfield", "slope")
 HEIGHT = 0.06
 
 
-def laid(kind: str, *, n: int = 3, seed: int = 0, **reference: float) -> tuple[Config, Terrain]:
+def laid(kind: str, *, n: int = 3, seed: int = 0, **reference: Any) -> tuple[Config, Terrain]:
     config = configured(n, terrain=kind, terrain_height=HEIGHT, seed=seed, seconds=8.0)
     config = replace(config, reference=ReferenceConfig(**reference))
     return config, build_terrain(config, formation(n, config.team.spacing))
@@ -119,6 +121,36 @@ def test_a_very_long_way_is_covered_to_a_bound_only() -> None:
     config = replace(config, world=replace(config.world, seconds=3600.0))
     extent = build_course(config, formation(1, 0.9)).extent
     assert 40.0 < extent.x_high < 50.0
+
+
+@pytest.mark.parametrize("slope", [4.0, 8.0, 15.0])
+def test_ramps_are_as_steep_as_they_are_said_to_be(slope: float) -> None:
+    config = configured(3, terrain="slope", terrain_height=0.3, slope=slope, seconds=20.0)
+    terrain = build_terrain(config, formation(3, 0.9))
+    x = np.arange(1.0, 9.0, 0.05)
+    z = np.array([terrain.height(x, np.full_like(x, y)) for y in (-0.05, 0.05)])
+    grade = np.hypot(np.diff(z, axis=1)[0] / 0.05, (z[1] - z[0])[1:] / 0.1)
+    steep = np.tan(np.radians(slope))
+    assert np.median(grade) == pytest.approx(steep, rel=0.02)
+    assert grade.max() < 1.02 * steep
+    assert {1.0, -1.0} <= set(np.sign(np.diff(z[0]).round(6)))  # up and down
+    assert 0.15 < terrain.top <= 0.3
+
+
+def test_a_trace_leads_over_the_terrain() -> None:
+    config = configured(1, terrain="boxes", seconds=30.0)
+    config = replace(config, reference=ReferenceConfig(trace="joystick.csv"))
+    way = build_course(config, formation(1, 0.9)).way
+    trace = trace_of(config)
+    assert trace is not None
+    yaw, at = 0.0, np.zeros(2)
+    for k in range(3000):
+        vx, vy, wz = trace.at(1e-2 * k)
+        yaw += 1e-2 * wz
+        turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+        at = at + 1e-2 * turn @ (vx, vy)
+        assert np.linalg.norm(way - at, axis=1).min() < 0.1
+    assert np.linalg.norm(at) > 3.0
 
 
 def test_no_relief_without_height() -> None:

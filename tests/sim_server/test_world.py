@@ -13,7 +13,7 @@ from shared.robot import GRAVITY, N_JOINTS, TORQUE_LIMIT, TOTAL_MASS, q_stand
 from sim_server.world import MOTOR_DAMPING, World
 from tests.sim_server.standing import STAND, command, configured, momentum, shift, stand
 
-TERRAINS = ("flat", "boxes", "gravel", "heightfield")
+TERRAINS = ("flat", "boxes", "gravel", "heightfield", "slope")
 
 
 @pytest.mark.parametrize("n", [1, 2, 5])
@@ -158,6 +158,24 @@ def test_motor_law_is_followed_and_limited() -> None:
     np.testing.assert_allclose(world.physics.qfrc_applied[6:], expected, atol=1e-12)
 
 
+def test_a_weak_motor_gives_its_share_of_the_torque_from_its_time_on() -> None:
+    config = configured(2, weak_motor="r2:RL_calf:0.01", weak_share=0.4)
+    world, sound = World(config), World(configured(2))
+    asked = command(tau=np.linspace(-40.0, 40.0, N_JOINTS))
+    for tick in range(12):
+        events = world.step({"r1": asked, "r2": asked})
+        sound.step({"r1": asked, "r2": asked})
+        tau = {name: state.tau_joint for name, state in world.states().items()}
+        limited = np.clip(asked.tau, -TORQUE_LIMIT, TORQUE_LIMIT)
+        np.testing.assert_array_equal(tau["r1"], limited)
+        limited[8] *= 0.4 if tick >= 10 else 1.0
+        np.testing.assert_array_equal(tau["r2"], limited)
+        faults = [(e.kind, e.robot, e.detail) for e in events if e.kind == "fault"]
+        told = [("fault", "r2", "RL_calf gives 40 % of its torque")] if tick == 10 else []
+        assert faults == told
+        assert (encode(world.truth()) == encode(sound.truth())) == (tick < 10)
+
+
 def test_a_robot_without_a_command_is_damped_and_the_others_go_on() -> None:
     world = World(configured(2))
     stand(world, 50)
@@ -226,6 +244,19 @@ def test_feet_have_the_configured_friction_on_every_terrain(terrain: str) -> Non
     assert world.physics.ncon >= 2
     np.testing.assert_allclose(world.physics.contact.friction[:, 0], 0.35)
     np.testing.assert_allclose(world.physics.contact.solref, [[0.01, 1.0]] * world.physics.ncon)
+
+
+def test_a_series_of_pushes_moves_who_it_is_said_to_push() -> None:
+    config = configured(3, yokes="chain", push_force=60.0, push_every=0.1, push_duration=0.02,
+                        seconds=0.2)  # fmt: skip
+    world = World(config)
+    shift(world, dz=10.0)  # in the air nothing else acts sideways
+    events = [event for _ in range(600) for event in world.step({}) if event.kind == "push"]
+    assert len(events) == 1
+    left = 1.0 if "towards 90 deg" in events[0].detail else -1.0
+    np.testing.assert_allclose(momentum(world)[:2], [0.0, left * 60.0 * 0.02], atol=0.02)
+    pushed = np.abs(world.truth().base_vel[:, 1]).argmax()
+    assert world.names[pushed] == events[0].robot
 
 
 def test_feet_slide_when_pushed_harder_than_friction_holds() -> None:

@@ -188,6 +188,19 @@ def test_terrain_lies_at_its_height(write_run: WriteRun, tmp_path: Path, terrain
     assert area.sum() == pytest.approx(np.prod(np.ptp(points[:, :2], axis=0)))
 
 
+def test_loose_stones_are_no_part_of_the_scene(write_run: WriteRun, tmp_path: Path) -> None:
+    world = WorldConfig(seconds=0.5, terrain="pebbles", terrain_height=0.02)
+    folder = write_run(replace(run_config(2, 0.5), world=world))
+    out = tmp_path / "out.mcap"
+    assert main(["export", str(folder / "run.mcap"), "--to", "foxglove", "-o", str(out)]) == 0
+    found = read(out)
+    links = {frame.child_frame_id for frame in found["/frames"][0][1].transforms}
+    assert {"r1/trunk", "r2/trunk"} <= links
+    assert all(link.startswith(("r1/", "r2/")) for link in links)
+    (drawn,) = [update for _, update in found["/scene/robots"]]
+    assert {entity.id for entity in drawn.entities} <= links
+
+
 def test_a_recording_of_real_robots_has_no_scene(write_run: WriteRun, tmp_path: Path) -> None:
     lose: Callable[..., Any] = lambda key, m: None if key == "team/sim/truth" else m  # noqa: E731
     folder, out = write_run(run_config(1, 0.5), change=lose), tmp_path / "out.mcap"
