@@ -25,8 +25,9 @@ def campaign(arguments: argparse.Namespace, _config: Config, _given: dict[str, A
     if worst < 0:
         raise ConfigError("--record-worst", str(worst), "at least 0")
     if arguments.scenario is not None:
-        raise ConfigError("--scenario", repr(arguments.scenario), "none: a campaign's scenarios are "
-                          "named without it")  # fmt: skip
+        raise ConfigError(
+            "--scenario", repr(arguments.scenario), "the names of scenarios without an option"
+        )
     if arguments.report is not None:
         if arguments.scenarios:
             raise ConfigError("--report", f"scenarios {', '.join(arguments.scenarios)}",
