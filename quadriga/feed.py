@@ -16,7 +16,7 @@ from shared.bus import POLL, Bus
 from shared.clock import monotonic, wall_ns
 from shared.config import Config
 from shared.envelope import envelope
-from shared.errors import QuadrigaError
+from shared.errors import RecordingError
 from shared.recording import Entry
 from shared.recording_config import recorded_config
 
@@ -51,7 +51,7 @@ def config_of(path: Path) -> Config:
     source, _ = open_any(path)
     try:
         return recorded_config(source)
-    except QuadrigaError:
+    except RecordingError:
         return Config()
 
 

@@ -95,10 +95,10 @@ def _differences(config: Config | None) -> Iterator[tuple[str, str]]:
         for item in fields(mine):
             value = getattr(mine, item.name)
             if value != getattr(default, item.name):
-                yield (
-                    f"{section.name}.{item.name}",
-                    f"{value}  (default {getattr(default, item.name)})",
-                )
+                shown = [
+                    str(v) if v != "" else NOTHING for v in (value, getattr(default, item.name))
+                ]
+                yield f"{section.name}.{item.name}", f"{shown[0]}  (default {shown[1]})"
 
 
 def _rate(track: TickTrack) -> str:

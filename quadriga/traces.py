@@ -21,8 +21,6 @@ from shared.robot import Array, robot_names
 from shared.topics import COMMAND, INPUTS, STATE, topic_of
 from shared.yokes import yoke_pairs
 
-__all__ = ["MeasurementTrace", "Traces", "in_force", "read_traces", "recorded_config"]
-
 # Up to 1 kHz each: only their ticks are read.
 _TIMED_ONLY: Final = (STATE.name, COMMAND.name, INPUTS.name)
 
@@ -77,7 +75,6 @@ def read_traces(recording: Recording, names: Container[str] | None = None) -> Tr
 
     Raises:
         RecordingError: the recording holds no message.
-        ConfigError: its configuration is another version's.
     """
     config = recorded_config(recording)
     robots = robot_names(config.team.robots)

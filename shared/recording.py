@@ -38,6 +38,8 @@ __all__ = [
 
 M = TypeVar("M", bound=Message)
 
+_RECOVER: Final = "`quadriga recover` writes what is readable"
+_MEND: Final = f"one cut or damaged in its first bytes: {_RECOVER}"
 _PART: Final = 1 << 20  # bytes that are read at once
 _END: Final = RECORD.size + 4 + RECORD.size + 20 + len(MCAP0_MAGIC)  # DataEnd, footer, magic
 
@@ -69,8 +71,10 @@ class Recording:
                 str(path), reason(error), "a recording", "did the walk start?"
             ) from None
         if head != MCAP0_MAGIC:
-            got = f"{self._size} bytes that do not start as MCAP" if self._size else "an empty file"
-            raise RecordingError(str(path), got, "an MCAP file")
+            if not self._size:
+                raise RecordingError(str(path), "an empty file", "a recording")
+            got = f"{self._size:,} bytes that do not start as MCAP"
+            raise RecordingError(str(path), got, "an MCAP file", f"a foreign file, or {_MEND}")
         self.metadata = self._metadata()
 
     def entries(self, names: Container[str] | None = None) -> Iterator[Entry]:
@@ -140,7 +144,7 @@ class Recording:
     def _damaged(self, got: str) -> RecordingError:
         return RecordingError(
             str(self.path), got, "a whole recording",
-            "was the recorder killed, or the disk full? `quadriga recover` writes what is readable",
+            f"was the recorder killed, or the disk full? {_RECOVER}",
         )  # fmt: skip
 
     def _records(self) -> Iterator[tuple[int, bytes]]:
@@ -181,7 +185,7 @@ class Recording:
                 break
         raise RecordingError(
             str(self.path), "no metadata of this project", "a recording made by `quadriga`",
-            "a foreign MCAP file, or one cut or damaged in its first bytes",
+            f"a foreign MCAP file, or {_MEND}",
         )  # fmt: skip
 
 

@@ -7,26 +7,9 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from agents.agent import Agent
-from quadriga.traces import recorded_config
 from shared.config import CENTRAL, BusConfig, Config
 from shared.config_file import build, overlaid
-from shared.errors import ConfigError, RecordingError
-from shared.recording import Recording
-
-
-def readable_config(recording: Recording) -> Config:
-    """The configuration of a recorded run.
-
-    Raises:
-        RecordingError: there is none, or it is another version's.
-    """
-    try:
-        return recorded_config(recording)
-    except ConfigError as error:
-        raise RecordingError(
-            f"configuration of {recording.path}", f"{error.name} = {error.got}", error.expected,
-            "recorded by another version of quadriga; replay it with that one",
-        ) from None  # fmt: skip
+from shared.errors import ConfigError
 
 
 def changed_config(config: Config, given: Mapping[str, Any]) -> Config:

@@ -13,12 +13,12 @@ import pytest
 from rich.console import Console
 
 from quadriga.summary import print_table, summarise
-from quadriga.traces import recorded_config
 from shared import messages as msg
 from shared.config import Config, PlannerConfig
 from shared.config_text import config_sha256
 from shared.errors import RecordingError
 from shared.recording import Recording
+from shared.recording_config import recorded_config
 from shared.robot import OUTPUTS
 from tests.quadriga.conftest import ESTIMATOR_ERROR, SPEED, WriteRun, run_config
 
