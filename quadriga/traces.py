@@ -17,7 +17,7 @@ from shared.errors import MessageError, RecordingError
 from shared.messages import Event, Measurement, Message, Plan, Reference, Status, Truth
 from shared.recording import Recording
 from shared.recording_config import recorded_config
-from shared.robot import Array, robot_names
+from shared.robot import OUTPUTS, Array, robot_names
 from shared.topics import COMMAND, INPUTS, STATE, topic_of
 from shared.yokes import yoke_pairs
 
@@ -145,6 +145,20 @@ def _row(key: str) -> tuple[Any, str]:
         return topic_of(key)
     except MessageError:
         return None, ""
+
+
+def estimate_errors(traces: Traces, index: int) -> tuple[Ticks, Array]:
+    """What the agent at `index` estimated, less the truth at the same ticks.
+
+    Returns:
+        Ticks (K,) and errors (K, 6); that of the roll is the shorter way round.
+    """
+    own, truth = traces.measurements[traces.robots[index]], traces.truth
+    tick, mine, true = np.intersect1d(own.tick, truth.tick, return_indices=True)
+    error = own.y[mine] - truth.y[true, index]
+    roll = OUTPUTS.index("roll")
+    error[:, roll] = (error[:, roll] + np.pi) % (2 * np.pi) - np.pi
+    return tick, error
 
 
 def _fits(truth: Truth, config: Config) -> bool:

@@ -93,6 +93,18 @@ def test_outputs_do_not_depend_on_the_heading(write_run: WriteRun) -> None:
     assert summary["rmse_per_robot"]["r2"]["pitch"] == pytest.approx(0.01, abs=APPROX)
 
 
+def test_a_roll_that_is_off_by_a_whole_turn_is_no_error(write_run: WriteRun) -> None:
+    def change(key: str, message: msg.Message) -> msg.Message:
+        if not isinstance(message, msg.Measurement):
+            return message
+        turned = message.y.copy()
+        turned[OUTPUTS.index("roll")] += 2 * np.pi
+        return replace(message, y=turned)
+
+    summary = summarise(write_run(run_config(2, 3.3), change=change))
+    assert summary["estimator_rmse"]["roll"] == pytest.approx(0.004, abs=APPROX)
+
+
 def test_every_lost_message_is_a_gap(write_run: WriteRun) -> None:
     lost = {
         ("team/r1/state", 17), ("team/r1/state", 18), ("team/r2/command", 0),

@@ -61,7 +61,7 @@ def test_a_package_that_is_not_installed_is_named_with_its_remedy(
     monkeypatch.setitem(sys.modules, package, None)
     said = failed(capsys, file, "--to", form, "-o", tmp_path / "out")
     assert f"--to {form}: got no Python package {package}" in said
-    assert "pip install 'quadriga[export]'" in said
+    assert "pip install -e '.[export]'" in said
 
 
 @pytest.mark.parametrize("form", ["foxglove", "csv", "parquet"])
