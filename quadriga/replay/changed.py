@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 from agents.agent import Agent
-from shared.config import CENTRAL, BusConfig, Config
+from shared.config import CENTRAL, Config
 from shared.config_file import build, overlaid
+from shared.config_text import departures
 from shared.errors import ConfigError
 
 
@@ -25,14 +26,8 @@ def changed_config(config: Config, given: Mapping[str, Any]) -> Config:
 
 
 def changes(old: Config, new: Config) -> str:
-    """Every changed key with its two values, or ""; how to reach the bus changes nothing."""
-    before, after = (asdict(replace(config, bus=BusConfig())) for config in (old, new))
-    return ", ".join(
-        f"{section}.{key} {value} → {after[section][key]}"
-        for section, keys in before.items()
-        for key, value in keys.items()
-        if after[section][key] != value
-    )
+    """Every changed key with its two values, or ""."""
+    return ", ".join(f"{name} {was} → {now}" for name, now, was, _ in departures(new, old))
 
 
 def check_change(old: Agent, new: Agent) -> None:
