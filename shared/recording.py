@@ -77,19 +77,22 @@ class Recording:
             raise RecordingError(str(path), got, "an MCAP file", f"a foreign file, or {_MEND}")
         self.metadata = self._metadata()
 
-    def entries(self, names: Container[str] | None = None) -> Iterator[Entry]:
-        """Recorded messages in the order of the file.
+    def entries(
+        self, names: Container[str] | None = None, keys: Container[str] | None = None
+    ) -> Iterator[Entry]:
+        """Recorded messages in the order of the file; what is not asked for is skipped cheaply.
 
         Args:
-            names: only topics of these names (`Topic.name`), others are skipped cheaply;
-                None gives every message, also of keys outside the table.
+            names: only topics of these names (`Topic.name`); None gives every message, also of
+                keys outside the table.
+            keys: only these keys; None gives all.
 
         Raises:
             RecordingError: the messages are of a schema later than this version's.
         """
         wanted: dict[int, str | None] = {}
         for chunk in self._chunks():
-            yield from messages_of(chunk, names, wanted, str(self.path))
+            yield from messages_of(chunk, wanted, str(self.path), names, keys)
 
     def messages(self, kind: type[M], robot: str = "") -> Iterator[M]:
         """Decoded messages of a type (of one robot, or of all).
