@@ -1,13 +1,19 @@
-"""What the tests have to say besides passing, and what they do not depend on."""
+"""How examples are drawn, and what the tests have to say besides passing."""
 
 from __future__ import annotations
+
+import os
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-# How fast a busy machine draws and runs an example is nowhere the subject.
-settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("busy")
+# The same examples each time, so that a change is judged by itself and not by chance; and no
+# verdict on speed, which on a busy machine is not the code's. HYPOTHESIS_PROFILE=search draws anew.
+settings.register_profile(
+    "same", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.register_profile("search", settings.get_profile("same"), derandomize=False)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
