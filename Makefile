@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+TOOLS := $(VENV)/.tools
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
 .PHONY: install walk test lint format docs acceptance bench-planner bench-recorder
@@ -13,26 +15,30 @@ $(STAMP): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "quadriga needs Python 3.11 or newer: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-		--no-deps --no-build-isolation --editable .
+	$(PIP) -c requirements.lock setuptools
+	$(PIP) -c requirements.lock --no-build-isolation --editable .
+	@touch $@
+
+# What tests and linters need and a walk does not: the extras `export` and `dev`, 0.8 GB.
+$(TOOLS): $(STAMP)
+	$(PIP) -r requirements.lock
 	@touch $@
 
 walk: $(STAMP)
 	$(BIN)/quadriga walk $(ARGS)
 
 # What several tests need is compiled, collected and fitted once, before they run side by side.
-test: $(STAMP)
+test: $(TOOLS)
 	$(BIN)/quadriga prepare --robots 2
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(ARGS)
 
-lint: $(STAMP)
+lint: $(TOOLS)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-format: $(STAMP)
+format: $(TOOLS)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 

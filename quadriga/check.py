@@ -25,9 +25,7 @@ def check(path: Path) -> list[Finding]:
     """Hold a recording, or what is readable of it, against every rule.
 
     Raises:
-        RecordingError: nothing of it can be read, or it does not say with which configuration the
-            team walked.
-        ConfigError: the configuration is another version's.
+        RecordingError: nothing of it can be read, or not with which configuration the team walked.
     """
     source, error = open_any(path)
     config = recorded_config(source)

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from quadriga import recording_cli, verbs
 from quadriga.campaign.options import add_campaign
+from quadriga.recording_cli import add_file
 from quadriga.scenarios import LABEL, label, path
 from shared.config import Config
 from shared.config_file import build, layers, parse_assignment
@@ -99,9 +100,9 @@ def parser() -> argparse.ArgumentParser:
     report.add_argument("--no-render", action="store_true", help="no pictures of the walk")
     _add_play(add("play", verbs.play, "put a recording back on the bus"))
     resim = add("resim", verbs.resim, "re-simulate a recorded world and compare it to the byte")
-    resim.add_argument("file", type=Path, metavar="FILE", help="a recording of a lock-step walk")
+    add_file(resim, "of a lock-step walk")
     export = add("export", verbs.export, "convert a recording for other tools")
-    export.add_argument("file", type=Path, metavar="FILE", help="a recording")
+    add_file(export)
     export.add_argument("--to", required=True, choices=("foxglove", "rerun", "csv", "parquet"),
                         help="MCAP for Foxglove or Rerun, or one table per key")  # fmt: skip
     export.add_argument("-o", "--output", type=Path, metavar="OUT",
@@ -131,7 +132,7 @@ def parser() -> argparse.ArgumentParser:
 
 def _add_play(play: argparse.ArgumentParser) -> None:
     play.epilog = "Keys in a terminal: space pauses, right arrow plays one planning step, q quits."
-    play.add_argument("file", type=Path, metavar="FILE", help="a recording")
+    add_file(play)
     play.add_argument("-r", "--rate", type=float, default=1.0, metavar="X",
                       help="world time per wall time (%(default)g)")  # fmt: skip
     play.add_argument("--start", type=float, default=0.0, metavar="S",
@@ -151,7 +152,12 @@ def _add_play(play: argparse.ArgumentParser) -> None:
 
 
 def _add_replay(replay: argparse.ArgumentParser) -> None:
-    replay.add_argument("recording", type=Path, metavar="FILE", help="a run.mcap or its folder")
+    replay.epilog = (
+        "Exit status: 0 if every recorded command, plan and measurement is recomputed to the byte, "
+        "however many the recorder lost; 1 if one differs or an input is not in the recording; "
+        "with a change always 0."
+    )
+    add_file(replay)
     whom = replay.add_mutually_exclusive_group(required=True)
     whom.add_argument("--robot", metavar="NAME", help="r1 … rn")
     whom.add_argument("--all", action="store_true", help="every robot of the team")

@@ -16,7 +16,7 @@ from shared.bus import POLL, Bus
 from shared.clock import monotonic, wall_ns
 from shared.config import Config
 from shared.envelope import envelope
-from shared.errors import QuadrigaError
+from shared.errors import RecordingError
 from shared.recording import Entry
 from shared.recording_config import recorded_config
 
@@ -27,7 +27,8 @@ def from_file(path: Path, keys: Sequence[str]) -> Iterator[Entry]:
     """The recorded messages of `keys` (none: all); of a damaged file what is readable.
 
     Raises:
-        RecordingError: at once if nothing can be read, at the end if the file is damaged.
+        RecordingError: at once if nothing can be read, at the end if the file is damaged or
+            has none of these keys.
         ConfigError: something is not a key.
     """
     source, error = open_any(path)
@@ -40,6 +41,9 @@ def from_file(path: Path, keys: Sequence[str]) -> Iterator[Entry]:
             yield entry
     if error is not None:
         raise error
+    if keys and not any(chosen.values()):
+        known = ", ".join(sorted(chosen)) or "no message at all"
+        raise RecordingError(str(path), f"no key that fits {' '.join(keys)}", f"some of {known}")
 
 
 def config_of(path: Path) -> Config:
@@ -51,7 +55,7 @@ def config_of(path: Path) -> Config:
     source, _ = open_any(path)
     try:
         return recorded_config(source)
-    except QuadrigaError:
+    except RecordingError:
         return Config()
 
 

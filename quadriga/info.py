@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import fields
 from datetime import UTC, datetime
 
 from quadriga.columns import NOTHING, columns
 from quadriga.survey import Survey, type_of
 from shared.config import Config
+from shared.config_text import departures
 from shared.tick_track import TickTrack
 
 _EVENTS = 40  # as many are shown
@@ -88,18 +88,10 @@ def _agents(s: Survey) -> Iterator[tuple[str, ...]]:
 
 
 def _differences(config: Config | None) -> Iterator[tuple[str, str]]:
-    """Keys that are not at their defaults; how the processes reached each other is left out."""
-    for section in fields(Config):
-        if config is None or section.name == "bus":
-            continue
-        mine, default = getattr(config, section.name), getattr(Config(), section.name)
-        for item in fields(mine):
-            value = getattr(mine, item.name)
-            if value != getattr(default, item.name):
-                yield (
-                    f"{section.name}.{item.name}",
-                    f"{value}  (default {getattr(default, item.name)})",
-                )
+    """Keys that are not at their defaults."""
+    for name, value, usual, _ in departures(config or Config(), Config()):
+        shown, default = (str(v) if v != "" else NOTHING for v in (value, usual))
+        yield name, f"{shown}  (default {default})"
 
 
 def _rate(track: TickTrack) -> str:

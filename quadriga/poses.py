@@ -10,13 +10,13 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from quadriga.traces import recorded_config
 from quadriga.truth_trace import Ticks
 from shared.codec import decode
 from shared.config import Config
 from shared.errors import MessageError, RecordingError
 from shared.messages import State, Truth
 from shared.recording import Recording
+from shared.recording_config import recorded_config
 from shared.robot import Array, q_stand, robot_names
 from shared.topics import STATE, TRUTH
 from sim_server.team_model import NQ, TeamModel, build_team_model

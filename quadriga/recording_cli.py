@@ -13,6 +13,12 @@ Add = Callable[[str, Any, str], argparse.ArgumentParser]
 _KEYS = "a topic, a robot or a key: plan, r2, r1/state, 'r*/**'"
 
 
+def add_file(command: argparse.ArgumentParser, what: str = "") -> None:
+    """The recording that a command reads."""
+    doc = f"a recording {what}".rstrip()
+    command.add_argument("file", type=_file, metavar="FILE", help=f"{doc}, or its run folder")
+
+
 def add_record_options(record: argparse.ArgumentParser) -> None:
     """Of `quadriga record`."""
     record.add_argument("-o", "--output", type=Path, metavar="FILE",
@@ -35,13 +41,13 @@ def add_record_options(record: argparse.ArgumentParser) -> None:
 def add_verbs(add: Add) -> None:
     """The commands themselves."""
     info = add("info", verbs.info, "say what a recording holds")
-    info.add_argument("file", type=Path, metavar="FILE", help="an MCAP recording")
+    add_file(info)
     recover = add("recover", verbs.recover, "write what is readable of a damaged recording")
-    recover.add_argument("file", type=Path, metavar="FILE", help="a cut or damaged recording")
+    add_file(recover, "that is cut or damaged")
     recover.add_argument("-o", "--output", type=Path, metavar="OUT",
                          help="the whole file that is made (FILE.recovered.mcap)")  # fmt: skip
     check = add("check", verbs.check, "hold every message of a recording against the rules")
-    check.add_argument("file", type=Path, metavar="FILE", help="an MCAP recording")
+    add_file(check)
     echo = add("echo", verbs.echo, "print messages, live or from a recording, one line each")
     echo.add_argument("key", nargs="+", metavar="KEY", help=_KEYS)
     echo.add_argument("--full", action="store_true", help="every number of every array")
@@ -50,6 +56,15 @@ def add_verbs(add: Add) -> None:
     hz.add_argument("--every", type=float, default=1.0, metavar="S",
                     help="live: seconds between two tables (1)")  # fmt: skip
     for looking, what in ((echo, "messages"), (hz, "tables")):
-        looking.add_argument("--file", type=Path, metavar="FILE", help="a recording, not the bus")
+        looking.add_argument("--file", type=_file, metavar="FILE", help="a recording, not the bus")
         looking.add_argument("-n", "--count", type=int, default=0, metavar="COUNT",
                              help=f"stop after so many {what} (0: never)")  # fmt: skip
+
+
+def _file(text: str) -> Path:
+    path = Path(text)
+    if not path.is_dir():
+        return path
+    from quadriga.summary import RECORDING
+
+    return path / RECORDING

@@ -40,7 +40,9 @@ def wanted(arguments: argparse.Namespace) -> Wanted:
 
 def recorded(done: Recorded) -> str:
     """What `quadriga record` says at its end."""
-    files = ", ".join(map(str, done.paths))
+    files = str(done.paths[0])
+    if len(done.paths) > 1:
+        files += f" … {done.paths[-1].name} ({len(done.paths)} files)"
     text = f"recorded to {files}: {done.messages:,} messages, {sum(done.lost.values()):,} lost"
     worst = sorted(done.lost.items(), key=lambda item: -item[1])[:5]
     return text + "".join(f"\n  {key}: {count:,} lost" for key, count in worst)

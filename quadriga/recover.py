@@ -11,7 +11,7 @@ from quadriga.columns import columns
 from quadriga.survey import open_any
 from shared.clock import wall_ns
 from shared.config import Config
-from shared.errors import QuadrigaError, RecordingError
+from shared.errors import RecordingError
 from shared.recording import COUNTS, LOST, PROFILE, Recording, RecordingWriter
 from shared.recording_config import recorded_config
 from shared.recording_writer import reason
@@ -60,10 +60,15 @@ def recover(path: Path, out: Path | None) -> Recovery | None:
     source, error = open_any(path)
     if isinstance(source, Recording) or error is None:
         return None
+    if not source.metadata and next(source.entries(), None) is None:
+        raise RecordingError(
+            str(path), error.got, "a recording of which something is left",
+            "neither a message nor the configuration can be read",
+        )  # fmt: skip
     out = out or path.with_name(f"{path.stem}.recovered{path.suffix}")
     try:
         config = recorded_config(source)
-    except QuadrigaError:
+    except RecordingError:
         config = Config()
     try:
         with RecordingWriter(out, source.metadata, periods=periods(config)) as writer:

@@ -10,12 +10,12 @@ from typing import Final
 
 from quadriga.by_tick import by_tick
 from quadriga.difference import Difference, difference
-from quadriga.traces import recorded_config
 from shared.codec import decode, encode
 from shared.config import Config
 from shared.errors import MessageError, RecordingError
 from shared.messages import Command, Event, Message
 from shared.recording import Entry, Recording
+from shared.recording_config import recorded_config
 from shared.topics import COMMAND, EVENT, STATE, TRUTH, topic_of
 from sim_server.lockstep import ANSWERS
 from sim_server.motors import WEAKENED
@@ -49,7 +49,6 @@ def resim(recording: Recording) -> Iterator[Resim]:
 
     Raises:
         RecordingError: not of a lock-step world, or with commands missing from the file.
-        ConfigError: its configuration is another version's.
     """
     config = recorded_config(recording)
     if config.world.mode != "lockstep":

@@ -10,9 +10,9 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 from quadriga.recorder import versions
 from quadriga.resim import Resim, other_versions, resim
-from quadriga.traces import recorded_config
 from shared.clock import monotonic
 from shared.recording import Recording
+from shared.recording_config import recorded_config
 
 _SHOWN: Final = 100  # ticks between looks at the bar
 
@@ -22,7 +22,6 @@ def run(path: Path, console: Console) -> bool:
 
     Raises:
         RecordingError: no recording, not of a lock-step world, or with commands missing.
-        ConfigError: its configuration is another version's.
     """
     recording = Recording(path)
     seconds = recorded_config(recording).world.seconds

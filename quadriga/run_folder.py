@@ -80,10 +80,10 @@ def report_file(path: Path, page: Path | None, *, console: Console) -> dict[str,
         RecordingError: the recording is empty or foreign, or the page cannot be written.
     """
     run = read_run(path)
+    written = write_page(run, page or path.with_suffix(".html"))
     print_table(dict(run.summary), console)
     for said in absent(run):
         console.print(said, style="yellow", markup=False, highlight=False)
-    written = write_page(run, page or path.with_suffix(".html"))
     console.print(f"page: {written}", markup=False, highlight=False)
     return dict(run.summary)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from quadriga.gaps import end_of_world, missing_ticks, repeated_ticks
 from quadriga.table import print_table
-from quadriga.traces import Traces, in_force, read_traces
+from quadriga.traces import Traces, estimate_errors, in_force, read_traces
 from quadriga.truth_trace import distance
 from shared.messages import Status
 from shared.recording import Recording
@@ -124,13 +124,10 @@ def _tracking(traces: Traces) -> dict[str, Any]:
 
 def _estimator(traces: Traces) -> dict[str, Any]:
     """Error of the agents' own outputs against truth at the same tick, steady part."""
-    truth, begin = traces.truth, steady_from(traces)
-    errors = [np.zeros((0, len(OUTPUTS)))]
-    for i, robot in enumerate(traces.robots):
-        measured = traces.measurements[robot]
-        _, mine, true = np.intersect1d(measured.tick, truth.tick, return_indices=True)
-        late = measured.tick[mine] >= begin
-        errors.append(measured.y[mine[late]] - truth.y[true[late], i])
+    begin, errors = steady_from(traces), []
+    for i in range(len(traces.robots)):
+        tick, error = estimate_errors(traces, i)
+        errors.append(error[tick >= begin])
     return {"estimator_rmse": _rmse(np.concatenate(errors)[:, None])}
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from shared.codec import decode
 from shared.config import Config
-from shared.errors import MessageError, QuadrigaError, RecordingError
+from shared.errors import MessageError, RecordingError
 from shared.mcap_chunk import name_of
 from shared.messages import Event, Message, Status
 from shared.recording import Entry, Recording
@@ -73,9 +73,8 @@ def survey(path: Path) -> Survey:
     source, error = open_any(path)
     try:
         config: Config | None = recorded_config(source)
-    except QuadrigaError as wrong:
-        config = None
-        error = error or RecordingError(str(path), wrong.got, wrong.expected, wrong.cause)
+    except RecordingError as wrong:
+        config, error = None, error or wrong
     found = _read(source.entries(), periods(config or Config()))
     notes = source.notes() if isinstance(source, Recording) else source.notes
     damages = () if isinstance(source, Recording) else tuple(source.damages)

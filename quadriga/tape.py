@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from typing import Final, NamedTuple
 
-from quadriga.traces import recorded_config
 from shared.errors import ConfigError, RecordingError
 from shared.recording import Entry, Recording
+from shared.recording_config import recorded_config
 from shared.topics import STATE, TRUTH
 
 Remap = tuple[str, str]

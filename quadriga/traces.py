@@ -17,11 +17,9 @@ from shared.errors import MessageError, RecordingError
 from shared.messages import Event, Measurement, Message, Plan, Reference, Status, Truth
 from shared.recording import Recording
 from shared.recording_config import recorded_config
-from shared.robot import Array, robot_names
+from shared.robot import OUTPUTS, Array, robot_names
 from shared.topics import COMMAND, INPUTS, STATE, topic_of
 from shared.yokes import yoke_pairs
-
-__all__ = ["MeasurementTrace", "Traces", "in_force", "read_traces", "recorded_config"]
 
 # Up to 1 kHz each: only their ticks are read.
 _TIMED_ONLY: Final = (STATE.name, COMMAND.name, INPUTS.name)
@@ -79,7 +77,6 @@ def read_traces(recording: Recording, names: Container[str] | None = None) -> Tr
 
     Raises:
         RecordingError: the recording holds no message.
-        ConfigError: its configuration is another version's.
     """
     config = recorded_config(recording)
     robots = robot_names(config.team.robots)
@@ -151,6 +148,20 @@ def _row(key: str) -> tuple[Any, str]:
         return topic_of(key)
     except MessageError:
         return None, ""
+
+
+def estimate_errors(traces: Traces, index: int) -> tuple[Ticks, Array]:
+    """What the agent at `index` estimated, less the truth at the same ticks.
+
+    Returns:
+        Ticks (K,) and errors (K, 6); that of the roll is the shorter way round.
+    """
+    own, truth = traces.measurements[traces.robots[index]], traces.truth
+    tick, mine, true = np.intersect1d(own.tick, truth.tick, return_indices=True)
+    error = own.y[mine] - truth.y[true, index]
+    roll = OUTPUTS.index("roll")
+    error[:, roll] = (error[:, roll] + np.pi) % (2 * np.pi) - np.pi
+    return tick, error
 
 
 def _fits(truth: Truth, config: Config) -> bool:

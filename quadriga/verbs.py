@@ -131,9 +131,11 @@ def _fitted_sha256(config: Config, wait: float) -> str:
 def report(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     """What came of a recorded walk."""
     from quadriga.run_folder import report, report_file, went_wrong
+    from shared.recording import Recording
 
     if arguments.run.is_file():
         summary = report_file(arguments.run, arguments.html, console=Console())
+        Recording(arguments.run).require_whole()
     elif arguments.html is not None:
         raise ConfigError("--html", str(arguments.html), "a recording's FILE before it",
                           "a run folder's page is its report.html")  # fmt: skip
@@ -155,23 +157,29 @@ def play(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     tape = Tape(recording, arguments.topics, remaps, arguments.clock)
     play(config.bus, tape, Console(), rate=arguments.rate, start=arguments.start,
          loop=arguments.loop, paused=arguments.paused)  # fmt: skip
+    recording.require_whole()
     return 0
 
 
 def resim(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
     """The world of a recording once more, compared to the byte."""
     from quadriga.resim_run import run
+    from shared.recording import Recording
 
     _expect_no_options(given, "the recording's own configuration is used")
-    return int(not run(arguments.file, Console()))
+    equal = run(arguments.file, Console())
+    Recording(arguments.file).require_whole()
+    return int(not equal)
 
 
 def export(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
     """A recording in a format of others."""
     from quadriga.export.run import run
+    from shared.recording import Recording
 
     _expect_no_options(given, "the recording's own configuration is used")
     run(arguments.file, arguments.to, arguments.output, Console())
+    Recording(arguments.file).require_whole()
     return 0
 
 
@@ -179,10 +187,9 @@ def replay(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
     """Recorded agents, run again; the configuration is the recording's, with `given` changed."""
     from quadriga.replay.run import break_in, replay
     from quadriga.replay.text import described
-    from quadriga.summary import RECORDING
+    from shared.recording import Recording
 
-    path = arguments.recording
-    path = path / RECORDING if path.is_dir() else path
+    path = arguments.file
     options = (given, arguments.predictor, arguments.out)
     if arguments.stop_at is not None:
         if arguments.all:
@@ -193,6 +200,7 @@ def replay(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
         outcomes = replay(path, robots, *options, Console(stderr=True))
     for outcome in outcomes:
         print(described(outcome))
+    Recording(path).require_whole()
     return int(any(outcome.failed for outcome in outcomes))
 
 

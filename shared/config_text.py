@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -53,6 +54,19 @@ def config_sha256(config: Config) -> str:
     values = {name: value for name, value in asdict(config).items() if name != "bus"}
     canonical = json.dumps(values, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(canonical.encode()).hexdigest()
+
+
+def departures(config: Config, usual: Config) -> Iterator[tuple[str, Any, Any, Mapping[str, Any]]]:
+    """Keys whose values differ: `section.key`, value, the usual one, the key's metadata.
+
+    How the processes reach each other (`bus`) changes nothing that they do and is left out.
+    """
+    for section in fields(config):
+        mine, theirs = getattr(config, section.name), getattr(usual, section.name)
+        for item in fields(mine):
+            value, other = getattr(mine, item.name), getattr(theirs, item.name)
+            if value != other and section.name != "bus":
+                yield f"{section.name}.{item.name}", value, other, item.metadata
 
 
 def _summary(section: Any) -> str:

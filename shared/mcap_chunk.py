@@ -46,15 +46,17 @@ def stream(content: bytes) -> ReadDataStream:
 
 
 def messages_of(
-    chunk: bytes, names: Container[str] | None, wanted: dict[int, str | None], path: str
-) -> Iterator[Entry]:
-    """Entries of one chunk of the topics `names` (None: all, also of keys outside the table).
+    chunk: bytes, wanted: dict[int, str | None], path: str, names: Container[str] | None = None,
+    keys: Container[str] | None = None,
+) -> Iterator[Entry]:  # fmt: skip
+    """Entries of one chunk.
 
     Args:
         chunk: its records, uncompressed.
-        names: see above.
         wanted: keys by channel, None for one that is not wanted; learns them as they pass by.
         path: the file's, for the error.
+        names: of topics that are wanted; None: all, also of keys outside the table.
+        keys: that are wanted; None: all.
 
     Raises:
         RecordingError: the messages are of a schema later than this version's.
@@ -65,7 +67,10 @@ def messages_of(
             opcode, length = RECORD.unpack_from(chunk, at)
             at += RECORD.size
             if opcode == Opcode.CHANNEL:
-                _learn(chunk, at, length, names, wanted)
+                channel_id = int.from_bytes(chunk[at : at + 2], "little")
+                if channel_id not in wanted:  # every chunk repeats them
+                    topic = Channel.read(stream(chunk[at : at + length])).topic
+                    wanted[channel_id] = _asked_for(topic, names, keys)
             elif opcode == Opcode.SCHEMA:
                 check_schema(Schema.read(stream(chunk[at : at + length])), path)
             at += length
@@ -109,12 +114,7 @@ def robot_of(key: str) -> str:
         return ""
 
 
-def _learn(
-    chunk: bytes, at: int, length: int, names: Container[str] | None,
-    wanted: dict[int, str | None],
-) -> None:  # fmt: skip
-    if int.from_bytes(chunk[at : at + 2], "little") in wanted:
-        return  # every chunk repeats them
-    channel = Channel.read(stream(chunk[at : at + length]))
-    skipped = names is not None and name_of(channel.topic) not in names
-    wanted[channel.id] = None if skipped else channel.topic
+def _asked_for(key: str, names: Container[str] | None, keys: Container[str] | None) -> str | None:
+    """The key, None if it is not wanted."""
+    named = names is None or name_of(key) in names
+    return key if named and (keys is None or key in keys) else None

@@ -38,6 +38,8 @@ __all__ = [
 
 M = TypeVar("M", bound=Message)
 
+_RECOVER: Final = "`quadriga recover` writes what is readable"
+_MEND: Final = f"one cut or damaged in its first bytes: {_RECOVER}"
 _PART: Final = 1 << 20  # bytes that are read at once
 _END: Final = RECORD.size + 4 + RECORD.size + 20 + len(MCAP0_MAGIC)  # DataEnd, footer, magic
 
@@ -69,23 +71,28 @@ class Recording:
                 str(path), reason(error), "a recording", "did the walk start?"
             ) from None
         if head != MCAP0_MAGIC:
-            got = f"{self._size} bytes that do not start as MCAP" if self._size else "an empty file"
-            raise RecordingError(str(path), got, "an MCAP file")
+            if not self._size:
+                raise RecordingError(str(path), "an empty file", "a recording")
+            got = f"{self._size:,} bytes that do not start as MCAP"
+            raise RecordingError(str(path), got, "an MCAP file", f"a foreign file, or {_MEND}")
         self.metadata = self._metadata()
 
-    def entries(self, names: Container[str] | None = None) -> Iterator[Entry]:
-        """Recorded messages in the order of the file.
+    def entries(
+        self, names: Container[str] | None = None, keys: Container[str] | None = None
+    ) -> Iterator[Entry]:
+        """Recorded messages in the order of the file; what is not asked for is skipped cheaply.
 
         Args:
-            names: only topics of these names (`Topic.name`), others are skipped cheaply;
-                None gives every message, also of keys outside the table.
+            names: only topics of these names (`Topic.name`); None gives every message, also of
+                keys outside the table.
+            keys: only these keys; None gives all.
 
         Raises:
             RecordingError: the messages are of a schema later than this version's.
         """
         wanted: dict[int, str | None] = {}
         for chunk in self._chunks():
-            yield from messages_of(chunk, names, wanted, str(self.path))
+            yield from messages_of(chunk, wanted, str(self.path), names, keys)
 
     def messages(self, kind: type[M], robot: str = "") -> Iterator[M]:
         """Decoded messages of a type (of one robot, or of all).
@@ -140,7 +147,7 @@ class Recording:
     def _damaged(self, got: str) -> RecordingError:
         return RecordingError(
             str(self.path), got, "a whole recording",
-            "was the recorder killed, or the disk full? `quadriga recover` writes what is readable",
+            f"was the recorder killed, or the disk full? {_RECOVER}",
         )  # fmt: skip
 
     def _records(self) -> Iterator[tuple[int, bytes]]:
@@ -181,7 +188,7 @@ class Recording:
                 break
         raise RecordingError(
             str(self.path), "no metadata of this project", "a recording made by `quadriga`",
-            "a foreign MCAP file, or one cut or damaged in its first bytes",
+            f"a foreign MCAP file, or {_MEND}",
         )  # fmt: skip
 
 

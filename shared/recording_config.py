@@ -6,7 +6,7 @@ import json
 
 from shared.config import Config
 from shared.config_file import build
-from shared.errors import RecordingError
+from shared.errors import ConfigError, RecordingError
 from shared.recording import Recording
 from shared.salvage import Salvage
 
@@ -15,8 +15,8 @@ def recorded_config(recording: Recording | Salvage) -> Config:
     """The configuration of a recorded run.
 
     Raises:
-        RecordingError: the recording holds none.
-        ConfigError: it has keys or values that this version does not know.
+        RecordingError: the recording holds none, or one with keys or values that this version
+            does not know.
     """
     try:
         sections = json.loads(recording.metadata.get("config_json", ""))
@@ -26,4 +26,10 @@ def recorded_config(recording: Recording | Salvage) -> Config:
         raise RecordingError(
             str(recording.path), "metadata without a configuration", "config_json in the metadata"
         )
-    return build(sections)
+    try:
+        return build(sections)
+    except ConfigError as error:
+        raise RecordingError(
+            f"configuration of {recording.path}", f"{error.name} = {error.got}", error.expected,
+            "recorded by another version of quadriga: use that one",
+        ) from None  # fmt: skip

@@ -106,7 +106,7 @@ class Salvage:
             self._explain(anchor, at)
             self.chunks += 1
             try:
-                yield from messages_of(content, None, keys, str(self.path))
+                yield from messages_of(content, keys, str(self.path))
             except CORRUPT as error:  # of another program that writes LZ4 chunks as we do
                 self.damages.append(Damage(at, end - at, f"a foreign chunk ({error})"))
             anchor = end

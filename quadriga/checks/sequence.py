@@ -96,9 +96,8 @@ class Gaps:
         team = self._config.team
         states = [self._tracks.get(STATE.key(team.name, name)) for name in robot_names(team.robots)]
         seen = [row[1] for row in states if row is not None]
-        if not seen:
-            return
-        begin, end = min(track.first for track in seen), max(track.last for track in seen)
+        begin = min((track.first for track in seen), default=0)
+        end = max((track.last for track in seen), default=0)
         if begin > 0:
             self.finding.notes.append(f"begins at tick {begin}")
         if self._filtered:

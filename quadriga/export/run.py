@@ -89,5 +89,5 @@ def _imported(module: str, function: str, form: str) -> Any:
     except ModuleNotFoundError as error:
         raise ConfigError(
             f"--to {form}", f"no Python package {error.name}", "the extra 'export'",
-            "pip install 'quadriga[export]'",
+            "pip install -e '.[export]' in the project's folder",
         ) from None  # fmt: skip

@@ -8,11 +8,11 @@ from dataclasses import fields
 from typing import NamedTuple
 
 from quadriga.export.layout import Layout, build_layout
-from quadriga.traces import recorded_config
 from shared.codec import decode
 from shared.errors import MessageError
 from shared.messages import Message
 from shared.recording import Recording
+from shared.recording_config import recorded_config
 from shared.robot import Array
 from shared.topics import TABLE, topic_of
 
@@ -43,7 +43,7 @@ class Source:
         """Look through the recording once, for the names that occur in maps.
 
         Raises:
-            RecordingError, ConfigError: see `recorded_config`.
+            RecordingError: see `recorded_config`.
         """
         self.recording, self.config = recording, recorded_config(recording)
         self.left_out: Counter[str] = Counter()

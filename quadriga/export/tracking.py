@@ -27,7 +27,7 @@ class Tracking:
         """Read what is needed of a recording.
 
         Raises:
-            RecordingError, ConfigError: see `read_traces`.
+            RecordingError: see `read_traces`.
         """
         names = {topic.name for topic in (TRUTH, MEASUREMENT, PLAN, REFERENCE)}
         traces = read_traces(recording, names)

@@ -3,30 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 from agents.agent import Agent
-from quadriga.traces import recorded_config
-from shared.config import CENTRAL, BusConfig, Config
+from shared.config import CENTRAL, Config
 from shared.config_file import build, overlaid
-from shared.errors import ConfigError, RecordingError
-from shared.recording import Recording
-
-
-def readable_config(recording: Recording) -> Config:
-    """The configuration of a recorded run.
-
-    Raises:
-        RecordingError: there is none, or it is another version's.
-    """
-    try:
-        return recorded_config(recording)
-    except ConfigError as error:
-        raise RecordingError(
-            f"configuration of {recording.path}", f"{error.name} = {error.got}", error.expected,
-            "recorded by another version of quadriga; replay it with that one",
-        ) from None  # fmt: skip
+from shared.config_text import departures
+from shared.errors import ConfigError
 
 
 def changed_config(config: Config, given: Mapping[str, Any]) -> Config:
@@ -42,14 +26,8 @@ def changed_config(config: Config, given: Mapping[str, Any]) -> Config:
 
 
 def changes(old: Config, new: Config) -> str:
-    """Every changed key with its two values, or ""; how to reach the bus changes nothing."""
-    before, after = (asdict(replace(config, bus=BusConfig())) for config in (old, new))
-    return ", ".join(
-        f"{section}.{key} {value} → {after[section][key]}"
-        for section, keys in before.items()
-        for key, value in keys.items()
-        if after[section][key] != value
-    )
+    """Every changed key with its two values, or ""."""
+    return ", ".join(f"{name} {was} → {now}" for name, now, was, _ in departures(new, old))
 
 
 def check_change(old: Agent, new: Agent) -> None:

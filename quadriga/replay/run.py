@@ -16,7 +16,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from agents.agent import Agent, AgentState, Inputs
 from agents.arrivals import Arrivals
 from quadriga.replay.breakpoint import stop_here
-from quadriga.replay.changed import changed_config, changes, check_change, readable_config
+from quadriga.replay.changed import changed_config, changes, check_change
 from quadriga.replay.feed import Feed
 from quadriga.replay.figure import Curves, draw
 from quadriga.replay.recorded_predictor import recorded_predictor
@@ -31,6 +31,7 @@ from shared.clock import monotonic
 from shared.errors import ConfigError, QuadrigaError, RecordingError
 from shared.messages import Message
 from shared.recording import Recording
+from shared.recording_config import recorded_config
 from shared.robot import robot_names
 from shared.topics import PLAN
 
@@ -107,7 +108,7 @@ def replay(
         ConfigError: no such robot, or a change that cannot be replayed.
         PredictorError: the predictor is not to be found.
     """
-    config = readable_config(Recording(path))
+    config = recorded_config(Recording(path))
     jobs = [
         Job(path, robot, given, predictor, _folder(path, out))
         for robot in _known(robots, robot_names(config.team.robots))
@@ -140,7 +141,7 @@ def break_in(
         QuadrigaError: as `replay`.
         KeyboardInterrupt: the user has left the debugger.
     """
-    _known((robot,), robot_names(readable_config(Recording(path)).team.robots))
+    _known((robot,), robot_names(recorded_config(Recording(path)).team.robots))
     job = Job(path, robot, given, predictor, _folder(path, out))
     try:
         return replay_one(job, look=stop_here, at=round(1000 * seconds))
@@ -166,7 +167,7 @@ def replay_one(
     begun = monotonic()
     one_blas_thread()
     recording = Recording(job.path)
-    config = readable_config(recording)
+    config = recorded_config(recording)
     predictor, own = recorded_predictor(recording, config, job.predictor)
     recorded_agent = Agent(config, job.robot, predictor)
     new = changed_config(config, job.given)

@@ -24,14 +24,11 @@ from shared.topics import (
     MEASUREMENT,
     PLAN,
     STATE,
-    STATUS,
-    TABLE,
     Topic,
 )
 
 Packet = tuple[str, bytes]  # key, payload
 Serial = tuple[str, int, int]  # topic of an output and its order
-_NEEDED: Final = frozenset(topic.name for topic in TABLE) - {STATUS.name, EVENT.name}
 _REPORT_AFTER: Final = 2000  # entries
 
 
@@ -76,10 +73,9 @@ def read_tape(
     """
     tape = Tape()
     takers = _takers(tape, config, agent, arrivals)
-    for count, entry in enumerate(recording.entries(_NEEDED)):
-        taker = takers.get(entry.key)
-        if taker is not None and entry.tick >= 0:
-            taker(entry)
+    for count, entry in enumerate(recording.entries(keys=takers)):
+        if entry.tick >= 0:
+            takers[entry.key](entry)
         if count % _REPORT_AFTER == 0:
             progress(entry.tick)
     # A forged tick must not ask for years of steps.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import fields
 from datetime import UTC, datetime
 from typing import Any, Final
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from quadriga.report.run import Run
 from shared.config import Config
+from shared.config_text import departures
 from shared.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, STATE, STATUS, TRUTH
 
 _DIGITS: Final = 12  # of a digest
@@ -74,19 +74,12 @@ def facts(run: Run) -> Iterator[tuple[str, str]]:
     yield "versions", ", ".join(f"{k} {v}" for k, v in _versions(run).items()) or "not recorded"
 
 
-def departures(config: Config) -> list[tuple[str, str, str, str]]:
+def not_usual(config: Config) -> list[tuple[str, str, str, str]]:
     """Keys whose values are not the defaults: key, value, default, meaning with unit."""
-    default, found = Config(), []
-    for section in fields(config):
-        if section.name == "bus":  # how the processes reached each other changes nothing they did
-            continue
-        mine, theirs = getattr(config, section.name), getattr(default, section.name)
-        for item in fields(mine):
-            value, usual = getattr(mine, item.name), getattr(theirs, item.name)
-            if value != usual:
-                unit = item.metadata["unit"]
-                doc = item.metadata["doc"] + ("" if unit in ("-", "1") else f" [{unit}]")
-                found.append((f"{section.name}.{item.name}", _text(value), _text(usual), doc))
+    found = []
+    for name, value, usual, meta in departures(config, Config()):
+        doc = meta["doc"] + ("" if meta["unit"] in ("-", "1") else f" [{meta['unit']}]")
+        found.append((name, _text(value), _text(usual), doc))
     return found
 
 

@@ -142,7 +142,7 @@ def _curves(panel: Panel, box: Box, points: int) -> Iterator[str]:
         if low <= height <= high:
             y = box.y + box.h * float((high - height) / (high - low))
             yield f'<path class="grid" d="M{box.x:.0f} {y:.1f}h{box.w:.0f}"/>'
-            yield f'<text class="tick end" x="{box.x - 6:.0f}" y="{y + 4:.1f}">{tick:g}</text>'
+            yield f'<text class="tick end" x="{box.x - 6:.0f}" y="{y + 4:.1f}">{tick:,.9g}</text>'
     yield (
         f'<svg x="{box.x:.0f}" y="{box.y:.1f}" width="{box.w:.1f}" height="{box.h:.0f}">'
         '<g transform="scale(.1)">'

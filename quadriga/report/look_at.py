@@ -76,7 +76,7 @@ def episodes(run: Run) -> list[Episode]:
 def _episode(run: Run, troubles: Sequence[Moment]) -> Episode:
     tick = troubles[0].tick
     signs = [
-        Sign(m.tick, m.robot, f"{m.kind}: {m.text}" if m.text else m.kind)
+        Sign(m.tick, m.robot, _told(m, tick))
         for m in run.moments
         if m.kind in _TELLING
         and tick - BEFORE_MS <= m.stop
@@ -90,6 +90,12 @@ def _episode(run: Run, troubles: Sequence[Moment]) -> Episode:
     signs.sort(key=lambda sign: sign.tick)
     accounts = tuple(build_account(run, index, tick) for index in range(len(run.traces.robots)))
     return Episode(tick, tuple(troubles), tuple(signs), accounts)
+
+
+def _told(moment: Moment, tick: int) -> str:
+    """A moment in words, and how long it lasted if it was not over at `tick`."""
+    text = f"{moment.kind}: {moment.text}" if moment.text else moment.kind
+    return text + (f", until {moment.stop / 1000:.2f} s" if moment.stop > tick else "")
 
 
 def _signs(robot: str, window: Samples) -> Iterator[Sign]:

@@ -72,7 +72,7 @@ def _absent(run: Run) -> str:
 
 def _run(run: Run) -> str:
     config = run.traces.config
-    changed = about.departures(config)
+    changed = about.not_usual(config)
     facts = table((), list(about.facts(run)), named=True)
     if not changed:
         return facts + "<p>Every key of the configuration has its default value.</p>"

@@ -63,7 +63,6 @@ def read_run(path: Path) -> Run:
 
     Raises:
         RecordingError: there is none, or it is empty or foreign.
-        ConfigError: its configuration is another version's.
     """
     recording = Recording(path)
     return build_run(recording, read_traces(recording))

@@ -12,7 +12,7 @@ from quadriga.report.axis import nice
 from quadriga.report.chart import WIDTH, draw
 from quadriga.report.panel import Curve, Mark, Panel
 from quadriga.report.run import Run
-from quadriga.traces import in_force
+from quadriga.traces import estimate_errors, in_force
 from quadriga.truth_trace import Ticks
 from shared.robot import OUTPUTS, Array
 from shared.yokes import yoke_pairs
@@ -109,14 +109,13 @@ def reference_against_measured(run: Run) -> str:
 
 def estimator_errors(run: Run) -> str:
     """Estimated less true outputs of all robots."""
-    truth, panels = run.traces.truth, []
+    robots, panels = range(len(run.traces.robots)), []
+    errors = [estimate_errors(run.traces, index) for index in robots]
     for i in _ORDER:
         curves = []
-        for index, robot in enumerate(run.traces.robots):
-            own = run.traces.measurements[robot]
-            tick, mine, true = np.intersect1d(own.tick, truth.tick, return_indices=True)
-            error = own.y[mine, i] - truth.y[true, index, i]
-            curves.append(Curve(tick / 1000, error, style(index), gap=_GAP))
+        for index in robots:
+            tick, error = errors[index]
+            curves.append(Curve(tick / 1000, error[:, i], style(index), gap=_GAP))
         panels.append(Panel(NAMES[i], curves, span=0.02 * _SPANS[i], until=until(run)))
     return figure(run, panels, "estimator errors", most=points(run, 12), height=70.0)
 

@@ -84,7 +84,7 @@ def test_one_bit_of_one_sensor_is_found_at_its_tick(entries: list[Entry]) -> Non
     after = heard_again(changed(entries, "team/r2/state", 433, flip_last_bit), "r2")
     found = first_difference(before, after)
     assert found is not None
-    assert (found.tick, found.key) == (433, "team/r2/command")
+    assert (found.tick, found.name) == (433, "team/r2/command")
     assert found.field.startswith("tau[")
     assert heard_again(entries, "r2") == before, "nothing is remembered from one run to the next"
 
@@ -93,7 +93,7 @@ def test_a_changed_gain_is_a_change_of_behaviour(entries: list[Entry]) -> None:
     stiffer = replace(CONFIG, controller=replace(CONFIG.controller, kp_z=400.1))
     verdict = judge("r1", heard_again(entries, "r1"), heard_again(entries, "r1", stiffer), ())
     assert not verdict.ok
-    assert "First difference: tick 0, team/r1/command, tau[" in verdict.text
+    assert "First difference: tick 0, team/r1/command.tau[" in verdict.text
     assert REMEDY in verdict.text
 
 
@@ -111,7 +111,7 @@ def test_what_another_machine_may_do_to_the_last_bits_is_let_through_and_told() 
     assert "Zen" in told.text
     beyond = judge("r1", command(2.0), far, ["BLAS 'Zen' instead of 'SkylakeX'"])
     assert not beyond.ok
-    assert "tick 7, team/r1/command, tau[3]: recorded 2.0, recomputed 2.00000" in beyond.text
+    assert "tick 7, team/r1/command.tau[3]: recorded 2.0, recomputed 2.00000" in beyond.text
     assert not judge("r1", command(2.0), [], ["BLAS 'Zen' instead of 'SkylakeX'"]).ok
 
 

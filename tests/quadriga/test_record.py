@@ -24,9 +24,8 @@ from shared.config import BusConfig, Config, RecorderConfig, TeamConfig
 from shared.config_text import to_toml
 from shared.messages import Plan, Reference
 from shared.recording import LOST, SINCE, Recording
+from tests.listening import WAIT, await_listener, await_recorded
 from tests.shared.test_recording import state
-
-WAIT = 20.0  # s
 
 
 @pytest.fixture
@@ -49,12 +48,13 @@ Start = Callable[..., subprocess.Popen[str]]
 
 @pytest.fixture
 def start(config: Config, tmp_path: Path) -> Iterator[Start]:
-    """A function that starts `quadriga record` with more options, linked to the world."""
+    """A function that starts `quadriga record` with more options, and waits until it hears."""
     started = []
 
     def begin(
-        *options: str, room: int = -1, of: Config = config, out: Path | None = None
+        world: Bus, *options: str, room: int = -1, of: Config = config, out: Path | None = None
     ) -> subprocess.Popen[str]:
+        await_listener(world, "band/r1/state", there=False)  # of one before it that was killed
         file = tmp_path / "band.toml"
         file.write_text(to_toml(of), encoding="utf-8")
         out = out or tmp_path / "run.mcap"
@@ -65,7 +65,7 @@ def start(config: Config, tmp_path: Path) -> Iterator[Start]:
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, -1)),
         )  # fmt: skip
         started.append(recorder)
-        await_start(recorder, out)
+        await_listener(world, "band/r1/state")
         return recorder
 
     yield begin
@@ -75,18 +75,9 @@ def start(config: Config, tmp_path: Path) -> Iterator[Start]:
         recorder.communicate()
 
 
-def await_start(recorder: subprocess.Popen[str], file: Path) -> None:
-    """Wait until a recorder has made its file and hears what the world publishes."""
-    deadline = monotonic() + WAIT
-    while not file.exists():
-        assert recorder.poll() is None
-        assert monotonic() < deadline
-        sleep(0.02)
-    sleep(0.6)
-
-
-def ended(recorder: subprocess.Popen[str], world: Bus) -> tuple[str, str]:
-    """End the walk; what the recorder said on stdout and stderr."""
+def ended(recorder: subprocess.Popen[str], world: Bus, to: Path, count: int) -> tuple[str, str]:
+    """End the walk once `count` messages are recorded; what is said on stdout and stderr."""
+    await_recorded(to, count)
     world.withdraw()
     out, err = recorder.communicate(timeout=WAIT)
     assert recorder.returncode == 0, err
@@ -98,11 +89,11 @@ def test_joining_late_says_what_it_missed_and_counts_what_is_lost(
 ) -> None:
     put = world.publisher("band/r1/state")
     put(encode(state(0)))
-    recorder = start()
+    recorder = start(world)
     for tick in range(4000, 5000):
         if not 4100 <= tick < 4110 and tick != 4500:
             put(encode(state(tick)))
-    out, err = ended(recorder, world)
+    out, err = ended(recorder, world, tmp_path, 989)
     assert "joined late, has state since tick 4000" in err
     assert "989 messages, 11 lost" in out
     recording = Recording(tmp_path / "run.mcap")
@@ -120,31 +111,28 @@ def test_beside_a_team_s_own_recorder_nobody_is_doubled(
     ):
         other.declare(HERE)
         world.declare(HERE)
-        recorder = start()
-        sleep(0.5)
-        assert world.doubles(HERE) == frozenset()
+        recorder = start(world)
         world.publisher("band/r1/state")(encode(state(0)))
-        sleep(0.1)
-        _, err = ended(recorder, world)
+        await_recorded(tmp_path, 1)
+        assert world.doubles(HERE) == frozenset()
+        _, err = ended(recorder, world, tmp_path, 1)
     assert err == ""
     assert len(list(Recording(tmp_path / "run.mcap").entries())) == 1
 
 
 def test_another_team_s_configuration_is_noticed(start: Start, world: Bus, tmp_path: Path) -> None:
-    recorder = start()
+    recorder = start(world)
     for robot in ("r1", "r2"):
         world.publisher(f"band/{robot}/state")(encode(state(70)))
-    sleep(0.1)
-    _, err = ended(recorder, world)
+    _, err = ended(recorder, world, tmp_path, 2)
     assert "r2 walk too, but the configuration that is stored is of r1: give" in err
 
 
 def test_only_what_is_asked_for(start: Start, world: Bus, tmp_path: Path) -> None:
-    recorder = start("--topics", "state", "r2", "--exclude", "r3/*")
+    recorder = start(world, "--topics", "state", "r2", "--exclude", "r3/*")
     for key in ("r1/state", "r2/state", "r2/plan", "r3/state", "r1/command", "reference"):
         world.publisher(f"band/{key}")(encode(state(0)))
-    sleep(0.1)
-    ended(recorder, world)
+    ended(recorder, world, tmp_path, 3)
     recording = Recording(tmp_path / "run.mcap")
     keys = sorted(entry.key for entry in recording.entries())
     assert keys == ["band/r1/state", "band/r2/plan", "band/r2/state"]
@@ -154,12 +142,12 @@ def test_only_what_is_asked_for(start: Start, world: Bus, tmp_path: Path) -> Non
 def test_parts_are_whole_small_and_together_everything(
     start: Start, world: Bus, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    recorder = start("--max-size", "0.2")
+    recorder = start(world, "--max-size", "0.2")
     put, sent = world.publisher("band/r1/state"), []
     for tick in range(1200):
         sent.append(encode(state(tick)))
         put(sent[-1])
-    out, _ = ended(recorder, world)
+    out, _ = ended(recorder, world, tmp_path, len(sent))
     count = len(list(tmp_path.glob("*.mcap")))  # how many depends on when chunks were closed
     paths = [tmp_path / "run.mcap", *(tmp_path / f"run-{k}.mcap" for k in range(1, count))]
     assert "1,200 messages, 0 lost" in out
@@ -181,12 +169,12 @@ def test_parts_are_whole_small_and_together_everything(
 def test_kill_9_loses_a_tenth_of_a_second_at_most(start: Start, world: Bus, tmp_path: Path) -> None:
     put = world.publisher("band/r1/state")
     losses = []
-    for attempt in range(3):  # a busy machine may keep messages from even reaching the recorder
+    for attempt in range(12):  # a busy machine may not let the recorder run for a while
         path = tmp_path / f"{attempt}.mcap"
-        recorder = start(out=path)
+        recorder = start(world, out=path)
         sent: list[int] = []
         begun = monotonic()
-        while monotonic() - begun < 1.0 + 0.03 * attempt:
+        while monotonic() - begun < 0.8 + 0.03 * attempt:
             put(encode(state(len(sent))))
             sent.append(wall_ns())
             sleep(0.001)
@@ -195,20 +183,21 @@ def test_kill_9_loses_a_tenth_of_a_second_at_most(start: Start, world: Bus, tmp_
         recorder.communicate()
         found = survey(path)
         assert found.error is not None
-        (track,) = found.tracks.values()
-        assert (track.first, track.lost) == (0, 0)
-        losses.append(1e-9 * (killed - sent[track.last]))
+        for track in found.tracks.values():  # one, or none at all
+            assert (track.first, track.lost) == (0, 0)
+        last = max((track.last for track in found.tracks.values()), default=0)
+        losses.append(1e-9 * (killed - sent[last]))
         if losses[-1] < 0.1:
             return
     pytest.fail(f"{losses} s were lost")
 
 
 def test_what_is_lost_is_known_after_a_kill(start: Start, world: Bus, tmp_path: Path) -> None:
-    recorder = start()
+    recorder = start(world)
     put = world.publisher("band/r1/state")
     for tick in (*range(100), *range(107, 200)):
         put(encode(state(tick)))
-    sleep(0.5)
+    await_recorded(tmp_path / "run.mcap", 193)
     recorder.kill()
     recorder.communicate()
     (track,) = survey(tmp_path / "run.mcap").tracks.values()
@@ -216,11 +205,12 @@ def test_what_is_lost_is_known_after_a_kill(start: Start, world: Bus, tmp_path: 
 
 
 def test_a_full_disk_is_one_clear_error(start: Start, world: Bus, tmp_path: Path) -> None:
-    recorder = start(room=100_000)
+    recorder = start(world, room=100_000)
     put = world.publisher("band/r1/state")
     for tick in range(1000):
         put(encode(state(tick)))
-        sleep(0.0005)
+        if tick == 100:
+            await_recorded(tmp_path / "run.mcap", 101)
     out, err = recorder.communicate(timeout=WAIT)
     assert (recorder.returncode, out) == (2, "")
     assert err.count("\n") == 1
@@ -236,16 +226,17 @@ def test_a_full_file_system_is_named(start: Start, world: Bus, tmp_path: Path) -
         pytest.skip("no small file system can be mounted here")
     recorder = None
     try:
-        recorder = start(out=small / "run.mcap")
+        recorder = start(world, out=small / "run.mcap")
         put = world.publisher("band/r1/state")
         for tick in range(1000):
             put(encode(state(tick)))
-            sleep(0.0005)
+            if tick == 100:
+                await_recorded(small / "run.mcap", 101)
         _, err = recorder.communicate(timeout=WAIT)
         assert recorder.returncode == 2
         assert "got No space left on device, expected room for the recording" in err
         assert err.count("\n") == 1
-        assert survey(small / "run.mcap").tracks["band/r1/state"].count > 0
+        assert survey(small / "run.mcap").tracks["band/r1/state"].count > 100
     finally:
         if recorder is not None:
             recorder.kill()
@@ -255,11 +246,11 @@ def test_a_full_file_system_is_named(start: Start, world: Bus, tmp_path: Path) -
 
 def test_at_once_waits_for_no_team(config: Config, start: Start, tmp_path: Path) -> None:
     with Bus.open(config.bus, "band", SIM) as hub:  # it never says that it is there
-        recorder = start("--now")
+        recorder = start(hub, "--now")
         plan = Plan(40, 40, 1, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 0)
         hub.publisher("band/r1/plan")(encode(plan))
         hub.publisher("band/reference")(encode(Reference(0, 0, 0.0, 0.0, 0.0, 0.26)))
-        sleep(0.2)
+        await_recorded(tmp_path / "run.mcap", 2)
         recorder.terminate()
         recorder.communicate(timeout=WAIT)
     assert recorder.returncode == 0
@@ -292,10 +283,9 @@ def test_a_team_without_recorder_is_recorded_from_the_start(
     alone = replace(config, recorder=RecorderConfig(enabled=False))
     with Bus.open(alone.bus, "band", SIM) as world:
         world.declare(HERE)
-        recorder = start(of=alone)
+        recorder = start(world, of=alone)
         put = world.publisher("band/r1/state")
         for tick in range(10):
             put(encode(state(tick)))
-        sleep(0.1)
-        _, err = ended(recorder, world)
+        _, err = ended(recorder, world, tmp_path, 10)
     assert err == ""

@@ -120,6 +120,18 @@ def test_echo_shows_what_is_no_message(tmp_path: Path, say: Say) -> None:
     assert "100 bytes, key is 'team/some/thing': 00 00" in lines[1]
 
 
+def test_a_key_that_is_not_there_is_no_silence(small: Path, say: Say) -> None:
+    for verb in ("echo", "hz"):
+        status, _, err = say(verb, "r7", "r1/stat", "--file", small)
+        assert (status, err.count("\n")) == (2, 1)
+        assert "run.mcap: got no key that fits r7 r1/stat, expected some of team/r1/command" in err
+
+
+def test_a_run_folder_stands_for_its_recording(small: Path, say: Say) -> None:
+    assert say("info", small.parent) == say("info", small)
+    assert say("echo", "plan", "--file", small.parent) == say("echo", "plan", "--file", small)
+
+
 def test_hz_knows_rates_intervals_and_gaps(tmp_path: Path, say: Say) -> None:
     def change(key: str, message: msg.Message) -> msg.Message | None:
         return None if key == "team/r1/state" and 100 <= message.tick < 105 else message

@@ -135,9 +135,11 @@ def test_a_cut_recording_is_compared_up_to_the_cut(
     content = whole.read_bytes()
     (tmp_path / "cut.mcap").write_bytes(content[: len(content) // 2])
     status, said = resim(capsys, tmp_path / "cut.mcap")
-    assert status == 0
+    assert status == 2
+    assert "equal to the byte: " in said
     assert "compared up to there only: " in said
     assert "the file ends at byte" in said
+    assert "got a file that is cut after" in said
 
 
 def test_what_is_not_lockstep_or_not_used_is_refused(

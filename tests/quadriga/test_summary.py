@@ -13,12 +13,12 @@ import pytest
 from rich.console import Console
 
 from quadriga.summary import print_table, summarise
-from quadriga.traces import recorded_config
 from shared import messages as msg
 from shared.config import Config, PlannerConfig
 from shared.config_text import config_sha256
 from shared.errors import RecordingError
 from shared.recording import Recording
+from shared.recording_config import recorded_config
 from shared.robot import OUTPUTS
 from tests.quadriga.conftest import ESTIMATOR_ERROR, SPEED, WriteRun, run_config
 
@@ -91,6 +91,18 @@ def test_outputs_do_not_depend_on_the_heading(write_run: WriteRun) -> None:
     assert summary["mean_vx"] == pytest.approx(SPEED, abs=APPROX)
     assert summary["rmse"]["vy"] == pytest.approx(0.02, abs=APPROX)
     assert summary["rmse_per_robot"]["r2"]["pitch"] == pytest.approx(0.01, abs=APPROX)
+
+
+def test_a_roll_that_is_off_by_a_whole_turn_is_no_error(write_run: WriteRun) -> None:
+    def change(key: str, message: msg.Message) -> msg.Message:
+        if not isinstance(message, msg.Measurement):
+            return message
+        turned = message.y.copy()
+        turned[OUTPUTS.index("roll")] += 2 * np.pi
+        return replace(message, y=turned)
+
+    summary = summarise(write_run(run_config(2, 3.3), change=change))
+    assert summary["estimator_rmse"]["roll"] == pytest.approx(0.004, abs=APPROX)
 
 
 def test_every_lost_message_is_a_gap(write_run: WriteRun) -> None:

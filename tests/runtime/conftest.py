@@ -22,7 +22,7 @@ from shared.config_text import to_toml
 from shared.recording import Recording
 from shared.robot import robot_names
 
-WAIT = 30.0  # s, more than anything here takes on a busy machine
+WAIT = 60.0  # s, more than anything here takes on a busy machine
 
 
 @dataclass(frozen=True)

@@ -132,7 +132,10 @@ def test_a_process_alone_names_the_absent(make_team: Make, verb: tuple[str, ...]
     assert said.count("\n") == 1
 
 
-def test_a_process_that_waits_for_the_others_can_be_stopped(make_team: Make) -> None:
+def test_a_process_that_waits_for_the_others_can_be_stopped(
+    make_team: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(launch, "_GRACE", WAIT)
     team = make_team()
     with team.launch() as running:
         sleep(0.2)
@@ -140,4 +143,4 @@ def test_a_process_that_waits_for_the_others_can_be_stopped(make_team: Make) -> 
         with pytest.raises(ProcessError, match="process operator: got signal 9"):
             running.watch(never)
         begun = monotonic()
-    assert monotonic() - begun < 4.0  # SIGTERM was enough
+    assert monotonic() - begun < WAIT  # SIGTERM was enough

@@ -15,7 +15,7 @@ def test_a_walk_with_a_frozen_robot_comes_out_equal(
     make_team: Make, capsys: pytest.CaptureFixture[str]
 ) -> None:
     team = make_team(
-        recorder__enabled=True, world__seconds=4.0, world__command_timeout=0.3,
+        recorder__enabled=True, world__seconds=600.0, world__command_timeout=0.3,
         world__push="r1:50:90:0.3:0.1",
     )  # fmt: skip
     with team.launch() as running:
@@ -24,6 +24,7 @@ def test_a_walk_with_a_frozen_robot_comes_out_equal(
         team.await_log("sim", "fault r2 silent for 0.3 s")
         os.kill(running.pids["r2"], signal.SIGCONT)
         team.await_log("sim", "fault r2 answers again")
+        os.kill(running.pids["sim"], signal.SIGTERM)
         running.watch(lambda: False)
     assert main(["resim", str(team.folder / "run.mcap")]) == 0
     said = capsys.readouterr().out

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shared.codec import encode
@@ -56,7 +56,7 @@ def test_a_whole_file_comes_back_without_damage(original: Path) -> None:
     Recording(original).require_whole()
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=80)
 @given(data=st.data())
 def test_whatever_happened_to_it_the_rest_is_as_it_was(original: Path, data: st.DataObject) -> None:
     whole = original.read_bytes()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from shared.config import Config, EstimatorConfig, PlannerConfig, WorldConfig
 from shared.tick_track import TickTrack, periods
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     period=st.integers(1, 50), start=st.integers(0, 1000), count=st.integers(2, 60),
     data=st.data(),

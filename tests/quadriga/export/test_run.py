@@ -61,7 +61,7 @@ def test_a_package_that_is_not_installed_is_named_with_its_remedy(
     monkeypatch.setitem(sys.modules, package, None)
     said = failed(capsys, file, "--to", form, "-o", tmp_path / "out")
     assert f"--to {form}: got no Python package {package}" in said
-    assert "pip install 'quadriga[export]'" in said
+    assert "pip install -e '.[export]'" in said
 
 
 @pytest.mark.parametrize("form", ["foxglove", "csv", "parquet"])
@@ -81,7 +81,7 @@ def test_without_an_output_it_goes_beside_the_recording(
 ) -> None:
     cut = tmp_path / "run.mcap"
     cut.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
-    assert main(["export", str(cut), "--to", "csv"]) == 0
+    assert main(["export", str(cut), "--to", "csv"]) == 2
     said = capsys.readouterr().out
     assert said.startswith(str(tmp_path / "run-csv"))
     assert "only as far as the recording goes: the file ends at byte" in said

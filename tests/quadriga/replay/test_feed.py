@@ -123,7 +123,7 @@ def fed(mode: str, tape: Tape) -> list[Fed]:
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 1 << 32), late=st.sampled_from([0.0, 0.05, 0.5]),
     skipped=st.sampled_from([0.0, 0.02, 0.5]), held=st.sampled_from([256, 20, 7]),

@@ -96,7 +96,7 @@ def test_a_recording_of_another_version(
     said = complaint(capsys, future, "--all")
     assert "configuration of " in said
     assert "controller.kp_tail" in said
-    assert "replay it with that one" in said
+    assert "recorded by another version of quadriga: use that one" in said
     nothing = rewritten(run, tmp_path / "nothing.mcap", metadata={"config_json": ""})
     assert "metadata without a configuration" in complaint(capsys, nothing, "--all")
 
@@ -112,6 +112,21 @@ def test_recordings_that_lack_what_a_replay_needs(
     assert main(["replay", str(late), "--all"]) == 1
     said = capsys.readouterr().out
     assert "input missing from the recording: reference:operator:0 (tick 0); state of r1" in said
+
+
+def test_a_cut_recording_is_replayed_up_to_the_cut_and_said_to_be_cut(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = write(tmp_path / "run.mcap", configured(), ticks=2000)
+    content = run.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(content[: len(content) // 2])
+    assert main(["replay", str(cut), "--all"]) == 2
+    out, err = capsys.readouterr()
+    assert "commands differ" in out
+    assert err.count("\n") == 1
+    assert "cut.mcap: got a file that is cut after" in err
+    assert "`quadriga recover`" in err
 
 
 def test_a_false_command_is_told_with_its_values(

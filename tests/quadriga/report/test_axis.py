@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.report.axis import decades, grid, nice
 
 
-@settings(deadline=None)  # a busy machine is not the subject
 @given(st.floats(-1e4, 1e4), st.floats(1e-3, 1e4), st.integers(1, 12))
 def test_nice_values_are_round_and_within(low: float, width: float, count: int) -> None:
     found = nice(low, low + width, count)
@@ -20,7 +19,6 @@ def test_nice_values_are_round_and_within(low: float, width: float, count: int) 
     np.testing.assert_allclose(steps, steps[:1].repeat(len(steps)), rtol=1e-3, atol=slack)
 
 
-@settings(deadline=None)  # a busy machine is not the subject
 @given(st.floats(-1e3, 1e3), st.floats(1e-2, 1e3), st.floats(40.0, 900.0))
 def test_a_grid_has_room_for_its_names(low: float, width: float, length: float) -> None:
     found = grid(low, low + width, length, 15.0)

@@ -13,7 +13,7 @@ from quadriga.report.account import COLUMNS
 from quadriga.report.look_at import Episode, Sign, episodes
 from quadriga.report.run import read_run
 from shared import messages as msg
-from shared.messages import Command, Message, Plan, State, Truth
+from shared.messages import Command, Message, Plan, State, Status, Truth
 from shared.robot import TORQUE_LIMIT
 from tests.quadriga.conftest import Change, WriteRun, run_config
 from tests.quadriga.report.test_page import fallen
@@ -49,6 +49,16 @@ def test_a_fall_and_the_agents_word_on_it_are_one_episode(write_run: WriteRun) -
     assert {moment.kind for moment in episode.troubles} == {"fall", "stopped"}
     assert len(episode.accounts) == 2
     assert all(len(account.cells) == len(COLUMNS) for account in episode.accounts)
+
+
+def test_what_goes_on_after_the_fall_is_said_to(write_run: WriteRun) -> None:
+    def change(key: str, message: Message) -> Message:
+        if isinstance(message, Status) and "r1" in key:
+            return replace(message, counters={"missed": message.tick // 100})
+        return message
+
+    episode = only(told(write_run, change, extra=fallen(1300)))
+    assert "counted: missed 15, until 1.50 s" in [sign.text for sign in signs(episode, "r1")]
 
 
 def test_troubles_far_apart_are_two_and_who_is_down_is_not_judged(write_run: WriteRun) -> None:
@@ -123,7 +133,7 @@ def test_plans_that_failed_aged_or_pushed_at_their_limits_are_told(write_run: Wr
     assert marked
     assert text != "0 % of samples"
     assert cell(episode, "r1", "plans")[0].endswith("the last 500 ms before")
-    assert ("plan: nominal:infeasible, 17 plans", 920) in [
+    assert ("plan: nominal:infeasible, 17 plans, until 1.56 s", 920) in [
         (sign.text, sign.tick) for sign in signs(episode, "r2")
     ]
 

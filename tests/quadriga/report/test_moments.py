@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from quadriga.report.about import departures
+from quadriga.report.about import not_usual
 from quadriga.report.moments import Moment
 from quadriga.report.run import read_run
 from shared.config_file import load
@@ -77,8 +77,8 @@ def test_a_stretch_without_messages_is_a_gap_and_a_single_one_is_not(write_run: 
 
 def test_keys_that_are_not_at_their_defaults_are_told_with_unit_and_meaning() -> None:
     config = load(None, {"world.friction": 0.5, "planner.R": [1, 1, 1], "bus.mode": "client"})
-    assert departures(config) == [
+    assert not_usual(config) == [
         ("world.friction", "0.5", "0.8", "friction coefficient of feet on ground"),
         ("planner.R", "1, 1, 1", "0.2, 0.2, 0.05", "weights of fx, fy, fz"),
     ]
-    assert departures(load(None, {})) == []
+    assert not_usual(load(None, {})) == []

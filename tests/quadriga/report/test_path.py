@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
@@ -15,7 +15,6 @@ FINITE = st.floats(-1e3, 1e3)
 VALUES = arrays.arrays(np.float64, st.integers(1, 400), elements=FINITE)
 
 
-@settings(deadline=None)  # a busy machine is not the subject
 @given(VALUES, st.integers(2, 40))
 def test_thinning_keeps_both_ends_and_every_extreme_and_the_order(
     y: np.ndarray, columns: int
@@ -36,7 +35,6 @@ def absolute(d: str) -> list[tuple[float, float]]:
     return list(zip(np.cumsum(numbers[::2]), np.cumsum(numbers[1::2]), strict=True))
 
 
-@settings(deadline=None)  # a busy machine is not the subject
 @given(VALUES)
 def test_a_line_goes_through_its_points_to_a_tenth_of_a_pixel(y: np.ndarray) -> None:
     x = np.arange(len(y), dtype=float)
