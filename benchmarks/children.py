@@ -1,0 +1,50 @@
+"""Processes of a benchmark, which neither an error nor an interrupt leaves behind."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
+from multiprocessing.context import SpawnContext, SpawnProcess
+from typing import Any, Final
+
+from shared.signals import die_with_parent, interrupts_held
+
+SPAWN: Final[SpawnContext] = multiprocessing.get_context("spawn")
+_GRACE: Final = 10.0  # s
+
+
+def child(target: Callable[..., None], *arguments: Any) -> SpawnProcess:
+    """A process, not yet started, that calls `target` and dies with this one."""
+    return SPAWN.Process(target=_live, args=(os.getpid(), target, arguments))
+
+
+def _live(parent: int, target: Callable[..., None], arguments: tuple[Any, ...]) -> None:
+    die_with_parent(parent)
+    target(*arguments)
+
+
+@contextmanager
+def running(*processes: SpawnProcess) -> Iterator[None]:
+    """Start the processes; at the end of the block wait for them, after an error end them.
+
+    Raises:
+        ChildProcessError: one failed, or did not leave in time.
+    """
+    resource_tracker.ensure_running()  # before signals are held: its start lets them through
+    with interrupts_held():  # Ctrl-C goes to all, but is this process's to handle
+        for process in processes:
+            process.start()
+    try:
+        yield
+        for process in processes:
+            process.join(_GRACE)
+    finally:
+        for process in processes:
+            process.terminate()
+        for process in processes:
+            process.join()
+    if failed := [f"{p.name}: exit code {p.exitcode}" for p in processes if p.exitcode]:
+        raise ChildProcessError(f"a process of the benchmark failed: {', '.join(failed)}")
