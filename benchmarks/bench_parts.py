@@ -106,15 +106,14 @@ def walks(options: Options, console: Console, tell: Tell) -> Part:
         parts = alone(config, predictor)
         found = over_the_bus(config, path, predictor, lambda s, n=robots: tell(f"n = {n}: {s}"))
         rows.append({"robots": robots, "alone": parts, **found})
-    config, path, predictor = team(options, options.middle, options.seconds, console)
+    middle = options.middle
+    config, path, predictor = team(options, middle, options.seconds, console)
     plain = replace(config, recorder=replace(config.recorder, enabled=False))
-    factors: dict[str, list[float]] = {"with": [], "without": []}
-    for _ in range(1 if options.quick else 2):
-        for name, asked in (("without", plain), ("with", config)):
-            found = over_the_bus(
-                asked, path, predictor, lambda s, n=name: tell(f"{n} recorder: {s}")
-            )
-            factors[name].append(found["rtf"])
+    factors = {"with": [row["rtf"] for row in rows if row["robots"] == middle], "without": []}
+    turns = [("without", plain), ("with", config), ("without", plain)]
+    for name, asked in turns[: 1 if options.quick else None]:
+        tell(f"n = {middle}, {name} recorder")
+        factors[name].append(over_the_bus(asked, path, predictor, lambda _: None)["rtf"])
     return {"rows": rows, "recorder": {"robots": options.middle, **factors},
             "planner": options.planner, "seconds": options.seconds}  # fmt: skip
 

@@ -34,17 +34,18 @@ def running(*processes: SpawnProcess) -> Iterator[None]:
         ChildProcessError: one failed, or did not leave in time.
     """
     resource_tracker.ensure_running()  # before signals are held: its start lets them through
-    with interrupts_held():  # Ctrl-C goes to all, but is this process's to handle
-        for process in processes:
-            process.start()
     try:
+        with interrupts_held():  # Ctrl-C goes to all, but is this process's to handle
+            for process in processes:
+                process.start()
         yield
         for process in processes:
             process.join(_GRACE)
     finally:
-        for process in processes:
+        started = [process for process in processes if process.pid is not None]
+        for process in started:
             process.terminate()
-        for process in processes:
+        for process in started:
             process.join()
     if failed := [f"{p.name}: exit code {p.exitcode}" for p in processes if p.exitcode]:
         raise ChildProcessError(f"a process of the benchmark failed: {', '.join(failed)}")

@@ -1,7 +1,8 @@
 """The whole-body QP as a user of TSID writes it; imported only where `tsid` is installed.
 
 Decision variables are accelerations and forces. No slip, dynamics, friction cone and torque limits
-are constraints; trunk, swing feet, forces and torques are in the cost with our weights.
+are constraints; trunk, swing feet and forces are in the cost with our weights. TSID's Python
+interface takes no cost on torques: that small term is not in it, which spares it some work.
 """
 
 from __future__ import annotations
@@ -40,9 +41,6 @@ class Tsid:
         self._bounds = tsid.TaskActuationBounds("limits", self._robot)
         self._bounds.setBounds(-limit, limit)
         self._form.addActuationTask(self._bounds, 1.0, 0, 0.0)
-        self._torque = tsid.TaskActuationEquality("torque", self._robot)
-        self._torque.setReference(np.zeros(N_JOINTS))
-        self._form.addActuationTask(self._torque, weights.gamma_tau, 1, 0.0)
         self._feet = [self._se3(f"swing_{name}", name, _POSITION) for name in FOOT_FRAMES]
         self._contacts = [self._contact(name) for name in FOOT_FRAMES]
         self._standing: list[bool | None] = [None] * 4
@@ -66,6 +64,7 @@ class Tsid:
         contact.setKp(np.zeros(3))
         contact.setKd(np.zeros(3))
         contact.useLocalFrame(False)
+        contact.setRegularizationTaskWeightVector(np.ones(3))
         return contact
 
     def set(self, case: Case) -> None:

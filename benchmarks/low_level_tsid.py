@@ -9,7 +9,7 @@ with ours; so it is tried in a process of its own.
 
 from __future__ import annotations
 
-import gc
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -47,7 +47,7 @@ class Case:
 
 def cases(config: Config, predictor: Predictor | None, ticks: list[AgentTick]) -> list[Case]:
     """The whole-body part's inputs at every tick after the stand."""
-    agent, memory = Agent(config, "r1", predictor), None
+    agent = Agent(config, "r1", predictor)
     agent._controller = listening = _Listening(config)
     memory = agent.initial()
     for tick in ticks:
@@ -74,12 +74,12 @@ def compare(config: Config, found: list[Case]) -> dict[str, Any] | None:
 
 
 def _answer(sender: Connection, config: Config, found: list[Case]) -> None:
+    warnings.simplefilter("ignore", RuntimeWarning)  # two of TSID's converters have one type
     try:
         import tsid  # noqa: F401
     except ImportError:
         sender.send(None)
         return
-    gc.collect()
     with collector_off():
         sender.send(_compare(config, found))
 
