@@ -46,7 +46,7 @@ def bench(options: Options) -> int:
     """Every part in turn, then the page."""
     from bench_figure import draw
     from bench_page import headline, section, targets
-    from bench_parts import PARTS
+    from bench_parts import PARTS, prefixed
     from rich.console import Console
 
     console = Console(width=120, highlight=False)
@@ -56,9 +56,7 @@ def bench(options: Options) -> int:
     for name in options.parts:
         with console.status(f"{name} …") as status:
             try:
-                parts[name] = PARTS[name](
-                    options, console, lambda s, n=name: status.update(f"{n}: {s}")
-                )
+                parts[name] = PARTS[name](options, console, prefixed(status.update, name))
             except (QuadrigaError, ChildProcessError) as error:
                 failed[name] = str(error)
         console.print(section(name, parts[name]) if name in parts else f"{name}: {failed[name]}")
@@ -67,20 +65,20 @@ def bench(options: Options) -> int:
     options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     picture = draw(parts, options.out.with_suffix(".png"))
-    console.print(targets(figures))
+    if not options.quick:
+        console.print(targets(figures))
     console.print(f"{options.out}, {picture}; {result['seconds']:.0f} s", markup=False)
     return int(bool(failed))
 
 
 def machine() -> dict[str, Any]:
     """What the figures depend on beside the code."""
-    from children import SPAWN
+    from children import result_of
 
     from shared.config import Config
     from shared.scheduling import take_priority
 
-    with SPAWN.Pool(1) as pool:  # in a process of its own: what is started later would inherit it
-        realtime = pool.apply(take_priority, (Config(),))
+    realtime = result_of(take_priority, Config())  # what this process starts would inherit it
     cpus = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     models = [line.partition(":")[2].strip() for line in cpus if line.startswith("model name")]
     return {

@@ -20,7 +20,8 @@ Part = dict[str, Any]
 
 def planner(options: Options, console: Console, tell: Tell) -> Part:
     """What a plan costs, ours and as written; `planner.py` alone does it at length."""
-    from planner import Local, Team, measure, walked
+    from planner import measure, walked
+    from planner_contenders import Local, Team
 
     robots, seconds = (1, 1.0) if options.quick else (3, 1.2)
     config, predictor, walks = walked(robots, seconds, console)
@@ -36,12 +37,13 @@ def low_level(options: Options, console: Console, tell: Tell) -> Part:
     import low_level
     import low_level_ticks
     import low_level_tsid
+    from children import result_of
 
     seconds, passes = (0.5, 1) if options.quick else (2.5, 3)
     config, _, predictor = team(options, options.middle, seconds, console)
     ticks = low_level_ticks.record(config, predictor)
     tell("ticks")
-    found = low_level.measure(config, predictor, ticks, passes)
+    found: Part = result_of(low_level.measure, config, predictor, ticks, passes)
     tell("against TSID")
     cases = low_level_tsid.cases(config, predictor, ticks)
     found["tsid"] = low_level_tsid.compare(config, cases)
@@ -53,7 +55,7 @@ def bus(options: Options, _console: Console, tell: Tell) -> Part:
     from messaging import measure
 
     rows = []
-    for robots in (1, 2) if options.quick else (1, 3, 5):
+    for robots in (2,) if options.quick else (1, 3, 5):
         tell(f"n = {robots}")
         rows.append(measure(robots, 250 if options.quick else 4000))
     return {"rows": rows}
@@ -61,12 +63,13 @@ def bus(options: Options, _console: Console, tell: Tell) -> Part:
 
 def world(options: Options, _console: Console, tell: Tell) -> Part:
     """A tick of the world."""
+    from children import result_of
     from world_steps import measure
 
     rows = []
     for robots, terrain in (*((n, "flat") for n in (1, 3, 5, 10)), (3, "heightfield")):
         tell(f"n = {robots}, {terrain}")
-        rows.append(measure(robots, terrain, 50 if options.quick else 2000))
+        rows.append(result_of(measure, robots, terrain, 50 if options.quick else 2000))
     return {"rows": rows}
 
 
@@ -81,19 +84,19 @@ def recorder(options: Options, _console: Console, _tell: Tell) -> Part:
 
 def fit(options: Options, _console: Console, _tell: Tell) -> Part:
     """The predictor's fit for a small team; `fit.py` alone does the large ones."""
-    from children import SPAWN
-    from fit import SIZES, asdict, measure
+    from dataclasses import asdict
+
+    from children import result_of
+    from fit import SIZES, measure
 
     size = SIZES[0]
     samples = 2100 if options.quick else size.samples
-    with SPAWN.Pool(1) as pool:
-        return asdict(pool.apply(measure, (size.robots, samples, "ridge")))
+    return asdict(result_of(measure, size.robots, samples, "ridge"))
 
 
 def walks(options: Options, console: Console, tell: Tell) -> Part:
-    """Real walks of every size, and one with and without the recorder in turns."""
-    from dataclasses import replace
-
+    """Real walks of every size, and of one with and without the recorder in turns."""
+    from children import result_of
     from walks import alone, over_the_bus
 
     from quadriga.warm_up import warm_up
@@ -103,19 +106,35 @@ def walks(options: Options, console: Console, tell: Tell) -> Part:
         config, path, predictor = team(options, robots, options.seconds, console)
         warm_up(config, console)
         tell(f"n = {robots} in one process")
-        parts = alone(config, predictor)
-        found = over_the_bus(config, path, predictor, lambda s, n=robots: tell(f"n = {n}: {s}"))
+        parts = result_of(alone, config, predictor)
+        found = over_the_bus(config, path, predictor, prefixed(tell, f"n = {robots}"))
         rows.append({"robots": robots, "alone": parts, **found})
+    return {
+        "rows": rows, "planner": options.planner, "seconds": options.seconds,
+        "recorder": None if options.quick else recorder_turns(options, rows, console, tell),
+    }  # fmt: skip
+
+
+def recorder_turns(options: Options, rows: list[Part], console: Console, tell: Tell) -> Part:
+    """Real-time factors of walks with and without recorder, in turns after the one in `rows`."""
+    from dataclasses import replace
+
+    from walks import over_the_bus
+
     middle = options.middle
     config, path, predictor = team(options, middle, options.seconds, console)
     plain = replace(config, recorder=replace(config.recorder, enabled=False))
-    factors = {"with": [row["rtf"] for row in rows if row["robots"] == middle], "without": []}
-    turns = [("without", plain), ("with", config), ("without", plain)]
-    for name, asked in turns[: 1 if options.quick else None]:
+    found: Part = {"robots": middle, "with": [], "without": []}
+    found["with"] += [row["rtf"] for row in rows if row["robots"] == middle]
+    for name, asked in (("without", plain), ("with", config), ("without", plain)):
         tell(f"n = {middle}, {name} recorder")
-        factors[name].append(over_the_bus(asked, path, predictor, lambda _: None)["rtf"])
-    return {"rows": rows, "recorder": {"robots": options.middle, **factors},
-            "planner": options.planner, "seconds": options.seconds}  # fmt: skip
+        found[name].append(over_the_bus(asked, path, predictor, lambda _: None)["rtf"])
+    return found
+
+
+def prefixed(tell: Tell, prefix: str) -> Tell:
+    """`tell` with `prefix` before what is told."""
+    return lambda text: tell(f"{prefix}: {text}")
 
 
 def team(

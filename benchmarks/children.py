@@ -7,9 +7,12 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Final
 
+from shared.config import Config
+from shared.scheduling import take_priority
 from shared.signals import die_with_parent, interrupts_held
 
 SPAWN: Final[SpawnContext] = multiprocessing.get_context("spawn")
@@ -49,3 +52,23 @@ def running(*processes: SpawnProcess) -> Iterator[None]:
             process.join()
     if failed := [f"{p.name}: exit code {p.exitcode}" for p in processes if p.exitcode]:
         raise ChildProcessError(f"a process of the benchmark failed: {', '.join(failed)}")
+
+
+def result_of(target: Callable[..., Any], *arguments: Any) -> Any:
+    """What `target` returns in a process of its own that is scheduled like those of a walk.
+
+    Raises:
+        ChildProcessError: it raised, which it has shown, or crashed.
+    """
+    receiver, sender = SPAWN.Pipe(duplex=False)
+    with running(child(_answer, sender, target, arguments)):
+        sender.close()  # else its end would not be noticed
+        try:
+            return receiver.recv()
+        except EOFError:
+            raise ChildProcessError(f"{target.__name__} failed in a process of its own") from None
+
+
+def _answer(sender: Connection, target: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+    take_priority(Config())
+    sender.send(target(*arguments))

@@ -12,11 +12,10 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
-from children import SPAWN, child
+from children import result_of
 from low_level import collector_off
 from low_level_ticks import AgentTick
 
@@ -29,9 +28,6 @@ from agents.planner.predictor import Predictor
 from shared.clock import monotonic_ns
 from shared.config import Config
 from shared.robot import Array
-
-ABSENT: Final = "not measured: `import tsid` fails or crashes here"
-_TIMEOUT: Final = 120.0  # s
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,35 +53,25 @@ def cases(config: Config, predictor: Predictor | None, ticks: list[AgentTick]) -
 
 def compare(config: Config, found: list[Case]) -> dict[str, Any] | None:
     """Both on every case, see `_compare`; None if TSID is not there."""
-    receiver, sender = SPAWN.Pipe(duplex=False)
-    process = child(_answer, sender, config, found)
-    process.start()
-    sender.close()
     try:
-        if not receiver.poll(_TIMEOUT):
-            return None
-        answer: dict[str, Any] | None = receiver.recv()
-        return answer
-    except EOFError:  # it crashed
+        answer: dict[str, Any] | None = result_of(_compare, config, found)
+    except ChildProcessError:
         return None
-    finally:
-        process.terminate()
-        process.join()
+    return answer
 
 
-def _answer(sender: Connection, config: Config, found: list[Case]) -> None:
+def _compare(config: Config, found: list[Case]) -> dict[str, Any] | None:
+    """Medians, µs, of both in turns, each first at every other tick, and how torques differ."""
     warnings.simplefilter("ignore", RuntimeWarning)  # two of TSID's converters have one type
     try:
         import tsid  # noqa: F401
     except ImportError:
-        sender.send(None)
-        return
+        return None
     with collector_off():
-        sender.send(_compare(config, found))
+        return _turns(config, found)
 
 
-def _compare(config: Config, found: list[Case]) -> dict[str, Any]:
-    """Medians, µs, of both in turns, each first at every other tick, and how torques differ."""
+def _turns(config: Config, found: list[Case]) -> dict[str, Any]:
     from low_level_peer import Tsid
 
     weights = Controller(config).weights

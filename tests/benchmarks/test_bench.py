@@ -41,9 +41,8 @@ def test_parts_print_their_lines_and_write_their_figures(
     assert sum(stages.values()) == pytest.approx(found["low_level_us_median"], rel=0.5)
     assert found["low_level_vs_tsid"] is None
     assert "`import tsid` fails" in page
-    rows = {row["robots"]: row for row in found["parts"]["bus"]["rows"]}
-    assert set(rows) == {1, 2}
-    assert all(row["bus"]["median"] > row["socket"]["median"] > 0.0 for row in rows.values())
+    (row,) = found["parts"]["bus"]["rows"]
+    assert row["bus"]["median"] > row["socket"]["median"] > 0.0
     assert found["recorder_gaps"] == 0
     assert found["recorder_msgs_per_s"] > 1000.0
     assert found["machine"]["scheduling"] in ("realtime", "ordinary")
@@ -52,12 +51,11 @@ def test_parts_print_their_lines_and_write_their_figures(
     assert (tmp_path / "b.png").stat().st_size > 10_000
 
 
-def test_walks_are_measured_with_and_without_bus_and_recorder(tmp_path: Path) -> None:
+def test_walks_are_measured_with_and_without_the_bus(tmp_path: Path) -> None:
     words = ("walks", "--planner", "none", "--robots", "1", "--seconds", "1")
     page, found = run(tmp_path / "b.json", *words)
     assert found["rtf"]["1"] > 0.0
     assert found["messaging_share"]["1"] < 1.0
-    assert found["recorder_cost"] < 1.0
     row = found["parts"]["walks"]["rows"][0]
     assert row["seconds"] == pytest.approx(1.0, abs=0.02)
     assert set(row["memory_mb"]) == {"sim", "r1", "operator", "recorder"}
