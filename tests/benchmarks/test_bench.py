@@ -38,7 +38,9 @@ def test_parts_print_their_lines_and_write_their_figures(
     assert all(name in page for name in parts)
     assert 0.0 < found["low_level_us_median"] < found["low_level_us_cold_median"]
     stages = found["parts"]["low-level"]["hot"]["stages"]
-    assert sum(stages.values()) == pytest.approx(found["low_level_us_median"], rel=0.5)
+    share = sum(stages.values()) / found["low_level_us_median"]
+    assert 0.3 < share < 3.0, "the stages, from passes of their own, make up the tick"
+    assert min(stages.values()) > 0.0
     assert found["low_level_vs_tsid"] is None
     assert "`import tsid` fails" in page
     (row,) = found["parts"]["bus"]["rows"]
