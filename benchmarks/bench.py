@@ -59,10 +59,12 @@ def bench(options: Options) -> int:
                 parts[name] = PARTS[name](options, console, prefixed(status.update, name))
             except (QuadrigaError, ChildProcessError) as error:
                 failed[name] = str(error)
-        console.print(section(name, parts[name]) if name in parts else f"{name}: {failed[name]}")
+        if name in parts:
+            console.print(section(name, parts[name]))
+        else:
+            console.print(f"{name}: {failed[name]}", style="red", markup=False)
     figures = headline(parts)
     result |= {**figures, "parts": parts, "failed": failed, "seconds": monotonic() - begun}
-    options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     picture = draw(parts, options.out.with_suffix(".png"))
     if not options.quick:
@@ -108,6 +110,13 @@ def arguments(words: Sequence[str] | None = None) -> Options:
         parser.error(f"no part {', '.join(unknown)}; there are {', '.join(PARTS)}")
     if min(given.robots) < 1 or given.seconds < 1.0:
         parser.error("a walk takes at least one robot and one second")
+    folder = given.out.parent  # looked at now, not after minutes
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(f"--out {given.out}: {error.strerror}; expected a folder that can be made")
+    if given.out.is_dir() or not os.access(folder, os.W_OK):
+        parser.error(f"--out {given.out}: expected a file that can be written")
     chosen = tuple(name for name in PARTS if name in given.parts or not given.parts)
     return Options(
         chosen, tuple(given.robots), given.seconds, given.planner, given.quick, given.out
