@@ -7,7 +7,7 @@ TOOLS := $(VENV)/.tools
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install walk test lint format docs acceptance bench-planner bench-recorder
+.PHONY: install walk test lint format docs acceptance bench bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -48,6 +48,11 @@ docs: $(STAMP)
 # Every scenario the project promises, on three seeds; about an hour.
 acceptance: $(STAMP)
 	$(BIN)/python benchmarks/acceptance.py $(ARGS)
+
+# What everything costs, on one page, in runs/bench.json and runs/bench.png; some three minutes, and
+# as many more for each team that has not walked here before (ten robots: much more).
+bench: $(STAMP)
+	$(BIN)/python benchmarks/bench.py $(ARGS)
 
 # What a plan costs, as the paper writes it and as it is solved here; about ten minutes, and five
 # more for a team of five that has not walked here before.

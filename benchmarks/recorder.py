@@ -10,18 +10,20 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import os
 import signal
 import subprocess
 import sys
 import tempfile
 from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from children import SPAWN, child, running
 
 from quadriga.endpoint import free_endpoint
 from shared.barrier import SIM
@@ -73,36 +75,39 @@ def measure(rate: float, seconds: float, publishers: int, folder: Path) -> dict[
     """Publish and record once; the figures."""
     config = load(None, {"bus.endpoint": free_endpoint(), "team.name": "bench"})
     (folder / "bench.toml").write_text(to_toml(config), encoding="utf-8")
-    spawn = multiprocessing.get_context("spawn")
-    go, ended = spawn.Event(), spawn.Event()
+    go, ended = SPAWN.Event(), SPAWN.Event()
     names = [SIM, *(f"p{k}" for k in range(1, publishers))]
-    counts = [spawn.Value("q", 0) for _ in names]
+    counts = [SPAWN.Value("q", 0) for _ in names]
     senders = [
-        spawn.Process(
-            target=publish, args=(config, name, rate / publishers, seconds, go, ended, count)
-        )
+        child(publish, config, name, rate / publishers, seconds, go, ended, count)
         for name, count in zip(names, counts, strict=True)
     ]
-    for sender in senders:
-        sender.start()
     file = folder / "bench.mcap"
-    recorder = subprocess.Popen(
-        [sys.executable, "-m", "quadriga", "record", "--now", "-o", str(file), "--config",
-         str(folder / "bench.toml")], stdout=subprocess.DEVNULL,
-    )  # fmt: skip
-    while probed(file) < publishers:
-        sleep(0.1)
-    before = processor_time(recorder.pid)
-    go.set()
-    sleep(seconds + 1.0)
-    used = processor_time(recorder.pid) - before
-    recorder.send_signal(signal.SIGINT)
-    recorder.wait()
-    ended.set()
-    for sender in senders:
-        sender.join()
+    with running(*senders), recording(file, folder / "bench.toml") as pid:
+        while probed(file) < publishers:
+            sleep(0.1)
+        before = processor_time(pid)
+        go.set()
+        sleep(seconds + 1.0)
+        used = processor_time(pid) - before
+        ended.set()
     return {**figures(file, sum(count.value for count in counts)), "core": used / seconds,
             "asked_per_s": rate, "load": os.getloadavg()[0]}  # fmt: skip
+
+
+@contextmanager
+def recording(file: Path, config: Path) -> Iterator[int]:
+    """Run a recorder, whose process id is given; at the end of the block it closes the file."""
+    recorder = subprocess.Popen(
+        [sys.executable, "-m", "quadriga", "record", "--now", "-o", str(file), "--config",
+         str(config), "--parent", str(os.getpid())],
+        stdout=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
+    try:
+        yield recorder.pid
+    finally:
+        recorder.send_signal(signal.SIGINT)
+        recorder.wait()
 
 
 def probed(file: Path) -> int:

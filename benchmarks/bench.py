@@ -1,0 +1,127 @@
+"""What everything costs, on one page: planner, low level, messages, world, recorder, fit, walks.
+
+Run: python benchmarks/bench.py [PART ...] [--robots 1 2 3 5 10] [--seconds 4] [--out FILE]
+
+Prints a page, writes FILE (JSON) and beside it a picture. Each part is measured by real processes
+and real walks of this machine; what else runs on it is in the figures, so let nothing. A team
+that has not walked here before is collected and fitted first, which for ten takes minutes;
+`--planner none` walks without. `--quick` only shows that all parts work.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import sys
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import blas_threads
+from bench_options import Options
+
+from shared.clock import monotonic, wall_ns
+from shared.errors import QuadrigaError
+from shared.signals import interrupt_on_sigterm
+
+_VERSIONS = ("eclipse-zenoh", "numpy", "numba", "pin", "mujoco")
+INTERRUPTED = 130
+
+
+def main() -> int:
+    """Measure, print, write and draw; 0 if every part could be measured."""
+    interrupt_on_sigterm()
+    try:
+        return bench(arguments())
+    except KeyboardInterrupt:
+        print("\ninterrupted; nothing was written", file=sys.stderr)
+        return INTERRUPTED
+
+
+def bench(options: Options) -> int:
+    """Every part in turn, then the page."""
+    from bench_figure import draw
+    from bench_page import headline, section, targets
+    from bench_parts import PARTS, prefixed
+    from rich.console import Console
+
+    console = Console(width=120, highlight=False)
+    result: dict[str, Any] = {"machine": machine(), "quick": options.quick}
+    begun, parts, failed = monotonic(), {}, {}
+    console.print(section("machine", result["machine"]))
+    for name in options.parts:
+        with console.status(f"{name} …") as status:
+            try:
+                parts[name] = PARTS[name](options, console, prefixed(status.update, name))
+            except (QuadrigaError, ChildProcessError) as error:
+                failed[name] = str(error)
+        if name in parts:
+            console.print(section(name, parts[name]))
+        else:
+            console.print(f"{name}: {failed[name]}", style="red", markup=False)
+    figures = headline(parts)
+    result |= {**figures, "parts": parts, "failed": failed, "seconds": monotonic() - begun}
+    options.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    picture = draw(parts, options.out.with_suffix(".png"))
+    if not options.quick:
+        console.print(targets(figures))
+    console.print(f"{options.out}, {picture}; {result['seconds']:.0f} s", markup=False)
+    return int(bool(failed))
+
+
+def machine() -> dict[str, Any]:
+    """What the figures depend on beside the code."""
+    from children import result_of
+
+    from shared.config import Config
+    from shared.scheduling import take_priority
+
+    realtime = result_of(take_priority, Config())  # what this process starts would inherit it
+    cpus = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    models = [line.partition(":")[2].strip() for line in cpus if line.startswith("model name")]
+    return {
+        "date": datetime.fromtimestamp(1e-9 * wall_ns(), UTC).isoformat(timespec="seconds"),
+        "cores": len(os.sched_getaffinity(0)), "processor": models[0] if models else "?",
+        "python": platform.python_version(), **{name: version(name) for name in _VERSIONS},
+        "scheduling": "realtime" if realtime else "ordinary",
+        "blas_threads": blas_threads.THREADS, "load": os.getloadavg()[0],
+    }  # fmt: skip
+
+
+def arguments(words: Sequence[str] | None = None) -> Options:
+    """The command line."""
+    from bench_parts import PARTS
+
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (all)")
+    parser.add_argument("--robots", type=int, nargs="+", default=[1, 2, 3, 5, 10],
+                        help="sizes of the teams that walk")  # fmt: skip
+    parser.add_argument("--seconds", type=float, default=4.0, help="length of each walk")
+    parser.add_argument("--planner", default="distributed", help="of the walks (%(default)s)",
+                        choices=("distributed", "decentralised", "none"))  # fmt: skip
+    parser.add_argument("--quick", action="store_true", help="all parts, too short to mean much")
+    parser.add_argument("--out", type=Path, default=Path("runs/bench.json"), metavar="FILE")
+    given = parser.parse_args(words)
+    if unknown := sorted(set(given.parts) - PARTS.keys()):
+        parser.error(f"no part {', '.join(unknown)}; there are {', '.join(PARTS)}")
+    if min(given.robots) < 1 or given.seconds < 1.0:
+        parser.error("a walk takes at least one robot and one second")
+    folder = given.out.parent  # looked at now, not after minutes
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(f"--out {given.out}: {error.strerror}; expected a folder that can be made")
+    if given.out.is_dir() or not os.access(folder, os.W_OK):
+        parser.error(f"--out {given.out}: expected a file that can be written")
+    chosen = tuple(name for name in PARTS if name in given.parts or not given.parts)
+    return Options(
+        chosen, tuple(given.robots), given.seconds, given.planner, given.quick, given.out
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,130 @@
+"""The benchmark as a picture; a part that was left out leaves its panel out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+Part = dict[str, Any]
+_COLOURS: Final = ("#1f77b4", "#e6550d", "#2ca02c", "#9467bd", "#8c564b", "#bcbd22")
+_GREY: Final = "0.55"
+
+
+def draw(parts: dict[str, Part], path: Path) -> Path:
+    """Write the picture and return its path."""
+    panels: list[tuple[Callable[[Axes, Part], None], Part]] = [
+        (panel, parts[name]) for name, panel in PANELS if name in parts
+    ]
+    rows = max(1, (len(panels) + 1) // 2)
+    figure = Figure(figsize=(9.0, 3.2 * rows), layout="constrained")
+    axes = figure.subplots(rows, 2, squeeze=False).ravel()
+    for axis, (panel, part) in zip(axes, panels, strict=False):
+        panel(axis, part)
+        _tidy(axis)
+    for axis in axes[len(panels) :]:
+        axis.set_axis_off()
+    FigureCanvasAgg(figure)
+    figure.savefig(path, dpi=150)
+    return path
+
+
+def _factor(axis: Axes, part: Part) -> None:
+    rows = part["rows"]
+    sizes, factors = [row["robots"] for row in rows], [row["rtf"] for row in rows]
+    axis.axhline(1.0, color=_GREY, linewidth=1.0, linestyle="--")
+    axis.plot(sizes, factors, "o-", color=_COLOURS[0], linewidth=1.2)
+    for size, factor in zip(sizes, factors, strict=True):
+        axis.annotate(f"{factor:.2f}", (size, factor), xytext=(4, 5), textcoords="offset points",
+                      fontsize=8)  # fmt: skip
+    axis.set_ylim(bottom=0.0, top=1.2 * max([1.0, *factors]))
+    axis.set_xticks(sizes)
+    axis.set_xlabel("robots")
+    axis.set_ylabel("real-time factor")
+    axis.set_title("walks over the bus, recorded", fontsize=9, loc="left")
+
+
+def _shares(axis: Axes, part: Part) -> None:
+    """Left what it takes in one process, part by part; right over the bus."""
+    rows, width = part["rows"], 0.38
+    place, base = np.arange(len(rows)), np.zeros(len(rows))
+    labels = {"physics_us": "physics", "controllers_us": "control", "planners_us": "planning"}
+    for colour, (key, label) in zip(_COLOURS, labels.items(), strict=False):
+        height = 1e-3 * np.array([row["alone"][key] for row in rows])
+        axis.bar(place - width / 2, height, width, base, color=colour, label=label)
+        base += height
+    over = 1e-3 * np.array([row["tick_us"] for row in rows])
+    axis.bar(place + width / 2, over, width, color=_GREY, label="all, over the bus")
+    axis.set_xticks(place, [str(row["robots"]) for row in rows])
+    axis.set_xlabel("robots")
+    axis.set_ylabel("one tick [ms]")
+    axis.legend(fontsize=8, frameon=False)
+    axis.set_title("in one process, and over the bus", fontsize=9, loc="left")
+
+
+def _low_level(axis: Axes, part: Part) -> None:
+    base = np.zeros(2)
+    for colour, stage in zip(_COLOURS, part["hot"]["stages"], strict=True):
+        width = np.array([part[name]["stages"][stage] for name in ("hot", "cold")])
+        axis.barh([1, 0], width, 0.6, base, color=colour, label=stage)
+        base += width
+    axis.set_yticks([1, 0], ["hot", "cold"])
+    axis.set_xlabel("µs, medians of the stages")
+    axis.set_ylim(-0.5, 2.3)
+    axis.legend(fontsize=8, frameon=False, ncols=3, loc="upper left")
+    axis.set_title("a robot's tick, low level", fontsize=9, loc="left")
+
+
+def _bus(axis: Axes, part: Part) -> None:
+    rows, width = part["rows"], 0.38
+    place = np.arange(len(rows))
+    for k, (name, label) in enumerate((("bus", "bus"), ("socket", "raw sockets"))):
+        at = place + (k - 0.5) * width
+        median = np.array([row[name]["median"] for row in rows])
+        axis.bar(at, median, width, color=(_COLOURS[0], _GREY)[k], label=label)
+    axis.set_xticks(place, [str(row["robots"]) for row in rows])
+    axis.set_xlabel("robots")
+    axis.set_ylabel("one tick [µs]")
+    axis.legend(fontsize=8, frameon=False)
+    axis.set_title("messages alone, states and commands", fontsize=9, loc="left")
+
+
+def _world(axis: Axes, part: Part) -> None:
+    rows = part["rows"]
+    names = [f"{row['robots']} {row['terrain']}" for row in rows]
+    axis.barh(names[::-1], [row["median"] for row in rows][::-1], 0.6, color=_COLOURS[0])
+    axis.set_xlabel("µs")
+    axis.set_title("a step of the world, by robots", fontsize=9, loc="left")
+
+
+def _memory(axis: Axes, part: Part) -> None:
+    """Own memory of the processes, of the largest team."""
+    row = max(part["rows"], key=lambda row: row["robots"])
+    found = {name: m for name, m in row["memory_mb"].items() if m}
+    names = list(found)[::-1]
+    axis.barh(names, [found[name]["rss"] for name in names], 0.6, color="0.85", label="resident")
+    axis.barh(names, [found[name]["pss"] for name in names], 0.6, color=_COLOURS[0],
+              label="its share of it")  # fmt: skip
+    axis.set_xlabel("MB")
+    axis.legend(fontsize=8, frameon=False)
+    axis.set_title(f"memory while {row['robots']} walk", fontsize=9, loc="left")
+
+
+def _tidy(axis: Axes) -> None:
+    axis.spines[["top", "right"]].set_visible(False)
+    axis.grid(color="0.92", linewidth=0.6)
+    axis.set_axisbelow(True)
+    if axis.get_ylabel():
+        axis.yaxis.set_major_locator(MaxNLocator(5))
+
+
+PANELS: Final = (
+    ("walks", _factor), ("walks", _shares), ("low-level", _low_level), ("bus", _bus),
+    ("world", _world), ("walks", _memory),
+)  # fmt: skip

@@ -1,0 +1,172 @@
+"""The benchmark's page: the figures of each part in a few lines, and what they are held to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from rich.table import Table
+
+Part = dict[str, Any]
+# Key, sign, limit; a dot leads to the size of the team.
+TARGETS: Final = (
+    ("low_level_us_median", "<=", 150.0), ("low_level_vs_tsid", ">=", 1.0), ("rtf.3", ">=", 1.2),
+    ("rtf.5", ">=", 0.8), ("messaging_share.3", "<=", 0.55),
+    ("recorder_msgs_per_s", ">=", 19_900.0), ("recorder_gaps", "<=", 0.0),
+)  # fmt: skip
+_WIDTH: Final = 11
+_NO_TSID: Final = "not measured: `import tsid` fails or crashes here"
+
+
+def headline(parts: dict[str, Part]) -> dict[str, Any]:
+    """The figures that other programs look for; None where a part was left out."""
+    low, walks, recorder = (parts.get(name, {}) for name in ("low-level", "walks", "recorder"))
+    rows, cost = walks.get("rows", []), walks.get("recorder")
+    tsid = low.get("tsid")
+    return {
+        "low_level_us_median": low["hot"]["median"] if low else None,
+        "low_level_us_cold_median": low["cold"]["median"] if low else None,
+        "low_level_vs_tsid": tsid["ratio"] if tsid else None,
+        "rtf": {str(row["robots"]): row["rtf"] for row in rows},
+        "messaging_share": {str(row["robots"]): messaging_share(row) for row in rows},
+        "recorder_msgs_per_s": recorder.get("per_s"),
+        "recorder_gaps": recorder.get("gaps"),
+        "recorder_core_share": recorder.get("core"),
+        "recorder_cost": 1.0 - _mean(cost["with"]) / _mean(cost["without"]) if cost else None,
+    }
+
+
+def messaging_share(row: Part) -> float:
+    """Share of a tick over the bus that is neither physics nor control, were those in a row.
+
+    Robots compute side by side over the bus, so on several cores this is less than what messages
+    and waiting take, and may be negative.
+    """
+    return 1.0 - float(row["alone"]["tick_us"] / row["tick_us"])
+
+
+def section(name: str, part: Part) -> Table:
+    """A part's lines, its name before the first."""
+    shown = Table.grid(padding=(0, 1))
+    shown.add_column(width=_WIDTH, style="bold")
+    shown.add_column()
+    for k, line in enumerate(LINES[name](part)):
+        shown.add_row("" if k else name, line)
+    return shown
+
+
+def targets(figures: dict[str, Any]) -> Table:
+    """What was measured of what is held to a limit."""
+    shown = Table.grid(padding=(0, 1))
+    for key, sign, limit in TARGETS:
+        name, _, size = key.partition(".")
+        value = figures[name].get(size) if size else figures[name]
+        if value is not None:
+            met = value >= limit if sign == ">=" else value <= limit
+            verdict = "met" if met else "[red]MISSED[/red]"
+            shown.add_row(key, f"{value:,.4g}", f"held to {sign} {limit:,g}: {verdict}")
+    return shown
+
+
+def _machine(part: Part) -> list[str]:
+    return [
+        f"{part['cores']} cores, {part['processor']}, load {part['load']:.1f}; scheduling: "
+        f"{part['scheduling']}; BLAS threads: {part['blas_threads']}",
+        f"Python {part['python']}, Zenoh {part['eclipse-zenoh']}, Pinocchio {part['pin']}, "
+        f"MuJoCo {part['mujoco']}, numba {part['numba']}, numpy {part['numpy']}",
+    ]
+
+
+def _planner(part: Part) -> list[str]:
+    return [
+        f"n = {row['robots']}, {row['problem']}, {row['name']}: {row['median_ms']:.3f} ms, p99 "
+        f"{row['p99_ms']:.3f} (as written × {row['ratio_median']:.0f})"
+        for row in part["rows"] if row["name"] == "daqp"
+    ]  # fmt: skip
+
+
+def _low_level(part: Part) -> list[str]:
+    lines = []
+    for name in ("hot", "cold"):
+        found = part[name]
+        stages = ", ".join(f"{stage} {us:.1f}" for stage, us in found["stages"].items())
+        lines.append(f"{name}: {found['median']:.0f} µs, p99 {found['p99']:.0f}: {stages}")
+    tsid = part["tsid"]
+    if tsid is None:
+        return [*lines, f"whole-body part against TSID: {_NO_TSID}"]
+    return [
+        *lines,
+        f"whole-body part: {tsid['ours_us']:.1f} µs, TSID {tsid['tsid_us']:.1f} (× "
+        f"{tsid['ratio']:.2f}); torques differ by {tsid['torque_difference_median_nm']:.2g} N·m "
+        "in the median",
+    ]
+
+
+def _bus(part: Part) -> list[str]:
+    return [
+        f"n = {row['robots']}, messages of a tick: {row['bus']['median']:.0f} µs, p99 "
+        f"{row['bus']['p99']:.0f}; raw sockets {row['socket']['median']:.0f}, p99 "
+        f"{row['socket']['p99']:.0f} (× {row['bus']['median'] / row['socket']['median']:.1f})"
+        for row in part["rows"]
+    ]
+
+
+def _world(part: Part) -> list[str]:
+    rows = (f"n = {r['robots']} {r['terrain']} {r['median']:.0f} µs" for r in part["rows"])
+    return [f"a step: {', '.join(rows)}"]
+
+
+def _recorder(part: Part) -> list[str]:
+    return [
+        f"{part['per_s']:,.0f} messages/s of {part['asked_per_s']:,.0f} asked for, "
+        f"{part['gaps']:.0f} gaps, {100 * part['core']:.0f} % of a core"
+    ]
+
+
+def _fit(part: Part) -> list[str]:
+    return [
+        f"n = {part['robots']}, T = {part['samples']}: {part['seconds']:.2f} s, "
+        f"peak {part['peak_gb']:.2f} GB"
+    ]
+
+
+def _walks(part: Part) -> list[str]:
+    lines = []
+    for row in part["rows"]:
+        alone, asked = row["alone"], part["seconds"]
+        early = "" if row["seconds"] > asked - 0.1 else f"; ENDED at {row['seconds']:.1f} s"
+        lines.append(
+            f"n = {row['robots']}: {row['rtf']:.2f} × real time, tick {row['tick_us']:.0f} µs; in "
+            f"one process {alone['tick_us']:.0f} = physics {alone['physics_us']:.0f} + control "
+            f"{alone['controllers_us']:.0f} + planning {alone['planners_us']:.0f}; messaging "
+            f"{100 * messaging_share(row):.0f} %{early}"
+        )
+        lines.append("  " + _memory(row["memory_mb"]))
+    if cost := part["recorder"]:
+        lines.append(
+            f"n = {cost['robots']}: {_mean(cost['with']):.2f} × real time with recorder, "
+            f"{_mean(cost['without']):.2f} without"
+        )
+    return lines
+
+
+def _memory(found: dict[str, dict[str, float]]) -> str:
+    """RSS (PSS) by process, of all robots the largest."""
+    robots = [name for name in found if name[1:].isdigit()]
+    shown = {name: m for name, m in found.items() if name not in robots and m}
+    if robots:
+        largest = max(robots, key=lambda name: found[name].get("rss", 0.0))
+        shown = {"largest agent": found[largest], **shown}
+    cells = (f"{name} {m['rss']:.0f} ({m['pss']:.0f})" for name, m in shown.items() if m)
+    total = sum(m.get("pss", 0.0) for m in found.values())
+    return f"MB (of it own): {', '.join(cells)}; all {total:.0f}"
+
+
+def _mean(values: list[float]) -> float:
+    return sum(values) / len(values)
+
+
+LINES: Final[dict[str, Callable[[Part], list[str]]]] = {
+    "machine": _machine, "planner": _planner, "low-level": _low_level, "bus": _bus,
+    "world": _world, "recorder": _recorder, "fit": _fit, "walks": _walks,
+}  # fmt: skip

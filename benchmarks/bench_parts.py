@@ -1,0 +1,159 @@
+"""The parts of the benchmark: what each measures. Each imports what it needs."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bench_options import Options
+from rich.console import Console
+
+if TYPE_CHECKING:
+    from agents.planner.predictor import Predictor
+    from shared.config import Config
+
+Tell = Callable[[str], None]
+Part = dict[str, Any]
+
+
+def planner(options: Options, console: Console, tell: Tell) -> Part:
+    """What a plan costs, ours and as written; `planner.py` alone does it at length."""
+    from planner import measure, walked
+    from planner_contenders import Local, Team
+
+    robots, seconds = (1, 1.0) if options.quick else (3, 1.2)
+    config, predictor, walks = walked(robots, seconds, console)
+    tell("plans")
+    rows = measure(config, Local(config, predictor), walks)
+    if not options.quick:
+        rows += measure(config, Team(config, predictor), [walk[-4:] for walk in walks])
+    return {"rows": rows}
+
+
+def low_level(options: Options, console: Console, tell: Tell) -> Part:
+    """The tick of one robot's low level, and its whole-body part against TSID's."""
+    import low_level
+    import low_level_ticks
+    import low_level_tsid
+    from children import result_of
+
+    seconds, passes = (0.5, 1) if options.quick else (2.5, 3)
+    config, _, predictor = team(options, options.middle, seconds, console)
+    ticks = low_level_ticks.record(config, predictor)
+    tell("ticks")
+    found: Part = result_of(low_level.measure, config, predictor, ticks, passes)
+    tell("against TSID")
+    cases = low_level_tsid.cases(config, predictor, ticks)
+    found["tsid"] = low_level_tsid.compare(config, cases)
+    return found
+
+
+def bus(options: Options, _console: Console, tell: Tell) -> Part:
+    """The messages of a tick, over the Bus and over raw sockets."""
+    from messaging import measure
+
+    rows = []
+    for robots in (2,) if options.quick else (1, 3, 5):
+        tell(f"n = {robots}")
+        rows.append(measure(robots, 250 if options.quick else 4000))
+    return {"rows": rows}
+
+
+def world(options: Options, _console: Console, tell: Tell) -> Part:
+    """A tick of the world."""
+    from children import result_of
+    from world_steps import measure
+
+    rows = []
+    for robots, terrain in (*((n, "flat") for n in (1, 3, 5, 10)), (3, "heightfield")):
+        tell(f"n = {robots}, {terrain}")
+        rows.append(result_of(measure, robots, terrain, 50 if options.quick else 2000))
+    return {"rows": rows}
+
+
+def recorder(options: Options, _console: Console, _tell: Tell) -> Part:
+    """What the recorder takes in."""
+    from recorder import measure
+
+    with tempfile.TemporaryDirectory() as scratch:
+        rate, seconds = (2000.0, 0.5) if options.quick else (20_000.0, 5.0)
+        return dict(measure(rate, seconds, 2, Path(scratch)))
+
+
+def fit(options: Options, _console: Console, _tell: Tell) -> Part:
+    """The predictor's fit for a small team; `fit.py` alone does the large ones."""
+    from dataclasses import asdict
+
+    from children import result_of
+    from fit import SIZES, measure
+
+    size = SIZES[0]
+    samples = 2100 if options.quick else size.samples
+    return asdict(result_of(measure, size.robots, samples, "ridge"))
+
+
+def walks(options: Options, console: Console, tell: Tell) -> Part:
+    """Real walks of every size, and of one with and without the recorder in turns."""
+    from children import result_of
+    from walks import alone, over_the_bus
+
+    from quadriga.warm_up import warm_up
+
+    rows = []
+    for robots in options.robots:
+        config, path, predictor = team(options, robots, options.seconds, console)
+        warm_up(config, console)
+        tell(f"n = {robots} in one process")
+        parts = result_of(alone, config, predictor)
+        found = over_the_bus(config, path, predictor, prefixed(tell, f"n = {robots}"))
+        rows.append({"robots": robots, "alone": parts, **found})
+    return {
+        "rows": rows, "planner": options.planner, "seconds": options.seconds,
+        "recorder": None if options.quick else recorder_turns(options, rows, console, tell),
+    }  # fmt: skip
+
+
+def recorder_turns(options: Options, rows: list[Part], console: Console, tell: Tell) -> Part:
+    """Real-time factors of walks with and without recorder, in turns after the one in `rows`."""
+    from dataclasses import replace
+
+    from walks import over_the_bus
+
+    middle = options.middle
+    config, path, predictor = team(options, middle, options.seconds, console)
+    plain = replace(config, recorder=replace(config.recorder, enabled=False))
+    found: Part = {"robots": middle, "with": [], "without": []}
+    found["with"] += [row["rtf"] for row in rows if row["robots"] == middle]
+    for name, asked in (("without", plain), ("with", config), ("without", plain)):
+        tell(f"n = {middle}, {name} recorder")
+        found[name].append(over_the_bus(asked, path, predictor, lambda _: None)["rtf"])
+    return found
+
+
+def prefixed(tell: Tell, prefix: str) -> Tell:
+    """`tell` with `prefix` before what is told."""
+    return lambda text: tell(f"{prefix}: {text}")
+
+
+def team(
+    options: Options, robots: int, seconds: float, console: Console
+) -> tuple[Config, Path | None, Predictor | None]:
+    """A team that walks on flat ground, its predictor's file and the predictor."""
+    from quadriga.identify import ensure_predictor, load_predictor
+    from shared.config_file import load
+
+    config = load(None, {
+        "team.robots": robots, "world.seconds": seconds, "planner.kind": options.planner,
+    })  # fmt: skip
+    if options.planner == "none":
+        return config, None, None
+    path = ensure_predictor(config, console)
+    return config, path, load_predictor(path, config)
+
+
+PARTS: dict[str, Callable[[Options, Console, Tell], Part]] = {
+    "planner": planner, "low-level": low_level, "bus": bus, "world": world,
+    "recorder": recorder, "fit": fit, "walks": walks,
+}  # fmt: skip

@@ -1,0 +1,170 @@
+"""What the tick of one robot's low level costs and where the time goes, on a real walk's ticks.
+
+A tick is everything between the bytes of a state and the bytes of the command: decode, estimate,
+gait and plan in force, Pinocchio's terms, references and QP, encode. Hot means one tick after
+the other; cold, that an array larger than the caches is gone through between two ticks: in a
+walk the world and other robots run in between, so the agent finds them cold.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from low_level_ticks import AgentTick
+
+from agents.agent import Agent, AgentState, Inputs, Outputs
+from agents.controller.controller import Acted, Controller, Schedule, Task
+from agents.controller.memory import Memory
+from agents.controller.model import RigidBody, Terms
+from agents.controller.sensing import Seen
+from agents.planner.predictor import Predictor
+from shared.clock import monotonic_ns
+from shared.codec import decode, encode
+from shared.config import Config
+from shared.messages import State
+from shared.robot import Array
+
+STAGES: Final = ("decode", "sense", "gait, plan", "terms", "references, QP", "encode")
+_L2: Final = Path("/sys/devices/system/cpu/cpu0/cache/index2/size")
+_SIZE: Final = 8 << 20  # B, of an array larger than any L2 where the system does not tell its size
+
+
+def measure(
+    config: Config, predictor: Predictor | None, ticks: list[AgentTick], passes: int = 3
+) -> dict[str, Any]:
+    """Medians and p99 of the whole tick and of its stages, µs, hot and cold.
+
+    Only ticks after the stand count. Each pass goes through the walk from its start, since an
+    agent remembers; the stages come from passes of their own, so that the stopwatch is not in
+    the whole.
+    """
+    first = config.gait.stand_ms
+    figures: dict[str, Any] = {"ticks": len(ticks) - first, "robots": config.team.robots}
+    agent = Agent(config, "r1", predictor)
+    watch = _Stopwatch()
+    watched = Agent(config, "r1", predictor)
+    watched._controller = _Watched(config, watch)
+    between = {"hot": lambda: None, "cold": _evict()}
+    with collector_off():
+        _replay(agent, ticks)  # first calls load and set up
+        for name, forget in between.items():
+            whole = [_replay(agent, ticks, forget)[first:] for _ in range(passes)]
+            parts = [_staged(watched, watch, ticks, forget)[first:] for _ in range(passes)]
+            times, stages = np.concatenate(whole), np.concatenate(parts)
+            figures[name] = {
+                "median": float(np.median(times)), "p99": float(np.percentile(times, 99)),
+                "stages": dict(zip(STAGES, np.median(stages, axis=0).tolist(), strict=True)),
+            }  # fmt: skip
+    return figures
+
+
+@contextmanager
+def collector_off() -> Iterator[None]:
+    """No garbage collection within the block, as in an agent's process while it walks."""
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+def _replay(
+    agent: Agent, ticks: list[AgentTick], forget: Callable[[], object] = lambda: None
+) -> Array:
+    """Time of every tick, µs; `forget` is called before each."""
+    times, memory = np.empty(len(ticks)), agent.initial()
+    for k, tick in enumerate(ticks):
+        forget()
+        begun = monotonic_ns()
+        memory, outputs = _step(agent, memory, tick, decode(tick.payload, State))
+        encode(outputs.command)
+        times[k] = monotonic_ns() - begun
+    return 1e-3 * times
+
+
+def _staged(
+    agent: Agent, watch: _Stopwatch, ticks: list[AgentTick], forget: Callable[[], object]
+) -> Array:
+    """Time of every tick's stages, (T, 6), µs."""
+    times, memory = np.empty((len(ticks), len(STAGES))), agent.initial()
+    for k, tick in enumerate(ticks):
+        forget()
+        watch.ns.clear()
+        begun = monotonic_ns()
+        state = decode(tick.payload, State)
+        decoded = monotonic_ns()
+        memory, outputs = _step(agent, memory, tick, state)
+        stepped = monotonic_ns()
+        encode(outputs.command)
+        ended = monotonic_ns()
+        sense, act, terms = (watch.ns[name] for name in ("sense", "act", "terms"))
+        rest = stepped - decoded - sense - act
+        times[k] = decoded - begun, sense, rest, terms, act - terms, ended - stepped
+    return 1e-3 * times
+
+
+def _step(
+    agent: Agent, memory: AgentState, tick: AgentTick, state: State
+) -> tuple[AgentState, Outputs]:
+    heard = tick.inputs
+    return agent.step(memory, Inputs(state, heard.measurements, heard.plans, heard.references))
+
+
+def _evict() -> Callable[[], object]:
+    """A function after whose call the caches hold nothing of what was there before."""
+    size = _SIZE
+    if _L2.is_file():
+        kibibytes = _L2.read_text(encoding="ascii").strip().removesuffix("K")
+        size = 2 * 1024 * int(kibibytes) if kibibytes.isdigit() else size
+    return np.ones(size // 8).sum
+
+
+class _Stopwatch:
+    """Nanoseconds spent per name since it was cleared."""
+
+    def __init__(self) -> None:
+        self.ns: defaultdict[str, int] = defaultdict(int)
+
+
+class _Watched(Controller):
+    """A controller whose halves, and Pinocchio's terms within the second, are timed."""
+
+    def __init__(self, config: Config, watch: _Stopwatch) -> None:
+        super().__init__(config)
+        self._watch = watch
+        self.body = _WatchedBody(watch)
+
+    def sense(self, memory: Memory | None, state: State, schedule: Schedule, dt: float) -> Seen:
+        begun = monotonic_ns()
+        seen = super().sense(memory, state, schedule, dt)
+        self._watch.ns["sense"] += monotonic_ns() - begun
+        return seen
+
+    def act(
+        self, seen: Seen, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
+    ) -> Acted:
+        begun = monotonic_ns()
+        acted = super().act(seen, schedule, task, dt, new_sample=new_sample)
+        self._watch.ns["act"] += monotonic_ns() - begun
+        return acted
+
+
+class _WatchedBody(RigidBody):
+    """Pinocchio's terms, timed."""
+
+    def __init__(self, watch: _Stopwatch) -> None:
+        super().__init__()
+        self._watch = watch
+
+    def terms(self, q: Array, v: Array) -> Terms:
+        begun = monotonic_ns()
+        terms = super().terms(q, v)
+        self._watch.ns["terms"] += monotonic_ns() - begun
+        return terms

@@ -1,0 +1,116 @@
+"""The whole-body QP as a user of TSID writes it; imported only where `tsid` is installed.
+
+Decision variables are accelerations and forces. No slip, dynamics, friction cone and torque limits
+are constraints; trunk, swing feet and forces are in the cost with our weights. TSID's Python
+interface takes no cost on torques: that small term is not in it, which spares it some work.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+import tsid
+
+from agents.controller.whole_body_qp import Weights
+from shared.a1_model import build_pinocchio_model
+from shared.robot import FOOT_FRAMES, N_JOINTS, TORQUE_LIMIT, Array
+
+if TYPE_CHECKING:
+    from low_level_tsid import Case
+
+_TRUNK = "root_joint"
+_POSITION = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+
+
+class Tsid:
+    """One A1 with four feet that are contacts or tasks, as the tick has it."""
+
+    def __init__(self, weights: Weights) -> None:
+        self._weights = weights
+        model = build_pinocchio_model()
+        self._robot = tsid.RobotWrapper(model, tsid.FLOATING_BASE_SYSTEM, False)
+        self._form = tsid.InverseDynamicsFormulationAccForce("tsid", self._robot, False)
+        self._v0 = np.zeros(model.nv)
+        q0 = pin.neutral(model)
+        self._form.computeProblemData(0.0, q0, self._v0)
+        self._trunk = self._se3("trunk", _TRUNK, np.ones(6))
+        self._form.addMotionTask(self._trunk, weights.gamma_defect, 1, 0.0)
+        limit = np.full(N_JOINTS, TORQUE_LIMIT)
+        self._bounds = tsid.TaskActuationBounds("limits", self._robot)
+        self._bounds.setBounds(-limit, limit)
+        self._form.addActuationTask(self._bounds, 1.0, 0, 0.0)
+        self._feet = [self._se3(f"swing_{name}", name, _POSITION) for name in FOOT_FRAMES]
+        self._contacts = [self._contact(name) for name in FOOT_FRAMES]
+        self._standing: list[bool | None] = [None] * 4
+        self._solver = tsid.SolverHQuadProgFast("solver")
+        self._solution: Any = None
+
+    def _se3(self, name: str, frame: str, mask: Array) -> Any:
+        """A task without feedback: its reference is the acceleration itself, world-aligned."""
+        task = tsid.TaskSE3Equality(name, self._robot, frame)
+        task.setKp(np.zeros(6))
+        task.setKd(np.zeros(6))
+        task.setMask(mask)
+        task.useLocalFrame(False)
+        return task
+
+    def _contact(self, frame: str) -> Any:
+        contact = tsid.ContactPoint(
+            f"contact_{frame}", self._robot, frame, np.array([0.0, 0.0, 1.0]),
+            self._weights.mu / np.sqrt(2.0), self._weights.force_min, 1e3,
+        )  # fmt: skip
+        contact.setKp(np.zeros(3))
+        contact.setKd(np.zeros(3))
+        contact.useLocalFrame(False)
+        contact.setRegularizationTaskWeightVector(np.ones(3))
+        return contact
+
+    def set(self, case: Case) -> None:
+        """References and contacts of a tick."""
+        goal, changed = case.goal, False
+        for leg, standing in enumerate(goal.contact > 0.5):
+            if standing != self._standing[leg]:
+                self._switch(leg, bool(standing), first=self._standing[leg] is None)
+                self._standing[leg], changed = bool(standing), True
+            if standing:
+                self._contacts[leg].setForceReference(goal.force[leg])
+            else:
+                self._feet[leg].setReference(_accelerate(np.append(goal.swing[leg], np.zeros(3))))
+        self._trunk.setReference(_accelerate(goal.trunk))
+        if changed:
+            self._form.computeProblemData(0.0, case.q, case.v)
+            self._solver.resize(self._form.nVar, self._form.nEq, self._form.nIn)
+
+    def _switch(self, leg: int, standing: bool, *, first: bool) -> None:
+        task, contact = self._feet[leg], self._contacts[leg]
+        if standing:
+            if not first:
+                self._form.removeTask(task.name, 0.0)
+            self._form.addRigidContact(contact, self._weights.gamma_force, 1.0, 0)
+        else:
+            if not first:
+                self._form.removeRigidContact(contact.name, 0.0)
+            self._form.addMotionTask(task, self._weights.gamma_defect, 1, 0.0)
+
+    def solve(self, case: Case) -> None:
+        """What TSID does at a tick."""
+        problem = self._form.computeProblemData(0.0, case.q, case.v)
+        self._solution = self._solver.solve(problem)
+
+    def torques(self) -> Array:
+        """Of the last tick, (12,), N·m."""
+        tau: Array = np.array(self._form.getActuatorForces(self._solution))
+        return tau
+
+
+def _accelerate(acceleration: Array) -> Any:
+    """A sample of a trajectory whose position and velocity do not matter."""
+    sample = tsid.TrajectorySample(12, 6)
+    pose = np.zeros(12)
+    pose[3:] = np.eye(3).ravel()
+    sample.value(pose)
+    sample.derivative(np.zeros(6))
+    sample.second_derivative(acceleration)
+    return sample

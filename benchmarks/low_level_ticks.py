@@ -1,0 +1,47 @@
+"""What one robot's low level takes in on a real walk, tick by tick, for a benchmark."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from agents.agent import REFERENCE_EPOCH_MS, Agent, AgentState, Inputs, Outputs
+from agents.planner.predictor import Predictor
+from quadriga.operator import reference_at
+from quadriga.rollout import Rollout
+from shared.codec import encode
+from shared.config import Config
+from shared.messages import Reference
+
+
+@dataclass(frozen=True, slots=True)
+class AgentTick:
+    """Everything that reached an agent at one tick; its own state as it was on the wire."""
+
+    payload: bytes
+    inputs: Inputs
+
+
+def record(config: Config, predictor: Predictor | None) -> list[AgentTick]:
+    """Walk `config` in this process and keep what r1 consumed at every tick."""
+
+    def reference(tick: int) -> Reference | None:
+        return reference_at(config, tick) if tick % REFERENCE_EPOCH_MS == 0 else None
+
+    rollout = Rollout(config, predictor, reference)
+    heard = _Heard(rollout.agents["r1"])
+    rollout.agents["r1"] = heard
+    for _ in rollout.ticks(round(1000 * config.world.seconds)):
+        pass
+    return heard.ticks
+
+
+class _Heard(Agent):
+    """An agent that keeps what it is given."""
+
+    def __init__(self, agent: Agent) -> None:
+        self._agent = agent
+        self.ticks: list[AgentTick] = []
+
+    def step(self, state: AgentState, inputs: Inputs) -> tuple[AgentState, Outputs]:
+        self.ticks.append(AgentTick(encode(inputs.state), inputs))
+        return self._agent.step(state, inputs)

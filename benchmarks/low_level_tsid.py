@@ -1,0 +1,142 @@
+"""The whole-body part of a tick against TSID: the same robot, the same ticks, the same costs.
+
+Ours is Pinocchio's terms, assembly and solution; TSID's is `computeProblemData` and the solution by
+its own solver (eiquadprog). References and contacts are set outside of what is timed.
+
+TSID is no dependency of the project. Its wheel on PyPI is built for another Pinocchio and crashes
+with ours; so it is tried in a process of its own.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from children import result_of
+from low_level import collector_off
+from low_level_ticks import AgentTick
+
+from agents.agent import Agent
+from agents.controller.controller import Acted, Controller, Schedule, Task
+from agents.controller.model import RigidBody
+from agents.controller.sensing import Seen
+from agents.controller.whole_body_qp import Goal, Weights, closed_form, solve_goal
+from agents.planner.predictor import Predictor
+from shared.clock import monotonic_ns
+from shared.config import Config
+from shared.robot import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """What one tick gives the whole-body part, see `Seen` and `Goal`; q (19,), v (18,)."""
+
+    q: Array
+    v: Array
+    R: Array
+    p_foot: Array
+    goal: Goal
+
+
+def cases(config: Config, predictor: Predictor | None, ticks: list[AgentTick]) -> list[Case]:
+    """The whole-body part's inputs at every tick after the stand."""
+    agent = Agent(config, "r1", predictor)
+    agent._controller = listening = _Listening(config)
+    memory = agent.initial()
+    for tick in ticks:
+        memory, _ = agent.step(memory, tick.inputs)
+    return listening.cases[config.gait.stand_ms :]
+
+
+def compare(config: Config, found: list[Case]) -> dict[str, Any] | None:
+    """Both on every case, see `_compare`; None if TSID is not there."""
+    try:
+        answer: dict[str, Any] | None = result_of(_compare, config, found)
+    except ChildProcessError:
+        return None
+    return answer
+
+
+def _compare(config: Config, found: list[Case]) -> dict[str, Any] | None:
+    """Medians, µs, of both in turns, each first at every other tick, and how torques differ."""
+    warnings.simplefilter("ignore", RuntimeWarning)  # two of TSID's converters have one type
+    try:
+        import tsid  # noqa: F401
+    except ImportError:
+        return None
+    with collector_off():
+        return _turns(config, found)
+
+
+def _turns(config: Config, found: list[Case]) -> dict[str, Any]:
+    from low_level_peer import Tsid
+
+    weights = Controller(config).weights
+    ours, peer = _Ours(weights), Tsid(weights)
+    times, differences = np.empty((2, len(found))), []
+    for case in found[:20]:
+        ours.solve(case)
+    for k, case in enumerate(found):
+        peer.set(case)
+        answers: list[Array] = [np.empty(0), np.empty(0)]
+        order: list[tuple[int, Callable[[Case], object], Callable[[], Array]]] = [
+            (0, ours.solve, ours.torques), (1, peer.solve, peer.torques),
+        ]  # fmt: skip
+        for which, solve, torques in order if k % 2 else reversed(order):
+            begun = monotonic_ns()
+            solve(case)
+            times[which, k] = 1e-3 * (monotonic_ns() - begun)
+            answers[which] = torques()
+        differences.append(np.abs(answers[0] - answers[1]).max())
+    median, p99 = np.median(times, axis=1), np.percentile(times, 99, axis=1)
+    return {
+        "ours_us": float(median[0]), "tsid_us": float(median[1]),
+        "ours_us_p99": float(p99[0]), "tsid_us_p99": float(p99[1]),
+        "ratio": float(median[1] / median[0]),
+        "torque_difference_median_nm": float(np.median(differences)), "ticks": len(found),
+    }  # fmt: skip
+
+
+class _Ours:
+    """Terms, assembly and solution as `Controller.act` goes about them."""
+
+    def __init__(self, weights: Weights) -> None:
+        self._body, self._weights, self._flat = RigidBody(), weights, weights.as_array()
+        self._x = np.zeros(42)
+
+    def solve(self, case: Case) -> None:
+        """One tick's torques."""
+        terms, goal = self._body.terms(case.q, case.v), case.goal
+        self._x = np.zeros(42)
+        if not closed_form(
+            terms.M_inverse, terms.nle, terms.J, terms.dJ, case.v, case.R, case.p_foot,
+            goal.contact, goal.trunk, goal.swing, goal.force, self._flat, self._x,
+        ):  # fmt: skip
+            self._x = solve_goal(terms, case.R, case.p_foot, goal, self._weights).x
+
+    def torques(self) -> Array:
+        """Of the last tick, (12,), N·m."""
+        return self._x[:12]
+
+
+class _Listening(Controller):
+    """A controller that keeps what its QP is given."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__(config)
+        self.cases: list[Case] = []
+
+    def act(
+        self, seen: Seen, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
+    ) -> Acted:
+        acted = super().act(seen, schedule, task, dt, new_sample=new_sample)
+        q, v = seen.flat[:19].copy(), seen.flat[19:37].copy()
+        goal = acted.goal
+        self.cases.append(Case(
+            q, v, seen.R.copy(), seen.p_foot.copy(),
+            Goal(goal.contact.copy(), goal.trunk.copy(), goal.swing.copy(), goal.force.copy()),
+        ))  # fmt: skip
+        return acted

@@ -1,0 +1,113 @@
+"""The benchmark as its user starts it, with sizes that only show that all parts work."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shared.clock import monotonic, sleep
+
+BENCH = Path(__file__).parents[2] / "benchmarks" / "bench.py"
+NO_TSID = "raise ImportError('not installed')\n"
+
+
+def command(out: Path, *words: str) -> list[str]:
+    return [sys.executable, str(BENCH), *words, "--quick", "--out", str(out)]
+
+
+def run(out: Path, *words: str) -> tuple[str, dict[str, Any]]:
+    done = subprocess.run(command(out, *words), check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout, json.loads(out.read_text(encoding="utf-8"))
+
+
+def test_parts_print_their_lines_and_write_their_figures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "tsid.py").write_text(NO_TSID, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=":")
+    parts = ("low-level", "bus", "recorder")
+    page, found = run(tmp_path / "b.json", *parts, "--planner", "none", "--robots", "1")
+    assert all(name in page for name in parts)
+    assert 0.0 < found["low_level_us_median"] < found["low_level_us_cold_median"]
+    stages = found["parts"]["low-level"]["hot"]["stages"]
+    share = sum(stages.values()) / found["low_level_us_median"]
+    assert 0.3 < share < 3.0, "the stages, from passes of their own, make up the tick"
+    assert min(stages.values()) > 0.0
+    assert found["low_level_vs_tsid"] is None
+    assert "`import tsid` fails" in page
+    (row,) = found["parts"]["bus"]["rows"]
+    assert row["bus"]["median"] > row["socket"]["median"] > 0.0
+    assert found["recorder_gaps"] == 0
+    assert found["recorder_msgs_per_s"] > 1000.0
+    assert found["machine"]["scheduling"] in ("realtime", "ordinary")
+    assert found["rtf"] == {}
+    assert found["failed"] == {}
+    assert (tmp_path / "b.png").stat().st_size > 10_000
+
+
+def test_walks_are_measured_with_and_without_the_bus(tmp_path: Path) -> None:
+    words = ("walks", "--planner", "none", "--robots", "1", "--seconds", "1")
+    page, found = run(tmp_path / "b.json", *words)
+    assert found["rtf"]["1"] > 0.0
+    assert found["messaging_share"]["1"] < 1.0
+    row = found["parts"]["walks"]["rows"][0]
+    assert row["seconds"] == pytest.approx(1.0, abs=0.02)
+    assert set(row["memory_mb"]) == {"sim", "r1", "operator", "recorder"}
+    assert all(0.0 < m["pss"] <= m["rss"] for m in row["memory_mb"].values())
+    assert "ENDED" not in page
+
+
+def test_an_unknown_part_is_refused_by_name(tmp_path: Path) -> None:
+    words = command(tmp_path / "b.json", "wrold")
+    done = subprocess.run(words, check=False, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "no part wrold" in done.stderr
+
+
+def test_an_interrupt_leaves_no_process_and_no_file(tmp_path: Path) -> None:
+    words = command(tmp_path / "b.json", "bus")
+    with subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as bench:
+        children = awaited_children(bench.pid, 2)
+        bench.send_signal(signal.SIGINT)
+        _, said = bench.communicate(timeout=20.0)
+    assert bench.returncode == 130
+    assert "interrupted" in said
+    assert "Traceback" not in said
+    assert not any(lives(pid) for pid in children)
+    assert not (tmp_path / "b.json").exists()
+
+
+def awaited_children(pid: int, count: int) -> Sequence[int]:
+    """Processes of the benchmark, once there are as many as its team has."""
+    deadline = monotonic() + 20.0
+    while monotonic() < deadline:
+        text = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii")
+        found = [int(word) for word in text.split()]
+        if len(found) > count:
+            return found
+        sleep(0.02)
+    raise AssertionError("the benchmark started no processes")
+
+
+def lives(pid: int) -> bool:
+    """Whether a process is still there after the moment that a helper of Python's takes to end."""
+    stat = Path(f"/proc/{pid}/stat")
+    deadline = monotonic() + 5.0
+    while monotonic() < deadline:
+        try:
+            if stat.read_text(encoding="ascii").rpartition(") ")[2].startswith("Z"):
+                return False
+        except (FileNotFoundError, ProcessLookupError):
+            return False
+        sleep(0.02)
+    return True
