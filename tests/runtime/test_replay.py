@@ -312,4 +312,4 @@ def test_the_plans_of_a_central_planner_are_inputs(tmp_path: Path, kind: str) ->
     edit = planted_bit("team/r2/plan", 480, "u")
     (outcome,) = replayed(rewritten(run, tmp_path / "planted.mcap", edit), "r2")
     assert outcome.verdict.first is not None
-    assert outcome.verdict.first.tick == 481  # a plan arrives a tick after its data
+    assert outcome.verdict.first.tick == 488  # a plan arrives 8 ms after its data
