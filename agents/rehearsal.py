@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from agents.agent import Agent, Inputs
+from agents.agent import REFERENCE_EPOCH_MS, Agent, AgentState, Inputs
 from agents.central import Central, CentralState
 from agents.gait import nominal_forces, scheduled_stance
 from agents.planner.horizon import SAMPLE_MS, step_ms
@@ -25,13 +25,20 @@ from shared.robot import (
     robot_names,
 )  # fmt: skip
 
+_LEAN = 0.8  # of the tilt that is a fall
 
-def rehearse(config: Config, agent: Agent) -> None:
-    """Step `agent` through standing, the first walking ticks and two planning steps."""
-    memory = agent.initial()
-    last = config.gait.stand_ms + SAMPLE_MS * config.planner.T_ini + 2 * step_ms(config)
-    for tick in range(last + 1):
-        memory, _ = agent.step(memory, Inputs(standing(tick), references=(_stay(config),)))
+
+def rehearse(config: Config, agent: Agent) -> AgentState:
+    """Step `agent` through standing, the first walking ticks and some planning steps.
+
+    For the last two of them it leans, so far that limits of both its QPs are active.
+    """
+    memory, lean = agent.initial(), _LEAN * config.controller.fall_tilt
+    upright = config.gait.stand_ms + SAMPLE_MS * config.planner.T_ini + 2 * step_ms(config)
+    for tick in range(upright + 2 * step_ms(config) + 1):
+        state = standing(tick, lean if tick > upright else 0.0)
+        memory, _ = agent.step(memory, Inputs(state, references=(_stay(config, tick),)))
+    return memory
 
 
 def rehearse_central(config: Config, central: Central) -> None:
@@ -48,19 +55,22 @@ def rehearse_central(config: Config, central: Central) -> None:
         state, _ = central.step(central.remember(state, sampled, [_stay(config)]))
 
 
-def _stay(config: Config) -> Reference:
-    return Reference(0, 0, 0.0, 0.0, 0.0, config.reference.height)
+def _stay(config: Config, tick: int = 0) -> Reference:
+    epoch = tick - tick % REFERENCE_EPOCH_MS
+    return Reference(epoch, epoch * 1_000_000, 0.0, 0.0, 0.0, config.reference.height)
 
 
-def standing(tick: int) -> State:
-    """What a robot that stands still on flat ground measures.
+def standing(tick: int, lean: float = 0.0) -> State:
+    """What a robot that stands still on flat ground measures, or leans to its right, rad.
 
     It goes through the codec, because compiled functions tell arrays of the wire, which cannot be
     written, from others.
     """
     zero = np.zeros(N_JOINTS)
+    quat = np.array([np.cos(0.5 * lean), np.sin(0.5 * lean), 0.0, 0.0])
+    weight = np.full(N_LEGS, TOTAL_MASS * GRAVITY / N_LEGS)
     state = State(
-        tick, tick * 1_000_000, q_stand(), zero, zero, np.array([1.0, 0.0, 0.0, 0.0]),
-        np.zeros(3), np.array([0.0, 0.0, GRAVITY]), np.full(N_LEGS, TOTAL_MASS * GRAVITY / N_LEGS),
+        tick, tick * 1_000_000, q_stand(), zero, zero, quat, np.zeros(3),
+        np.array([0.0, 0.0, GRAVITY]), weight,
     )  # fmt: skip
     return decode(encode(state), State)
