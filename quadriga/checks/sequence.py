@@ -137,7 +137,9 @@ class Ages:
     def _look_at_status(self, item: Item, status: Status) -> None:
         for name, age in status.ages_ms.items():
             topic = name.partition(".")[0]
-            limit = _MAX_AGE.get(topic, 0)
+            if topic not in _MAX_AGE:
+                continue  # the jitter of states in real time
+            limit = _MAX_AGE[topic]
             self._oldest[topic] = max(age, self._oldest.get(topic, 0.0))
             if limit and age > limit:
                 self.finding.object(status.tick, item.key, f"{name} {age:g} ms old", f"{limit} ms")
