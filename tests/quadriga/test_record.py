@@ -9,9 +9,11 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
 from quadriga.cli import main
 from quadriga.endpoint import free_endpoint
@@ -190,6 +192,25 @@ def test_kill_9_loses_a_tenth_of_a_second_at_most(start: Start, world: Bus, tmp_
         if losses[-1] < 0.1:
             return
     pytest.fail(f"{losses} s were lost")
+
+
+def test_what_comes_is_in_a_chunk_of_its_own_within_a_tenth_of_a_second(
+    start: Start, world: Bus, tmp_path: Path
+) -> None:
+    """What a kill can cost is the chunk that is open: by the recorder's own clock, however busy."""
+    recorder = start(world)
+    put, begun, tick = world.publisher("band/r1/state"), monotonic(), 0
+    while monotonic() - begun < 1.5:
+        put(encode(state(tick)))
+        tick += 1
+        sleep(0.001)
+    ended(recorder, world, tmp_path, tick)
+    with (tmp_path / "run.mcap").open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    spans = [1e-9 * (c.message_end_time - c.message_start_time) for c in summary.chunk_indexes]
+    assert median(spans) < 0.1
+    assert len(spans) > 5
 
 
 def test_what_is_lost_is_known_after_a_kill(start: Start, world: Bus, tmp_path: Path) -> None:

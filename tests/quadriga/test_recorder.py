@@ -119,7 +119,7 @@ def test_records_all_and_ends_with_the_sim_server(
 def test_a_signal_loses_nothing_sent_before_it(
     config: Config, others: dict[str, Bus], tmp_path: Path
 ) -> None:
-    for attempt in range(5):  # a busy machine may keep a message under way for longer than QUIET
+    for attempt in range(2):  # a busy machine may keep a message under way for longer than QUIET
         folder = tmp_path / str(attempt)
         folder.mkdir()
         await_listener(others["r1"], "band/r1/state", there=False)

@@ -234,28 +234,32 @@ def check_exact_up_to_a_loss(path: Path, outcome: Outcome) -> None:
 
 
 def test_real_time_is_replayed_to_the_byte(tmp_path: Path) -> None:
-    for attempt in range(2):  # on a busy machine links drop messages, and robots pass over states
+    for attempt in range(5):  # on a busy machine links drop messages, and robots pass over states
         run = walked(tmp_path / str(attempt), world__mode="realtime", world__seconds=1.5)
         outcomes = replayed(run)
         for outcome in outcomes:
             check_exact_up_to_a_loss(run, outcome)
         if all(len(outcome.verdict.equal) == 3 and outcome.verdict.exact for outcome in outcomes):
             break
+    else:
+        pytest.fail("no recording without a loss")
     assert [outcome.robot for outcome in outcomes] == ["r1", "r2"]
+    assert all(outcome.verdict.equal["command"] > 300 for outcome in outcomes)
     assert list(Recording(run).messages(Consumed, "r1")), "it tells what it took in"
 
 
 def test_what_was_taken_in_in_real_time_cannot_be_guessed(tmp_path: Path) -> None:
-    run = walked(tmp_path / "run", world__mode="realtime", world__seconds=0.5)
-    before, lost, after = list(Recording(run).messages(Consumed, "r1"))[:3]
-    path = rewritten(run, tmp_path / "lost.mcap", without("team/r1/inputs", lost.tick))
-    shutil.copy(run.parent / "predictor.npz", tmp_path)
-    (outcome,) = replayed(path, "r1")
-    tick, name = outcome.verdict.missing[0]
-    if tick > before.tick:  # else a busy recorder had lost something before
-        count = after.number - before.number - 1
-        assert tick == before.tick + 1
-        assert name == f"{count} of inputs of r1 between ticks {before.tick} and {after.tick}"
+    for attempt in range(5):
+        run = walked(tmp_path / str(attempt), world__mode="realtime", world__seconds=0.5)
+        before, lost, after = list(Recording(run).messages(Consumed, "r1"))[:3]
+        path = rewritten(run, run.parent / "lost.mcap", without("team/r1/inputs", lost.tick))
+        (outcome,) = replayed(path, "r1")
+        tick, name = outcome.verdict.missing[0]
+        if tick > before.tick:  # else a busy recorder had lost something before
+            break
+    count = after.number - before.number - 1
+    assert tick == before.tick + 1
+    assert name == f"{count} of inputs of r1 between ticks {before.tick} and {after.tick}"
 
 
 def frozen_for_a_while(running: Launch, endpoint: str) -> None:
