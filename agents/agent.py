@@ -133,7 +133,7 @@ class Agent:
         elif predictor is not None:
             self._pilot = LocalPilot(config, self.index, predictor, clock_ns)
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
-        self._damping = np.full(12, config.controller.damping)
+        self._damping = config.controller.damping
         self._feedforward = config.planner.interface == "feedforward"
 
     @property
@@ -245,11 +245,12 @@ class Agent:
 
     def _command(self, tick: int, solution: Solution, last_tau: Array, mode: Mode) -> Command:
         """The motor command: the QP's torques, the last good ones, or damping."""
-        if mode.limp:
-            return Command(tick, tick * 1_000_000, _ZERO, _ZERO, _ZERO, _ZERO, self._damping)
-        if not solution.solved:
-            return Command(tick, tick * 1_000_000, last_tau, _ZERO, _ZERO, _ZERO, self._damping)
-        return Command(tick, tick * 1_000_000, solution.tau, _ZERO, _ZERO, _ZERO, _ZERO)
+        row = np.zeros(60)  # tau, q_des, v_des, kp, kd
+        if mode.limp or not solution.solved:
+            row[48:] = self._damping
+        if not mode.limp:
+            row[:12] = solution.tau if solution.solved else last_tau
+        return Command.of(tick, tick * 1_000_000, row)
 
 
 def _schedules(config: Config, index: int) -> tuple[Schedule, ...]:

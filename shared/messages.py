@@ -8,13 +8,18 @@ Every message carries `tick` (1 ms of world time) and `stamp_ns` (the world's ti
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
-from typing import Any, ClassVar
+from dataclasses import dataclass, field, fields
+from functools import partial
+from itertools import accumulate
+from typing import Any, ClassVar, Self, TypeVar, dataclass_transform
+
+import numpy as np
 
 from shared.record import record
 from shared.robot import Array
 
 Dim = int | str
+F = TypeVar("F", bound="Flat")
 
 
 def array(*shape: Dim, unit: str, frame: str = "-") -> Any:
@@ -36,10 +41,61 @@ class Message:
     stamp_ns: int = plain(int, "world time of the content [ns]")
 
 
-@record
-class State(Message):
+class Flat(Message):
+    """A message whose arrays all have fixed sizes: they are read-only views of one `row`.
+
+    Made of arrays like any other, or with `of` of a row, in the order of its fields.
+
+    Attributes:
+        row: all numbers, float64; not to be changed.
+    """
+
+    __slots__ = ("row",)
+    CUTS: ClassVar[dict[str, slice]] = {}
+    row: Array
+
+    def __init__(self, tick: int, stamp_ns: int, *arrays: Array, **named: Array) -> None:
+        rest = list(self.CUTS)[len(arrays) :]
+        if named.keys() != {*rest}:
+            raise TypeError(f"{type(self).__name__}: got {sorted(named)}, expected {rest}")
+        super().__init__(tick, stamp_ns)
+        self.row = np.concatenate([*arrays, *(named[name] for name in rest)], dtype=float)
+
+    @classmethod
+    def of(cls, tick: int, stamp_ns: int, row: Array) -> Self:
+        """The message of a row, which is kept, not copied."""
+        made = cls.__new__(cls)
+        Message.__init__(made, tick, stamp_ns)
+        made.row = row
+        return made
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+def flat_record(cls: type[F]) -> type[F]:
+    """A record that is `Flat`."""
+    made: Any = dataclass(init=False, eq=False)(cls)
+    sizes = {f.name: f.metadata["shape"][0] for f in fields(made) if "shape" in f.metadata}
+    stops = accumulate(sizes.values())
+    made.CUTS = {
+        name: slice(stop - size, stop)
+        for (name, size), stop in zip(sizes.items(), stops, strict=True)
+    }
+    for name, cut in made.CUTS.items():
+        setattr(made, name, property(partial(_view, cut)))
+    return made  # type: ignore[no-any-return]
+
+
+def _view(cut: slice, message: Flat) -> Array:
+    view = message.row[cut]
+    view.setflags(write=False)
+    return view
+
+
+@flat_record
+class State(Flat):
     """What one real robot measures at `tick`; nothing else may enter here."""
 
+    __slots__ = ()
     q_joint: Array = array(12, unit="rad", frame="joint")
     v_joint: Array = array(12, unit="rad/s", frame="joint")
     tau_joint: Array = array(12, unit="N·m", frame="joint")
@@ -49,10 +105,11 @@ class State(Message):
     foot_force: Array = array(4, unit="N", frame="ground normal")
 
 
-@record
-class Command(Message):
+@flat_record
+class Command(Flat):
     """Motor command; the motor applies `tau + kp (q_des − q) + kd (v_des − v)`, limited."""
 
+    __slots__ = ()
     tau: Array = array(12, unit="N·m", frame="joint")
     q_des: Array = array(12, unit="rad", frame="joint")
     v_des: Array = array(12, unit="rad/s", frame="joint")

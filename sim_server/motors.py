@@ -1,4 +1,4 @@
-"""Motors that weaken: which, from when, and how much of their torque is left."""
+"""Motors: what they do with a command, and which of them weaken."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 
 from shared.config import Config
 from shared.errors import ConfigError
-from shared.robot import JOINT_NAMES, robot_names
+from shared.jit import compiled
+from shared.robot import JOINT_NAMES, TORQUE_LIMIT, Array, robot_names
 
 WEAKENED: Final = "of its torque"  # how the event of a weak motor ends; a re-simulation reads it
 _KEY: Final = "world.weak_motor"
@@ -40,6 +41,27 @@ class WeakMotor:
     def detail(self) -> str:
         """What is announced when it weakens."""
         return f"{_JOINTS[self.joint]} gives {100 * self.share:g} % {WEAKENED}"
+
+
+@compiled
+def drive(commands: Array, q: Array, v: Array, strength: Array, tau: Array) -> None:
+    """Fill `tau`, (n, 12), with what the motors give: tau + kp (q_des − q) + kd (v_des − v).
+
+    Args:
+        commands: rows of the robots' `Command`s, (n, 60).
+        q: coordinates of each robot, its joints behind the trunk's seven, (n, 19).
+        v: velocities, its joints behind the trunk's six, (n, 18).
+        strength: the share of its limited torque that each motor gives, (n, 12).
+        tau: N·m.
+    """
+    for i in range(len(commands)):
+        row = commands[i]
+        for k in range(12):
+            torque = row[36 + k] * (row[12 + k] - q[i, 7 + k])
+            torque += row[48 + k] * (row[24 + k] - v[i, 6 + k])
+            torque += row[k]
+            torque = min(max(torque, -TORQUE_LIMIT), TORQUE_LIMIT)
+            tau[i, k] = strength[i, k] * torque
 
 
 def weak_motors(config: Config, random: np.random.Generator) -> tuple[WeakMotor, ...]:

@@ -7,21 +7,23 @@ from typing import Final
 import numpy as np
 
 from shared.config import SensorsConfig
+from shared.jit import compiled
 from shared.messages import State
 from shared.robot import N_JOINTS, N_LEGS, Array
 
 _STREAM: Final = 2  # of the seed: the terrain draws from another one
-# Channels of one robot, in the order of the fields of `State` but for the attitude, which is last
-# because its noise is a rotation and not a sum.
+# Columns of a robot's noise: those of its joints, its gyro, its accelerometer and its feet, in the
+# order of the fields of `State`, then its attitude's, which is a rotation and not a sum.
 _Q = slice(0, N_JOINTS)
 _V = slice(_Q.stop, _Q.stop + N_JOINTS)
 _TAU = slice(_V.stop, _V.stop + N_JOINTS)
 _GYRO = slice(_TAU.stop, _TAU.stop + 3)
 _ACCEL = slice(_GYRO.stop, _GYRO.stop + 3)
 _FOOT = slice(_ACCEL.stop, _ACCEL.stop + N_LEGS)
-N_CHANNELS: Final = _FOOT.stop  # those that `Sensors.measure` takes as one array
+_SUMS: Final = _FOOT.stop
 _TURN = slice(_FOOT.stop, _FOOT.stop + 3)
 
+_ROW: Final = _SUMS + 4  # numbers of a `State`
 _BLOCK: Final = 64  # ticks of noise drawn at once, because many small draws cost more
 
 # Q(p) with q ⊗ p = Q(p) q is _SIGN[a, b] · p[_INDEX[a, b]], quaternions wxyz.
@@ -45,7 +47,7 @@ class Sensors:
             (_TURN, config.orientation),
         ):  # fmt: skip
             self._sigma[channel] = sigma
-        self._bias = np.zeros((len(names), N_CHANNELS))
+        self._bias = np.zeros((len(names), _SUMS))
         for row, stream in zip(self._bias, self._streams, strict=True):
             row[_GYRO] = config.gyro_bias * stream.standard_normal(3)
             row[_ACCEL] = config.accel_bias * stream.standard_normal(3)
@@ -53,42 +55,52 @@ class Sensors:
         self._next = _BLOCK  # row of the block that the next measurement takes
         self._block, self._turns = np.empty(0), np.empty(0)
 
-    def measure(self, tick: int, channels: Array, quat_wxyz: Array) -> dict[str, State]:
+    def measure(self, tick: int, q: Array, v: Array, tau: Array, sensed: Array) -> dict[str, State]:
         """The messages of one tick; every call draws fresh noise.
 
         Args:
             tick: the messages' tick, ms.
-            channels: true q, v, tau of the joints, angular rate, specific force and normal foot
-                forces, shape (n, 46), units and frames as in `State`.
-            quat_wxyz: true attitudes, trunk to world, shape (n, 4).
+            q: true coordinates of each robot, trunk position and attitude first, (n, 19).
+            v: true velocities, the trunk's first, (n, 18).
+            tau: true joint torques, (n, 12), N·m.
+            sensed: true angular rate, specific force and normal foot forces, units and frames as
+                in `State`, in the first ten of its columns; shape (n, ≥ 10).
         """
         if self._next == _BLOCK:
             self._draw()
-        x, turn = self._block[self._next], self._turns[self._next]
+        rows = np.empty((len(q), _ROW))
+        _observe(q, v, tau, sensed, self._block[self._next], self._turns[self._next], rows)
         self._next += 1
-        x += channels
-        foot = x[:, _FOOT]
-        np.maximum(foot, 0.0, out=foot)  # a foot sensor cannot pull
-        quat = (turn @ quat_wxyz[:, :, None])[:, :, 0]
-        # As from the wire: the compiler tells read-only arrays apart and would compile twice.
-        x.setflags(write=False)
-        quat.setflags(write=False)
-        return {
-            name: State(
-                tick=tick, stamp_ns=tick * 1_000_000,
-                q_joint=x[i, _Q], v_joint=x[i, _V], tau_joint=x[i, _TAU], imu_quat_wxyz=quat[i],
-                imu_gyro=x[i, _GYRO], imu_accel=x[i, _ACCEL], foot_force=x[i, _FOOT],
-            )
-            for i, name in enumerate(self._names)
-        }  # fmt: skip
+        stamp_ns = tick * 1_000_000
+        return {name: State.of(tick, stamp_ns, rows[i]) for i, name in enumerate(self._names)}
 
     def _draw(self) -> None:
         """Draw the next block: noise plus bias (_BLOCK, n, 46), and turns (_BLOCK, n, 4, 4)."""
         draws = [stream.standard_normal((_BLOCK, _TURN.stop)) for stream in self._streams]
         noise = np.stack(draws, axis=1) * self._sigma
-        self._block = noise[:, :, :N_CHANNELS] + self._bias
+        self._block = noise[:, :, :_SUMS] + self._bias
         self._turns = turn_matrices(noise[:, :, _TURN])
         self._next = 0
+
+
+@compiled
+def _observe(
+    q: Array, v: Array, tau: Array, sensed: Array, noise: Array, turns: Array, rows: Array
+) -> None:
+    """Fill the rows of all robots' states."""
+    for i in range(len(rows)):
+        row, extra = rows[i], noise[i]
+        row[0:12] = extra[0:12] + q[i, 7:19]
+        row[12:24] = extra[12:24] + v[i, 6:18]
+        row[24:36] = extra[24:36] + tau[i]
+        for a in range(4):
+            row[36 + a] = 0.0
+            for b in range(4):
+                row[36 + a] += turns[i, a, b] * q[i, 3 + b]
+        row[40:46] = extra[36:42] + sensed[i, 0:6]
+        for foot in range(4):
+            # A foot sensor cannot pull.
+            row[46 + foot] = max(0.0, extra[42 + foot] + sensed[i, 6 + foot])
 
 
 def turn_matrices(rotation: Array) -> Array:

@@ -11,8 +11,9 @@ import numpy as np
 
 from shared.config import Config
 from shared.messages import Command, Event, State, Truth
-from shared.robot import FOOT_FRAMES, N_JOINTS, N_LEGS, TORQUE_LIMIT, Array, robot_names
+from shared.robot import FOOT_FRAMES, N_JOINTS, N_LEGS, Array, robot_names
 from sim_server.loose import PERIOD, LooseStones
+from sim_server.motors import drive
 from sim_server.scenario import build_scenario, event
 from sim_server.sensors import Sensors
 from sim_server.team_model import N_SENSORS, NQ, NV, build_team_model
@@ -60,10 +61,9 @@ class World:
         self._v = self.physics.qvel[: n * NV].reshape(n, NV)
         self._motor = self.physics.qfrc_applied[: n * NV].reshape(n, NV)[:, 6:]
         self._sensed = self.physics.sensordata.reshape(n, N_SENSORS)
-        self._rows = np.zeros(5 * n * N_JOINTS)
-        self._commanded = tuple(self._rows.reshape(5, n, N_JOINTS))  # tau, q_des, v_des, kp, kd
+        self._commanded = np.zeros((n, len(_DAMPED.row)))
         self._tau = np.zeros((n, N_JOINTS))
-        self._strength: Array | None = None  # while all motors are sound
+        self._strength = np.ones((n, N_JOINTS))
         self._fallen = [False] * n
         self._surely_up = _FALL_HEIGHT + self.team.terrain.top
         self._sensors = Sensors(config.sensors, config.world.seed, self.names)
@@ -93,7 +93,9 @@ class World:
             self.physics.xfrc_applied[self.team.trunks, :3] = self._scenario.forces(self.tick)
         if self.tick in self._weakenings:
             self._strength = self._scenario.strength(self.tick)
-        self._tau = self._torques(commands)
+        rows = [commands.get(name, _DAMPED).row for name in self.names]
+        np.concatenate(rows, out=self._commanded.reshape(-1))
+        drive(self._commanded, self._q, self._v, self._strength, self._tau)
         self._motor[:] = self._tau
         mujoco.mj_step2(self.team.model, self.physics)
         self._yoke_force = self._read_yoke_force()
@@ -125,30 +127,8 @@ class World:
         """Robots that have fallen so far."""
         return tuple(name for name, down in zip(self.names, self._fallen, strict=True) if down)
 
-    def _torques(self, commands: Mapping[str, Command]) -> Array:
-        """Torque of every motor. Shape (n, 12), N·m."""
-        commanded = [commands.get(name, _DAMPED) for name in self.names]
-        rows = [c.tau for c in commanded]
-        rows += [c.q_des for c in commanded]
-        rows += [c.v_des for c in commanded]
-        rows += [c.kp for c in commanded]
-        rows += [c.kd for c in commanded]
-        np.concatenate(rows, out=self._rows)
-        tau, q_des, v_des, kp, kd = self._commanded
-        torque: Array = kp * (q_des - self._q[:, 7:])
-        torque += kd * (v_des - self._v[:, 6:])
-        torque += tau
-        np.minimum(torque, TORQUE_LIMIT, out=torque)
-        np.maximum(torque, -TORQUE_LIMIT, out=torque)
-        if self._strength is not None:
-            torque *= self._strength
-        return torque
-
     def _measure(self) -> dict[str, State]:
-        channels = np.concatenate(
-            (self._q[:, 7:], self._v[:, 6:], self._tau, self._sensed[:, :10]), axis=1
-        )
-        return self._sensors.measure(self.tick, channels, self._q[:, 3:7])
+        return self._sensors.measure(self.tick, self._q, self._v, self._tau, self._sensed)
 
     def _read_yoke_force(self) -> Array:
         """Force of each yoke on its two robots, positive when it pushes them apart, N. Shape (k,).

@@ -1,8 +1,8 @@
 """The 1 kHz controller of one robot: contacts, references, whole-body QP, motor command.
 
-A tick is two compiled calls with Pinocchio's terms of the rigid body between them. Between two
-ticks the processor's caches are lost, so that a tick costs what it goes through: flat arrays, few
-objects. All arithmetic is in the functions that these calls are made of.
+A tick is two compiled calls. Between two ticks the processor's caches are lost, so that a tick
+costs what it goes through: flat arrays, few objects. All arithmetic is in the functions that these
+calls are made of.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from agents.controller.memory import (
 )
 from agents.controller.model import RigidBody
 from agents.controller.references import trunk_acceleration, trunk_gains
+from agents.controller.rigid_body import rigid_body_terms
 from agents.controller.rotation import roll_pitch_yaw
 from agents.controller.sensing import (
     SEEN_SIZE,
@@ -142,10 +143,7 @@ class Controller:
             mean, covariance = filter_of(before)
             mean[:], covariance[:] = standing_mean(state), sure()
         new, seen = np.empty(SIZE), np.empty(SEEN_SIZE)
-        sense(
-            before, state.imu_quat_wxyz, state.imu_gyro, state.imu_accel, state.q_joint,
-            state.v_joint, state.foot_force, schedule.row, dt, self._sensing, new, seen,
-        )  # fmt: skip
+        sense(before, state.row, schedule.row, dt, self._sensing, new, seen)
         return _begun(new, seen) if memory is None else Seen(Memory(new), seen)
 
     def place(
@@ -167,8 +165,8 @@ class Controller:
     ) -> Acted:
         """Torques for what the robot is asked to do.
 
-        Where no limit of the QP is active, as at most ticks, all but Pinocchio's terms is one
-        compiled call; a singular problem is no solution.
+        Where no limit of the QP is active, as at most ticks, this is one compiled call; a singular
+        problem is no solution.
 
         Args:
             seen: what `sense` gave for this tick.
@@ -177,16 +175,16 @@ class Controller:
             dt: time since the last tick, s.
             new_sample: whether a sample of forces begins with this tick.
         """
-        terms = self.body.terms(seen.flat[0:19], seen.flat[19:37])
         new, asked, x = np.empty(SIZE), np.empty(_ASKED), np.zeros(42)
         try:
             rows = _act(
                 seen.memory.flat, seen.flat, schedule.row, task.vx, task.vy, task.wz, task.height,
-                task.deviation, task.feedforward, dt, new_sample, terms.M_inverse, terms.nle,
-                terms.J, terms.dJ, self._acting, new, asked, x,
+                task.deviation, task.feedforward, dt, new_sample, self.body.links, self._acting,
+                new, asked, x,
             )  # fmt: skip
             if rows:
                 return Acted(Memory(new), asked, Solution(x, whole_body_qp.UNCONSTRAINED, rows))
+            terms = self.body.terms(seen.flat[0:19], seen.flat[19:37])
             goal = _goal(asked, legs_of(new)[0])
             solution = whole_body_qp.solve_goal(terms, seen.R, seen.p_foot, goal, self.weights)
         except np.linalg.LinAlgError:
@@ -229,16 +227,19 @@ def note_forces(memory: Array, planned: Array, stance: Array, new_sample: bool) 
 @compiled
 def _act(
     memory0: Array, seen: Array, schedule: Array, vx: float, vy: float, wz: float, height: float,
-    planned: Array, feedforward: bool, dt: float, new_sample: bool, M_inverse: Array, nle: Array,
-    J: Array, dJ: Array, constants: Array, memory: Array, asked: Array, x: Array,
+    planned: Array, feedforward: bool, dt: float, new_sample: bool, links: Array,
+    constants: Array, memory: Array, asked: Array, x: Array,
 ) -> int:  # fmt: skip
     """Fill the new memory, what is asked and the answer `closed_form` gives, with its result."""
     gains, feet, com = constants[0:12], constants[12:19], constants[19:22]
     inertia_inverse, weights = constants[22:31].reshape(3, 3), constants[31:36]
     stance, progress = schedule[0:4], schedule[4]
     position, v_trunk, R, omega = trunk_of(seen)
-    _, v = coordinates_of(seen)
+    q, v = coordinates_of(seen)
     p_foot, mass = feet_of(seen), feet[6]
+    M_inverse, nle = np.empty((18, 18)), np.empty(18)
+    J, dJ = np.empty((6, 18)), np.empty((6, 18))
+    rigid_body_terms(q, v, links, M_inverse, nle, J, dJ)
     memory[:] = memory0
     deviation = note_forces(memory, planned, stance, new_sample)
     speed, lead = speed_of(memory)

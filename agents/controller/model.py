@@ -1,13 +1,23 @@
-"""Rigid-body terms of one robot from Pinocchio, in the form the whole-body QP takes them."""
+"""The rigid body of one robot, in the form the whole-body QP takes it."""
 
 from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
 
+from agents.controller.rigid_body import link_table, rigid_body_terms
 from shared.a1_model import build_pinocchio_model
 from shared.record import record
 from shared.robot import Array, q_stand
+
+
+def _single_rigid_body(model: pin.Model) -> tuple[Array, Array]:
+    """Inverse composite inertia about the centre of mass, and that centre."""
+    q, scratch = pin.neutral(model), model.createData()
+    q[7:] = q_stand()
+    pin.ccrba(model, scratch, q, np.zeros(model.nv))
+    com = pin.centerOfMass(model, scratch, q)
+    return np.linalg.inv(scratch.Ig.inertia), np.array(com)
 
 
 @record
@@ -30,26 +40,23 @@ class Terms:
 
 
 class RigidBody:
-    """Pinocchio's model of one A1 with its scratch memory."""
+    """What is constant of one A1, taken from Pinocchio's model of its URDF.
+
+    Attributes:
+        links: `link_table`.
+        mass: kg.
+        com: centre of mass in the nominal pose, trunk frame, (3,), m.
+        inertia_inverse: inverse of the inertia about it, trunk frame, (3, 3), 1/(kg·m²).
+    """
 
     def __init__(self) -> None:
-        self.model = build_pinocchio_model()
-        self._scratch = self.model.createData()
-        self.mass: float = float(pin.computeTotalMass(self.model))
-        self.inertia_inverse, self.com = self._single_rigid_body()
-
-    def _single_rigid_body(self) -> tuple[Array, Array]:
-        """Inverse composite inertia about the centre of mass, and that centre, trunk frame."""
-        q = pin.neutral(self.model)
-        q[7:] = q_stand()
-        pin.ccrba(self.model, self._scratch, q, np.zeros(self.model.nv))
-        com = pin.centerOfMass(self.model, self._scratch, q)
-        return np.linalg.inv(self._scratch.Ig.inertia), np.array(com)
+        model = build_pinocchio_model()
+        self.links = link_table(model)
+        self.mass: float = float(pin.computeTotalMass(model))
+        self.inertia_inverse, self.com = _single_rigid_body(model)
 
     def terms(self, q: Array, v: Array) -> Terms:
         """Terms at Pinocchio's coordinates, (19,) and (18,), quaternion normalised."""
-        scratch = self._scratch
-        M_inverse = pin.computeMinverse(self.model, scratch, q)
-        nle = pin.nonLinearEffects(self.model, scratch, q, v)
-        pin.computeJointJacobiansTimeVariation(self.model, scratch, q, v)
-        return Terms(M_inverse, nle, scratch.J, scratch.dJ, v)
+        terms = Terms(np.empty((18, 18)), np.empty(18), np.empty((6, 18)), np.empty((6, 18)), v)
+        rigid_body_terms(q, v, self.links, terms.M_inverse, terms.nle, terms.J, terms.dJ)
+        return terms

@@ -93,16 +93,23 @@ def sensing_constants(config: Config) -> Array:
 
 
 @compiled
+def sensors_of(row: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """Joint angles and rates, attitude, gyro, accelerometer and foot forces in a `State.row`."""
+    return row[0:12], row[12:24], row[36:40], row[40:43], row[43:46], row[46:50]
+
+
+@compiled
 def sense(
-    memory0: Array, quat: Array, gyro: Array, accel: Array, q_joint: Array, v_joint: Array,
-    foot_force: Array, schedule: Array, dt: float, constants: Array, memory: Array, seen: Array,
+    memory0: Array, state: Array, schedule: Array, dt: float, constants: Array, memory: Array,
+    seen: Array,
 ) -> None:  # fmt: skip
     """Estimate the trunk's state and the contacts.
 
-    From the memory at the last tick, what `State` holds, the gait's `Schedule.row` and the time
+    From the memory at the last tick, the row of a `State`, the gait's `Schedule.row` and the time
     since the last tick, s, `memory` and `seen` are filled: see `Memory` and `Seen`. `constants` are
     `sensing_constants`.
     """
+    q_joint, v_joint, quat, gyro, accel, foot_force = sensors_of(state)
     stance, progress, noise = schedule[0:4], schedule[4], constants[6:11]
     trust = foot_trust(stance, progress, foot_force, constants[0], constants[1])
     mean0, covariance0 = filter_of(memory0)
