@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from itertools import accumulate
 from math import isfinite, prod
 from typing import Any, Final, TypeVar
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from shared.errors import MessageError
 from shared.flat_layout import FlatLayout
-from shared.messages import Message
+from shared.messages import Flat, Message
 from shared.robot import Array
 
 M = TypeVar("M", bound=Message)
@@ -20,14 +21,15 @@ M = TypeVar("M", bound=Message)
 MAX_BYTES = 1 << 20  # a message larger than this is refused before it is parsed
 MAX_TICK = 1 << 42  # 139 years of ms, so that a tick in ns is still an integer of the wire
 _TEXT_LIMIT = 4096
+_ENVELOPE: Final = ("tick", "stamp_ns")
 _FLOAT64: Final = np.dtype("<f8")
 
 
 def encode(message: Message) -> bytes:
     """The wire form of a message. Equal messages give equal bytes."""
     layout = _layout(type(message))
-    if layout.flat is not None:
-        return layout.flat.write(message.tick, message.stamp_ns, message.row)  # type: ignore[attr-defined]
+    if isinstance(message, Flat) and layout.flat is not None:
+        return layout.flat.write(message.tick, message.stamp_ns, message.row)
     body: dict[str, Any] = {"schema": message.SCHEMA}
     for name in layout.plain:
         body[name] = getattr(message, name)
@@ -48,7 +50,10 @@ def decode(payload: bytes, kind: type[M]) -> M:
     if layout.flat is not None and (found := layout.flat.read(payload)) is not None:
         tick, stamp_ns, row = found
         if tick < MAX_TICK:
-            return kind.of(tick, stamp_ns, row)  # type: ignore[attr-defined,no-any-return]
+            if layout.in_one_row:
+                return kind.of(tick, stamp_ns, row)  # type: ignore[attr-defined,no-any-return]
+            row.setflags(write=False)
+            return kind(tick, stamp_ns, *(row[cut] for cut in layout.cuts))
     if len(payload) > MAX_BYTES:
         raise _error(kind, f"{len(payload)} bytes", f"at most {MAX_BYTES}", "a foreign publisher?")
     try:
@@ -117,8 +122,14 @@ class _Layout:
         self.order = (*self.plain, *self.shapes)  # as `encode` writes them
         self.names = {*self.order}
         self.in_order = self.order == tuple(item.name for item in fields(kind))
-        sizes = {name: cut.stop - cut.start for name, cut in getattr(kind, "CUTS", {}).items()}
-        self.flat = FlatLayout(kind.SCHEMA, sizes) if sizes else None
+        self.in_one_row = issubclass(kind, Flat)
+        sizes = {name: shape[0] for name, shape in self.shapes.items() if len(shape) == 1}
+        fixed = {name: size for name, size in sizes.items() if isinstance(size, int)}
+        self.flat: FlatLayout | None = None
+        if fixed and fixed.keys() == self.shapes.keys() and tuple(self.plain) == _ENVELOPE:
+            self.flat = FlatLayout(kind.SCHEMA, fixed)
+            ends = list(accumulate(fixed.values()))
+            self.cuts = [slice(a, b) for a, b in zip([0, *ends], ends, strict=False)]
 
 
 _LAYOUTS: dict[type[Message], _Layout] = {}

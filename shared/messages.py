@@ -59,7 +59,12 @@ class Flat(Message):
         if named.keys() != {*rest}:
             raise TypeError(f"{type(self).__name__}: got {sorted(named)}, expected {rest}")
         super().__init__(tick, stamp_ns)
-        self.row = np.concatenate([*arrays, *(named[name] for name in rest)], dtype=float)
+        parts = dict(zip(self.CUTS, (*arrays, *(named[name] for name in rest)), strict=True))
+        for name, cut in self.CUTS.items():
+            if np.shape(parts[name]) != (cut.stop - cut.start,):
+                got = f"{type(self).__name__}.{name}: got shape {np.shape(parts[name])}"
+                raise ValueError(f"{got}, expected {(cut.stop - cut.start,)}")
+        self.row = np.concatenate([*parts.values()], dtype=float)
 
     @classmethod
     def of(cls, tick: int, stamp_ns: int, row: Array) -> Self:
