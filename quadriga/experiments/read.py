@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
@@ -138,7 +139,8 @@ def _variants(table: _Table) -> tuple[Variant, ...]:
     """Planners by name, then the tables; each on top of what all have in common."""
     common = flattened(table.mapping("common"))
     planners = table.texts("planners", ())
-    found = list(variants_of([",".join(planners)], None)) if planners else []
+    with _of(table, "planners"):
+        found = list(variants_of([",".join(planners)], None)) if planners else []
     for name, keys in keys_of(table.mapping("variants"), f"{table.where}: variants").items():
         found.append(Variant(name, keys))
     names = [variant.name for variant in found]
@@ -146,6 +148,16 @@ def _variants(table: _Table) -> tuple[Variant, ...]:
         raise ConfigError(f"{table.where}: planners and variants", ", ".join(names) or "none",
                           "at least one, of different names")  # fmt: skip
     return tuple(Variant(variant.name, {**common, **variant.keys}) for variant in found)
+
+
+@contextmanager
+def _of(table: _Table, name: str) -> Iterator[None]:
+    """Have what reads the command line name the file instead."""
+    try:
+        yield
+    except ConfigError as error:
+        raise ConfigError(f"{table.where}: {name}", error.got, error.expected, error.cause
+                          ) from None  # fmt: skip
 
 
 def _scenarios(table: _Table) -> tuple[str, ...]:
@@ -167,7 +179,9 @@ def _parts(table: _Table, names: tuple[str, ...]) -> tuple[Part, ...]:
     found = []
     for label, name in labels.items():
         mine = swept.table(label, ("keys", "axis"))
-        sweep = sweep_of(mine.text("keys"))
+        keys = mine.text("keys")
+        with _of(mine, "keys"):
+            sweep = sweep_of(keys)
         found.append(Part(label, (name,), sweep, mine.text("axis", sweep.name)))
     return tuple(found)
 

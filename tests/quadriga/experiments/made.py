@@ -7,11 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from quadriga.campaign.choice import Variant
 from quadriga.campaign.ledger import Ledger
 from quadriga.campaign.manifest import GroupEntry, Manifest, SweepEntry
 from quadriga.campaign.outcome import Outcome
 from quadriga.campaign.plan import Group
-from quadriga.experiments.experiment import Experiment
+from quadriga.experiments.experiment import Experiment, Part, Published, Requirement
 from quadriga.experiments.publish import folder_of
 from tests.quadriga.campaign.rows import row
 
@@ -25,6 +26,23 @@ def checkout(folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "README.md").write_text(README, encoding="utf-8")
     return folder
+
+
+def experiment_of(*scenarios: str, **changes: Any) -> Experiment:
+    """Variants `none` and `mine` in these scenarios, seeds 0 … 9."""
+    told: dict[str, Any] = {
+        "name": "small", "title": "Small", "question": "Is it so?",
+        "parts": (Part("", scenarios),),
+        "variants": (
+            Variant("none", {"planner.kind": "none"}), Variant("mine", {"team.robots": 2}),
+        ),
+        "baseline": "none", "seeds": tuple(range(10)),
+        "published": Published(
+            ("trials", "success"), True, ("cost", "roll"), ("success", "falls"),
+        ),
+        "requirements": (Requirement("success", "least", 97.0, variants=("mine",)),),
+    }  # fmt: skip
+    return Experiment(**told | changes)
 
 
 def rows_of(groups: Iterable[Group], seeds: Iterable[int], fate: Fate) -> list[Outcome]:
