@@ -45,8 +45,8 @@ format: $(TOOLS)
 docs: $(STAMP)
 	$(BIN)/quadriga config --markdown > docs/configuration.md
 
-# Every figure and table of results in README and docs: 11,000 walks, some 33 hours of one core. It
-# goes on where it ended; ARGS=--only-publish walks nothing, ARGS='hard --seeds 0:2' only looks.
+# Every figure and table of results in README and docs: 11,000 walks, a day or so on two cores.
+# It goes on where it ended; ARGS=--only-publish walks nothing, ARGS='hard --seeds 0:2' only looks.
 figures: $(STAMP)
 	$(BIN)/quadriga experiments $(ARGS)
 

@@ -32,12 +32,16 @@ class Measure:
         unit: of the figure and of what it must come to; empty for a bare number.
         digits: how it is written.
         of: the figure, None if the trials do not give it.
+        paired: whether it is of pairs with the baseline.
+        interval: whether it has one.
     """
 
     text: str
     unit: str
     digits: str
     of: Callable[[Line], Estimate | None]
+    paired: bool = False
+    interval: bool = True
 
     def written(self, value: float, *, signed: bool = True) -> str:
         """A value of it as text, without its unit."""
@@ -122,18 +126,21 @@ def _p99(line: Line) -> Estimate | None:
 
 MEASURES: Final[Mapping[str, Measure]] = {
     "success": Measure("success", "%", ".1f", _success),
-    "falls": Measure("number of falls", "", ".0f", _falls),
+    "falls": Measure("number of falls", "", ".0f", _falls, interval=False),
     "fall-rate": Measure("share of walks with a fall", "%", ".1f", _fall_rate),
-    "fall-difference": Measure("fall rate less that of {}", "points", "+.1f", _difference),
-    "fall-ratio": Measure("falls over those of {}", "", ".2f", _fall_ratio),
-    "fewer-falls": Measure("McNemar's p of falling less than {}", "", "p", _fewer),
+    "fall-difference": Measure("fall rate less that of {}", "points", "+.1f", _difference,
+                               paired=True),
+    "fall-ratio": Measure("falls over those of {}", "", ".2f", _fall_ratio, paired=True,
+                          interval=False),
+    "fewer-falls": Measure("McNemar's p of falling less than {}", "", "p", _fewer, paired=True,
+                           interval=False),
     **{
         ratio(name): Measure(
             "control cost over that of {}, median" if name == COST
             else f"RMSE of {name} over that of {{}}, median",
-            "", ".3f", _ratio(name),
+            "", ".3f", _ratio(name), paired=True,
         )
         for name in (COST, *OUTPUTS)
     },
-    "p99": Measure("99th percentile of a planning step", "ms", ".2f", _p99),
+    "p99": Measure("99th percentile of a planning step", "ms", ".2f", _p99, interval=False),
 }  # fmt: skip

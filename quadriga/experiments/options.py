@@ -8,8 +8,6 @@ from quadriga.campaign.options import add_where
 from quadriga.experiments import verb
 from quadriga.recording_cli import Add
 
-_CHECKOUT = Path(__file__).parents[2]
-
 
 def add_experiments(add: Add) -> None:
     """The command itself."""
@@ -29,5 +27,5 @@ def add_experiments(add: Add) -> None:
     add_where(command)
     option("--out", type=Path, default=Path("runs/experiments"), metavar="DIR",
            help="where campaigns are kept, to go on with (%(default)s)")  # fmt: skip
-    option("--into", type=Path, default=_CHECKOUT, metavar="DIR",
+    option("--into", type=Path, metavar="DIR",
            help="the checkout whose README.md and docs/ are written (this code's)")  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from quadriga.campaign.bar import duration
@@ -99,7 +99,9 @@ def _section(entry: Entry) -> Iterator[str]:
     for figure in entry.figures:
         yield f"![{experiment.title}]({figure})"
     for sheet in sheets(experiment, results):
-        yield f"### {sheet.title}\n\n{table(sheet, left=2)}"
+        left = sheet.columns.index("variant") + 1 if "variant" in sheet.columns else 2
+        notes = "".join(f"\n\n{note}" for note in sheet.notes)
+        yield f"### {sheet.title}\n\n{table(replace(sheet, notes=()), left)}{notes}"
 
 
 def _facts(entry: Entry) -> str:

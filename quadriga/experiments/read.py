@@ -62,7 +62,9 @@ def read(path: Path) -> Experiment:
         requirements=tuple(
             requirement
             for asked in table.tables("requirements", _ASKED)
-            for requirement in _requirements(asked, known, baseline, labels)
+            for requirement in _requirements(
+                asked, known, baseline, labels, poolable=len(labels) > 1 and not table.has("sweep")
+            )
         ),
     )
 
@@ -196,7 +198,7 @@ def _published(table: _Table, *, compared: bool) -> Published:
 
 
 def _requirements(
-    table: _Table, variants: list[str], baseline: str, labels: list[str]
+    table: _Table, variants: list[str], baseline: str, labels: list[str], *, poolable: bool
 ) -> list[Requirement]:
     """Those of a table: one for each of its measures."""
     senses = [sense for sense in SENSES if table.has(sense)]
@@ -209,14 +211,19 @@ def _requirements(
     measures = table.texts("measure", (), MEASURES)
     if not measures or not over:
         raise ConfigError(f"{table.where}: measure and over", "nothing", "at least one of each")
-    chosen = table.texts("variants", (), variants) or tuple(v for v in variants if v != baseline)
+    others = tuple(variant for variant in variants if variant != baseline)
+    chosen = table.texts("variants", (), variants) or others or (baseline,)
+    _check_measures(table, measures, bound, paired=baseline not in chosen)
+    if "all" in over and not poolable:
+        raise ConfigError(f"{table.where}: over", "all", "each", "pooled are several scenarios, "
+                          "of which none sweeps")  # fmt: skip
     return [
         Requirement(
             measure=measure,
             sense=senses[0],
             limit=table.number(senses[0]),
             bound=next(known for known in BOUNDS if known == bound),
-            variants=chosen or (baseline,),
+            variants=chosen,
             scenarios=table.texts("scenarios", (), labels),
             each="each" in over,
             pooled="all" in over,
@@ -224,3 +231,14 @@ def _requirements(
         )
         for measure in measures
     ]
+
+
+def _check_measures(table: _Table, measures: tuple[str, ...], bound: str, *, paired: bool) -> None:
+    """Refuse what no trial could ever answer."""
+    for name in measures:
+        if MEASURES[name].paired and not paired:
+            raise ConfigError(f"{table.where}: measure", repr(name), "one of a variant alone",
+                              "it compares with the baseline, of which it is asked")  # fmt: skip
+        if bound != "value" and not MEASURES[name].interval:
+            raise ConfigError(f"{table.where}: bound", repr(bound), "none",
+                              f"{name} has no interval")  # fmt: skip

@@ -7,6 +7,9 @@ from pathlib import Path
 
 from rich.console import Console
 
+from quadriga.campaign.job import origin
+from quadriga.campaign.ledger import read_manifest
+from quadriga.campaign.manifest import FILE
 from quadriga.campaign.plan import Plan, build_plan
 from quadriga.campaign.report import report
 from quadriga.campaign.run import run
@@ -32,6 +35,18 @@ def plans_of(experiment: Experiment, seeds: Sequence[int]) -> list[Named]:
                                  experiment.baseline, None, {}))
         for part in experiment.parts
     ]  # fmt: skip
+
+
+def check_folders(experiment: Experiment, runs: Path) -> None:
+    """Refuse to go on with trials of other code, before anything is walked.
+
+    Raises:
+        ConfigError: a campaign's folder holds such trials, or is none.
+    """
+    for part in experiment.parts:
+        folder = folder_of(runs, experiment, part.folder)
+        if (folder / FILE).is_file():
+            read_manifest(folder).check_versions(origin(), folder)
 
 
 def walk(

@@ -50,6 +50,12 @@ def test_walked_published_and_gone_on_with(capsys: Said, experiment: Path, tmp_p
     assert len(finished(runs / "tiny")) == 4
     assert main([*words, "--only-publish"]) == 0
     assert page.read_text(encoding="utf-8") == text
+    manifest = runs / "tiny" / "campaign.json"
+    manifest.write_text(manifest.read_text(encoding="utf-8").replace("quadriga 0", "quadriga 9"),
+                        encoding="utf-8")  # fmt: skip
+    capsys.readouterr()
+    assert main([*words, "--jobs", "1"]) == 2, "trials of other code"
+    assert "use a new folder" in capsys.readouterr().err
     kept = (into / "docs" / "results" / "tiny.json").read_text(encoding="utf-8")
     assert str(tmp_path) not in kept
 

@@ -169,3 +169,17 @@ def test_an_experiment_without_pairs_has_no_table_of_them(tmp_path: Path) -> Non
     assert "### Walks" in page
     assert "### Falls" not in page
     assert not (tmp_path / "here/docs/figures/small-falls.png").exists()
+
+
+def test_a_refused_variant_is_a_row_and_says_why(tmp_path: Path) -> None:
+    experiment, into = experiment_of("ice"), checkout(tmp_path / "here")
+    refused = {"refused": "radius 0.9, not at most 0.5", "success": False}
+    write_runs(experiment, tmp_path, range(10), lambda group, _seed: (
+        refused if group.variant == "mine" else {}
+    ))  # fmt: skip
+    publish([experiment], tmp_path, into)
+    page = (into / PAGE).read_text(encoding="utf-8")
+    assert (
+        "| ice | mine | refused | – |\n\nmine was refused: radius 0.9, not at most 0.5.\n" in page
+    )
+    assert "| **missed** | **missed**: refused, radius 0.9, not at most 0.5 |" in page
