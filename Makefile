@@ -7,7 +7,7 @@ TOOLS := $(VENV)/.tools
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install walk test lint format docs acceptance bench bench-planner bench-recorder
+.PHONY: install walk test lint format docs figures acceptance bench bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -44,6 +44,11 @@ format: $(TOOLS)
 
 docs: $(STAMP)
 	$(BIN)/quadriga config --markdown > docs/configuration.md
+
+# Every figure and table of results in README and docs: 11,000 walks, a day or so on two cores.
+# It goes on where it ended; ARGS=--only-publish walks nothing, ARGS='hard --seeds 0:2' only looks.
+figures: $(STAMP)
+	$(BIN)/quadriga experiments $(ARGS)
 
 # Every scenario the project promises, on three seeds; about an hour.
 acceptance: $(STAMP)

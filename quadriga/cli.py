@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from quadriga import recording_cli, verbs
 from quadriga.campaign.options import add_campaign
+from quadriga.experiments.options import add_experiments
 from quadriga.recording_cli import add_file
 from quadriga.scenarios import LABEL, label, path
 from shared.config import Config
@@ -122,6 +123,7 @@ def parser() -> argparse.ArgumentParser:
     _add_comparison(add("compare", verbs.compare,
                         "compare planners and predictors in the same worlds"))  # fmt: skip
     add_campaign(add)
+    add_experiments(add)
     estop = add("estop", verbs.estop, "stop the team at once: every joint is damped")
     estop.add_argument("--reason", default="operator", help="told to every agent")
     config = add("config", verbs.show_config, "print the configuration in force as TOML")

@@ -49,12 +49,12 @@ class Sheet:
             table.add_row(*(escape(cell) for cell in row))
         return table
 
-    def to_markdown(self) -> str:
-        """With a heading of the second level."""
+    def to_markdown(self, level: int = 2) -> str:
+        """With a heading of this level."""
         rule = [":--", *("--:" for _ in self.columns[1:])]
         lines = [_row(self.columns), f"| {' | '.join(rule)} |", *map(_row, self.rows)]
         notes = [f"\n{note}" for note in self.notes]
-        return "\n".join([f"## {self.title}\n", *lines, *notes]) + "\n"
+        return "\n".join([f"{'#' * level} {self.title}\n", *lines, *notes]) + "\n"
 
 
 def show(sheets: Iterable[Sheet]) -> None:

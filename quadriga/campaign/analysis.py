@@ -24,7 +24,7 @@ class Tally:
         refused: why others were not; empty if all were.
         successes, falls, stops: of the trials; a stop is one without a fall.
         time_to_fall: median over the falls, s.
-        mean_vx, cost_of_transport, rmse: medians over the walks to the end.
+        mean_vx, cost_of_transport, control_cost, rmse: medians over the walks to the end.
         planner_ms_p50, planner_ms_p99: medians of the trials' own quantiles.
         plans: how many plans had which status.
     """
@@ -37,6 +37,7 @@ class Tally:
     time_to_fall: float | None
     mean_vx: float | None
     cost_of_transport: float | None
+    control_cost: float | None
     rmse: Mapping[str, float | None]
     planner_ms_p50: float | None
     planner_ms_p99: float | None
@@ -92,6 +93,7 @@ def tally(rows: Sequence[Outcome]) -> Tally:
         time_to_fall=_median(row.time_to_fall_s for row in walked),
         mean_vx=_median(row.mean_vx for row in whole),
         cost_of_transport=_median(row.cost_of_transport for row in whole),
+        control_cost=_median(row.control_cost for row in whole),
         rmse={name: _median(row.rmse(name) for row in whole) for name in OUTPUTS},
         planner_ms_p50=_median(row.planner_ms_p50 for row in walked),
         planner_ms_p99=_median(row.planner_ms_p99 for row in walked),

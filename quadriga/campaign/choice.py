@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -57,7 +57,7 @@ def variants_of(options: Sequence[str], file: Path | None) -> tuple[Variant, ...
         ConfigError: a name that nothing explains or that is given twice, or none at all.
     """
     known: dict[str, Keys] = dict(PLANNERS)
-    mine = {} if file is None else _in_file(file)
+    mine = {} if file is None else keys_of(read_toml(file), str(file))
     known |= mine
     found: dict[str, Keys] = {}
     for text in [part for option in options for part in parted(option, ",")] or list(mine):
@@ -121,9 +121,13 @@ def _parts(text: str, mark: str) -> Iterator[str]:
     yield text[begun:]
 
 
-def _in_file(path: Path) -> dict[str, Keys]:
-    tables = read_toml(path)
+def keys_of(tables: Mapping[str, Any], where: str) -> dict[str, Keys]:
+    """Values by `section.key` of each table of a file.
+
+    Raises:
+        ConfigError: what has a name is no table, or the name is not a plain one; `where` it stands.
+    """
     for name, keys in tables.items():
         if not _NAME.fullmatch(name) or not isinstance(keys, dict):
-            raise ConfigError(f"{path}: {name}", "no table of a plain name", "[name] and its keys")
+            raise ConfigError(f"{where}: {name}", "no table of a plain name", "[name] and its keys")
     return {name: flattened(keys) for name, keys in tables.items()}

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from quadriga.campaign import verb
 from quadriga.recording_cli import Add
+from shared.errors import ConfigError
 
 
 def add_campaign(add: Add) -> None:
@@ -25,11 +26,7 @@ def add_campaign(add: Add) -> None:
     option("--sweep", action="append", default=[], metavar="KEY=V,V",
            help="with each of these values: world.terrain_height=0.04,0.08, or of a text: "
            "'world.push=r1:{80,120}:90:3:0.2'; may be repeated")  # fmt: skip
-    option("--jobs", type=_jobs, default=_cores(), metavar="N|auto",
-           help="walks side by side (auto: one for each core)")  # fmt: skip
-    option("--dask", nargs="?", const="local", metavar="tcp://HOST:PORT",
-           help="walk on the workers of a Dask scheduler; without an address on those of a "
-           "cluster made here")  # fmt: skip
+    add_where(command)
     option("--out", type=Path, metavar="DIR",
            help="folder, new or of a campaign to go on with (runs/<date>-<time>)")  # fmt: skip
     option("--report", type=Path, metavar="DIR",
@@ -37,6 +34,28 @@ def add_campaign(add: Add) -> None:
     option("--record-worst", type=int, default=0, metavar="K",
            help="walk the K worst seeds of each group again over the bus, and link the "
            "recordings")  # fmt: skip
+
+
+def add_where(command: argparse.ArgumentParser) -> None:
+    """Where trials are walked."""
+    option = command.add_argument
+    option("--jobs", type=_jobs, default=_cores(), metavar="N|auto",
+           help="walks side by side (auto: one for each core)")  # fmt: skip
+    option("--dask", nargs="?", const="local", metavar="tcp://HOST:PORT",
+           help="walk on the workers of a Dask scheduler; without an address on those of a "
+           "cluster made here")  # fmt: skip
+
+
+def dask_of(arguments: argparse.Namespace, before: str) -> str | None:
+    """The scheduler asked for, None without one; names of what is walked stand `before` it.
+
+    Raises:
+        ConfigError: it is no address.
+    """
+    dask: str | None = arguments.dask
+    if dask not in (None, "local") and "://" not in dask:
+        raise ConfigError("--dask", repr(dask), "tcp://HOST:PORT", f"{before} come before it")
+    return dask
 
 
 def _jobs(text: str) -> int:

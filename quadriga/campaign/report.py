@@ -44,7 +44,9 @@ class Campaign:
     named: int
 
 
-def report(folder: Path, *, baseline: str | None, record_worst: int, console: Console) -> Path:
+def report(
+    folder: Path, *, baseline: str | None, record_worst: int, console: Console, shown: bool = True
+) -> Path:
     """Write the page and the tables of a campaign; show success and falls.
 
     Args:
@@ -52,6 +54,7 @@ def report(folder: Path, *, baseline: str | None, record_worst: int, console: Co
         baseline: another variant to compare with than the campaign's own.
         record_worst: record so many of the worst trials of each group first.
         console: for progress; the tables go to stdout.
+        shown: whether any go there.
 
     Returns:
         The page.
@@ -74,7 +77,8 @@ def report(folder: Path, *, baseline: str | None, record_worst: int, console: Co
     first, rest = _tables(campaign)
     write_text(folder / PAGE, _page(campaign))
     write_text(folder / TABLES, _markdown(campaign, [*first, *rest]))
-    show(first)
+    if shown:
+        show(first)
     return folder / PAGE
 
 

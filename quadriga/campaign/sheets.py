@@ -14,7 +14,7 @@ from quadriga.sheet import LABELS, NOTHING, Sheet, output_text, text
 from shared.robot import OUTPUTS
 
 ALL: Final = "all worlds"
-_POOLED: Final = (
+POOLED_NOTE: Final = (
     f"{ALL.capitalize()}: pairs of every world together. Where one seed gives similar worlds (the "
     "same boxes, higher) they are not independent, and intervals and p say too much."
 )
@@ -88,7 +88,7 @@ def _beside(
     return [
         _sheet(f"{scenario}: {what} against {baseline}", manifest, columns, lines,
                lambda mine: cells(against(mine, theirs)),
-               (*notes, _POOLED) if scenario == ALL else notes)
+               (*notes, POOLED_NOTE) if scenario == ALL else notes)
         for scenario, lines in scenarios if lines
     ]  # fmt: skip
 
@@ -141,7 +141,7 @@ def _outcome(rows: Sequence[Outcome]) -> Iterator[str]:
     low, high = found.success
     yield str(found.trials)
     yield f"{100 * found.successes / found.trials:.1f} %"
-    yield _unbroken(f"{100 * low:.1f} … {100 * high:.1f}")
+    yield unbroken(f"{100 * low:.1f} … {100 * high:.1f}")
     yield str(found.falls)
     yield str(found.stops)
     yield text(found.time_to_fall, ".2f")
@@ -169,7 +169,7 @@ def _falls(found: Against) -> Iterator[str]:
     yield str(pairs.first)
     yield str(pairs.second)
     yield f"{100 * difference:+.1f}"
-    yield _unbroken(f"{100 * low:+.1f} … {100 * high:+.1f}")
+    yield unbroken(f"{100 * low:+.1f} … {100 * high:+.1f}")
     yield p_text(mcnemar(pairs))
 
 
@@ -189,11 +189,11 @@ def _ratio(values: Sequence[float]) -> str:
     if middle is None:
         return NOTHING
     return f"{middle:.2f}" + (
-        "" if ends is None else " " + _unbroken(f"[{ends[0]:.2f}, {ends[1]:.2f}]")
+        "" if ends is None else " " + unbroken(f"[{ends[0]:.2f}, {ends[1]:.2f}]")
     )
 
 
-def _unbroken(text: str) -> str:
+def unbroken(text: str) -> str:
     """A text that no line ends in."""
     return text.replace(" ", "\N{NO-BREAK SPACE}")
 
@@ -201,5 +201,5 @@ def _unbroken(text: str) -> str:
 def _shares(found: Tally) -> str:
     total = sum(found.plans.values())
     ranked = sorted(found.plans.items(), key=lambda item: -item[1])
-    shares = (_unbroken(f"{name} {100 * count / total:.3g} %") for name, count in ranked)
+    shares = (unbroken(f"{name} {100 * count / total:.3g} %") for name, count in ranked)
     return ", ".join(shares) or NOTHING

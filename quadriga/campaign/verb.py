@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 def campaign(arguments: argparse.Namespace, _config: Config, _given: dict[str, Any]) -> int:
     """Walk what is missing of a campaign, then report on all of it."""
+    from quadriga.campaign.options import dask_of
     from quadriga.campaign.report import report
     from quadriga.campaign.run import run
     from quadriga.run_folder import make_run_dir
@@ -34,9 +35,7 @@ def campaign(arguments: argparse.Namespace, _config: Config, _given: dict[str, A
                               "none: it walks nothing")  # fmt: skip
         out = arguments.report
     else:
-        dask = arguments.dask
-        if dask not in (None, "local") and "://" not in dask:
-            raise ConfigError("--dask", repr(dask), "tcp://HOST:PORT", "scenarios come before it")
+        dask = dask_of(arguments, "scenarios")
         plan = _plan(arguments)
         out = arguments.out or make_run_dir(None)
         run(plan, out, jobs=arguments.jobs, dask=dask, typed=arguments.typed, console=console)

@@ -27,6 +27,8 @@ PROMISED = {
     "payload-uneven-5": 5, "blocks-3": 3, "gravel-3": 3, "push-3": 3, "joystick-3": 3,
     "payload-heavy-2": 2, "payload-heavy-4": 4, "asymmetric-5": 5, "chain-5": 5, "ring-5": 5,
     "ten": 10, "slope": 3, "low-friction": 3, "one-soft-leg": 3, "turn": 3,
+    "flat": 3, "hard-blocks": 3, "hard-payload": 3, "hard-friction": 3, "hard-push": 3,
+    "hard-motor": 3,
 }  # fmt: skip
 
 

@@ -14,9 +14,9 @@ from shared.clock import monotonic, sleep
 LONGEST = 300.0  # s; that things happen is tested, not how soon
 
 
-def start(*words: str) -> subprocess.Popen[str]:
-    """`quadriga campaign` with these words."""
-    command = [sys.executable, "-m", "quadriga", "campaign", *words]
+def start(*words: str, verb: str = "campaign") -> subprocess.Popen[str]:
+    """`quadriga campaign`, or another verb, with these words."""
+    command = [sys.executable, "-m", "quadriga", verb, *words]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 

@@ -1,0 +1,31 @@
+"""Options of `quadriga experiments`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from quadriga.campaign.options import add_where
+from quadriga.experiments import verb
+from quadriga.recording_cli import Add
+
+
+def add_experiments(add: Add) -> None:
+    """The command itself."""
+    command = add("experiments", verb.experiments,
+                  "walk what README and docs tell results of, and publish them")  # fmt: skip
+    command.epilog = (
+        "The same command goes on where it ended. Exit status 0 says that results are published, "
+        "whether or not they meet what is required."
+    )
+    option = command.add_argument
+    option("names", nargs="*", metavar="NAME",
+           help="of deploy/experiments, or a TOML file (all)")  # fmt: skip
+    option("--only-publish", action="store_true",
+           help="walk nothing: draw tables and figures from the runs there are, or from what is "
+           "published")  # fmt: skip
+    option("--seeds", metavar="LIST", help="instead of an experiment's own, for a quick look: 0:2")
+    add_where(command)
+    option("--out", type=Path, default=Path("runs/experiments"), metavar="DIR",
+           help="where campaigns are kept, to go on with (%(default)s)")  # fmt: skip
+    option("--into", type=Path, metavar="DIR",
+           help="the checkout whose README.md and docs/ are written (this code's)")  # fmt: skip

@@ -1,0 +1,158 @@
+"""The page of all experiments, and the table that the README shows: text made of results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from quadriga.campaign.bar import duration
+from quadriga.campaign.report import span
+from quadriga.campaign.sheets import POOLED_NOTE, unbroken
+from quadriga.experiments.experiment import Experiment
+from quadriga.experiments.results import Results
+from quadriga.experiments.sheets import asked, finding_text, sheets, word_text
+from quadriga.experiments.summarise import POOLED, done
+from quadriga.experiments.verdict import Verdict, verdicts
+from quadriga.sheet import NOTHING, Sheet
+
+BEGIN: Final = "<!-- results:begin -->"
+END: Final = "<!-- results:end -->"
+_MADE: Final = (
+    "<!-- Generated, all of it, by `make figures` from deploy/experiments: do not edit. -->"
+)
+_READ: Final = """\
+Every walk is of the whole system in lock-step, without a bus, which comes to the same to the byte
+([campaigns.md](campaigns.md) says what is compared and how). Variants of an experiment walk in the
+same worlds, seed by seed. A walk is a success if every robot walked to the end.
+
+In brackets: 95 % intervals. Success rates: Wilson. Differences of fall rates, of pairs: Newcombe's
+method 10, with the p of McNemar's exact two-sided test. Ratios: medians over the pairs that both
+walked to the end, with the exact interval by order statistics. Each p and interval is that of a
+single figure, not corrected for their number. Cost of transport, control cost and times of planning
+are medians over walks; times are of the machine that walked, under load. A requirement is held
+against the figure itself unless it names a bound of its interval; behind *met* and *missed* stands
+how far the figure, or that bound, is from the limit.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """An experiment, what came of it, and the figures there are, as paths from the page."""
+
+    experiment: Experiment
+    results: Results
+    figures: Sequence[str] = ()
+
+
+def page(entries: Sequence[Entry]) -> str:
+    """`docs/results.md`."""
+    parts = [_MADE, "# Results", f"{_READ}\n{POOLED_NOTE}",
+             overview(entries, "#")]  # fmt: skip
+    for entry in entries:
+        parts += _section(entry)
+    return "\n\n".join(parts) + "\n"
+
+
+def overview(entries: Sequence[Entry], link: str) -> str:
+    """A row for each requirement: where it stands worst, and whether it is met.
+
+    Args:
+        entries: experiments, in order.
+        link: what stands before the anchor of a section.
+    """
+    rows = []
+    for entry in entries:
+        experiment = entry.experiment
+        have, of = done(experiment, entry.results)
+        head = (f"[{experiment.name}]({link}{experiment.name})", _count(have, of))
+        found = verdicts(experiment, entry.results)
+        for k, verdict in enumerate(found):
+            rows.append((*(head if not k else ("", "")), asked(verdict, experiment),
+                         _worst(verdict), word_text(verdict)))  # fmt: skip
+        if not found:
+            rows.append((*head, "nothing: a comparison", NOTHING, NOTHING))
+    columns = ("experiment", "trials", "required", "found, where it stands worst", "verdict")
+    return table(Sheet("", columns, tuple(rows)), left=len(columns))
+
+
+def fragment(entries: Sequence[Entry]) -> str:
+    """What stands between the markers of the README."""
+    return f"{BEGIN}\n{overview(entries, 'docs/results.md#')}\n{END}"
+
+
+def table(sheet: Sheet, left: int = 1) -> str:
+    """A sheet without its title; so many columns at the left are text."""
+    head, _, *body = sheet.to_markdown().partition("\n\n")[2].strip().split("\n")
+    rule = [":--"] * left + ["--:"] * (len(sheet.columns) - left)
+    return "\n".join([head, f"| {' | '.join(rule)} |", *body])
+
+
+def _section(entry: Entry) -> Iterator[str]:
+    experiment, results = entry.experiment, entry.results
+    yield f'<a id="{experiment.name}"></a>\n\n## {experiment.title}'
+    yield experiment.question
+    yield _facts(entry)
+    yield _variants(experiment)
+    if not results.lines:
+        return
+    for figure in entry.figures:
+        yield f"![{experiment.title}]({figure})"
+    for sheet in sheets(experiment, results):
+        left = sheet.columns.index("variant") + 1 if "variant" in sheet.columns else 2
+        notes = "".join(f"\n\n{note}" for note in sheet.notes)
+        yield f"### {sheet.title}\n\n{table(replace(sheet, notes=()), left)}{notes}"
+
+
+def _facts(entry: Entry) -> str:
+    experiment, results = entry.experiment, entry.results
+    have, of = done(experiment, results)
+    spent = sum(line.wall_s for line in results.lines if line.world != POOLED)
+    lines = [
+        f"- command: `quadriga experiments {experiment.name}`",
+        f"- seeds: {span(experiment.seeds)}; walked: {results.seeds or 'none'}",
+        f"- trials: **{_count(have, of)}**" + (f", {duration(spent)} on one core" if have else ""),
+        f"- baseline: {experiment.baseline}",
+    ]
+    lines += [f"- code and libraries: {versions}" for versions in results.versions]
+    return "\n".join(lines)
+
+
+def _variants(experiment: Experiment) -> str:
+    rows = tuple(
+        (variant.name, ", ".join(f"`{_key(key, value)}`" for key, value in variant.keys.items())
+         or "the defaults")
+        for variant in experiment.variants
+    )  # fmt: skip
+    text = table(Sheet("", ("variant", "keys"), rows), left=2)
+    for part in experiment.parts:
+        if part.sweep is not None:
+            labels = ", ".join(label for label, _ in part.sweep.values)
+            text += f"\n\nSwept on {part.folder}: `{part.sweep.name}`, {part.axis}: {labels}."
+    return text
+
+
+def _key(key: str, value: Any) -> str:
+    shown = str(value).lower() if isinstance(value, bool) else str(value)
+    return f"{key} = {shown}"
+
+
+def _count(have: int, of: int) -> str:
+    return unbroken(f"{have:,} of {of:,}")
+
+
+def _worst(verdict: Verdict) -> str:
+    finding = verdict.worst
+    if finding is None:
+        return NOTHING
+    text = finding_text(verdict, finding)
+    return text if len(verdict.findings) == 1 else f"{' · '.join(finding.world)}: {text}"
+
+
+def replaced(text: str, fragment: str) -> str | None:
+    """A text with what stands between the markers replaced; None unless both stand there once."""
+    if text.count(BEGIN) != 1 or text.count(END) != 1:
+        return None
+    head, _, rest = text.partition(BEGIN)
+    _, found, tail = rest.partition(END)
+    return f"{head}{fragment}{tail}" if found else None

@@ -1,0 +1,66 @@
+"""SHELL of walking experiments: each of their campaigns, as `quadriga campaign` walks them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from quadriga.campaign.job import origin
+from quadriga.campaign.ledger import read_manifest
+from quadriga.campaign.manifest import FILE
+from quadriga.campaign.plan import Plan, build_plan
+from quadriga.campaign.report import report
+from quadriga.campaign.run import run
+from quadriga.experiments.experiment import Experiment
+from quadriga.experiments.publish import folder_of
+
+Named = tuple[str, Plan]  # the folder of a campaign within that of the experiment, and its trials
+
+
+def plans_of(experiment: Experiment, seeds: Sequence[int]) -> list[Named]:
+    """The campaigns of an experiment.
+
+    Args:
+        experiment: what its file says.
+        seeds: instead of its own, if any.
+
+    Raises:
+        ConfigError: a key or a value is wrong, or a world cannot be built.
+    """
+    chosen = tuple(seeds) or experiment.seeds
+    return [
+        (part.folder, build_plan(part.scenarios, experiment.variants, part.sweeps, chosen,
+                                 experiment.baseline, None, {}))
+        for part in experiment.parts
+    ]  # fmt: skip
+
+
+def check_folders(experiment: Experiment, runs: Path) -> None:
+    """Refuse to go on with trials of other code, before anything is walked.
+
+    Raises:
+        ConfigError: a campaign's folder holds such trials, or is none.
+    """
+    for part in experiment.parts:
+        folder = folder_of(runs, experiment, part.folder)
+        if (folder / FILE).is_file():
+            read_manifest(folder).check_versions(origin(), folder)
+
+
+def walk(
+    experiment: Experiment, plans: Sequence[Named], runs: Path, *, jobs: int, dask: str | None,
+    typed: str, console: Console,
+) -> None:  # fmt: skip
+    """Walk what is missing of an experiment, and leave a report in each campaign's folder.
+
+    Raises:
+        ConfigError: a folder is in use or holds trials that do not belong to these.
+        ProcessError: a worker died, or is not of this version.
+    """
+    for part, plan in plans:
+        folder = folder_of(runs, experiment, part)
+        console.print(f"{folder}", markup=False, highlight=False)
+        run(plan, folder, jobs=jobs, dask=dask, typed=typed, console=console)
+        report(folder, baseline=None, record_worst=0, console=console, shown=False)
