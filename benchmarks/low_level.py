@@ -1,7 +1,7 @@
 """What the tick of one robot's low level costs and where the time goes, on a real walk's ticks.
 
 A tick is everything between the bytes of a state and the bytes of the command: decode, estimate,
-gait and plan in force, Pinocchio's terms, references and QP, encode. Hot means one tick after
+gait and plan in force, rigid-body terms, references and QP, encode. Hot means one tick after
 the other; cold, that an array larger than the caches is gone through between two ticks: in a
 walk the world and other robots run in between, so the agent finds them cold.
 """
@@ -21,7 +21,6 @@ from low_level_ticks import AgentTick
 from agents.agent import Agent, AgentState, Inputs, Outputs
 from agents.controller.controller import Acted, Controller, Schedule, Task
 from agents.controller.memory import Memory
-from agents.controller.model import RigidBody, Terms
 from agents.controller.sensing import Seen
 from agents.planner.predictor import Predictor
 from shared.clock import monotonic_ns
@@ -30,7 +29,7 @@ from shared.config import Config
 from shared.messages import State
 from shared.robot import Array
 
-STAGES: Final = ("decode", "sense", "gait, plan", "terms", "references, QP", "encode")
+STAGES: Final = ("decode", "sense", "gait, plan", "terms, references, QP", "encode")
 _L2: Final = Path("/sys/devices/system/cpu/cpu0/cache/index2/size")
 _SIZE: Final = 8 << 20  # B, of an array larger than any L2 where the system does not tell its size
 
@@ -92,7 +91,7 @@ def _replay(
 def _staged(
     agent: Agent, watch: _Stopwatch, ticks: list[AgentTick], forget: Callable[[], object]
 ) -> Array:
-    """Time of every tick's stages, (T, 6), µs."""
+    """Time of every tick's stages, (T, 5), µs."""
     times, memory = np.empty((len(ticks), len(STAGES))), agent.initial()
     for k, tick in enumerate(ticks):
         forget()
@@ -104,9 +103,8 @@ def _staged(
         stepped = monotonic_ns()
         encode(outputs.command)
         ended = monotonic_ns()
-        sense, act, terms = (watch.ns[name] for name in ("sense", "act", "terms"))
-        rest = stepped - decoded - sense - act
-        times[k] = decoded - begun, sense, rest, terms, act - terms, ended - stepped
+        sense, act = watch.ns["sense"], watch.ns["act"]
+        times[k] = decoded - begun, sense, stepped - decoded - sense - act, act, ended - stepped
     return 1e-3 * times
 
 
@@ -134,12 +132,11 @@ class _Stopwatch:
 
 
 class _Watched(Controller):
-    """A controller whose halves, and Pinocchio's terms within the second, are timed."""
+    """A controller whose halves are timed."""
 
     def __init__(self, config: Config, watch: _Stopwatch) -> None:
         super().__init__(config)
         self._watch = watch
-        self.body = _WatchedBody(watch)
 
     def sense(self, memory: Memory | None, state: State, schedule: Schedule, dt: float) -> Seen:
         begun = monotonic_ns()
@@ -154,17 +151,3 @@ class _Watched(Controller):
         acted = super().act(seen, schedule, task, dt, new_sample=new_sample)
         self._watch.ns["act"] += monotonic_ns() - begun
         return acted
-
-
-class _WatchedBody(RigidBody):
-    """Pinocchio's terms, timed."""
-
-    def __init__(self, watch: _Stopwatch) -> None:
-        super().__init__()
-        self._watch = watch
-
-    def terms(self, q: Array, v: Array) -> Terms:
-        begun = monotonic_ns()
-        terms = super().terms(q, v)
-        self._watch.ns["terms"] += monotonic_ns() - begun
-        return terms

@@ -1,6 +1,6 @@
 """The whole-body part of a tick against TSID: the same robot, the same ticks, the same costs.
 
-Ours is Pinocchio's terms, assembly and solution; TSID's is `computeProblemData` and the solution by
+Ours is the rigid body's terms, assembly and solution; TSID's is `computeProblemData` and the solution by
 its own solver (eiquadprog). References and contacts are set outside of what is timed.
 
 TSID is no dependency of the project. Its wheel on PyPI is built for another Pinocchio and crashes

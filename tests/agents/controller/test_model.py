@@ -8,6 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from agents.controller.rigid_body import link_table
+from shared.errors import ConfigError
 from shared.robot import TOTAL_MASS, q_stand
 from tests.agents.controller.poses import BODY, FEET, MODEL, random_pose
 
@@ -54,6 +56,11 @@ def test_an_attitude_need_not_be_of_unit_norm() -> None:
     pose = random_pose(np.random.default_rng(1))
     scaled = replace(pose, quat_wxyz=1.01 * pose.quat_wxyz)
     np.testing.assert_allclose(scaled.terms().nle, pose.terms().nle, atol=1e-10)
+
+
+def test_another_kind_of_robot_is_refused() -> None:
+    with pytest.raises(ConfigError, match="four legs with a hip that turns about x"):
+        link_table(pin.buildSampleModelHumanoid())
 
 
 def test_the_single_rigid_body_is_the_sum_of_its_links() -> None:
