@@ -70,7 +70,7 @@ def _shares(axis: Axes, part: Part) -> None:
 
 def _low_level(axis: Axes, part: Part) -> None:
     base = np.zeros(2)
-    for colour, stage in zip(_COLOURS, part["hot"]["stages"], strict=True):
+    for colour, stage in zip(_COLOURS, part["hot"]["stages"], strict=False):
         width = np.array([part[name]["stages"][stage] for name in ("hot", "cold")])
         axis.barh([1, 0], width, 0.6, base, color=colour, label=stage)
         base += width

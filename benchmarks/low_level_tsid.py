@@ -1,7 +1,8 @@
 """The whole-body part of a tick against TSID: the same robot, the same ticks, the same costs.
 
-Ours is the rigid body's terms, assembly and solution; TSID's is `computeProblemData` and the solution by
-its own solver (eiquadprog). References and contacts are set outside of what is timed.
+Ours is the rigid body's terms, assembly and solution, one compiled call as in the tick; TSID's is
+`computeProblemData` and the solution by its own solver (eiquadprog). References and contacts are
+set outside of what is timed.
 
 TSID is no dependency of the project. Its wheel on PyPI is built for another Pinocchio and crashes
 with ours; so it is tried in a process of its own.
@@ -22,11 +23,13 @@ from low_level_ticks import AgentTick
 from agents.agent import Agent
 from agents.controller.controller import Acted, Controller, Schedule, Task
 from agents.controller.model import RigidBody
+from agents.controller.rigid_body import rigid_body_terms
 from agents.controller.sensing import Seen
 from agents.controller.whole_body_qp import Goal, Weights, closed_form, solve_goal
 from agents.planner.predictor import Predictor
 from shared.clock import monotonic_ns
 from shared.config import Config
+from shared.jit import compiled
 from shared.robot import Array
 
 
@@ -109,17 +112,32 @@ class _Ours:
 
     def solve(self, case: Case) -> None:
         """One tick's torques."""
-        terms, goal = self._body.terms(case.q, case.v), case.goal
+        goal = case.goal
         self._x = np.zeros(42)
-        if not closed_form(
-            terms.M_inverse, terms.nle, terms.J, terms.dJ, case.v, case.R, case.p_foot,
-            goal.contact, goal.trunk, goal.swing, goal.force, self._flat, self._x,
+        if not _whole_body(
+            case.q, case.v, self._body.links, case.R, case.p_foot, goal.contact, goal.trunk,
+            goal.swing, goal.force, self._flat, self._x,
         ):  # fmt: skip
+            terms = self._body.terms(case.q, case.v)
             self._x = solve_goal(terms, case.R, case.p_foot, goal, self._weights).x
 
     def torques(self) -> Array:
         """Of the last tick, (12,), N·m."""
         return self._x[:12]
+
+
+@compiled
+def _whole_body(
+    q: Array, v: Array, links: Array, R: Array, p_foot: Array, contact: Array, trunk: Array,
+    swing: Array, force: Array, weights: Array, x: Array,
+) -> int:  # fmt: skip
+    """Terms and `closed_form`."""
+    M_inverse, nle = np.empty((18, 18)), np.empty(18)
+    J, dJ = np.empty((6, 18)), np.empty((6, 18))
+    rigid_body_terms(q, v, links, M_inverse, nle, J, dJ)
+    return closed_form(
+        M_inverse, nle, J, dJ, v, R, p_foot, contact, trunk, swing, force, weights, x
+    )
 
 
 class _Listening(Controller):
