@@ -61,10 +61,10 @@ class Sensors:
         Args:
             tick: the messages' tick, ms.
             q: true coordinates of each robot, trunk position and attitude first, (n, 19).
-            v: true velocities, the trunk's first, (n, 18).
+            v: true velocities, (n, 18): of the trunk, its rate in its own frame, of the joints.
             tau: true joint torques, (n, 12), N·m.
-            sensed: true angular rate, specific force and normal foot forces, units and frames as
-                in `State`, in the first ten of its columns; shape (n, ≥ 10).
+            sensed: true specific force and normal foot forces, units and frames as in `State`, in
+                its columns 3 … 9; shape (n, ≥ 10).
         """
         if self._next == _BLOCK:
             self._draw()
@@ -97,7 +97,8 @@ def _observe(
             row[36 + a] = 0.0
             for b in range(4):
                 row[36 + a] += turns[i, a, b] * q[i, 3 + b]
-        row[40:46] = extra[36:42] + sensed[i, 0:6]
+        row[40:43] = extra[36:39] + v[i, 3:6]
+        row[43:46] = extra[39:42] + sensed[i, 3:6]
         for foot in range(4):
             # A foot sensor cannot pull.
             row[46 + foot] = max(0.0, extra[42 + foot] + sensed[i, 6 + foot])

@@ -54,6 +54,7 @@ class Stage:
         for name, state in world.states().items():
             put = self._put_silent if name in self.silent else self._put_state
             put[name](encode(state))
+        world.settle()
 
     def announce(self, kind: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick."""

@@ -35,7 +35,8 @@ class World:
     positions and velocities at t + 1, then `mj_step1` evaluates everything that depends on those
     alone. So what is published for t + 1 has positions and rates at t + 1, while specific force,
     contact forces and yoke forces are those that acted from t to t + 1, as a sensor would have it:
-    the forces of t + 1 itself depend on a command not yet given. This costs what `mj_step` costs.
+    the forces of t + 1 itself depend on a command not yet given. This costs what `mj_step` costs,
+    and no sensor waits for `mj_step1`: it has time until the commands come.
     The forces of tick 0 are those of motors without torque.
 
     Raises:
@@ -74,6 +75,7 @@ class World:
         feet = (f"{name}/{foot}" for name in self.names for foot in FOOT_FRAMES)
         self._feet = [model.geom(foot).id for foot in feet]
         self._stones = None if pebbles is None else LooseStones(pebbles, model, self.physics, n)
+        self._settled = True
         self._yoke_force = self._read_yoke_force()
         self._states = self._measure()
 
@@ -97,17 +99,29 @@ class World:
         np.concatenate(rows, out=self._commanded.reshape(-1))
         drive(self._commanded, self._q, self._v, self._strength, self._tau)
         self._motor[:] = self._tau
+        self.settle()
         mujoco.mj_step2(self.team.model, self.physics)
+        self._settled = False
         self._yoke_force = self._read_yoke_force()
-        if self._stones is not None and self.tick % PERIOD == 0:
-            self._stones.follow(self.physics.geom_xpos[self._feet])
-        mujoco.mj_step1(self.team.model, self.physics)
         self.tick += 1
         self._states = self._measure()
         return (*events, *self._falls())
 
+    def settle(self) -> None:
+        """Evaluate what depends on this tick's positions and velocities; again has no effect.
+
+        The next step does it if nobody has; while the robots answer there is time for it.
+        """
+        if self._settled:
+            return
+        if self._stones is not None and (self.tick - 1) % PERIOD == 0:
+            self._stones.follow(self.physics.geom_xpos[self._feet])
+        mujoco.mj_step1(self.team.model, self.physics)
+        self._settled = True
+
     def truth(self) -> Truth:
         """The true state of this tick."""
+        self.settle()
         rotation = self.physics.xmat[self.team.trunks].reshape(-1, 3, 3)
         return Truth(
             tick=self.tick,

@@ -48,5 +48,6 @@ def shift(world: World, dx: float = 0.0, dz: float = 0.0) -> None:
 
 def momentum(world: World) -> Any:
     """Linear momentum of everything, N·s, world frame."""
+    world.settle()
     mujoco.mj_subtreeVel(world.team.model, world.physics)
     return world.team.model.body_subtreemass[0] * world.physics.subtree_linvel[0]

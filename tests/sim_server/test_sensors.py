@@ -24,7 +24,7 @@ def measure(sensors: Sensors, tick: int, channels: Array, quat: Array) -> dict[s
     """The messages of robots of which the sensors see `channels`, (n, 46)."""
     place = np.zeros((len(channels), 3))
     q = np.concatenate([place, quat, channels[:, :12]], axis=1)
-    v = np.concatenate([place, place, channels[:, 12:24]], axis=1)
+    v = np.concatenate([place, channels[:, 36:39], channels[:, 12:24]], axis=1)
     tau, sensed = channels[:, 24:36].copy(), channels[:, 36:].copy()
     return sensors.measure(tick, q, v, tau, sensed)
 
