@@ -7,7 +7,7 @@ import numpy as np
 from agents.controller.rotation import cross, roll_pitch_yaw, wrap_angle
 from shared.config import ControllerConfig
 from shared.jit import compiled
-from shared.robot import Array
+from shared.robot import GRAVITY, Array
 
 _Z_LIMIT = 0.05  # m·s, height integrator
 _SPEED_LIMIT = 0.15  # m, speed integrator
@@ -52,6 +52,21 @@ def trunk_acceleration(
             deviation, stance, R, position, p_foot, mass, com, inertia_inverse
         )
     return height, speed, lead, yaw, trunk, v_des
+
+
+@compiled
+def achievable(trunk: Array, contact: Array, acceleration_z: float, flight: bool) -> None:
+    """Bring the demand on the trunk, (6,), down to what feet on the ground can give, in place.
+
+    The vertical acceleration has a limit [m/s²]: the QP would else throw a trunk that has risen
+    off its feet, or push one that has sunk into a jump. With `flight` a robot without contact is
+    asked to fall freely, since legs thrown about would be all that a demand could move.
+    """
+    if flight and np.sum(contact) < 0.5:
+        trunk[:] = 0.0
+        trunk[2] = -GRAVITY
+    else:
+        trunk[2] = min(acceleration_z, max(-acceleration_z, trunk[2]))
 
 
 @compiled

@@ -111,7 +111,7 @@ def test_swing_feet_follow_their_reference(seed: int) -> None:
         )  # fmt: skip
         x, v, a = swing_reference(
             before.estimate.p_foot[leg], target, ground[[0, 3]].mean(),
-            ground.max() + config.swing_height, 0.4, 0.2,
+            ground.max() + config.swing_height, 0.4, 0.2, config.swing_delay,
         )  # fmt: skip
         world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         v_foot = pin.getFrameVelocity(MODEL, data, FEET[leg], world).linear

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from agents.controller.controller import Task
 from agents.controller.estimator import Estimate
-from agents.controller.references import single_rigid_body, trunk_gains
+from agents.controller.references import achievable, single_rigid_body, trunk_gains
 from shared.config import ControllerConfig
-from shared.robot import STAND_HEIGHT, Array
+from shared.robot import GRAVITY, STAND_HEIGHT, Array
 from tests.agents.controller.parts import (
     Integrators,
     initial_integrators,
@@ -183,3 +183,17 @@ def test_the_speed_integral_forgets() -> None:
         if tick in (1000, 5000, 20_000):
             expected = 0.004 * CONFIG.leak_xy * -np.expm1(-1e-3 * tick / CONFIG.leak_xy)
             assert state.speed[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_robot_in_the_air_is_asked_to_fall_freely() -> None:
+    trunk = np.arange(1.0, 7.0)
+    achievable(trunk, np.zeros(4), 15.0, True)
+    np.testing.assert_array_equal(trunk, [0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(("asked", "given"), [(40.0, 15.0), (-40.0, -15.0), (3.0, 3.0)])
+def test_the_vertical_demand_has_a_limit(asked: float, given: float) -> None:
+    for contact, flight in ((np.array([0.0, 1.0, 0.0, 0.0]), True), (np.zeros(4), False)):
+        trunk = np.array([1.0, 2.0, asked, 4.0, 5.0, 6.0])
+        achievable(trunk, contact, 15.0, flight)
+        np.testing.assert_array_equal(trunk, [1.0, 2.0, given, 4.0, 5.0, 6.0])
