@@ -14,7 +14,7 @@ _PAPER: Final = MappingProxyType(
         "kp_tilt": 400.0, "kd_tilt": 40.0, "contact_detection": False, "swing_height": 0.07,
         "tell_sides": False, "liftoff_hold_ms": 0, "give_way_ms": 0, "swing_delay": 0.0,
         "follow_fall": False, "flight": False, "acceleration_z": 1e4,
-        "swing_acceleration": 1e4, "slip_speed": 0.0, "contact_force": 8.0, "force_min": 2.0,
+        "swing_acceleration": 1e4, "contact_force": 8.0, "force_min": 2.0,
         "descent_speed": 0.5, "tilt_length": 1.0, "swing_weight": 1.0,
     }
 )  # fmt: skip
