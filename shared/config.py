@@ -232,7 +232,9 @@ class ControllerConfig:
         low=0, high=100,
     )  # fmt: skip
     stumble_lift: float = key(1.0, "m/s", "speed of a rising foot that stumbled", low=0.0, high=3.0)
-    follow_fall: bool = key(True, "-", "a descending foot goes down with the trunk, and in reach")
+    follow_fall: bool = key(
+        True, "-", "a descending foot goes down with the trunk; feet are asked to where legs reach"
+    )
     flight: bool = key(True, "-", "without contact the trunk is asked to fall freely")
     acceleration_z: float = key(
         15.0, "m/s²", "largest vertical acceleration asked of the trunk", low=0.1, high=1e4

@@ -36,6 +36,7 @@ def feet_demand(
         contact, stance, progress, early, lift, stumble, felt, swing_start, foot_goal, ground,
         position, velocity, R, p_foot, _foot_velocities(J, v, p_foot), v_des, wz, duration,
         raibert_gain, height, descent_speed, kp, kd, constants[7], constants[8], constants[9],
+        constants[10] > 0.5,
     )  # fmt: skip
     out[3] = _desired_force(contact, deviation, R, mass)
     return out
@@ -109,7 +110,7 @@ def _feet_acceleration(
     felt: Array, swing_start: Array, foot_goal: Array, ground: Array, position: Array,
     velocity: Array, R: Array, p_foot: Array, v_foot: Array, v_des: Array, wz: float,
     duration: float, raibert_gain: float, height: float, descent_speed: float, kp: float,
-    kd: float, delay: float, stumble_lift: float, nimble: float,
+    kd: float, delay: float, stumble_lift: float, nimble: float, in_reach: bool,
 ) -> Array:  # fmt: skip
     """Desired accelerations of the feet not in contact, (4, 3), m/s²; `felt` is updated."""
     out = np.zeros((4, 3))
@@ -142,7 +143,8 @@ def _feet_acceleration(
             if lift[leg] > 0.0:
                 apex = max(apex, swing_start[leg, 2] + _CLEARANCE)
                 swing.within_reach(target, swing_start[leg], nimble, left * duration)
-            apex = min(apex, max(position[2] - _SHORTEST, swing_start[leg, 2]))
+            if in_reach:
+                apex = min(apex, max(position[2] - _SHORTEST, swing_start[leg, 2]))
             reference = swing.swing_reference(
                 swing_start[leg], target, expected, apex, (progress - lift[leg]) / left,
                 left * duration, delay,
