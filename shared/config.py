@@ -224,7 +224,7 @@ class ControllerConfig:
         "a foot stopped from the side is no contact, nor one that landed early and bears no load",
     )  # fmt: skip
     liftoff_hold_ms: int = key(
-        40, "ms", "longest wait of a foot about to swing for those that shall stand", low=0,
+        0, "ms", "longest wait of a foot about to swing for those that shall stand; 0: none", low=0,
         high=1000,
     )  # fmt: skip
     give_way_ms: int = key(
@@ -236,9 +236,6 @@ class ControllerConfig:
         True, "-", "a descending foot goes down with the trunk; feet are asked to where legs reach"
     )
     flight: bool = key(True, "-", "without contact the trunk is asked to fall freely")
-    acceleration_z: float = key(
-        15.0, "m/s²", "largest vertical acceleration asked of the trunk", low=0.1, high=1e4
-    )
     swing_delay: float = key(
         0.1, "1", "share of swing in which a foot rises before it goes forward", low=0.0, high=0.5
     )

@@ -3,8 +3,8 @@
 With contact detection on, a swing foot that is loaded from below in the second half of swing
 becomes a stance foot early, and a stance foot without load for `lost_contact_ms` is taken out of
 the contact set and descends until it finds ground. A foot that is stopped from the side is no
-support, however loaded: it stumbles and gives way (`feet`). Feet about to swing wait for those
-that shall carry the robot instead.
+support, however loaded: it stumbles and gives way (`feet`). Feet about to swing may be told to wait
+for those that shall carry the robot instead; where it is pushed, that keeps it from stepping.
 """
 
 from __future__ import annotations

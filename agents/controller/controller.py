@@ -35,7 +35,7 @@ from agents.controller.memory import (
     swings_of,
 )
 from agents.controller.model import RigidBody
-from agents.controller.references import achievable, trunk_acceleration, trunk_gains
+from agents.controller.references import fall_freely, trunk_acceleration, trunk_gains
 from agents.controller.rotation import roll_pitch_yaw
 from agents.controller.sensing import (
     SEEN_SIZE,
@@ -128,7 +128,7 @@ class Controller:
             [
                 trunk_gains(controller), feet, self.body.com, self.body.inertia_inverse.ravel(),
                 self.weights.as_array(),
-                [controller.acceleration_z, float(controller.flight)],
+                [float(controller.flight)],
             ]
         )  # fmt: skip
 
@@ -254,7 +254,8 @@ def _act(
     start, goal = anchors_of(memory)
     legs = legs_of(memory)
     contact, ground = legs[0], legs[4]
-    achievable(trunk, contact, constants[42], constants[43] > 0.5)
+    if constants[42] > 0.5:
+        fall_freely(trunk, contact)
     lift, stumble, felt = swings_of(memory)
     demand = feet_demand(
         start, goal, contact, stance, progress, seen[SWITCHED] > 0.5, legs[1], lift, stumble, felt,

@@ -55,18 +55,15 @@ def trunk_acceleration(
 
 
 @compiled
-def achievable(trunk: Array, contact: Array, acceleration_z: float, flight: bool) -> None:
-    """Bring the demand on the trunk, (6,), down to what feet on the ground can give, in place.
+def fall_freely(trunk: Array, contact: Array) -> None:
+    """Ask a robot without contact for free fall, in `trunk` (6,), m/s² and rad/s².
 
-    The vertical acceleration has a limit [m/s²]: the QP would else throw a trunk that has risen
-    off its feet, or push one that has sunk into a jump. With `flight` a robot without contact is
-    asked to fall freely, since legs thrown about would be all that a demand could move.
+    It cannot have anything else; asked for more, the QP throws its legs about to move the trunk a
+    little, and the feet are not where the ground will be.
     """
-    if flight and np.sum(contact) < 0.5:
+    if np.sum(contact) < 0.5:
         trunk[:] = 0.0
         trunk[2] = -GRAVITY
-    else:
-        trunk[2] = min(acceleration_z, max(-acceleration_z, trunk[2]))
 
 
 @compiled

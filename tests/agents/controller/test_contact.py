@@ -12,6 +12,7 @@ from shared.robot import FOOT_RADIUS, Array
 from tests.agents.controller.parts import ContactState, initial_contact, step_contact
 
 DETECTING = ControllerConfig()
+WAITING = replace(DETECTING, liftoff_hold_ms=40)
 SCHEDULED = replace(DETECTING, contact_detection=False)
 DT = 1e-3
 LOAD = 50.0
@@ -115,7 +116,7 @@ def test_a_stance_foot_beside_a_block_is_no_contact_until_it_stands_on_something
 
 
 def test_feet_wait_to_swing_until_the_others_carry() -> None:
-    feet = Feet()
+    feet = Feet(WAITING)
     feet.run(50, PAIR, 0.9, 0)
     feet.force[1] = 0.0  # FR is late
     state = feet.run(3, OTHER, 0.05, 1)
@@ -128,10 +129,10 @@ def test_feet_wait_to_swing_until_the_others_carry() -> None:
 
 
 def test_feet_wait_no_longer_than_they_may() -> None:
-    feet = Feet()
+    feet = Feet(WAITING)
     feet.run(50, PAIR, 0.9, 0)
     feet.force[1] = 0.0
-    hold = 1e-3 * DETECTING.liftoff_hold_ms / 0.2
+    hold = 1e-3 * WAITING.liftoff_hold_ms / 0.2
     assert feet.run(1, OTHER, 0.99 * hold, 1).contact[0] == 1.0
     assert feet.run(1, OTHER, hold, 1).contact[0] == 0.0
 
