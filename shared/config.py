@@ -195,6 +195,15 @@ class ControllerConfig:
         high=10.0,
     )  # fmt: skip
     mu: float = key(0.6, "1", "friction coefficient the QP may use", low=0.05, high=2.0)
+    mu_least: float = key(0.35, "1", "friction always counted on, slide as feet may", low=0.05,
+                          high=2.0)  # fmt: skip
+    mu_recovery: float = key(
+        0.5, "1/s", "how fast friction is counted on again after feet slid", low=0.0, high=10.0
+    )
+    slip_speed: float = key(
+        0.3, "m/s", "a stance foot faster than this slides: the QP uses less friction; 0: never",
+        low=0.0, high=5.0,
+    )  # fmt: skip
     force_min: float = key(5.0, "N", "least normal force of a stance foot", low=0.0, high=50.0)
     kp_z: float = key(400.0, "1/s²", "height", low=0.0, high=1e4)
     kd_z: float = key(40.0, "1/s", "height rate", low=0.0, high=1e3)

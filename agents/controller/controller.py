@@ -7,7 +7,7 @@ objects. All arithmetic is in the functions that these calls are made of.
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -18,8 +18,10 @@ from agents.controller.estimator import (
     standing_mean,
     sure,
 )
-from agents.controller.feet import feet_demand
+from agents.controller.feet import feet_demand, foot_velocities
+from agents.controller.friction import caution
 from agents.controller.memory import (
+    CAUTION,
     COUNT,
     HEIGHT,
     LEVEL,
@@ -128,7 +130,10 @@ class Controller:
             [
                 trunk_gains(controller), feet, self.body.com, self.body.inertia_inverse.ravel(),
                 self.weights.as_array(),
-                [float(controller.flight)],
+                [
+                    float(controller.flight), controller.slip_speed, controller.mu_least,
+                    controller.mu_recovery,
+                ],
             ]
         )  # fmt: skip
 
@@ -192,7 +197,8 @@ class Controller:
             if rows:
                 return Acted(Memory(new), asked, Solution(x, whole_body_qp.UNCONSTRAINED, rows))
             goal = _goal(asked, legs_of(new)[0])
-            solution = whole_body_qp.solve_goal(terms, seen.R, seen.p_foot, goal, self.weights)
+            weights = replace(self.weights, mu=self.weights.mu - new[CAUTION])
+            solution = whole_body_qp.solve_goal(terms, seen.R, seen.p_foot, goal, weights)
         except np.linalg.LinAlgError:
             solution = whole_body_qp.singular()
         return Acted(Memory(new), asked, solution)
@@ -238,7 +244,7 @@ def _act(
 ) -> int:  # fmt: skip
     """Fill the new memory, what is asked and the answer `closed_form` gives, with its result."""
     gains, feet, com = constants[0:12], constants[12:23], constants[23:26]
-    inertia_inverse, weights = constants[26:35].reshape(3, 3), constants[35:42]
+    inertia_inverse, weights = constants[26:35].reshape(3, 3), constants[35:42].copy()
     stance, progress = schedule[0:4], schedule[4]
     position, v_trunk, R, omega = trunk_of(seen)
     _, v = coordinates_of(seen)
@@ -256,10 +262,16 @@ def _act(
     contact, ground = legs[0], legs[4]
     if constants[42] > 0.5:
         fall_freely(trunk, contact)
+    v_foot = foot_velocities(J, v, p_foot)
+    memory[CAUTION] = caution(
+        memory0[CAUTION], contact, stance, progress, v_foot, constants[43], weights[3],
+        constants[44], constants[45], dt,
+    )  # fmt: skip
+    weights[3] -= memory[CAUTION]
     lift, stumble, felt = swings_of(memory)
     demand = feet_demand(
         start, goal, contact, stance, progress, seen[SWITCHED] > 0.5, legs[1], lift, stumble, felt,
-        ground, position, v_trunk, R, p_foot, J, v, v_des, wz, deviation, dt, feet,
+        ground, position, v_trunk, R, p_foot, v_foot, v_des, wz, deviation, dt, feet,
     )  # fmt: skip
     start[:], goal[:] = demand[0], demand[1]
     asked[:6], asked[6:18], asked[18:] = trunk, demand[2].ravel(), demand[3].ravel()

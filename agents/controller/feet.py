@@ -18,7 +18,7 @@ _BACK = 0.3  # of the speed at which a foot that stumbled rises: away from what 
 def feet_demand(
     swing_start0: Array, foot_goal0: Array, contact: Array, stance: Array, progress: float,
     switched: bool, early: Array, lift: Array, stumble: Array, felt: Array, ground: Array,
-    position: Array, velocity: Array, R: Array, p_foot: Array, J: Array, v: Array, v_des: Array,
+    position: Array, velocity: Array, R: Array, p_foot: Array, v_foot: Array, v_des: Array,
     wz: float, deviation: Array, dt: float, constants: Array,
 ) -> Array:  # fmt: skip
     """New swing starts and foot goals, desired accelerations and forces, rows of (4, 4, 3).
@@ -34,7 +34,7 @@ def feet_demand(
     out[0], out[1] = swing_start, foot_goal
     out[2] = _feet_acceleration(
         contact, stance, progress, early, lift, stumble, felt, swing_start, foot_goal, ground,
-        position, velocity, R, p_foot, _foot_velocities(J, v, p_foot), v_des, wz, duration,
+        position, velocity, R, p_foot, v_foot, v_des, wz, duration,
         raibert_gain, height, descent_speed, kp, kd, constants[7], constants[8], constants[9],
         constants[10] > 0.5,
     )  # fmt: skip
@@ -88,7 +88,7 @@ def _desired_force(contact: Array, deviation: Array, R: Array, mass: float) -> A
 
 
 @compiled
-def _foot_velocities(J: Array, v: Array, p_foot: Array) -> Array:
+def foot_velocities(J: Array, v: Array, p_foot: Array) -> Array:
     """Velocities of the foot centres, (4, 3), m/s, odometry frame."""
     out = np.empty((4, 3))
     for leg in range(4):

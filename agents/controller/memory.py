@@ -13,12 +13,13 @@ from shared.jit import compiled
 from shared.record import record
 from shared.robot import Array
 
-SIZE: Final = 139
+SIZE: Final = 140
 LEVEL: Final = 102  # filtered height of the ground under the stance feet, m
 HALF: Final = 103  # number of the gait's half period, to notice a switch
 HEIGHT: Final = 104  # integral of the height error, m·s
 YAW: Final = 105  # desired heading, rad
 COUNT: Final = 118  # ticks of the present sample
+CAUTION: Final = 139  # what is taken off the friction coefficient
 
 
 @compiled
@@ -59,7 +60,7 @@ def forces_of(flat: Array) -> Array:
 
 @record
 class Memory:
-    """The low level's memory; `flat` is (139,) and not to be changed."""
+    """The low level's memory; `flat` is (140,) and not to be changed."""
 
     flat: Array
 
@@ -134,6 +135,11 @@ class Memory:
     def stumble(self) -> Array:
         """How long each swing foot will still give way to what stopped it, (4,), s."""
         return swings_of(self.flat)[1]
+
+    @property
+    def caution(self) -> float:
+        """What is taken off the friction coefficient the QP may use, because feet slid."""
+        return float(self.flat[CAUTION])
 
     @property
     def felt(self) -> Array:
