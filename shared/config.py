@@ -201,7 +201,7 @@ class ControllerConfig:
         0.5, "1/s", "how fast friction is counted on again after feet slid", low=0.0, high=10.0
     )
     slip_speed: float = key(
-        0.3, "m/s", "a stance foot faster than this slides: the QP uses less friction; 0: never",
+        0.0, "m/s", "a stance foot faster than this slides: the QP uses less friction; 0: never",
         low=0.0, high=5.0,
     )  # fmt: skip
     force_min: float = key(5.0, "N", "least normal force of a stance foot", low=0.0, high=50.0)
