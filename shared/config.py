@@ -186,8 +186,25 @@ class ControllerConfig:
     gamma_tau: float = key(1e2, "1", "gamma_1, weight of torques", low=0.0, high=1e9)
     gamma_force: float = key(1e3, "1", "gamma_2, weight of force errors", low=0.0, high=1e9)
     gamma_defect: float = key(1e6, "1", "gamma_3, weight of the defect", low=1.0, high=1e12)
+    tilt_length: float = key(
+        0.15, "m", "weight of the trunk's angular defect against its linear one (paper: 1)",
+        low=0.01, high=10.0,
+    )  # fmt: skip
+    swing_weight: float = key(
+        0.3, "1", "weight of the swing feet's defect against the trunk's (paper: 1)", low=0.01,
+        high=10.0,
+    )  # fmt: skip
     mu: float = key(0.6, "1", "friction coefficient the QP may use", low=0.05, high=2.0)
-    force_min: float = key(2.0, "N", "least normal force of a stance foot", low=0.0, high=50.0)
+    mu_least: float = key(0.35, "1", "friction always counted on, slide as feet may", low=0.05,
+                          high=2.0)  # fmt: skip
+    mu_recovery: float = key(
+        0.5, "1/s", "how fast friction is counted on again after feet slid", low=0.0, high=10.0
+    )
+    slip_speed: float = key(
+        0.0, "m/s", "a stance foot faster than this slides: the QP uses less friction; 0: never",
+        low=0.0, high=5.0,
+    )  # fmt: skip
+    force_min: float = key(5.0, "N", "least normal force of a stance foot", low=0.0, high=50.0)
     kp_z: float = key(400.0, "1/s²", "height", low=0.0, high=1e4)
     kd_z: float = key(40.0, "1/s", "height rate", low=0.0, high=1e3)
     ki_z: float = key(400.0, "1/s³", "height integrator", low=0.0, high=1e5)
@@ -208,9 +225,32 @@ class ControllerConfig:
     kp_swing: float = key(400.0, "1/s²", "swing foot", low=0.0, high=1e4)
     kd_swing: float = key(40.0, "1/s", "swing foot rate", low=0.0, high=1e3)
     contact_detection: bool = key(True, "-", "early touchdown becomes stance, a lost foot descends")
-    contact_force: float = key(8.0, "N", "foot force that counts as contact", low=0.5, high=100.0)
+    contact_force: float = key(4.0, "N", "foot force that counts as contact", low=0.5, high=100.0)
     lost_contact_ms: int = key(5, "ms", "stance without force until it descends", low=1, high=100)
-    descent_speed: float = key(0.5, "m/s", "speed of a descending stance foot", low=0.0, high=3.0)
+    descent_speed: float = key(0.8, "m/s", "speed of a descending stance foot", low=0.0, high=3.0)
+    tell_sides: bool = key(
+        True, "-",
+        "a foot stopped from the side is no contact, nor one that landed early and bears no load",
+    )  # fmt: skip
+    liftoff_hold_ms: int = key(
+        0, "ms", "longest wait of a foot about to swing for those that shall stand; 0: none", low=0,
+        high=1000,
+    )  # fmt: skip
+    give_way_ms: int = key(
+        10, "ms", "a swing foot that stumbles rises until so long after it is free; 0: never",
+        low=0, high=100,
+    )  # fmt: skip
+    stumble_lift: float = key(1.0, "m/s", "speed of a rising foot that stumbled", low=0.0, high=3.0)
+    follow_fall: bool = key(
+        True, "-", "a descending foot goes down with the trunk; feet are asked to where legs reach"
+    )
+    flight: bool = key(True, "-", "without contact the trunk is asked to fall freely")
+    swing_delay: float = key(
+        0.1, "1", "share of swing in which a foot rises before it goes forward", low=0.0, high=0.5
+    )
+    swing_acceleration: float = key(
+        80.0, "m/s²", "footholds of swings begun late are near enough for this", low=1.0, high=1e4
+    )
     ground_filter_ms: float = key(50.0, "ms", "filter of the ground height", low=0.0, high=1e3)
     swing_height: float = key(
         0.09, "m", "apex above the highest foothold (paper: above the ground)", low=0.01, high=0.2

@@ -1,8 +1,10 @@
 """From scheduled stance and foot force to the contacts the QP may push on, and the ground height.
 
-With contact detection on, a swing foot that is loaded in the second half of swing becomes a
-stance foot early, and a stance foot without load for `lost_contact_ms` is taken out of the
-contact set and descends until it finds ground.
+With contact detection on, a swing foot that is loaded from below in the second half of swing
+becomes a stance foot early, and a stance foot without load for `lost_contact_ms` is taken out of
+the contact set and descends until it finds ground. A foot that is stopped from the side is no
+support, however loaded: it stumbles and gives way (`feet`). Feet about to swing may be told to wait
+for those that shall carry the robot instead; where it is pushed, that keeps it from stepping.
 """
 
 from __future__ import annotations
@@ -13,6 +15,9 @@ from shared.jit import compiled
 from shared.robot import FOOT_RADIUS, Array
 
 _EARLIEST_TOUCHDOWN = 0.5  # of swing: before this a load is the foot still leaving the ground
+_EARLIEST_STUMBLE = 0.12  # of swing, likewise
+_LATEST_STUMBLE = 0.8  # of swing: after this there is no time to give way
+_BELOW = 0.7  # of what a foot feels, share that must point upwards for the ground to be below it
 
 
 @compiled
@@ -36,9 +41,17 @@ def contacts_by_schedule(
 
 
 @compiled
+def from_below(felt: Array) -> bool:
+    """Whether what stops a foot, (3,), is under it and not beside it; nothing felt is no side."""
+    size = np.sqrt(felt[0] ** 2 + felt[1] ** 2 + felt[2] ** 2)
+    return bool(felt[2] >= _BELOW * size)
+
+
+@compiled
 def contacts_by_force(
     legs0: Array, level0: float, switched: bool, stance: Array, progress: float, foot_force: Array,
-    foot_z: Array, threshold: float, patience: float, rate: float, dt: float,
+    foot_z: Array, threshold: float, patience: float, rate: float, dt: float, lift: Array,
+    stumble: Array, felt: Array, hold: float, give_way: float, tell_sides: bool,
 ) -> tuple[Array, float]:  # fmt: skip
     """Update the contacts of one robot.
 
@@ -57,6 +70,13 @@ def contacts_by_force(
         patience: time without load after which a stance foot is no contact, s.
         rate: share of a tick in the filter of the ground's height.
         dt: time since the last tick, s.
+        lift: progress at which each swing began, −1 while it has not, (4,); updated in place.
+        stumble: time for which each swing foot will give way, (4,), s; updated in place.
+        felt: acceleration each foot off the ground was kept from at the last tick, (4, 3), m/s².
+        hold: share of the half period for which a foot waits for those that shall stand.
+        give_way: time for which a foot gives way once nothing stops it any more, s; 0: never.
+        tell_sides: whether a foot stopped from the side is no contact, and one that landed early
+            and is not loaded any more neither.
 
     Returns:
         The new legs and level.
@@ -64,20 +84,57 @@ def contacts_by_force(
     legs = legs0.copy()
     contact, early, unloaded, latched, ground = legs
     total, count = 0.0, 0
+    carried = True
     for leg in range(4):
+        if stance[leg] < 0.5:
+            continue
         loaded = foot_force[leg] >= threshold
+        if tell_sides and not switched and contact[leg] < 0.5 and not from_below(felt[leg]):
+            loaded = False
         if switched:
-            if stance[leg] < 0.5:
-                latched[leg] = 0.0
             early[leg] = 0.0
             unloaded[leg] = 0.0
+        lift[leg], stumble[leg] = 0.0, 0.0
+        unloaded[leg] = 0.0 if loaded else unloaded[leg] + dt
+        contact[leg] = 1.0 if unloaded[leg] <= patience else 0.0
+        carried = carried and loaded
+    for leg in range(4):
         if stance[leg] > 0.5:
-            unloaded[leg] = 0.0 if loaded else unloaded[leg] + dt
+            continue
+        loaded = foot_force[leg] >= threshold
+        if switched:
+            latched[leg] = 0.0
+            early[leg] = 0.0
+            unloaded[leg] = 0.0
+            stumble[leg] = 0.0
+            lift[leg] = -1.0 if contact[leg] > 0.5 else 0.0
+        if lift[leg] < 0.0:
+            if carried or not loaded or progress >= hold:
+                lift[leg] = 0.0 if switched else progress
+            else:
+                contact[leg] = 1.0
+                continue
+        contact[leg] = 0.0
+        since = (progress - lift[leg]) / (1.0 - lift[leg])
+        below = not tell_sides or from_below(felt[leg])
+        if loaded and below and since > _EARLIEST_TOUCHDOWN:
+            early[leg] = 1.0
+            unloaded[leg] = 0.0
+            stumble[leg] = 0.0
+        if early[leg] > 0.5:
+            if tell_sides:
+                unloaded[leg] = 0.0 if loaded else unloaded[leg] + dt
             contact[leg] = 1.0 if unloaded[leg] <= patience else 0.0
-        else:
-            if loaded and progress > _EARLIEST_TOUCHDOWN:
-                early[leg] = 1.0
-            contact[leg] = early[leg]
+        elif give_way > 0.0:
+            if loaded and not below and since > _EARLIEST_STUMBLE and progress < _LATEST_STUMBLE:
+                stumble[leg] = give_way
+            elif stumble[leg] > 0.0:
+                stumble[leg] -= dt
+                if stumble[leg] <= 0.0:
+                    stumble[leg] = 0.0
+                    lift[leg] = progress  # the swing begins anew from here
+    for leg in range(4):
+        loaded = foot_force[leg] >= threshold
         # The ground is where the foot first bore load: latching at the scheduled touchdown
         # would take the height of a foot still in the air, and ratchet upward.
         if contact[leg] > 0.5 and loaded and latched[leg] < 0.5:

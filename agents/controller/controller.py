@@ -7,7 +7,7 @@ calls are made of.
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -18,8 +18,10 @@ from agents.controller.estimator import (
     standing_mean,
     sure,
 )
-from agents.controller.feet import feet_demand
+from agents.controller.feet import feet_demand, foot_velocities
+from agents.controller.friction import caution
 from agents.controller.memory import (
+    CAUTION,
     COUNT,
     HEIGHT,
     LEVEL,
@@ -32,9 +34,10 @@ from agents.controller.memory import (
     forces_of,
     legs_of,
     speed_of,
+    swings_of,
 )
 from agents.controller.model import RigidBody
-from agents.controller.references import trunk_acceleration, trunk_gains
+from agents.controller.references import fall_freely, trunk_acceleration, trunk_gains
 from agents.controller.rigid_body import rigid_body_terms
 from agents.controller.rotation import roll_pitch_yaw
 from agents.controller.sensing import (
@@ -116,16 +119,22 @@ class Controller:
             [
                 1e-3 * config.gait.stance_ms, controller.raibert_gain, controller.swing_height,
                 controller.descent_speed, controller.kp_swing, controller.kd_swing, self.body.mass,
+                controller.swing_delay, controller.stumble_lift, controller.swing_acceleration,
+                float(controller.follow_fall),
             ]
         )  # fmt: skip
         self.weights = Weights(
             controller.gamma_tau, controller.gamma_force, controller.gamma_defect, controller.mu,
-            controller.force_min,
+            controller.force_min, controller.tilt_length, controller.swing_weight,
         )  # fmt: skip
         self._acting = np.concatenate(
             [
                 trunk_gains(controller), feet, self.body.com, self.body.inertia_inverse.ravel(),
                 self.weights.as_array(),
+                [
+                    float(controller.flight), controller.slip_speed, controller.mu_least,
+                    controller.mu_recovery,
+                ],
             ]
         )  # fmt: skip
 
@@ -186,7 +195,8 @@ class Controller:
                 return Acted(Memory(new), asked, Solution(x, whole_body_qp.UNCONSTRAINED, rows))
             terms = self.body.terms(seen.flat[0:19], seen.flat[19:37])
             goal = _goal(asked, legs_of(new)[0])
-            solution = whole_body_qp.solve_goal(terms, seen.R, seen.p_foot, goal, self.weights)
+            weights = replace(self.weights, mu=self.weights.mu - new[CAUTION])
+            solution = whole_body_qp.solve_goal(terms, seen.R, seen.p_foot, goal, weights)
         except np.linalg.LinAlgError:
             solution = whole_body_qp.singular()
         return Acted(Memory(new), asked, solution)
@@ -231,8 +241,8 @@ def _act(
     constants: Array, memory: Array, asked: Array, x: Array,
 ) -> int:  # fmt: skip
     """Fill the new memory, what is asked and the answer `closed_form` gives, with its result."""
-    gains, feet, com = constants[0:12], constants[12:19], constants[19:22]
-    inertia_inverse, weights = constants[22:31].reshape(3, 3), constants[31:36]
+    gains, feet, com = constants[0:12], constants[12:23], constants[23:26]
+    inertia_inverse, weights = constants[26:35].reshape(3, 3), constants[35:42].copy()
     stance, progress = schedule[0:4], schedule[4]
     position, v_trunk, R, omega = trunk_of(seen)
     q, v = coordinates_of(seen)
@@ -251,9 +261,18 @@ def _act(
     start, goal = anchors_of(memory)
     legs = legs_of(memory)
     contact, ground = legs[0], legs[4]
+    if constants[42] > 0.5:
+        fall_freely(trunk, contact)
+    v_foot = foot_velocities(J, v, p_foot)
+    memory[CAUTION] = caution(
+        memory0[CAUTION], contact, stance, progress, v_foot, constants[43], weights[3],
+        constants[44], constants[45], dt,
+    )  # fmt: skip
+    weights[3] -= memory[CAUTION]
+    lift, stumble, felt = swings_of(memory)
     demand = feet_demand(
-        start, goal, contact, stance, progress, seen[SWITCHED] > 0.5, ground, position, v_trunk, R,
-        p_foot, J, v, v_des, wz, deviation, dt, feet,
+        start, goal, contact, stance, progress, seen[SWITCHED] > 0.5, legs[1], lift, stumble, felt,
+        ground, position, v_trunk, R, p_foot, v_foot, v_des, wz, deviation, dt, feet,
     )  # fmt: skip
     start[:], goal[:] = demand[0], demand[1]
     asked[:6], asked[6:18], asked[18:] = trunk, demand[2].ravel(), demand[3].ravel()

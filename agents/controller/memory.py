@@ -13,12 +13,13 @@ from shared.jit import compiled
 from shared.record import record
 from shared.robot import Array
 
-SIZE: Final = 119
+SIZE: Final = 140
 LEVEL: Final = 102  # filtered height of the ground under the stance feet, m
 HALF: Final = 103  # number of the gait's half period, to notice a switch
 HEIGHT: Final = 104  # integral of the height error, m·s
 YAW: Final = 105  # desired heading, rad
 COUNT: Final = 118  # ticks of the present sample
+CAUTION: Final = 139  # what is taken off the friction coefficient
 
 
 @compiled
@@ -31,6 +32,12 @@ def filter_of(flat: Array) -> tuple[Array, Array]:
 def legs_of(flat: Array) -> Array:
     """View (5, 4), of each leg: contact, early, unloaded, latched, ground."""
     return flat[54:74].reshape(5, 4)
+
+
+@compiled
+def swings_of(flat: Array) -> tuple[Array, Array, Array]:
+    """Views of the progress at which each swing began, (4,), of its stumble, (4,), and felt."""
+    return flat[119:123], flat[123:127], flat[127:139].reshape(4, 3)
 
 
 @compiled
@@ -53,7 +60,7 @@ def forces_of(flat: Array) -> Array:
 
 @record
 class Memory:
-    """The low level's memory; `flat` is (119,) and not to be changed."""
+    """The low level's memory; `flat` is (140,) and not to be changed."""
 
     flat: Array
 
@@ -118,6 +125,26 @@ class Memory:
     def foot_goal(self) -> Array:
         """Where a foot that lost contact is being lowered to, (4, 3), m."""
         return anchors_of(self.flat)[1]
+
+    @property
+    def lift(self) -> Array:
+        """Progress of the half period at which each foot's swing began; −1: not yet. (4,)."""
+        return swings_of(self.flat)[0]
+
+    @property
+    def stumble(self) -> Array:
+        """How long each swing foot will still give way to what stopped it, (4,), s."""
+        return swings_of(self.flat)[1]
+
+    @property
+    def caution(self) -> float:
+        """What is taken off the friction coefficient the QP may use, because feet slid."""
+        return float(self.flat[CAUTION])
+
+    @property
+    def felt(self) -> Array:
+        """Acceleration that each foot off the ground seems to be kept from, (4, 3), m/s²."""
+        return swings_of(self.flat)[2]
 
     @property
     def height(self) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from agents.controller.rotation import cross, roll_pitch_yaw, wrap_angle
 from shared.config import ControllerConfig
 from shared.jit import compiled
-from shared.robot import Array
+from shared.robot import GRAVITY, Array
 
 _Z_LIMIT = 0.05  # m·s, height integrator
 _SPEED_LIMIT = 0.15  # m, speed integrator
@@ -52,6 +52,18 @@ def trunk_acceleration(
             deviation, stance, R, position, p_foot, mass, com, inertia_inverse
         )
     return height, speed, lead, yaw, trunk, v_des
+
+
+@compiled
+def fall_freely(trunk: Array, contact: Array) -> None:
+    """Ask a robot without contact for free fall, in `trunk` (6,), m/s² and rad/s².
+
+    It cannot have anything else; asked for more, the QP throws its legs about to move the trunk a
+    little, and the feet are not where the ground will be.
+    """
+    if np.sum(contact) < 0.5:
+        trunk[:] = 0.0
+        trunk[2] = -GRAVITY
 
 
 @compiled

@@ -8,7 +8,7 @@ import numpy as np
 
 from agents.controller.contact import contacts_by_force, contacts_by_schedule
 from agents.controller.estimator import filter_step, foot_trust, noise_parameters
-from agents.controller.memory import HALF, LEVEL, Memory, filter_of, legs_of
+from agents.controller.memory import HALF, LEVEL, Memory, filter_of, legs_of, swings_of
 from agents.controller.rotation import roll_pitch_yaw
 from shared.config import Config
 from shared.jit import compiled
@@ -81,13 +81,15 @@ class Seen:
 
 
 def sensing_constants(config: Config) -> Array:
-    """What `sense` needs of the configuration. Shape (11,)."""
+    """What `sense` needs of the configuration. Shape (14,)."""
     controller, estimator = config.controller, config.estimator
     return np.array(
         [
             estimator.trust_ramp, estimator.contact_force, float(controller.contact_detection),
             controller.contact_force, 1e-3 * controller.lost_contact_ms,
             1e-3 * controller.ground_filter_ms, *noise_parameters(estimator),
+            controller.liftoff_hold_ms / config.gait.stance_ms, 1e-3 * controller.give_way_ms,
+            float(controller.tell_sides),
         ]
     )  # fmt: skip
 
@@ -154,9 +156,11 @@ def place(
     seen[SWITCHED] = 1.0 if switched else 0.0
     rate = dt / (constants[5] + dt)
     if constants[2] > 0.5:
+        lift, stumble, felt = swings_of(memory)
         legs, level = contacts_by_force(
             legs_of(memory0), level0, switched, stance, progress, foot_force, p_foot[:, 2],
-            constants[3], constants[4], rate, dt,
+            constants[3], constants[4], rate, dt, lift, stumble, felt, constants[11],
+            constants[12], constants[13] > 0.5,
         )  # fmt: skip
     else:
         legs, level = contacts_by_schedule(

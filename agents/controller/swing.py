@@ -36,9 +36,24 @@ def foothold(
 
 
 @compiled
+def within_reach(target: Array, start: Array, acceleration: float, duration: float) -> None:
+    """Shorten the way from `start` to the foothold `target`, (2,), to what can be done in time.
+
+    Minimum jerk over a way d in a time T has the greatest acceleration 10 d / (√3 T²).
+    """
+    dx, dy = target[0] - start[0], target[1] - start[1]
+    way = np.sqrt(dx * dx + dy * dy)
+    longest = 0.1 * np.sqrt(3.0) * acceleration * duration * duration
+    if way > longest:
+        target[0] = start[0] + dx * longest / way
+        target[1] = start[1] + dy * longest / way
+
+
+@compiled
 def swing_reference(
-    start: Array, target: Array, ground: float, apex: float, progress: float, duration: float
-) -> Array:
+    start: Array, target: Array, ground: float, apex: float, progress: float, duration: float,
+    delay: float,
+) -> Array:  # fmt: skip
     """Reference of one swing foot's centre. Shape (3, 3): rows position, velocity, acceleration.
 
     Args:
@@ -48,10 +63,11 @@ def swing_reference(
         apex: height of the foot's centre at mid-swing, m.
         progress: progress of swing in [0, 1).
         duration: swing time, s.
+        delay: share of it in which the foot rises before it goes forward.
     """
     out = np.zeros((3, 3))
-    s = min(1.0, progress / _PLANE_DONE)
-    rate = 1.0 / (_PLANE_DONE * duration)
+    s = min(1.0, max(0.0, progress - delay) / (_PLANE_DONE - delay))
+    rate = 1.0 / ((_PLANE_DONE - delay) * duration)
     jerk = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
     slope = 30.0 * s * s * (1.0 - s) ** 2 * rate
     bend = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) * rate * rate

@@ -1,9 +1,12 @@
 """The whole-body QP (the paper's low-level controller), reduced to the twelve torques.
 
-min  γ₁/2 |τ|² + γ₂/2 |f − f_des|² + γ₃/2 |δ|²
+min  γ₁/2 |τ|² + γ₂/2 |f − f_des|² + γ₃/2 |W δ|²
 s.t. ḧ(τ, f) = a_des + δ   (output dynamics: trunk and swing feet; a_des holds −K_P h − K_D ḣ)
      r̈(τ, f) = 0           (no slip of the feet in contact)
      |τ| ≤ τ_max,  f in the friction cone
+
+W = diag(1, 1, 1, ℓ, ℓ, ℓ, s, s, …) says what a rad/s² of the trunk and a m/s² of a swing foot weigh
+against a m/s² of the trunk (the paper: ℓ = 1 m, s = 1).
 
 No slip makes the forces affine in the torques, f = A τ + a₀, and with them the outputs,
 ḧ = B τ + b₀: twelve variables, a box and five rows per foot in contact remain.
@@ -54,19 +57,24 @@ class Goal:
 
 @record
 class Weights:
-    """γ₁, γ₂, γ₃ of the cost, friction coefficient and least normal force of the cone."""
+    """γ₁, γ₂, γ₃ of the cost, friction coefficient and least normal force of the cone; ℓ and s."""
 
     gamma_tau: float
     gamma_force: float
     gamma_defect: float
     mu: float
     force_min: float
+    tilt_length: float = 1.0
+    swing_weight: float = 1.0
 
     def as_array(self) -> Array:
-        """As the compiled assembly takes them. Shape (5,)."""
+        """As the compiled assembly takes them. Shape (7,)."""
         return np.array(
-            [self.gamma_tau, self.gamma_force, self.gamma_defect, self.mu, self.force_min]
-        )
+            [
+                self.gamma_tau, self.gamma_force, self.gamma_defect, self.mu, self.force_min,
+                self.tilt_length, self.swing_weight,
+            ]
+        )  # fmt: skip
 
 
 @record
@@ -228,7 +236,7 @@ def _assemble(
     contact: Array, trunk: Array, swing: Array, force: Array, weights: Array,
 ) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:  # fmt: skip
     """H, g, C, c, A, a₀, B, b₀ − a_des of `Problem`; NaN where no slip cannot be had."""
-    gamma_tau, gamma_force, gamma_defect, mu, force_min = weights
+    gamma_tau, gamma_force, gamma_defect, mu, force_min, tilt_length, swing_weight = weights
     n_c = 0
     for leg in range(4):
         if contact[leg] > 0.5:
@@ -279,13 +287,16 @@ def _assemble(
 
     H = np.zeros((12, 12))
     add_gram(gamma_force, A, H)
-    add_gram(gamma_defect, B, H)
+    outputs[3:6] *= tilt_length
+    outputs[6:] *= swing_weight
+    W_B, W_b = outputs[:, :12].copy(), outputs[:, 12].copy()
+    add_gram(gamma_defect, W_B, H)
     trace = 0.0
     for k in range(12):
         H[k, k] += gamma_tau
         trace += H[k, k]
     mirror(H)
-    g = gamma_force * transposed_times(A, a0 - f_des) + gamma_defect * transposed_times(B, b)
+    g = gamma_force * transposed_times(A, a0 - f_des) + gamma_defect * transposed_times(W_B, W_b)
     scale = 12.0 / trace
 
     cone = mu / np.sqrt(2.0)

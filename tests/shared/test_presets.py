@@ -41,6 +41,10 @@ def test_the_papers_setting_is_the_plain_one() -> None:
     paper = load(None, {"controller.preset": "paper"}).controller
     assert not paper.contact_detection
     assert paper.ki_z == paper.ki_xy == 0.0
+    assert not any((paper.tell_sides, paper.follow_fall, paper.flight))
+    assert paper.tilt_length == paper.swing_weight == 1.0
+    assert paper.liftoff_hold_ms == paper.give_way_ms == 0
+    assert paper.swing_delay == paper.slip_speed == 0.0
     assert (paper.gamma_tau, paper.gamma_force, paper.gamma_defect) == (1e2, 1e3, 1e6)
 
 

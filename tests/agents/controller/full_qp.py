@@ -71,6 +71,8 @@ def solve_full(pose: Pose, goal: Goal, weights: Weights) -> tuple[Array, Array, 
     f_des = goal.force[goal.contact > 0.5].ravel()
     gammas = (weights.gamma_tau, weights.gamma_force, weights.gamma_defect)
     P = np.repeat(gammas, (12, n_f, n_h))
+    W = np.repeat((1.0, weights.tilt_length, weights.swing_weight), (3, 3, n_h - 6))
+    P[12 + n_f :] *= W**2
     q = np.concatenate([np.zeros(12), -weights.gamma_force * f_des, np.zeros(n_h)])
     drive = np.hstack([dyn.M_inverse @ _S, dyn.M_inverse @ dyn.J_c.T])
     free = dyn.M_inverse @ dyn.nle

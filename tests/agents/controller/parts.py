@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -66,6 +66,9 @@ class ContactState:
     ground: Array
     level: float
     half: int
+    lift: Array = field(default_factory=lambda: np.zeros(4))
+    stumble: Array = field(default_factory=lambda: np.zeros(4))
+    felt: Array = field(default_factory=lambda: np.zeros((4, 3)))
 
 
 def initial_contact() -> ContactState:
@@ -75,20 +78,25 @@ def initial_contact() -> ContactState:
 
 def step_contact(
     previous: ContactState, config: ControllerConfig, stance: Array, progress: float, half: int,
-    foot_force: Array, foot_z: Array, dt: float,
+    foot_force: Array, foot_z: Array, dt: float, stance_time: float = 0.2,
 ) -> ContactState:  # fmt: skip
-    """One step of the contact detection."""
+    """One step of the contact detection; what the feet feel stays as it is."""
     p, rate = previous, dt / (1e-3 * config.ground_filter_ms + dt)
     before = np.array([p.contact, p.early, p.unloaded, p.latched, p.ground])
+    lift, stumble = p.lift.copy(), p.stumble.copy()
     if config.contact_detection:
         legs, level = contacts_by_force(
             before, p.level, half != p.half, stance, progress, foot_force, foot_z,
-            config.contact_force, 1e-3 * config.lost_contact_ms, rate, dt,
+            config.contact_force, 1e-3 * config.lost_contact_ms, rate, dt, lift, stumble, p.felt,
+            1e-3 * config.liftoff_hold_ms / stance_time, 1e-3 * config.give_way_ms,
+            config.tell_sides,
         )  # fmt: skip
     else:
         legs, level = contacts_by_schedule(p.ground, p.level, stance, foot_z, rate)
     contact, early, unloaded, latched, ground = legs
-    return ContactState(contact, early, unloaded, latched, ground, level, half)
+    return ContactState(
+        contact, early, unloaded, latched, ground, level, half, lift, stumble, p.felt
+    )
 
 
 @dataclass(frozen=True)

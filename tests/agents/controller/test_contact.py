@@ -12,6 +12,7 @@ from shared.robot import FOOT_RADIUS, Array
 from tests.agents.controller.parts import ContactState, initial_contact, step_contact
 
 DETECTING = ControllerConfig()
+WAITING = replace(DETECTING, liftoff_hold_ms=40)
 SCHEDULED = replace(DETECTING, contact_detection=False)
 DT = 1e-3
 LOAD = 50.0
@@ -63,8 +64,9 @@ def test_a_single_tick_of_load_starts_the_patience_anew() -> None:
         assert feet.run(1, PAIR, 0.3, 0).contact[0] == 1.0
 
 
-def test_a_foot_that_lands_early_is_a_contact_until_the_switch() -> None:
-    feet = Feet()
+@pytest.mark.parametrize("tells_sides", [False, True])
+def test_a_foot_that_lands_early_is_a_contact_until_the_switch(tells_sides: bool) -> None:
+    feet = Feet(replace(DETECTING, tell_sides=tells_sides))
     feet.force[1:3] = 0.0
     feet.run(50, PAIR, 0.3, 0)
     feet.force[1], feet.z[1] = LOAD, FOOT_RADIUS + 0.03
@@ -74,11 +76,65 @@ def test_a_foot_that_lands_early_is_a_contact_until_the_switch() -> None:
     assert state.ground[1] == pytest.approx(0.03)
     assert state.level == pytest.approx(0.0, abs=1e-12)  # only scheduled feet carry the level
     feet.force[1] = 0.0
-    assert feet.run(20, PAIR, 0.7, 0).contact[1] == 1.0  # a bounce is not a second swing
+    state = feet.run(20, PAIR, 0.7, 0)
+    assert state.early[1] == 1.0  # a bounce is not a second swing
+    assert state.contact[1] == float(not tells_sides)  # but a foot in the air carries nothing
     feet.force[:] = LOAD
     state = feet.run(1, OTHER, 0.0, 1)
     np.testing.assert_array_equal(state.contact, OTHER)
     assert state.ground[1] == pytest.approx(0.03)
+
+
+def test_a_foot_stopped_from_the_side_is_no_contact_but_stumbles() -> None:
+    """And begins its swing anew once nothing has stopped it for the time it gives way."""
+    feet = Feet()
+    feet.force[1:3] = 0.0
+    feet.run(50, PAIR, 0.3, 0)
+    feet.force[1] = LOAD
+    feet.state.felt[1] = [-50.0, 0.0, 20.0]
+    state = feet.run(1, PAIR, 0.6, 0)
+    np.testing.assert_array_equal(state.contact, PAIR)
+    assert state.stumble[1] == pytest.approx(1e-3 * DETECTING.give_way_ms)
+    feet.force[1] = 0.0
+    assert feet.run(DETECTING.give_way_ms - 1, PAIR, 0.65, 0).lift[1] == 0.0
+    state = feet.run(2, PAIR, 0.65, 0)
+    assert state.lift[1] == 0.65
+    assert state.stumble[1] == 0.0
+
+
+def test_a_stance_foot_beside_a_block_is_no_contact_until_it_stands_on_something() -> None:
+    feet = Feet()
+    feet.force[:] = [LOAD, 0.0, 0.0, 0.0]
+    feet.run(20, OTHER, 0.9, 1)
+    feet.state.felt[0] = [50.0, 0.0, 10.0]
+    feet.force[0] = 0.0
+    assert feet.run(20, PAIR, 0.1, 0).contact[0] == 0.0
+    feet.force[0] = LOAD
+    assert feet.run(20, PAIR, 0.2, 0).contact[0] == 0.0
+    feet.state.felt[0] = [10.0, 0.0, 50.0]
+    assert feet.run(1, PAIR, 0.3, 0).contact[0] == 1.0
+
+
+def test_feet_wait_to_swing_until_the_others_carry() -> None:
+    feet = Feet(WAITING)
+    feet.run(50, PAIR, 0.9, 0)
+    feet.force[1] = 0.0  # FR is late
+    state = feet.run(3, OTHER, 0.05, 1)
+    np.testing.assert_array_equal(state.contact, np.ones(4))
+    assert (state.lift[[0, 3]] == -1.0).all()
+    feet.force[1] = LOAD
+    state = feet.run(1, OTHER, 0.1, 1)
+    np.testing.assert_array_equal(state.contact, OTHER)
+    assert (state.lift[[0, 3]] == 0.1).all()
+
+
+def test_feet_wait_no_longer_than_they_may() -> None:
+    feet = Feet(WAITING)
+    feet.run(50, PAIR, 0.9, 0)
+    feet.force[1] = 0.0
+    hold = 1e-3 * WAITING.liftoff_hold_ms / 0.2
+    assert feet.run(1, OTHER, 0.99 * hold, 1).contact[0] == 1.0
+    assert feet.run(1, OTHER, hold, 1).contact[0] == 0.0
 
 
 def test_a_late_foot_latches_the_ground_where_it_first_bears_load() -> None:

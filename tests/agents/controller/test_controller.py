@@ -111,7 +111,7 @@ def test_swing_feet_follow_their_reference(seed: int) -> None:
         )  # fmt: skip
         x, v, a = swing_reference(
             before.estimate.p_foot[leg], target, ground[[0, 3]].mean(),
-            ground.max() + config.swing_height, 0.4, 0.2,
+            ground.max() + config.swing_height, 0.4, 0.2, config.swing_delay,
         )  # fmt: skip
         world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         v_foot = pin.getFrameVelocity(MODEL, data, FEET[leg], world).linear
@@ -119,6 +119,55 @@ def test_swing_feet_follow_their_reference(seed: int) -> None:
         expected += config.kd_swing * (v - v_foot)
         np.testing.assert_allclose(acted.goal.swing[leg], expected, atol=1e-8)
     assert not acted.goal.swing[[0, 3]].any()
+
+
+def hanging(controller: Controller, pose: Pose, ticks: int = 30) -> Acted:
+    """A robot whose scheduled stance feet find nothing to stand on."""
+    memory = step(controller, None, standing_pose(), STANDING).memory
+    for _ in range(ticks):
+        acted = step(controller, memory, pose, Schedule(TROT, 0.3, 0), load=np.zeros(4))
+        memory = acted.memory
+    return acted
+
+
+def test_a_robot_in_the_air_falls_and_reaches_for_the_ground() -> None:
+    """As fast as it sinks and no farther than its legs are long."""
+    config, pose = Config().controller, standing_pose()
+    pose.estimate.velocity[2] = pose.v[2] = -1.0
+    acted = hanging(controller_of(), pose)
+    assert not acted.memory.contact.any()
+    np.testing.assert_array_equal(acted.goal.trunk, [0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0])
+    before = hanging(controller_of(), pose, ticks=29).memory
+    descent = (before.foot_goal - acted.memory.foot_goal)[[0, 3], 2]
+    np.testing.assert_allclose(descent, 1e-3 * (config.descent_speed + 1.0), atol=1e-12)
+    lowest = hanging(controller_of(), pose, ticks=500).memory.foot_goal[[0, 3], 2]
+    assert (lowest > pose.estimate.position[2] - 0.4).all()
+
+
+def test_a_foot_that_stumbles_rises_and_moves_away_from_what_stopped_it() -> None:
+    """While it gives way; then its swing begins anew from where it is."""
+    controller, config, pose = controller_of(), Config().controller, standing_pose()
+    load = 30.0 * TROT
+    memory = step(controller, None, pose, STANDING).memory
+    memory = step(controller, memory, pose, Schedule(TROT, 0.0, 0), load=load).memory
+    task = replace(REST, vx=0.5)  # the foot stays where it is: something holds it
+    for tick in range(1, 80):
+        memory = step(controller, memory, pose, Schedule(TROT, tick / 200, 0), task, load).memory
+    memory.felt[1] = [-60.0, 0.0, 10.0]
+    acted = step(
+        controller, memory, pose, Schedule(TROT, 0.4, 0), task, np.array([30.0, 30.0, 0.0, 30.0])
+    )
+    assert acted.memory.contact[1] == 0.0
+    assert acted.memory.stumble[1] == pytest.approx(1e-3 * config.give_way_ms)
+    away = config.kd_swing * config.stumble_lift
+    np.testing.assert_allclose(acted.goal.swing[1], [-0.3 * away, 0.0, away], atol=1e-9)
+    for tick in range(81, 100):
+        memory = acted.memory
+        acted = step(controller, memory, pose, Schedule(TROT, tick / 200, 0), task, load)
+        if acted.memory.lift[1] > 0.0:
+            break
+    assert acted.memory.lift[1] == tick / 200
+    np.testing.assert_array_equal(acted.memory.swing_start[1], pose.estimate.p_foot[1])
 
 
 def test_planned_deviations_are_asked_of_the_stance_feet_in_the_yaw_frame() -> None:

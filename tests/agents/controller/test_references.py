@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from agents.controller.controller import Task
 from agents.controller.estimator import Estimate
-from agents.controller.references import single_rigid_body, trunk_gains
+from agents.controller.references import fall_freely, single_rigid_body, trunk_gains
 from shared.config import ControllerConfig
-from shared.robot import STAND_HEIGHT, Array
+from shared.robot import GRAVITY, STAND_HEIGHT, Array
 from tests.agents.controller.parts import (
     Integrators,
     initial_integrators,
@@ -183,3 +183,11 @@ def test_the_speed_integral_forgets() -> None:
         if tick in (1000, 5000, 20_000):
             expected = 0.004 * CONFIG.leak_xy * -np.expm1(-1e-3 * tick / CONFIG.leak_xy)
             assert state.speed[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_only_a_robot_in_the_air_is_asked_to_fall_freely() -> None:
+    trunk = np.arange(1.0, 7.0)
+    fall_freely(trunk, np.array([0.0, 1.0, 0.0, 0.0]))
+    np.testing.assert_array_equal(trunk, np.arange(1.0, 7.0))
+    fall_freely(trunk, np.zeros(4))
+    np.testing.assert_array_equal(trunk, [0.0, 0.0, -GRAVITY, 0.0, 0.0, 0.0])

@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from agents.controller.kinematics import hip_neutral
-from agents.controller.swing import foothold, swing_reference
+from agents.controller.swing import foothold, swing_reference, within_reach
 from shared.robot import FOOT_RADIUS, Array
 
 START, TARGET = np.array([0.1, -0.2, 0.03]), np.array([0.25, -0.15])
 GROUND, APEX, DURATION = 0.01, 0.12, 0.2
 
 
-def reference(progress: float) -> Array:
-    return swing_reference(START, TARGET, GROUND, APEX, progress, DURATION)
+def reference(progress: float, delay: float = 0.0) -> Array:
+    return swing_reference(START, TARGET, GROUND, APEX, progress, DURATION, delay)
 
 
 def test_a_swing_starts_where_the_foot_is_and_at_rest() -> None:
@@ -52,16 +52,18 @@ def test_at_half_time_the_foot_is_at_its_apex() -> None:
     arrays(np.float64, 3, elements=st.floats(-0.3, 0.3)),
     arrays(np.float64, 2, elements=st.floats(-0.3, 0.3)),
     st.floats(-0.1, 0.1), st.floats(0.05, 0.2), st.floats(0.01, 0.99), st.floats(0.1, 0.5),
+    st.floats(0.0, 0.3),
 )  # fmt: skip
 @settings(deadline=None, max_examples=50)
 def test_velocity_and_acceleration_are_the_derivatives(
-    start: Array, target: Array, ground: float, apex: float, progress: float, duration: float
-) -> None:
-    if abs(progress - 0.9) < 1e-3:  # the plane's jerk jumps where it is done
-        progress = 0.5
+    start: Array, target: Array, ground: float, apex: float, progress: float, duration: float,
+    delay: float,
+) -> None:  # fmt: skip
+    if min(abs(progress - 0.9), abs(progress - delay)) < 1e-3:
+        progress = 0.5  # the plane's jerk jumps where it begins and where it is done
     h = 1e-4
     before, now, after = (
-        swing_reference(start, target, ground, apex, progress + step, duration)
+        swing_reference(start, target, ground, apex, progress + step, duration, delay)
         for step in (-h, 0.0, h)
     )
     dt = h * duration
@@ -69,6 +71,34 @@ def test_velocity_and_acceleration_are_the_derivatives(
         now[1], (after[0] - before[0]) / (2 * dt), atol=1e-5 + 1e-6 / duration
     )
     np.testing.assert_allclose(now[2], (after[1] - before[1]) / (2 * dt), atol=1e-3, rtol=1e-4)
+
+
+def test_a_delayed_swing_rises_before_it_goes_forward() -> None:
+    position, velocity, _ = reference(0.2, delay=0.2)
+    np.testing.assert_array_equal(position[:2], START[:2])
+    np.testing.assert_array_equal(velocity[:2], 0.0)
+    np.testing.assert_allclose(reference(0.9, delay=0.2)[0, :2], TARGET, atol=1e-15)
+    assert position[2] == reference(0.2)[0, 2] > START[2] + 0.02
+
+
+@given(
+    arrays(np.float64, 2, elements=st.floats(-0.3, 0.3)), st.floats(1.0, 200.0),
+    st.floats(0.02, 0.3),
+)  # fmt: skip
+@settings(deadline=None, max_examples=50)
+def test_a_foothold_within_reach_asks_for_no_more_acceleration(
+    way: Array, acceleration: float, duration: float
+) -> None:
+    start, target = np.array([0.1, 0.2]), np.array([0.1, 0.2]) + way
+    within_reach(target, start, acceleration, duration)
+    found = target - start
+    s = np.linspace(0.0, 1.0, 1001)
+    bend = np.abs(60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)).max() / duration**2
+    assert np.linalg.norm(found) * bend <= acceleration * (1.0 + 1e-5)
+    shortened = np.linalg.norm(found) < np.linalg.norm(way) - 1e-9
+    if shortened:
+        assert np.linalg.norm(found) * bend == pytest.approx(acceleration, rel=1e-4)
+    np.testing.assert_allclose(found * np.linalg.norm(way), way * np.linalg.norm(found), atol=1e-9)
 
 
 @given(st.integers(0, 3), st.integers(0, 2**31))

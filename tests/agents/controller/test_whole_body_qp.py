@@ -26,6 +26,7 @@ from tests.agents.controller.full_qp import desired, dynamics, solve_full
 from tests.agents.controller.poses import Pose, random_pose, standing_pose
 
 WEIGHTS = Weights(1e2, 1e3, 1e6, 0.6, 2.0)
+BY_LENGTH = Weights(1e2, 1e3, 1e6, 0.6, 2.0, tilt_length=0.15, swing_weight=0.3)
 STANCES = [np.array(legs, dtype=float) for legs in itertools.product((0, 1), repeat=4)]
 ALL = np.ones(4)
 TROT = np.array([1.0, 0.0, 0.0, 1.0])
@@ -62,13 +63,14 @@ def check_limits(solution: Solution, goal: Goal, weights: Weights = WEIGHTS) -> 
 
 @pytest.mark.parametrize("contact", STANCES, ids=lambda c: "".join(str(int(x)) for x in c))
 @pytest.mark.parametrize("size", [1.0, 20.0])
-def test_the_reduced_problem_is_the_full_one(contact: Array, size: float) -> None:
+@pytest.mark.parametrize("weights", [WEIGHTS, BY_LENGTH], ids=["plain", "by_length"])
+def test_the_reduced_problem_is_the_full_one(contact: Array, size: float, weights: Weights) -> None:
     """Torques, forces and defect of the formulation with 12 + 3 n_c + n_h variables."""
     random = np.random.default_rng(round(size) + int(contact @ [1, 2, 4, 8]))
     for _ in range(2):
         pose, goal = random_pose(random), random_goal(random, contact, size)
-        solution = solution_of(pose, goal)
-        tau, force, defect = solve_full(pose, goal, WEIGHTS)
+        solution = solution_of(pose, goal, weights)
+        tau, force, defect = solve_full(pose, goal, weights)
         np.testing.assert_allclose(solution.tau, tau, atol=1e-5)
         np.testing.assert_allclose(solution.force[contact > 0.5].ravel(), force, atol=1e-4)
         np.testing.assert_allclose(solution.defect, defect, atol=1e-4)
@@ -103,6 +105,20 @@ def test_active_limits_are_those_of_the_full_problem(
     tau, full_force, _ = solve_full(pose, goal, WEIGHTS)
     np.testing.assert_allclose(solution.tau, tau, atol=1e-5)
     np.testing.assert_allclose(force.ravel(), full_force, atol=1e-4)
+
+
+def test_what_cannot_be_had_together_is_weighed_by_the_length() -> None:
+    """Two feet cannot turn the trunk about the line between them: what is given up for it?"""
+    across = np.array([0.1805, 0.1308]) / np.hypot(0.1805, 0.1308)
+    trunk = np.array([0.0, 0.0, 5.0, *(100.0 * across), 0.0])
+    linear, angular = [], []
+    for weights in (WEIGHTS, replace(WEIGHTS, tilt_length=0.15)):
+        solution = solution_of(standing_pose(), goal_of(TROT, trunk), weights)
+        assert solution.solved
+        linear.append(np.linalg.norm(solution.defect[:3]))
+        angular.append(np.linalg.norm(solution.defect[3:6]))
+    assert linear[1] < 0.9 * linear[0]
+    assert angular[1] > angular[0]
 
 
 @given(st.integers(0, 2**31), st.sampled_from(STANCES), st.floats(0.1, 50.0))

@@ -1,0 +1,44 @@
+"""How much friction to count on: less once feet slide, and slowly more again."""
+
+from __future__ import annotations
+
+from shared.jit import compiled
+from shared.robot import Array
+
+_SETTLED = 0.2  # of a half period: before this a foot may still be landing
+_LOSS = 15.0  # 1/s, of the coefficient counted on while a foot slides
+
+
+@compiled
+def caution(
+    caution0: float, contact: Array, stance: Array, progress: float, v_foot: Array,
+    slip_speed: float, mu: float, mu_least: float, recovery: float, dt: float,
+) -> float:  # fmt: skip
+    """What is taken off the friction coefficient `mu`, so that feet that slide find hold again.
+
+    A foot in contact slides where it moves along the ground faster than rolling would make it. A
+    foot that slides gives less than the QP asks of it, and not in the direction asked; friction
+    that is not there is then not counted on: ċ = 15/s while one slides, ċ = −`recovery` else, and
+    0 ≤ c ≤ `mu` − `mu_least`.
+
+    Args:
+        caution0: c at the last tick.
+        contact: 1 for the feet the QP may push on, (4,).
+        stance: scheduled stance, (4,).
+        progress: progress of the half period in [0, 1).
+        v_foot: velocities of the foot centres, (4, 3), m/s, odometry frame.
+        slip_speed: from which on a foot slides, m/s; 0: never.
+        mu: coefficient counted on where nothing slides.
+        mu_least: coefficient that is always counted on.
+        recovery: by which c falls, 1/s.
+        dt: time since the last tick, s.
+    """
+    if slip_speed <= 0.0:
+        return 0.0
+    slides = False
+    if progress >= _SETTLED:
+        for leg in range(4):
+            if contact[leg] > 0.5 and stance[leg] > 0.5:
+                slides = slides or v_foot[leg, 0] ** 2 + v_foot[leg, 1] ** 2 > slip_speed**2
+    rate = _LOSS if slides else -recovery
+    return min(max(0.0, mu - mu_least), max(0.0, caution0 + rate * dt))
