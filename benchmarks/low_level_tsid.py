@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -77,7 +77,8 @@ def _compare(config: Config, found: list[Case]) -> dict[str, Any] | None:
 def _turns(config: Config, found: list[Case]) -> dict[str, Any]:
     from low_level_peer import Tsid
 
-    weights = Controller(config).weights
+    # TSID weighs turning like moving, and a foot like the trunk: so do both here.
+    weights = replace(Controller(config).weights, tilt_length=1.0, swing_weight=1.0)
     ours, peer = _Ours(weights), Tsid(weights)
     times, differences = np.empty((2, len(found))), []
     for case in found[:20]:
