@@ -40,7 +40,7 @@ _CODE = (
     ),
     (
         sim_server,
-        ("team_model.py", "a1_body.py", "sensors.py", "world.py", "terrain.py"),
+        ("team_model.py", "a1_body.py", "sensors.py", "motors.py", "world.py", "terrain.py"),
     ),
     (quadriga, ("collect.py", "rollout.py")),
 )
