@@ -245,6 +245,10 @@ class ControllerConfig:
         True, "-", "a descending foot goes down with the trunk; feet are asked to where legs reach"
     )
     flight: bool = key(True, "-", "without contact the trunk is asked to fall freely")
+    load_time: float = key(
+        1.0, "s", "filter of the load that the feet feel; 0: the robot counts on none", low=0.0,
+        high=100.0,
+    )  # fmt: skip
     swing_delay: float = key(
         0.1, "1", "share of swing in which a foot rises before it goes forward", low=0.0, high=0.5
     )

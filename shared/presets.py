@@ -12,7 +12,8 @@ _PAPER: Final = MappingProxyType(
     {
         "ki_z": 0.0, "kp_xy": 100.0, "kd_xy": 20.0, "ki_xy": 0.0, "leash": 0.05,
         "kp_tilt": 400.0, "kd_tilt": 40.0, "contact_detection": False, "swing_height": 0.07,
-        "tell_sides": False, "liftoff_hold_ms": 0, "give_way_ms": 0, "swing_delay": 0.0,
+        "load_time": 0.0, "tell_sides": False, "liftoff_hold_ms": 0, "give_way_ms": 0,
+        "swing_delay": 0.0,
         "follow_fall": False, "flight": False, "slip_speed": 0.0,
         "swing_acceleration": 1e4, "contact_force": 8.0, "force_min": 2.0,
         "descent_speed": 0.5, "tilt_length": 1.0, "swing_weight": 1.0,

@@ -20,11 +20,13 @@ from agents.controller.estimator import (
 )
 from agents.controller.feet import feet_demand, foot_velocities
 from agents.controller.friction import caution
+from agents.controller.load import loaded
 from agents.controller.memory import (
     CAUTION,
     COUNT,
     HEIGHT,
     LEVEL,
+    LOAD,
     SIZE,
     YAW,
     Memory,
@@ -193,7 +195,7 @@ class Controller:
             )  # fmt: skip
             if rows:
                 return Acted(Memory(new), asked, Solution(x, whole_body_qp.UNCONSTRAINED, rows))
-            terms = self.body.terms(seen.flat[0:19], seen.flat[19:37])
+            terms = self.body.terms(seen.flat[0:19], seen.flat[19:37], new[LOAD])
             goal = _goal(asked, legs_of(new)[0])
             weights = replace(self.weights, mu=self.weights.mu - new[CAUTION])
             solution = whole_body_qp.solve_goal(terms, seen.R, seen.p_foot, goal, weights)
@@ -246,10 +248,11 @@ def _act(
     stance, progress = schedule[0:4], schedule[4]
     position, v_trunk, R, omega = trunk_of(seen)
     q, v = coordinates_of(seen)
-    p_foot, mass = feet_of(seen), feet[6]
+    p_foot, mass = feet_of(seen), feet[6] + memory0[LOAD]
     M_inverse, nle = np.empty((18, 18)), np.empty(18)
     J, dJ = np.empty((6, 18)), np.empty((6, 18))
-    rigid_body_terms(q, v, links, M_inverse, nle, J, dJ)
+    load = memory0[LOAD]
+    rigid_body_terms(q, v, loaded(links, load), M_inverse, nle, J, dJ)
     memory[:] = memory0
     deviation = note_forces(memory, planned, stance, new_sample)
     speed, lead = speed_of(memory)
@@ -272,7 +275,7 @@ def _act(
     lift, stumble, felt = swings_of(memory)
     demand = feet_demand(
         start, goal, contact, stance, progress, seen[SWITCHED] > 0.5, legs[1], lift, stumble, felt,
-        ground, position, v_trunk, R, p_foot, v_foot, v_des, wz, deviation, dt, feet,
+        ground, position, v_trunk, R, p_foot, v_foot, v_des, wz, deviation, dt, feet, mass,
     )  # fmt: skip
     start[:], goal[:] = demand[0], demand[1]
     asked[:6], asked[6:18], asked[18:] = trunk, demand[2].ravel(), demand[3].ravel()

@@ -19,13 +19,13 @@ def feet_demand(
     swing_start0: Array, foot_goal0: Array, contact: Array, stance: Array, progress: float,
     switched: bool, early: Array, lift: Array, stumble: Array, felt: Array, ground: Array,
     position: Array, velocity: Array, R: Array, p_foot: Array, v_foot: Array, v_des: Array,
-    wz: float, deviation: Array, dt: float, constants: Array,
+    wz: float, deviation: Array, dt: float, constants: Array, mass: float,
 ) -> Array:  # fmt: skip
     """New swing starts and foot goals, desired accelerations and forces, rows of (4, 4, 3).
 
     `lift`, `stumble` and `felt` are those of `Memory`; what each foot feels is updated in place.
     """
-    duration, raibert_gain, height, descent_speed, kp, kd, mass = constants[:7]
+    duration, raibert_gain, height, descent_speed, kp, kd = constants[:6]
     swing_start, foot_goal = _feet_anchors(
         swing_start0, foot_goal0, p_foot, contact, stance, switched, progress, early, lift,
         position, velocity, descent_speed * dt, dt, constants[10] > 0.5,

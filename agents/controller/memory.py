@@ -13,13 +13,14 @@ from shared.jit import compiled
 from shared.record import record
 from shared.robot import Array
 
-SIZE: Final = 140
+SIZE: Final = 141
 LEVEL: Final = 102  # filtered height of the ground under the stance feet, m
 HALF: Final = 103  # number of the gait's half period, to notice a switch
 HEIGHT: Final = 104  # integral of the height error, m·s
 YAW: Final = 105  # desired heading, rad
 COUNT: Final = 118  # ticks of the present sample
 CAUTION: Final = 139  # what is taken off the friction coefficient
+LOAD: Final = 140  # what the robot carries, kg
 
 
 @compiled
@@ -60,7 +61,7 @@ def forces_of(flat: Array) -> Array:
 
 @record
 class Memory:
-    """The low level's memory; `flat` is (140,) and not to be changed."""
+    """The low level's memory; `flat` is (141,) and not to be changed."""
 
     flat: Array
 
@@ -140,6 +141,11 @@ class Memory:
     def caution(self) -> float:
         """What is taken off the friction coefficient the QP may use, because feet slid."""
         return float(self.flat[CAUTION])
+
+    @property
+    def load(self) -> float:
+        """What the robot seems to carry, kg."""
+        return float(self.flat[LOAD])
 
     @property
     def felt(self) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from agents.controller.load import loaded
 from agents.controller.rigid_body import link_table, rigid_body_terms
 from shared.a1_model import build_pinocchio_model
 from shared.record import record
@@ -55,8 +56,13 @@ class RigidBody:
         self.mass: float = float(pin.computeTotalMass(model))
         self.inertia_inverse, self.com = _single_rigid_body(model)
 
-    def terms(self, q: Array, v: Array) -> Terms:
-        """Terms at Pinocchio's coordinates, (19,) and (18,), quaternion normalised."""
+    def terms(self, q: Array, v: Array, load: float = 0.0) -> Terms:
+        """Terms at Pinocchio's coordinates, (19,) and (18,), of a robot with a load, kg.
+
+        The quaternion is normalised.
+        """
         terms = Terms(np.empty((18, 18)), np.empty(18), np.empty((6, 18)), np.empty((6, 18)), v)
-        rigid_body_terms(q, v, self.links, terms.M_inverse, terms.nle, terms.J, terms.dJ)
+        rigid_body_terms(
+            q, v, loaded(self.links, load), terms.M_inverse, terms.nle, terms.J, terms.dJ
+        )
         return terms

@@ -8,12 +8,13 @@ import numpy as np
 
 from agents.controller.contact import contacts_by_force, contacts_by_schedule
 from agents.controller.estimator import filter_step, foot_trust, noise_parameters
-from agents.controller.memory import HALF, LEVEL, Memory, filter_of, legs_of, swings_of
+from agents.controller.load import felt_load
+from agents.controller.memory import HALF, LEVEL, LOAD, Memory, filter_of, legs_of, swings_of
 from agents.controller.rotation import roll_pitch_yaw
 from shared.config import Config
 from shared.jit import compiled
 from shared.record import record
-from shared.robot import Array
+from shared.robot import TOTAL_MASS, Array
 
 SEEN_SIZE: Final = 68
 SWITCHED: Final = 67  # 1 if stances and swings have just ended
@@ -81,7 +82,7 @@ class Seen:
 
 
 def sensing_constants(config: Config) -> Array:
-    """What `sense` needs of the configuration. Shape (14,)."""
+    """What `sense` needs of the configuration. Shape (15,)."""
     controller, estimator = config.controller, config.estimator
     return np.array(
         [
@@ -89,7 +90,7 @@ def sensing_constants(config: Config) -> Array:
             controller.contact_force, 1e-3 * controller.lost_contact_ms,
             1e-3 * controller.ground_filter_ms, *noise_parameters(estimator),
             controller.liftoff_hold_ms / config.gait.stance_ms, 1e-3 * controller.give_way_ms,
-            float(controller.tell_sides),
+            float(controller.tell_sides), controller.load_time,
         ]
     )  # fmt: skip
 
@@ -168,6 +169,8 @@ def place(
         )  # fmt: skip
     legs_of(memory)[:] = legs
     memory[LEVEL], memory[HALF] = level, half
+    if constants[14] > 0.0:
+        memory[LOAD] = felt_load(memory0[LOAD], foot_force, TOTAL_MASS, dt / (constants[14] + dt))
 
 
 @compiled

@@ -102,7 +102,7 @@ def captured(about: str) -> Iterator[dict[str, SavedQp]]:
     def whole_body(act: Callable[..., Acted]) -> Callable[..., Acted]:
         def observed(low_level: Controller, seen: Seen, *arguments: Any, **named: Any) -> Acted:
             acted = act(low_level, seen, *arguments, **named)
-            terms = low_level.body.terms(seen.flat[:19], seen.flat[19:37])
+            terms = low_level.body.terms(seen.flat[:19], seen.flat[19:37], acted.memory.load)
             problem = build(terms, seen.R, seen.p_foot, acted.goal, low_level.weights)
             box = np.full(len(problem.H), TORQUE_LIMIT)
             found[WHOLE_BODY] = SavedQp(
