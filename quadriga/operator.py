@@ -60,30 +60,34 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
         put = bus.publisher(REFERENCE.key(team))
         if not meet(bus, config, stopped):
             return
-        tick: int | None = 0
-        epoch = 0
-        while tick is not None and not stopped():
+        tick, epoch, over = 0, 0, False
+        while True:
             while EPOCH_MS * epoch <= tick + EPOCH_MS * _AHEAD:
                 put(encode(reference_at(config, EPOCH_MS * epoch)))
                 epoch += 1
+            if over or stopped():
+                return
             bus.declare(READY)
-            tick = _next_tick(bus, tick)
+            tick, over = _next_tick(bus, tick)
 
 
-def _next_tick(bus: Bus, tick: int) -> int | None:
-    """The world's time as far as it has come; None when the walk is over."""
+def _next_tick(bus: Bus, tick: int) -> tuple[int, bool]:
+    """The world's time as far as it has come, and whether the walk is over.
+
+    A walk ends at the same tick for an operator who is behind: equal walks have equal references.
+    """
     packet = bus.get(POLL)
     if packet is None:
-        return tick if SIM in bus.present(HERE) else None
+        return tick, SIM not in bus.present(HERE)
     for key, payload in (packet, *bus.drain()):
         try:
             if key == TRUTH.key(bus.team):
                 tick = max(tick, decode(payload, Truth).tick)
-            elif decode(payload, Event).kind == "stop":
-                return None
+            elif (event := decode(payload, Event)).kind == "stop":
+                return max(tick, event.tick - 1), True
         except MessageError:
             continue  # not for the operator to count: the recorder keeps it
-    return tick
+    return tick, False
 
 
 def stop_team(config: Config, reason: str) -> None:

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from quadriga.operator import reference_at
-from shared.config import Config
+from quadriga.endpoint import free_endpoint
+from quadriga.operator import _next_tick, reference_at
+from shared.barrier import OPERATOR, SIM
+from shared.bus import HERE, Bus
+from shared.codec import encode
+from shared.config import BusConfig, Config
 from shared.config_file import load
+from shared.messages import Event, Truth
+from shared.topics import EVENT, TRUTH
 
 
 def test_stand_then_ramp_then_full_speed() -> None:
@@ -37,3 +44,34 @@ def test_a_trace_is_followed_from_the_first_step_on(tmp_path: Path) -> None:
     assert [r.vx for r in asked] == pytest.approx([0.0, 0.0, 0.05, 0.4, 0.0, 0.4])
     assert (asked[3].vy, asked[3].wz) == pytest.approx((0.2, -0.2))
     assert asked[3].height == Config().reference.height
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_a_walk_ends_at_the_same_tick_for_who_is_behind(late: bool) -> None:
+    """Else the last references of two equal walks would depend on who was faster."""
+    config = BusConfig(endpoint=free_endpoint())
+    zero = np.zeros((1, 3))
+    with Bus.open(config, "team", SIM) as sim, Bus.open(config, "team", OPERATOR) as operator:
+        for key in (TRUTH.key("team"), EVENT.key("team")):
+            operator.subscribe(key)
+        operator.declare(HERE)
+        assert sim.wait_for(HERE, {OPERATOR}, 10.0, lambda: False)
+        sim.declare(HERE)
+        assert operator.wait_for(HERE, {SIM}, 10.0, lambda: False)
+        truth, event = sim.publisher(TRUTH.key("team")), sim.publisher(EVENT.key("team"))
+        heard = 0
+        for tick in range(0, 800, 10):
+            truth(encode(Truth(
+                tick, tick * 10**6, ("r1",), zero, np.zeros((1, 4)), zero, zero,
+                np.zeros((1, 4, 3)), np.zeros(0), np.zeros(0),
+            )))  # fmt: skip
+            while not late and heard < tick:
+                heard, over = _next_tick(operator, heard)
+                assert not over
+        event(encode(Event(800, 800 * 10**6, "stop", "", "end of world.seconds")))
+        if late:
+            sim.close()  # it leaves once all has arrived
+        over = False
+        while not over:
+            heard, over = _next_tick(operator, heard)
+        assert heard == 799
