@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from itertools import accumulate
+from functools import partial
 from math import isfinite, prod
 from typing import Any, Final, TypeVar
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from shared.errors import MessageError
 from shared.flat_layout import FlatLayout
-from shared.messages import Flat, Message
+from shared.messages import Flat, Message, cuts_of
 from shared.robot import Array
 
 M = TypeVar("M", bound=Message)
@@ -50,10 +50,8 @@ def decode(payload: bytes, kind: type[M]) -> M:
     if layout.flat is not None and (found := layout.flat.read(payload)) is not None:
         tick, stamp_ns, row = found
         if tick < MAX_TICK:
-            if layout.in_one_row:
-                return kind.of(tick, stamp_ns, row)  # type: ignore[attr-defined,no-any-return]
-            row.setflags(write=False)
-            return kind(tick, stamp_ns, *(row[cut] for cut in layout.cuts))
+            made: M = layout.of(tick, stamp_ns, row)
+            return made
     if len(payload) > MAX_BYTES:
         raise _error(kind, f"{len(payload)} bytes", f"at most {MAX_BYTES}", "a foreign publisher?")
     try:
@@ -122,14 +120,22 @@ class _Layout:
         self.order = (*self.plain, *self.shapes)  # as `encode` writes them
         self.names = {*self.order}
         self.in_order = self.order == tuple(item.name for item in fields(kind))
-        self.in_one_row = issubclass(kind, Flat)
         sizes = {name: shape[0] for name, shape in self.shapes.items() if len(shape) == 1}
         fixed = {name: size for name, size in sizes.items() if isinstance(size, int)}
         self.flat: FlatLayout | None = None
+        self.of: Callable[[int, int, Array], Any]  # makes a message of a row, if there is `flat`
         if fixed and fixed.keys() == self.shapes.keys() and tuple(self.plain) == _ENVELOPE:
-            self.flat = FlatLayout(kind.SCHEMA, fixed)
-            ends = list(accumulate(fixed.values()))
-            self.cuts = [slice(a, b) for a, b in zip([0, *ends], ends, strict=False)]
+            cuts = cuts_of(fixed)
+            self.flat = FlatLayout(kind.SCHEMA, cuts)
+            self.of = kind.of if issubclass(kind, Flat) else partial(_divided, kind, cuts)
+
+
+def _divided(
+    kind: type[Message], cuts: Mapping[str, slice], tick: int, stamp_ns: int, row: Array
+) -> Message:
+    row.setflags(write=False)
+    arrays: Any = {name: row[cut] for name, cut in cuts.items()}
+    return kind(tick, stamp_ns, **arrays)
 
 
 _LAYOUTS: dict[type[Message], _Layout] = {}

@@ -8,7 +8,6 @@ parser is dear not for what it computes but for all the code it goes through wit
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import accumulate
 from typing import Final
 
 import msgpack
@@ -29,17 +28,18 @@ class FlatLayout:
 
     Args:
         schema: its version.
-        sizes: number of float64 in each field, in the order of the wire and of the row.
+        cuts: where each field's numbers are in the row, in the order of the wire.
     """
 
-    def __init__(self, schema: int, sizes: Mapping[str, int]) -> None:
-        zeros = {name: bytes(8 * size) for name, size in sizes.items()}
+    def __init__(self, schema: int, cuts: Mapping[str, slice]) -> None:
+        self._cuts = [slice(8 * cut.start, 8 * cut.stop) for cut in cuts.values()]  # bytes
+        zeros = {name: bytes(8 * (cut.stop - cut.start)) for name, cut in cuts.items()}
         whole: bytes = msgpack.packb({"schema": schema, "tick": 0, "stamp_ns": 0, **zeros})
         cut = whole.index(_TICK) + len(_TICK)
         self._head, tail = whole[:cut], whole[cut + 1 + len(_STAMP) + 1 :]
         self._head_bytes = np.frombuffer(self._head, np.uint8)
         self._tail_bytes = np.frombuffer(tail, np.uint8)
-        self._size = sum(sizes.values())
+        self._size = max(cut.stop for cut in cuts.values())
         self._names: list[bytes] = []  # what precedes the numbers of each field
         spans, at = [], 0  # where those begin in the tail, how many bytes they are
         for name, raw in zeros.items():
@@ -48,8 +48,6 @@ class FlatLayout:
             at = start + len(raw)
             spans.append((start, len(raw)))
         self._spans = np.array(spans)
-        ends = list(accumulate(8 * size for size in sizes.values()))
-        self._cuts = [slice(a, b) for a, b in zip([0, *ends], ends, strict=False)]
 
     def write(self, tick: int, stamp_ns: int, row: Array) -> bytes:
         """The message's bytes, those of MessagePack."""

@@ -79,15 +79,21 @@ class Flat(Message):
 def flat_record(cls: type[F]) -> type[F]:
     """A record that is `Flat`."""
     made: Any = dataclass(init=False, eq=False)(cls)
-    sizes = {f.name: f.metadata["shape"][0] for f in fields(made) if "shape" in f.metadata}
-    stops = accumulate(sizes.values())
-    made.CUTS = {
-        name: slice(stop - size, stop)
-        for (name, size), stop in zip(sizes.items(), stops, strict=True)
-    }
+    made.CUTS = cuts_of(
+        {f.name: f.metadata["shape"][0] for f in fields(made) if "shape" in f.metadata}
+    )
     for name, cut in made.CUTS.items():
         setattr(made, name, property(partial(_view, cut)))
     return made  # type: ignore[no-any-return]
+
+
+def cuts_of(sizes: Mapping[str, int]) -> dict[str, slice]:
+    """Where arrays of these sizes are in a row, one behind the other."""
+    stops = accumulate(sizes.values())
+    return {
+        name: slice(stop - size, stop)
+        for (name, size), stop in zip(sizes.items(), stops, strict=True)
+    }
 
 
 def _view(cut: slice, message: Flat) -> Array:

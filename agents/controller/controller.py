@@ -53,7 +53,7 @@ from agents.controller.sensing import (
     sensing_constants,
     trunk_of,
 )
-from agents.controller.whole_body_qp import Goal, Solution, Weights, closed_form
+from agents.controller.whole_body_qp import Goal, Problem, Solution, Weights, closed_form
 from shared.config import Config
 from shared.jit import compiled
 from shared.messages import State
@@ -195,13 +195,27 @@ class Controller:
             )  # fmt: skip
             if rows:
                 return Acted(Memory(new), asked, Solution(x, whole_body_qp.UNCONSTRAINED, rows))
-            terms = self.body.terms(seen.flat[0:19], seen.flat[19:37], new[LOAD])
             goal = _goal(asked, legs_of(new)[0])
-            weights = replace(self.weights, mu=self.weights.mu - new[CAUTION])
-            solution = whole_body_qp.solve_goal(terms, seen.R, seen.p_foot, goal, weights)
+            problem = self.problem(seen, Memory(new), goal)
+            solution = whole_body_qp.unpack(problem, goal.contact, *whole_body_qp.solve(problem))
         except np.linalg.LinAlgError:
             solution = whole_body_qp.singular()
         return Acted(Memory(new), asked, solution)
+
+    def problem(self, seen: Seen, memory: Memory, goal: Goal) -> Problem:
+        """The QP of a tick.
+
+        Args:
+            seen: what `sense` gave for it.
+            memory: after it.
+            goal: what was asked for.
+
+        Raises:
+            numpy.linalg.LinAlgError: it is singular.
+        """
+        terms = self.body.terms(seen.flat[0:19], seen.flat[19:37], memory.load)
+        weights = replace(self.weights, mu=self.weights.mu - memory.caution)
+        return whole_body_qp.build(terms, seen.R, seen.p_foot, goal, weights)
 
 
 _ASKED = 30  # desired acceleration of the trunk (6), of the feet (12), desired forces (12)
@@ -248,10 +262,10 @@ def _act(
     stance, progress = schedule[0:4], schedule[4]
     position, v_trunk, R, omega = trunk_of(seen)
     q, v = coordinates_of(seen)
-    p_foot, mass = feet_of(seen), feet[6] + memory0[LOAD]
+    p_foot, load = feet_of(seen), memory0[LOAD]
+    mass = feet[6] + load
     M_inverse, nle = np.empty((18, 18)), np.empty(18)
     J, dJ = np.empty((6, 18)), np.empty((6, 18))
-    load = memory0[LOAD]
     rigid_body_terms(q, v, loaded(links, load), M_inverse, nle, J, dJ)
     memory[:] = memory0
     deviation = note_forces(memory, planned, stance, new_sample)

@@ -1,10 +1,10 @@
 """The rigid-body terms of a trunk with four legs of three joints, as one compiled function.
 
-A general library is made for any robot and is called once for each term; with cold caches that
-costs more than all else the low level does. Here everything is a spatial vector (linear, angular)
-about the trunk's origin, in the trunk's frame (Featherstone, Rigid Body Dynamics Algorithms, 2008:
-recursive Newton-Euler, composite rigid bodies); legs touch each other through the trunk alone, so
-M⁻¹ comes from four 3×3 blocks and one Schur complement of 6×6.
+A general library is made for any robot and called once for each term; with cold caches that cost
+nearly as much as the rest of the whole-body QP. Here everything is a spatial vector about the
+trunk's origin, in the trunk's frame (recursive Newton-Euler and composite rigid bodies:
+Featherstone, Rigid Body Dynamics Algorithms, 2008); legs touch each other through the trunk alone,
+so M⁻¹ comes from four 3×3 blocks and one Schur complement of 6×6.
 """
 
 from __future__ import annotations
@@ -16,14 +16,26 @@ import pinocchio as pin
 
 from agents.controller.rotation import rotation_matrix
 from agents.controller.small import factorise, product, solve_factorised
+from agents.controller.spatial import (
+    Inertia,
+    Spatial,
+    Symmetric,
+    Vector,
+    added,
+    combined,
+    inertial_force,
+    joined,
+    momentum_of,
+    motion_cross,
+    plus,
+    power,
+    scaled,
+    to_world,
+    vector_product,
+)
 from shared.errors import ConfigError
 from shared.jit import compiled
 from shared.robot import GRAVITY, Array
-
-Vector = tuple[float, float, float]
-Spatial = tuple[Vector, Vector]  # of a motion or a force: linear and angular part
-Symmetric = tuple[float, float, float, float, float, float]  # xx, xy, xz, yy, yz, zz
-Inertia = tuple[float, Vector, Symmetric]  # mass, mass · centre, moments about the trunk's origin
 
 _JOINTS: Final = ("JointModelFreeFlyer", *4 * ("JointModelRX", "JointModelRY", "JointModelRY"))
 
@@ -71,15 +83,15 @@ def rigid_body_terms(
     x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
     whole = _inertia(links[0], x, y, z, (0.0, 0.0, 0.0))
-    force = _inertial_force(whole, velocity, lifted)
+    force = inertial_force(whole, velocity, lifted)
     turn = np.zeros((6, 12))  # F D⁻¹: what the trunk feels of the legs' joints
     reduced = np.zeros((6, 6))
     M_inverse[:, :] = 0.0
     for column in range(3):
         axis = (R[0, column], R[1, column], R[2, column])
         _put(J, column, axis, (0.0, 0.0, 0.0))
-        _put(J, 3 + column, _cross(position, axis), axis)
-    moved = _to_world(R, position, velocity)
+        _put(J, 3 + column, vector_product(position, axis), axis)
+    moved = to_world(R, position, velocity)
     for column in range(6):
         _derive(J, dJ, column, moved)
 
@@ -93,38 +105,42 @@ def rigid_body_terms(
         x2, z2 = _turned(x, z1, q[first + 2])
         o3 = _point(links[row + 2], x2, y1, z2, o2)
         x3, z3 = _turned(x2, z2, q[first + 3])
-        S1, S2, S3 = (_cross(o1, x), x), (_cross(o2, y1), y1), (_cross(o3, y1), y1)
+        S1, S2, S3 = (
+            (vector_product(o1, x), x),
+            (vector_product(o2, y1), y1),
+            (vector_product(o3, y1), y1),
+        )
 
-        rate1, rate2 = _scaled(S1, v[first]), _scaled(S2, v[first + 1])
-        rate3 = _scaled(S3, v[first + 2])
-        v1 = _sum(velocity, rate1)
-        v2 = _sum(v1, rate2)
-        v3 = _sum(v2, rate3)
-        a1 = _sum(lifted, _motion_cross(v1, rate1))
-        a2 = _sum(a1, _motion_cross(v2, rate2))
-        a3 = _sum(a2, _motion_cross(v3, rate3))
+        rate1, rate2 = scaled(S1, v[first]), scaled(S2, v[first + 1])
+        rate3 = scaled(S3, v[first + 2])
+        v1 = added(velocity, rate1)
+        v2 = added(v1, rate2)
+        v3 = added(v2, rate3)
+        a1 = added(lifted, motion_cross(v1, rate1))
+        a2 = added(a1, motion_cross(v2, rate2))
+        a3 = added(a2, motion_cross(v3, rate3))
 
         link1 = _inertia(links[row], x, y1, z1, o1)
         link2 = _inertia(links[row + 1], x2, y1, z2, o2)
         link3 = _inertia(links[row + 2], x3, y1, z3, o3)
-        f3 = _inertial_force(link3, v3, a3)
-        f2 = _sum(f3, _inertial_force(link2, v2, a2))
-        f1 = _sum(f2, _inertial_force(link1, v1, a1))
-        force = _sum(force, f1)
-        nle[first], nle[first + 1], nle[first + 2] = _dot(S1, f1), _dot(S2, f2), _dot(S3, f3)
+        f3 = inertial_force(link3, v3, a3)
+        f2 = added(f3, inertial_force(link2, v2, a2))
+        f1 = added(f2, inertial_force(link1, v1, a1))
+        force = added(force, f1)
+        nle[first], nle[first + 1], nle[first + 2] = power(S1, f1), power(S2, f2), power(S3, f3)
 
-        link2 = _joined(link2, link3)
-        link1 = _joined(link1, link2)
-        whole = _joined(whole, link1)
-        F1, F2, F3 = _momentum(link1, S1), _momentum(link2, S2), _momentum(link3, S3)
-        D1, D2, D3 = _dot(S1, F1), _dot(S2, F2), _dot(S3, F3)
-        D_inverse = _inverse((D1, _dot(S1, F2), _dot(S1, F3), D2, _dot(S2, F3), D3))
+        link2 = joined(link2, link3)
+        link1 = joined(link1, link2)
+        whole = joined(whole, link1)
+        F1, F2, F3 = momentum_of(link1, S1), momentum_of(link2, S2), momentum_of(link3, S3)
+        D1, D2, D3 = power(S1, F1), power(S2, F2), power(S3, F3)
+        D_inverse = _inverse((D1, power(S1, F2), power(S1, F3), D2, power(S2, F3), D3))
         _eliminate(F1, F2, F3, D_inverse, leg, turn, reduced, M_inverse)
 
         for column, S, motion in ((first, S1, v1), (first + 1, S2, v2), (first + 2, S3, v3)):
-            seen = _to_world(R, position, S)
+            seen = to_world(R, position, S)
             _put(J, column, seen[0], seen[1])
-            _derive(J, dJ, column, _to_world(R, position, motion))
+            _derive(J, dJ, column, to_world(R, position, motion))
 
     for i in range(3):
         nle[i], nle[3 + i] = force[0][i], force[1][i]
@@ -192,12 +208,12 @@ def _close(whole: Inertia, turn: Array, reduced: Array, M_inverse: Array) -> Non
 def _inertia(link: Array, x: Vector, y: Vector, z: Vector, origin: Vector) -> Inertia:
     """Of a link whose axes are x, y, z and whose frame is at `origin`."""
     mass, xx, xy, xz, yy, yz, zz = link[0], link[4], link[5], link[6], link[7], link[8], link[9]
-    c = _plus(origin, _combined(link[1], x, link[2], y, link[3], z))
+    c = plus(origin, combined(link[1], x, link[2], y, link[3], z))
     h = (mass * c[0], mass * c[1], mass * c[2])
     # The moments about the link's centre: with I e = (xx x + xy y + xz z) and so on.
-    u = _combined(xx, x, xy, y, xz, z)
-    v = _combined(xy, x, yy, y, yz, z)
-    w = _combined(xz, x, yz, y, zz, z)
+    u = combined(xx, x, xy, y, xz, z)
+    v = combined(xy, x, yy, y, yz, z)
+    w = combined(xz, x, yz, y, zz, z)
     return (
         mass,
         h,
@@ -213,53 +229,6 @@ def _inertia(link: Array, x: Vector, y: Vector, z: Vector, origin: Vector) -> In
 
 
 @compiled
-def _joined(a: Inertia, b: Inertia) -> Inertia:
-    """Of two bodies that move as one."""
-    i, j = a[2], b[2]
-    return (
-        a[0] + b[0],
-        _plus(a[1], b[1]),
-        (i[0] + j[0], i[1] + j[1], i[2] + j[2], i[3] + j[3], i[4] + j[4], i[5] + j[5]),
-    )
-
-
-@compiled
-def _momentum(inertia: Inertia, motion: Spatial) -> Spatial:
-    """I V: with h = m c, linear m v + ω × h, angular h × v + I ω."""
-    mass, h, (xx, xy, xz, yy, yz, zz) = inertia
-    linear, w = motion
-    turned = (
-        xx * w[0] + xy * w[1] + xz * w[2],
-        xy * w[0] + yy * w[1] + yz * w[2],
-        xz * w[0] + yz * w[1] + zz * w[2],
-    )
-    moved = (mass * linear[0], mass * linear[1], mass * linear[2])
-    return _plus(moved, _cross(w, h)), _plus(turned, _cross(h, linear))
-
-
-@compiled
-def _inertial_force(inertia: Inertia, motion: Spatial, acceleration: Spatial) -> Spatial:
-    """I A + V ×* I V."""
-    p, momentum = _momentum(inertia, motion)
-    linear, w = motion
-    f, n = _momentum(inertia, acceleration)
-    return _plus(f, _cross(w, p)), _plus(n, _plus(_cross(w, momentum), _cross(linear, p)))
-
-
-@compiled
-def _motion_cross(a: Spatial, b: Spatial) -> Spatial:
-    """How b, fixed to a body that moves with a, changes."""
-    return _plus(_cross(a[1], b[0]), _cross(a[0], b[1])), _cross(a[1], b[1])
-
-
-@compiled
-def _to_world(R: Array, position: Vector, motion: Spatial) -> Spatial:
-    """A motion about the trunk's origin, in its frame, as one about the world's, in the world's."""
-    angular = _rotated(R, motion[1])
-    return _plus(_rotated(R, motion[0]), _cross(position, angular)), angular
-
-
-@compiled
 def _put(J: Array, column: int, linear: Vector, angular: Vector) -> None:
     for i in range(3):
         J[i, column], J[3 + i, column] = linear[i], angular[i]
@@ -270,7 +239,7 @@ def _derive(J: Array, dJ: Array, column: int, motion: Spatial) -> None:
     """The derivative of a column of J that moves with `motion`."""
     linear = (J[0, column], J[1, column], J[2, column])
     angular = (J[3, column], J[4, column], J[5, column])
-    changed = _motion_cross(motion, (linear, angular))
+    changed = motion_cross(motion, (linear, angular))
     _put(dJ, column, changed[0], changed[1])
 
 
@@ -289,7 +258,7 @@ def _inverse(a: Symmetric) -> Symmetric:
 @compiled
 def _point(link: Array, x: Vector, y: Vector, z: Vector, origin: Vector) -> Vector:
     """Where a link's joint is, on the link before with these axes and origin."""
-    return _plus(origin, _combined(link[10], x, link[11], y, link[12], z))
+    return plus(origin, combined(link[10], x, link[11], y, link[12], z))
 
 
 @compiled
@@ -300,51 +269,3 @@ def _turned(x: Vector, z: Vector, angle: float) -> tuple[Vector, Vector]:
         (c * x[0] - s * z[0], c * x[1] - s * z[1], c * x[2] - s * z[2]),
         (s * x[0] + c * z[0], s * x[1] + c * z[1], s * x[2] + c * z[2]),
     )
-
-
-@compiled
-def _rotated(R: Array, a: Vector) -> Vector:
-    return (
-        R[0, 0] * a[0] + R[0, 1] * a[1] + R[0, 2] * a[2],
-        R[1, 0] * a[0] + R[1, 1] * a[1] + R[1, 2] * a[2],
-        R[2, 0] * a[0] + R[2, 1] * a[1] + R[2, 2] * a[2],
-    )
-
-
-@compiled
-def _combined(a: float, x: Vector, b: float, y: Vector, c: float, z: Vector) -> Vector:
-    """The vector a x + b y + c z."""
-    return (
-        a * x[0] + b * y[0] + c * z[0],
-        a * x[1] + b * y[1] + c * z[1],
-        a * x[2] + b * y[2] + c * z[2],
-    )
-
-
-@compiled
-def _plus(a: Vector, b: Vector) -> Vector:
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-@compiled
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@compiled
-def _sum(a: Spatial, b: Spatial) -> Spatial:
-    return _plus(a[0], b[0]), _plus(a[1], b[1])
-
-
-@compiled
-def _scaled(a: Spatial, factor: float) -> Spatial:
-    (x, y, z), (p, q, r) = a
-    return (factor * x, factor * y, factor * z), (factor * p, factor * q, factor * r)
-
-
-@compiled
-def _dot(motion: Spatial, force: Spatial) -> float:
-    """Power."""
-    (x, y, z), (p, q, r) = motion
-    (a, b, c), (d, e, f) = force
-    return x * a + y * b + z * c + p * d + q * e + r * f

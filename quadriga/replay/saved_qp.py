@@ -25,7 +25,6 @@ import numpy as np
 
 from agents.controller.controller import Acted, Controller
 from agents.controller.sensing import Seen
-from agents.controller.whole_body_qp import build
 from agents.planner.free_step import FreeStep
 from agents.planner.qp_solver import SOLVERS
 from shared.errors import RecordingError
@@ -102,8 +101,7 @@ def captured(about: str) -> Iterator[dict[str, SavedQp]]:
     def whole_body(act: Callable[..., Acted]) -> Callable[..., Acted]:
         def observed(low_level: Controller, seen: Seen, *arguments: Any, **named: Any) -> Acted:
             acted = act(low_level, seen, *arguments, **named)
-            terms = low_level.body.terms(seen.flat[:19], seen.flat[19:37], acted.memory.load)
-            problem = build(terms, seen.R, seen.p_foot, acted.goal, low_level.weights)
+            problem = low_level.problem(seen, acted.memory, acted.goal)
             box = np.full(len(problem.H), TORQUE_LIMIT)
             found[WHOLE_BODY] = SavedQp(
                 problem.H, problem.g, problem.C, np.concatenate([-box, problem.c]),
