@@ -135,6 +135,7 @@ class Agent:
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
         self._damping = config.controller.damping
         self._feedforward = config.planner.interface == "feedforward"
+        self._planned_footholds = config.planner.footholds == "planned"
 
     @property
     def peers(self) -> tuple[str, ...]:
@@ -176,7 +177,7 @@ class Agent:
             if planned.stop_reason:
                 mode = stop_safely(mode, tick, planned.stop_reason)
 
-        task = self._task(tick, mode, reference, planned, inputs.excitation)
+        task = self._task(tick, mode, reference, planned, inputs.excitation, schedule.progress)
         acted = self._controller.act(seen, schedule, task, dt, new_sample=measurement is not None)
         solution = acted.solution
         failures, mode = self._failures(state.failures, solution, mode, tick)
@@ -211,19 +212,32 @@ class Agent:
 
     def _task(
         self, tick: int, mode: Mode, reference: Reference, planned: Planned,
-        excitation: Array | None,
+        excitation: Array | None, progress: float,
     ) -> Task:  # fmt: skip
         """The operator's wish with what is planned."""
-        deviation, velocity = planned.present.deviation, planned.present.velocity
+        deviation, outlook = planned.present.deviation, planned.present.outlook
         if excitation is not None:
             deviation = deviation + excitation
         if mode.name != WALK:
             deviation = _ZERO
         factor = mode.speed_factor(tick)
         vx, vy = factor * reference.vx, factor * reference.vy
-        if velocity is not None:
-            vx, vy = float(velocity[0]), float(velocity[1])
-        return Task(vx, vy, factor * reference.wz, reference.height, deviation, self._feedforward)
+        ahead = None
+        if outlook is not None:
+            if not self._feedforward:
+                # Planned roll and pitch are not tracked: the reference would follow the error.
+                vx, vy = float(outlook[0, 0]), float(outlook[0, 1])
+            if self._planned_footholds:
+                ahead = self._velocity_ahead(outlook, progress)
+        return Task(
+            vx, vy, factor * reference.wz, reference.height, deviation, self._feedforward, ahead
+        )
+
+    def _velocity_ahead(self, outlook: Array, progress: float) -> Array:
+        """Mean planned velocity until the middle of the stance to come, (2,), m/s."""
+        samples = round((1.5 - progress) * self._stance_ms / SAMPLE_MS)
+        mean: Array = outlook[: max(1, samples)].mean(axis=0)
+        return mean
 
     def _sense(self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float) -> Seen:
         if self._by_truth and inputs.truth is not None:  # a lost one is bridged by the filter

@@ -37,11 +37,12 @@ class Present:
 
     Attributes:
         deviation: force deviation, (12,), N, yaw frame.
-        velocity: planned vx, vy to track, (2,), m/s; None: the operator's.
+        outlook: planned vx, vy at the ends of this sample and of those after it, (k, 2), m/s;
+            None without a plan.
     """
 
     deviation: Array = field(default_factory=_NO_FORCE.copy)
-    velocity: Array | None = None
+    outlook: Array | None = None
 
 
 _NOTHING = Present()
@@ -54,16 +55,14 @@ def launched(flights: tuple[Flight, ...], new: Flight) -> tuple[Flight, ...]:
     return (*current, *waiting, new)
 
 
-def present(flights: tuple[Flight, ...], tick: int, *, track_velocity: bool) -> Present:
+def present(flights: tuple[Flight, ...], tick: int) -> Present:
     """What the newest plan in force says for this tick; nothing once it has run out."""
     for flight in reversed(flights):
         if flight.start <= tick:
             sample = (tick - flight.plan_tick) // SAMPLE_MS
             if sample >= len(flight.deviation):
                 break
-            # Planned roll and pitch are not tracked: the reference would follow the error.
-            velocity = flight.outputs[sample, 1:3] if track_velocity else None
-            return Present(flight.deviation[sample], velocity)
+            return Present(flight.deviation[sample], flight.outputs[sample:, 1:3])
     return _NOTHING
 
 

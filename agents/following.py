@@ -56,9 +56,8 @@ class Follower:
         due = (tick - self._latency) // self._step_ms
         age = due - max(state.newest[0], self._first_step - 1)
         lost = age > planner.max_peer_age + planner.hold_steps
-        track = planner.interface == "force"
         return state, Planned(
-            present=present(state.flights, tick, track_velocity=track),
+            present=present(state.flights, tick),
             stop_reason=LOST if lost else "",
             ages_ms={"plan": float(tick - self._step_ms * state.newest[0])} if heard.plans else {},
         )

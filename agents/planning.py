@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from agents.adaptation import Adapter
-from agents.flight import Flight, Present, fading, launched, present
+from agents.flight import Flight, fading, launched, present
 from agents.modes import WALK
 from agents.pilot import NOTHING, Awaited, Heard, PilotState, Planned
 from agents.planner.episode import commanded_outputs, output_base
@@ -89,7 +89,7 @@ class LocalPilot:
             return self._answer(state, memory, (step, turn), heard)
         if news and state.terms_for != step + 1:
             state = self._prepare(state, memory, step + 1, heard.references)
-        return state, Planned(present=self._in_force(state, tick))
+        return state, Planned(present=present(state.flights, tick))
 
     def _window_complete(self, state: PilotState, tick: int) -> bool:
         return _gapless(state.own, self._config.planner.T_ini, tick)
@@ -195,11 +195,7 @@ class LocalPilot:
         )
 
     def _present(self, state: PilotState, tick: int, planned: Planned) -> Planned:
-        return replace(planned, present=self._in_force(state, tick))
-
-    def _in_force(self, state: PilotState, tick: int) -> Present:
-        track = self._config.planner.interface == "force"
-        return present(state.flights, tick, track_velocity=track)
+        return replace(planned, present=present(state.flights, tick))
 
 
 def _gapless(own: tuple[Measurement, ...], count: int, tick: int) -> bool:

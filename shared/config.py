@@ -314,6 +314,12 @@ class PlannerConfig:
         "force: planned forces and speeds are tracked by the whole-body QP (the paper)",
         choices=("feedforward", "force"),
     )  # fmt: skip
+    footholds: str = key(
+        "measured", "-",
+        "velocity that footholds count on: measured, or as planned until the middle of the stance "
+        "to come",
+        choices=("measured", "planned"),
+    )  # fmt: skip
     N: int = key(25, "samples", "control horizon", low=4, high=100)
     T_ini: int = key(10, "samples", "estimation horizon", low=2, high=50)
     applied: int = key(4, "samples", "samples applied before the next plan", low=1, high=20)

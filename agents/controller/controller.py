@@ -41,7 +41,7 @@ from agents.controller.memory import (
 from agents.controller.model import RigidBody
 from agents.controller.references import fall_freely, trunk_acceleration, trunk_gains
 from agents.controller.rigid_body import rigid_body_terms
-from agents.controller.rotation import roll_pitch_yaw
+from agents.controller.rotation import from_yaw_frame, roll_pitch_yaw
 from agents.controller.sensing import (
     SEEN_SIZE,
     SWITCHED,
@@ -86,6 +86,7 @@ class Task:
         deviation: planned deviation from the nominal forces, (12,), N; that of legs scheduled to
             swing is not applied.
         feedforward: whether the deviation also becomes accelerations of the trunk.
+        ahead: velocity with which footholds count, (2,), m/s; None: the one of now.
     """
 
     vx: float
@@ -94,6 +95,7 @@ class Task:
     height: float
     deviation: Array
     feedforward: bool
+    ahead: Array | None = None
 
 
 @record
@@ -190,8 +192,8 @@ class Controller:
         try:
             rows = _act(
                 seen.memory.flat, seen.flat, schedule.row, task.vx, task.vy, task.wz, task.height,
-                task.deviation, task.feedforward, dt, new_sample, self.body.links, self._acting,
-                new, asked, x,
+                task.deviation, task.feedforward, _NOW if task.ahead is None else task.ahead, dt,
+                new_sample, self.body.links, self._acting, new, asked, x,
             )  # fmt: skip
             if rows:
                 return Acted(Memory(new), asked, Solution(x, whole_body_qp.UNCONSTRAINED, rows))
@@ -218,6 +220,7 @@ class Controller:
         return whole_body_qp.build(terms, seen.R, seen.p_foot, goal, weights)
 
 
+_NOW = np.full(2, np.nan)  # footholds count on the velocity of now
 _ASKED = 30  # desired acceleration of the trunk (6), of the feet (12), desired forces (12)
 
 
@@ -253,7 +256,7 @@ def note_forces(memory: Array, planned: Array, stance: Array, new_sample: bool) 
 @compiled
 def _act(
     memory0: Array, seen: Array, schedule: Array, vx: float, vy: float, wz: float, height: float,
-    planned: Array, feedforward: bool, dt: float, new_sample: bool, links: Array,
+    planned: Array, feedforward: bool, ahead: Array, dt: float, new_sample: bool, links: Array,
     constants: Array, memory: Array, asked: Array, x: Array,
 ) -> int:  # fmt: skip
     """Fill the new memory, what is asked and the answer `closed_form` gives, with its result."""
@@ -287,9 +290,10 @@ def _act(
     )  # fmt: skip
     weights[3] -= memory[CAUTION]
     lift, stumble, felt = swings_of(memory)
+    v_ahead = v_trunk if np.isnan(ahead[0]) else from_yaw_frame(ahead, R)
     demand = feet_demand(
         start, goal, contact, stance, progress, seen[SWITCHED] > 0.5, legs[1], lift, stumble, felt,
-        ground, position, v_trunk, R, p_foot, v_foot, v_des, wz, deviation, dt, feet, mass,
+        ground, position, v_trunk, v_ahead, R, p_foot, v_foot, v_des, wz, deviation, dt, feet, mass,
     )  # fmt: skip
     start[:], goal[:] = demand[0], demand[1]
     asked[:6], asked[6:18], asked[18:] = trunk, demand[2].ravel(), demand[3].ravel()

@@ -18,12 +18,13 @@ _BACK = 0.3  # of the speed at which a foot that stumbled rises: away from what 
 def feet_demand(
     swing_start0: Array, foot_goal0: Array, contact: Array, stance: Array, progress: float,
     switched: bool, early: Array, lift: Array, stumble: Array, felt: Array, ground: Array,
-    position: Array, velocity: Array, R: Array, p_foot: Array, v_foot: Array, v_des: Array,
-    wz: float, deviation: Array, dt: float, constants: Array, mass: float,
+    position: Array, velocity: Array, v_ahead: Array, R: Array, p_foot: Array, v_foot: Array,
+    v_des: Array, wz: float, deviation: Array, dt: float, constants: Array, mass: float,
 ) -> Array:  # fmt: skip
     """New swing starts and foot goals, desired accelerations and forces, rows of (4, 4, 3).
 
     `lift`, `stumble` and `felt` are those of `Memory`; what each foot feels is updated in place.
+    `v_ahead` is the velocity that footholds count on.
     """
     duration, raibert_gain, height, descent_speed, kp, kd = constants[:6]
     swing_start, foot_goal = _feet_anchors(
@@ -34,7 +35,7 @@ def feet_demand(
     out[0], out[1] = swing_start, foot_goal
     out[2] = _feet_acceleration(
         contact, stance, progress, early, lift, stumble, felt, swing_start, foot_goal, ground,
-        position, velocity, R, p_foot, v_foot, v_des, wz, duration,
+        position, v_ahead, R, p_foot, v_foot, v_des, wz, duration,
         raibert_gain, height, descent_speed, kp, kd, constants[7], constants[8], constants[9],
         constants[10] > 0.5,
     )  # fmt: skip

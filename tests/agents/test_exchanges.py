@@ -86,7 +86,7 @@ def test_a_plan_with_latency_takes_over_from_the_one_before_and_stays_aligned() 
     for tick in range(320, 480):
         if tick % 40 == 0:
             flights = launched(flights, flight(tick + 16, tick, float(tick // 40)))
-        seen[tick] = float(present(flights, tick, track_velocity=False).deviation[0])
+        seen[tick] = float(present(flights, tick).deviation[0])
     assert seen[335] == 0.0
     assert seen[336] == pytest.approx(8.01)  # its second sample: the first is over
     assert seen[375] == pytest.approx(8.05)
@@ -94,8 +94,9 @@ def test_a_plan_with_latency_takes_over_from_the_one_before_and_stays_aligned() 
     assert len(flights) <= 3
 
 
-def test_planned_speeds_are_handed_on_only_where_asked_for() -> None:
-    flights = (flight(320, 320, 8.0),)
-    assert present(flights, 330, track_velocity=False).velocity is None
-    velocity = present(flights, 330, track_velocity=True).velocity
-    np.testing.assert_array_equal(velocity, [8.0, 8.0])
+def test_planned_speeds_are_handed_on_from_the_present_sample_on() -> None:
+    outputs = np.arange(150.0).reshape(25, 6)
+    flights = (Flight(320, 320, np.zeros((25, 12)), outputs),)
+    np.testing.assert_array_equal(present(flights, 339).outlook, outputs[1:, 1:3])
+    np.testing.assert_array_equal(present(flights, 569).outlook, outputs[24:, 1:3])
+    assert present(flights, 570).outlook is None

@@ -136,13 +136,11 @@ def test_a_plan_fades_out_beyond_the_range_of_the_data(
     np.testing.assert_allclose(full.plan.y - faded.plan.y, (1.0 - share) * effect, atol=1e-6)
 
 
-def test_planned_speeds_are_tracked_only_with_the_interface_force() -> None:
+def test_the_planned_speeds_are_handed_on_with_the_plan() -> None:
     slow = ON_COURSE - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
-    assert Flight().fly(FIRST, slow).present.velocity is None
-    paper = replace(ALONE, planner=replace(ALONE.planner, interface="force"))
-    planned = Flight(paper).fly(FIRST, slow)
+    planned = Flight().fly(FIRST, slow)
     assert planned.plan is not None
-    np.testing.assert_array_equal(planned.present.velocity, planned.plan.y[0, 1:3])
+    np.testing.assert_array_equal(planned.present.outlook, planned.plan.y[:, 1:3])
 
 
 def test_the_first_plan_waits_for_the_window_when_the_stand_is_short() -> None:

@@ -1,0 +1,88 @@
+"""What the low level is asked to do of what the operator wants and what is planned."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from agents.agent import Agent, Outputs
+from agents.controller.controller import Acted, Schedule, Task
+from agents.planner.horizon import SAMPLE_MS
+from quadriga.rollout import Rollout
+from shared.config import Config, TeamConfig
+from shared.messages import Plan
+from shared.robot import Array
+from tests.agents.duet import every_100_ms, simple_predictor
+
+ALONE = Config(team=TeamConfig(robots=1))
+STANCE_MS = ALONE.gait.stance_ms
+
+
+class Watched:
+    """One robot that walks; what its low level is asked to do, and its plan in force."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, **planner: Any) -> None:
+        self.config = replace(ALONE, planner=replace(ALONE.planner, latency_ms=0, **planner))
+        predictor = simple_predictor(self.config)
+        self.rollout = Rollout(self.config, predictor, every_100_ms)
+        self.asked: list[tuple[int, Schedule, Task, Plan]] = []
+        self._plan: Plan | None = None
+        agent: Agent = self.rollout.agents["r1"]
+        act = agent._controller.act
+
+        def seen(at: Any, schedule: Schedule, task: Task, *rest: Any, **named: Any) -> Acted:
+            self._tasks.append((schedule, task))
+            return act(at, schedule, task, *rest, **named)
+
+        self._tasks: list[tuple[Schedule, Task]] = []
+        monkeypatch.setattr(agent._controller, "act", seen)
+
+    def walk(self, until: int) -> Watched:
+        for tick in self.rollout.ticks(until):
+            outputs: Outputs = tick.outputs["r1"]
+            self._plan = outputs.plan or self._plan
+            if self._plan is not None:
+                self.asked.append((tick.tick, *self._tasks[-1], self._plan))
+        return self
+
+
+def outlook(tick: int, plan: Plan) -> Array:
+    """Planned vx, vy from the sample of `tick` on."""
+    return plan.y[(tick - plan.tick) // SAMPLE_MS :, 1:3]
+
+
+def test_planned_speeds_are_tracked_with_the_interface_force(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = Watched(monkeypatch, interface="force").walk(600).asked
+    assert len(seen) > 200
+    for tick, _, task, plan in seen:
+        np.testing.assert_array_equal([task.vx, task.vy], outlook(tick, plan)[0])
+        assert task.ahead is None
+
+
+def test_by_default_speeds_are_the_operators_and_footholds_count_on_what_is_measured(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for _, _, task, _ in Watched(monkeypatch).walk(600).asked:
+        assert task.ahead is None
+        assert task.vy == 0.0
+
+
+def test_planned_footholds_count_on_the_way_to_the_middle_of_the_stance_to_come(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = Watched(monkeypatch, footholds="planned").walk(800).asked
+    assert len(seen) > 400
+    told = set()
+    for tick, schedule, task, plan in seen:
+        ahead_ms = (1.0 - schedule.progress) * STANCE_MS + 0.5 * STANCE_MS
+        assert task.ahead is not None
+        planned = outlook(tick, plan)[: max(1, round(ahead_ms / SAMPLE_MS))]
+        np.testing.assert_allclose(task.ahead, planned.mean(axis=0), atol=1e-12)
+        assert task.vy == 0.0
+        told.add(float(task.ahead[0]))
+    assert len(told) > 50
