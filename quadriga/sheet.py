@@ -16,10 +16,17 @@ NOTHING: Final = "–"
 _WIDE: Final = 180  # characters a line may have where no terminal says how many there are
 # Unit of each output and its factor from SI.
 UNITS: Final = {
-    "z": ("mm", 1e3), "vx": ("mm/s", 1e3), "vy": ("mm/s", 1e3),
+    "z": ("mm", 1e3), "z-felt": ("mm", 1e3), "vx": ("mm/s", 1e3), "vy": ("mm/s", 1e3),
     "roll": ("mrad", 1e3), "pitch": ("mrad", 1e3), "wz": ("mrad/s", 1e3),
 }  # fmt: skip
-LABELS: Final = tuple(f"{name} [{UNITS[name][0]}]" for name in OUTPUTS)
+
+
+def label(name: str) -> str:
+    """An output or an error with its unit, as a heading."""
+    return f"{name} [{UNITS[name][0]}]"
+
+
+LABELS: Final = tuple(label(name) for name in OUTPUTS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,11 @@ from shared.config import Config
 from shared.messages import Measurement
 from shared.robot import GRAVITY, N_LEGS, OUTPUTS, TOTAL_MASS, Array
 
+# What a walk is judged by: the outputs by the world's truth, the height over the terrain under the
+# hips, and the height over the ground that the robot's feet feel, by its own word: what it is asked
+# to keep. Where a hip passes the edge of a block the former jumps, whatever the robot does.
+FELT: Final = "z-felt"
+ERRORS: Final = (OUTPUTS[0], FELT, *OUTPUTS[1:])
 _SHORTEST: Final = 0.5  # m; over a shorter way a cost of transport is that of starting
 
 
@@ -49,7 +54,8 @@ class Figures:
         seconds: world time of the last sample seen, or of the first fall, s.
         fallen: when each robot that fell did so, s.
         stopped: why each robot that stopped for another reason did so.
-        mean, rmse: of each output over the steady part, all robots; m, m/s, rad, rad/s.
+        mean: of each output over the steady part, all robots; m, m/s, rad, rad/s.
+        rmse: the same, of each of `ERRORS`.
         cost: mean of ‖y − y_des‖²_Q + ‖u − u_nominal‖²_R over samples of 10 ms and robots.
         cost_outputs, cost_forces: its two parts.
         planner_ms_median, planner_ms_p99: time of one planning step, ms.
@@ -123,7 +129,10 @@ def figures(walk: Walk) -> Figures:
         mean={name: _mean(y[..., i]) for i, name in enumerate(OUTPUTS)},
         rmse={
             name: None if square is None else square**0.5
-            for name, square in zip(OUTPUTS, squares, strict=True)
+            for name, square in [
+                *zip(OUTPUTS, squares, strict=True),
+                (FELT, _felt_height(traces, begin, end)),
+            ]
         },
         cost=None if outputs is None or forces is None else outputs + forces,
         cost_outputs=outputs,
@@ -159,6 +168,17 @@ def _fallen(traces: Traces) -> dict[str, float]:
 def _stopped(traces: Traces, fallen: Mapping[str, float]) -> dict[str, str]:
     last = {robot: found[-1] for robot, found in traces.statuses.items() if found}
     return {r: s.reason for r, s in last.items() if s.reason and r not in fallen}
+
+
+def _felt_height(traces: Traces, begin: int, end: int) -> float | None:
+    """Mean square of the height over the felt ground less the one asked for, m²."""
+    parts = [np.zeros(0)]
+    for found in traces.measurements.values():
+        kept = _within(found.tick, begin, end)
+        asked = in_force(traces.references, found.tick[kept])[:, 3]
+        parts.append(found.y[kept, 0] - asked)
+    error = np.concatenate(parts)
+    return _mean(error[np.isfinite(error)] ** 2)
 
 
 def _force_cost(walk: Walk, begin: int, end: int, R: Array) -> Array:

@@ -10,7 +10,7 @@ from typing import Final
 from quadriga.campaign.outcome import Outcome
 from quadriga.campaign.plan import Group
 from quadriga.campaign.statistics import Interval, Pairs, median, wilson
-from shared.robot import OUTPUTS
+from quadriga.trial import ERRORS
 
 COST: Final = "cost"  # the ratio of control costs, beside those of the outputs' RMSE
 
@@ -94,7 +94,7 @@ def tally(rows: Sequence[Outcome]) -> Tally:
         mean_vx=_median(row.mean_vx for row in whole),
         cost_of_transport=_median(row.cost_of_transport for row in whole),
         control_cost=_median(row.control_cost for row in whole),
-        rmse={name: _median(row.rmse(name) for row in whole) for name in OUTPUTS},
+        rmse={name: _median(row.rmse(name) for row in whole) for name in ERRORS},
         planner_ms_p50=_median(row.planner_ms_p50 for row in walked),
         planner_ms_p99=_median(row.planner_ms_p99 for row in walked),
         plans=dict(plans),
@@ -113,7 +113,7 @@ def against(rows: Iterable[Outcome], baseline: Iterable[Outcome]) -> Against:
     return Against(
         fell=Pairs.of([(mine.fell, base.fell) for mine, base in pairs]),
         upright=len(upright),
-        ratios={name: tuple(_ratios(upright, name)) for name in (COST, *OUTPUTS)},
+        ratios={name: tuple(_ratios(upright, name)) for name in (COST, *ERRORS)},
         alone=tuple(mine.seed for mine, base in pairs if mine.fell and not base.fell),
         spared=tuple(mine.seed for mine, base in pairs if base.fell and not mine.fell),
     )

@@ -7,8 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Any, Final
 
 from quadriga.campaign.plan import Group
-from quadriga.trial import Figures
-from shared.robot import OUTPUTS
+from quadriga.trial import ERRORS, Figures
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +22,8 @@ class Outcome:
         fell: a robot fell; that ended the trial.
         time_to_fall_s, first_to_fall: when, and which robot.
         stopped: why robots stopped that did not fall.
-        rmse_z … rmse_wz: over the steady part, all robots; m, m/s, rad, rad/s.
+        rmse_z … rmse_wz: over the steady part, all robots; m, m/s, rad, rad/s. `rmse_z` is by the
+            world's truth over the terrain under the hips, `rmse_z_felt` over what the feet feel.
         mean_vx: over the steady part, all robots, m/s.
         distance_m: length of the way, mean over the robots.
         energy_j: ∑ |τ q̇| dt of all motors over the whole walk.
@@ -49,6 +49,7 @@ class Outcome:
     first_to_fall: str
     stopped: str
     rmse_z: float | None
+    rmse_z_felt: float | None
     rmse_vx: float | None
     rmse_vy: float | None
     rmse_roll: float | None
@@ -72,10 +73,14 @@ class Outcome:
         """The group that it is a trial of."""
         return Group(self.scenario, self.variant, self.swept)
 
-    def rmse(self, output: str) -> float | None:
-        """The RMSE of an output."""
-        found: float | None = getattr(self, f"rmse_{output}")
+    def rmse(self, error: str) -> float | None:
+        """The RMSE of one of `ERRORS`."""
+        found: float | None = getattr(self, _column(error))
         return found
+
+
+def _column(error: str) -> str:
+    return f"rmse_{error.replace('-', '_')}"
 
 
 _KINDS: Final = {f.name: str(f.type) for f in fields(Outcome) if f.name != "swept"}
@@ -105,7 +110,7 @@ def outcome(
         told |= dict.fromkeys(name for name, kind in _KINDS.items() if "None" in kind)
         return Outcome(**told, refused=_line(found), success=False, fell=False, first_to_fall="",
                        stopped="", solves=0, plans="", seconds=0.0)  # fmt: skip
-    told |= {f"rmse_{name}": found.rmse[name] for name in OUTPUTS}
+    told |= {_column(name): found.rmse[name] for name in ERRORS}
     first = min(found.fallen, key=lambda robot: found.fallen[robot], default="")
     return Outcome(
         **told,

@@ -10,8 +10,8 @@ from quadriga.campaign.manifest import Manifest
 from quadriga.campaign.outcome import Outcome
 from quadriga.campaign.plan import Group
 from quadriga.campaign.statistics import mcnemar, median, median_interval, paired_difference
-from quadriga.sheet import LABELS, NOTHING, Sheet, output_text, text
-from shared.robot import OUTPUTS
+from quadriga.sheet import NOTHING, Sheet, label, output_text, text
+from quadriga.trial import ERRORS
 
 ALL: Final = "all worlds"
 POOLED_NOTE: Final = (
@@ -39,10 +39,13 @@ def outcome_sheets(manifest: Manifest, rows: Rows) -> list[Sheet]:
 
 def tracking_sheets(manifest: Manifest, rows: Rows) -> list[Sheet]:
     """RMSE of each output, a table for each scenario."""
-    notes = ("Root mean square errors over the steady part, all robots; medians over the walks "
-             "to the end.",)  # fmt: skip
+    columns = tuple(label(name) for name in ERRORS)
+    notes = (
+        "Root mean square errors over the steady part, all robots; medians over the walks to the "
+        "end. z: over the terrain under the hips; z-felt: over the ground that the feet feel.",
+    )
     return [
-        _sheet(f"{scenario}: tracking errors", manifest, LABELS, lines, _tracking, notes)
+        _sheet(f"{scenario}: tracking errors", manifest, columns, lines, _tracking, notes)
         for scenario, lines in _scenarios(manifest, rows)
     ]
 
@@ -61,7 +64,7 @@ def fall_sheets(manifest: Manifest, rows: Rows, baseline: str) -> list[Sheet]:
 
 def ratio_sheets(manifest: Manifest, rows: Rows, baseline: str) -> list[Sheet]:
     """Errors of every variant over the baseline's: for each scenario, and for all together."""
-    columns = ("pairs", COST, *OUTPUTS)
+    columns = ("pairs", COST, *ERRORS)
     notes = (
         f"Pairs that both walked to the end: RMSE, and control cost, over that of '{baseline}'. "
         "Median, in brackets its exact 95 % interval (order statistics; six pairs at least).",
@@ -154,7 +157,7 @@ def _outcome(rows: Sequence[Outcome]) -> Iterator[str]:
 
 def _tracking(rows: Sequence[Outcome]) -> Iterator[str]:
     found = tally(rows)
-    for name in OUTPUTS:
+    for name in ERRORS:
         yield output_text(name, found.rmse[name])
 
 
@@ -175,7 +178,7 @@ def _falls(found: Against) -> Iterator[str]:
 
 def _ratios(found: Against) -> Iterator[str]:
     yield str(found.upright)
-    for name in (COST, *OUTPUTS):
+    for name in (COST, *ERRORS):
         yield _ratio(found.ratios[name])
 
 

@@ -11,7 +11,7 @@ from quadriga.campaign.analysis import COST
 from quadriga.campaign.sheets import p_text, unbroken
 from quadriga.campaign.statistics import mcnemar, paired_difference, wilson
 from quadriga.experiments.results import Line
-from shared.robot import OUTPUTS
+from quadriga.trial import ERRORS
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +140,7 @@ MEASURES: Final[Mapping[str, Measure]] = {
             else f"RMSE of {name} over that of {{}}, median",
             "", ".3f", _ratio(name), paired=True,
         )
-        for name in (COST, *OUTPUTS)
+        for name in (COST, *ERRORS)
     },
     "p99": Measure("99th percentile of a planning step", "ms", ".2f", _p99, interval=False),
 }  # fmt: skip

@@ -8,8 +8,8 @@ from typing import Final
 from quadriga.campaign.analysis import Tally
 from quadriga.campaign.sheets import unbroken
 from quadriga.experiments.results import Line
-from quadriga.sheet import LABELS, output_text, text
-from shared.robot import OUTPUTS
+from quadriga.sheet import label, output_text, text
+from quadriga.trial import ERRORS
 
 Column = tuple[str, Callable[[Line], str]]  # its heading, and a line's cell
 
@@ -39,8 +39,5 @@ COLUMNS: Final[Mapping[str, Column]] = {
     "cost": ("control cost", _of(lambda found: found.control_cost, ".0f")),
     "p50": ("plan p50 [ms]", _of(lambda found: found.planner_ms_p50, ".2f")),
     "p99": ("p99 [ms]", _of(lambda found: found.planner_ms_p99, ".2f")),
-    **{
-        f"rmse-{name}": (f"RMSE {label}", _rmse(name))
-        for name, label in zip(OUTPUTS, LABELS, strict=True)
-    },
+    **{f"rmse-{name}": (f"RMSE {label(name)}", _rmse(name)) for name in ERRORS},
 }

@@ -22,10 +22,10 @@ from quadriga.experiments.experiment import (
 from quadriga.experiments.figures import FIGURES
 from quadriga.experiments.measures import MEASURES
 from quadriga.experiments.outcome_columns import COLUMNS
+from quadriga.trial import ERRORS
 from quadriga.variants import seeds_of
 from shared.config_file import flattened, read_toml
 from shared.errors import ConfigError
-from shared.robot import OUTPUTS
 
 _KEYS: Final = ("title", "question", "scenarios", "planners", "baseline", "seeds", "common",
                 "variants", "sweep", "publish", "requirements")  # fmt: skip
@@ -33,7 +33,7 @@ _TABLES: Final = ("outcome", "falls", "ratios", "figures")
 _ASKED: Final = ("measure", *SENSES, "bound", "variants", "scenarios", "over", "moonshot")
 _OVER: Final = ("each", "all")
 _OUTCOME: Final = ("trials", "success", "falls", "transport", "cost", "p50", "p99")
-_RATIOS: Final = (COST, *OUTPUTS)
+_RATIOS: Final = (COST, *ERRORS)
 
 
 def read(path: Path) -> Experiment:

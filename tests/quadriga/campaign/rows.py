@@ -6,7 +6,7 @@ from typing import Any
 
 from quadriga.campaign.manifest import GroupEntry, Manifest, SweepEntry
 from quadriga.campaign.outcome import Outcome
-from shared.robot import OUTPUTS
+from quadriga.trial import ERRORS
 
 
 def row(variant: str = "none", seed: int = 0, **changes: Any) -> Outcome:
@@ -22,7 +22,8 @@ def row(variant: str = "none", seed: int = 0, **changes: Any) -> Outcome:
         "planner_ms_p99": None, "solves": 0, "plans": "", "seconds": fell or 8.0, "wall_s": 4.0,
         "versions": "code 1",
     }  # fmt: skip
-    told |= {f"rmse_{name}": error if upright else None for name in OUTPUTS}
+    errors = (name.replace("-", "_") for name in ERRORS)
+    told |= {f"rmse_{name}": error if upright else None for name in errors}
     return Outcome(**told | changes)
 
 
