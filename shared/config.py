@@ -278,6 +278,12 @@ CENTRAL: Final = ("centralised", "deepc")  # kinds of planner that are one proce
 class PlannerConfig:
     """The data-driven predictive planner."""
 
+    preset: str = key(
+        "usual", "-",
+        "usual: plans every 40 ms, as in the paper; fast: every 10 ms, for a network whose "
+        "messages take less: replaces the defaults below",
+        choices=("usual", "fast"),
+    )  # fmt: skip
     kind: str = key(
         "distributed", "-",
         "distributed: each agent plans with its peers' last plans (eq. 12); decentralised: without "

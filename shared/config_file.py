@@ -14,7 +14,7 @@ from typing import Any, Final
 from shared.config import Config
 from shared.errors import ConfigError
 from shared.payload import carriers
-from shared.presets import CONTROLLER
+from shared.presets import PRESETS
 from shared.robot import robot_names
 
 _SAMPLE_MS: Final = 10  # of measurements and plans; gait times must be whole samples
@@ -60,9 +60,10 @@ def overlaid(given: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, A
     Raises:
         ConfigError: an override names no key.
     """
-    if "controller.preset" in overrides and isinstance(given.get("controller"), dict):
-        preset_keys = {key for preset in CONTROLLER.values() for key in preset}
-        given["controller"] = {k: v for k, v in given["controller"].items() if k not in preset_keys}
+    for section, presets in PRESETS.items():
+        if f"{section}.preset" in overrides and isinstance(given.get(section), dict):
+            replaced = {key for preset in presets.values() for key in preset}
+            given[section] = {k: v for k, v in given[section].items() if k not in replaced}
     for name, value in overrides.items():
         section, dot, key = name.partition(".")
         if not dot or not isinstance(given.setdefault(section, {}), dict):
@@ -72,15 +73,15 @@ def overlaid(given: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, A
 
 
 def build(given: Mapping[str, Any]) -> Config:
-    """The configuration with these values; the preset's, then the defaults, for the rest.
+    """The configuration with these values; the presets', then the defaults, for the rest.
 
     Raises:
         ConfigError: see `load`.
     """
-    controller = given.get("controller", {})
-    if isinstance(controller, dict):
-        preset = CONTROLLER.get(str(controller.get("preset")), {})
-        given = {**given, "controller": {**preset, **controller}}
+    for section, presets in PRESETS.items():
+        keys = given.get(section, {})
+        if isinstance(keys, dict):
+            given = {**given, section: {**presets.get(str(keys.get("preset")), {}), **keys}}
     known = {item.name: item for item in fields(Config)}
     for section in given.keys() - known.keys():
         raise _unknown(section, list(known), "a section")

@@ -1,4 +1,4 @@
-"""Named settings of the low level: each replaces defaults of the section `controller`."""
+"""Named settings of a section, the choices of its key `preset`: each replaces some defaults."""
 
 from __future__ import annotations
 
@@ -28,6 +28,19 @@ _SOFT: Final = MappingProxyType(
     }
 )  # fmt: skip
 
-CONTROLLER: Final[Mapping[str, Mapping[str, Any]]] = MappingProxyType(
-    {"robust": MappingProxyType({}), "soft": _SOFT, "paper": _PAPER}
+# Replans every 10 ms, and weighs more what feed-forward can still correct on a stiff low level.
+# Peers' plans are held as long as with the usual rate.
+_FAST: Final = MappingProxyType(
+    {
+        "applied": 1, "latency_ms": 2, "Q": (1e6, 1e5, 2e5, 8e5, 1.5e6, 2e3),
+        "max_peer_age": 12, "hold_steps": 20,
+    }
+)  # fmt: skip
+
+_USUAL: Final = MappingProxyType[str, Any]({})
+PRESETS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = MappingProxyType(
+    {
+        "controller": MappingProxyType({"robust": _USUAL, "soft": _SOFT, "paper": _PAPER}),
+        "planner": MappingProxyType({"usual": _USUAL, "fast": _FAST}),
+    }
 )

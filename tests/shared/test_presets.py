@@ -1,39 +1,41 @@
-"""Named settings of the low level: permitted values of known keys, below what a user says."""
+"""Named settings of a section: permitted values of known keys, below what a user says."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 
 import pytest
 
-from shared.config import ControllerConfig
+from shared.config import Config
 from shared.config_file import build, load
-from shared.presets import CONTROLLER
+from shared.presets import PRESETS
 
-KEYS = {item.name: item for item in fields(ControllerConfig)}
-
-
-def test_presets_are_those_that_can_be_chosen() -> None:
-    assert set(CONTROLLER) == set(KEYS["preset"].metadata["choices"])
-    assert KEYS["preset"].default == "robust"
-    assert not CONTROLLER["robust"]
+NAMED = [(section, name) for section, presets in PRESETS.items() for name in presets]
 
 
-@pytest.mark.parametrize("name", CONTROLLER)
-def test_a_preset_sets_its_keys_and_leaves_the_others(name: str) -> None:
+@pytest.mark.parametrize("section", PRESETS)
+def test_presets_are_those_that_can_be_chosen(section: str) -> None:
+    keys = {item.name: item for item in fields(getattr(Config(), section))}
+    assert set(PRESETS[section]) == set(keys["preset"].metadata["choices"])
+    assert not PRESETS[section][str(keys["preset"].default)]
+
+
+@pytest.mark.parametrize(("section", "name"), NAMED)
+def test_a_preset_sets_its_keys_and_leaves_the_others(section: str, name: str) -> None:
     """Going through the same checks as a user's values: names, types and ranges."""
-    preset = CONTROLLER[name]
-    found = asdict(load(None, {"controller.preset": name}).controller)
-    expected = asdict(ControllerConfig()) | dict(preset) | {"preset": name}
-    assert found == expected
-    assert build({"controller": dict(preset)}).controller == ControllerConfig(**preset)
+    preset = PRESETS[section][name]
+    usual = getattr(Config(), section)
+    found = load(None, {f"{section}.preset": name})
+    expected = asdict(usual) | dict(preset) | {"preset": name}
+    assert asdict(found) == asdict(Config()) | {section: expected}
+    assert getattr(build({section: dict(preset)}), section) == replace(usual, **preset)
     assert "preset" not in preset
 
 
 def test_an_explicit_key_wins_over_the_preset() -> None:
     found = load(None, {"controller.preset": "paper", "controller.kp_tilt": 123.0}).controller
     assert found.kp_tilt == 123.0
-    assert found.kd_tilt == CONTROLLER["paper"]["kd_tilt"]
+    assert found.kd_tilt == PRESETS["controller"]["paper"]["kd_tilt"]
 
 
 def test_the_papers_setting_is_the_plain_one() -> None:
@@ -48,6 +50,14 @@ def test_the_papers_setting_is_the_plain_one() -> None:
     assert (paper.gamma_tau, paper.gamma_force, paper.gamma_defect) == (1e2, 1e3, 1e6)
 
 
+def test_a_fast_planner_holds_peers_plans_as_long_as_the_usual_one() -> None:
+    usual, fast = Config().planner, load(None, {"planner.preset": "fast"}).planner
+    assert fast.applied < usual.applied
+    assert fast.latency_ms <= 10 * fast.applied
+    for name in ("max_peer_age", "hold_steps"):
+        assert getattr(fast, name) * fast.applied == getattr(usual, name) * usual.applied
+
+
 def test_presets_cannot_be_changed() -> None:
     with pytest.raises(TypeError):
-        CONTROLLER["paper"]["kp_z"] = 1.0  # type: ignore[index]
+        PRESETS["controller"]["paper"]["kp_z"] = 1.0  # type: ignore[index]
