@@ -69,10 +69,10 @@ def overview(entries: Sequence[Entry], link: str) -> str:
         found = verdicts(experiment, entry.results)
         for k, verdict in enumerate(found):
             rows.append((*(head if not k else ("", "")), asked(verdict, experiment),
-                         _worst(verdict), word_text(verdict)))  # fmt: skip
+                         _found(verdict), word_text(verdict)))  # fmt: skip
         if not found:
             rows.append((*head, "nothing: a comparison", NOTHING, NOTHING))
-    columns = ("experiment", "trials", "required", "found, where it stands worst", "verdict")
+    columns = ("experiment", "trials", "required", "found, and where it stands worst", "verdict")
     return table(Sheet("", columns, tuple(rows)), left=len(columns))
 
 
@@ -141,12 +141,16 @@ def _count(have: int, of: int) -> str:
     return unbroken(f"{have:,} of {of:,}")
 
 
-def _worst(verdict: Verdict) -> str:
-    finding = verdict.worst
-    if finding is None:
+def _found(verdict: Verdict) -> str:
+    """What was found in all worlds together, if that is asked, and where it stands worst."""
+    worst = verdict.worst
+    if worst is None:
         return NOTHING
-    text = finding_text(verdict, finding)
-    return text if len(verdict.findings) == 1 else f"{' · '.join(finding.world)}: {text}"
+    if len(verdict.findings) == 1:
+        return finding_text(verdict, worst)
+    pooled = [one for one in verdict.findings if one.world == POOLED and one.margin is not None]
+    shown = dict.fromkeys((*pooled, worst))
+    return "; ".join(f"{' · '.join(one.world)}: {finding_text(verdict, one)}" for one in shown)
 
 
 def replaced(text: str, fragment: str) -> str | None:

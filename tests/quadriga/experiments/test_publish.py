@@ -11,9 +11,9 @@ from matplotlib import image
 
 from quadriga.campaign.choice import sweep_of
 from quadriga.experiments.catalogue import CHECKOUT, load
-from quadriga.experiments.experiment import Experiment, Part, Published
+from quadriga.experiments.experiment import Experiment, Part, Published, Requirement
 from quadriga.experiments.measures import MEASURES
-from quadriga.experiments.page import BEGIN, END, replaced
+from quadriga.experiments.page import BEGIN, END, overview, replaced
 from quadriga.experiments.publish import PAGE, publish
 from shared.errors import ConfigError
 from tests.quadriga.experiments.made import checkout, experiment_of, upright, write_runs
@@ -95,6 +95,22 @@ def test_the_page_says_what_came_of_it(experiments: list[Experiment], tmp_path: 
     )
     assert (
         "| [later](docs/results.md#later) | 0 of 20 | mine: success ≥ 97 % | – | open |" in readme
+    )
+
+
+def test_all_worlds_together_are_told_beside_the_worst(tmp_path: Path) -> None:
+    asked = Requirement("success", "least", 97.0, variants=("mine",), pooled=True)
+    experiment = experiment_of("steps", "ice", requirements=(asked,))
+    write_runs(experiment, tmp_path / "runs", range(7), fate)
+    (entry,) = publish([experiment], tmp_path / "runs", checkout(tmp_path / "here"))
+    text = overview([entry], "#").replace("\N{NO-BREAK SPACE}", " ")
+    assert "| all worlds: 92.9 [68.5, 98.7] **missed** by 4.1; steps: 85.7 [48.7, 97.4]" in text
+    assert "**missed** in 2 of 3 so far" in text
+    alone = replace(entry, experiment=replace(experiment, requirements=(
+        replace(asked, each=False),
+    )))  # fmt: skip
+    assert "| 92.9 [68.5, 98.7] **missed** by 4.1 |" in overview([alone], "#").replace(
+        "\N{NO-BREAK SPACE}", " "
     )
 
 
