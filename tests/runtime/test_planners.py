@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from agents.planner.horizon import step_ms
 from agents.planner.store import load as load_predictor
+from agents.planning import first_step
 from quadriga.endpoint import free_endpoint
 from quadriga.identify import ensure_predictor, team_planner
 from quadriga.launch import Launch, table
@@ -30,6 +32,7 @@ KINDS: dict[str, dict[str, object]] = {
     "centralised": {"planner.kind": "centralised", "planner.latency_ms": 8},
     "deepc": {"planner.kind": "deepc"},
     "exchanged": {"planner.exchanges": 2, "planner.compensation": True, "planner.damping": 0.2},
+    "fast": {"planner.preset": "fast", "planner.footholds": "planned"},
 }
 
 
@@ -91,6 +94,7 @@ def test_the_bus_changes_nothing(kind: str, tmp_path: Path) -> None:
         assert not first_difference(key, payloads, together[key])
     for name in robot_names(ROBOTS):
         exchanges = config.planner.exchanges + 1
-        steps = len(range(320, round(1000 * SECONDS), 40))
+        begin = first_step(config) * step_ms(config)
+        steps = len(range(begin, round(1000 * SECONDS), step_ms(config)))
         assert len(together[f"team/{name}/plan"]) == pytest.approx(steps * exchanges, abs=exchanges)
         assert len(alone[f"team/{name}/command"]) == 1000 * SECONDS
