@@ -32,7 +32,7 @@ _SOFT: Final = MappingProxyType(
 # Peers' plans are held as long as with the usual rate.
 _FAST: Final = MappingProxyType(
     {
-        "applied": 1, "latency_ms": 1, "Q": (6e6, 1e5, 3e5, 1.4e6, 1.8e6, 2e3),
+        "applied": 1, "latency_ms": 1, "Q": (1e7, 1e5, 6e5, 1.8e6, 2e6, 2e3),
         "max_peer_age": 12, "hold_steps": 20,
     }
 )  # fmt: skip
