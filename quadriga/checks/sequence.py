@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from agents.planner.horizon import step_ms
 from quadriga.checks.finding import Finding, Item
 from shared.config import Config
 from shared.messages import Plan, Status
@@ -14,6 +15,7 @@ from shared.topics import (
     ESTOP,
     EVENT,
     MEASUREMENT,
+    PLAN,
     REFERENCE,
     STATE,
     STATUS,
@@ -24,7 +26,6 @@ from shared.topics import (
 _MAY_REPEAT: Final = frozenset((STATUS.name, REFERENCE.name, EVENT.name))
 _WORLD: Final = frozenset((STATE.name, TRUTH.name, REFERENCE.name))
 _EVERYONE_S: Final = (STATE, COMMAND, MEASUREMENT)
-_MAX_AGE: Final = {topic.name: topic.max_age_ms for topic in TABLE}
 _TAIL_MS: Final = 20  # a world that was stopped may end in the middle of a sample
 
 
@@ -116,16 +117,23 @@ class Gaps:
 
 
 class Ages:
-    """Nothing is older than its topic allows: between two messages, and by the agents' word."""
+    """Nothing is older than it may be: between two messages, and by the agents' word.
 
-    def __init__(self) -> None:
+    What a topic allows; plans are used until their maker is given up, which the planner's keys say.
+    """
+
+    def __init__(self, config: Config) -> None:
+        """Of a recording made with this configuration."""
         self.finding = Finding("ages", "messages")
+        kept = 1 + config.planner.max_peer_age + config.planner.hold_steps
+        self._limits = {topic.name: topic.max_age_ms for topic in TABLE}
+        self._limits[PLAN.name] = kept * step_ms(config)
         self._last: dict[str, int] = {}
         self._oldest: dict[str, float] = {}
 
     def look(self, item: Item) -> None:
         """See `Check`."""
-        tick, limit = item.message.tick, _MAX_AGE[item.topic]
+        tick, limit = item.message.tick, self._limits[item.topic]
         self.finding.looked += 1
         age = tick - self._last.get(item.key, tick)
         if limit and age > limit:
@@ -137,9 +145,9 @@ class Ages:
     def _look_at_status(self, item: Item, status: Status) -> None:
         for name, age in status.ages_ms.items():
             topic = name.partition(".")[0]
-            if topic not in _MAX_AGE:
+            if topic not in self._limits:
                 continue  # the jitter of states in real time
-            limit = _MAX_AGE[topic]
+            limit = self._limits[topic]
             self._oldest[topic] = max(age, self._oldest.get(topic, 0.0))
             if limit and age > limit:
                 self.finding.object(status.tick, item.key, f"{name} {age:g} ms old", f"{limit} ms")

@@ -56,9 +56,12 @@ def plan(**changes: object) -> Callable[[msg.Message], msg.Message]:
     return alter
 
 
-def aged(message: msg.Message) -> msg.Message:
-    assert isinstance(message, msg.Status)
-    return replace(message, ages_ms={"plan.r1": 240.0, "reference": 500.0})
+def aged(plan_ms: float) -> Callable[[msg.Message], msg.Message]:
+    def alter(message: msg.Message) -> msg.Message:
+        assert isinstance(message, msg.Status)
+        return replace(message, ages_ms={"plan.r1": plan_ms, "reference": 500.0})
+
+    return alter
 
 
 def by_name(findings: list[Finding]) -> dict[str, Finding]:
@@ -99,7 +102,7 @@ def test_a_good_recording_passes(known_run: Path, capsys: pytest.CaptureFixture[
         (at("team/r1/plan", force(3, 2, -0.5)), "friction", "fz -0.5 N of FL at sample 3",
          "at least 0 N"),
         (at("team/r2/command", tau(33.6)), "torques", "33.6 N·m of FL_hip", "33.5 N·m"),
-        (at("team/r2/status", aged), "ages", "plan.r1 240 ms old", "200 ms"),
+        (at("team/r2/status", aged(400.0)), "ages", "plan.r1 400 ms old", "360 ms"),
         (lambda k, m: None if k == "team/reference" and 500 < m.tick < 1100 else m, "ages",
          "600 ms since", "500 ms"),
         (lambda k, m: None if k == "team/r2/measurement" else m, "gaps", "no message at all", ""),
@@ -122,6 +125,12 @@ def test_every_broken_rule_is_found_at_its_message(
 
 def test_tolerances_are_a_millionth_of_a_newton(write_run: WriteRun) -> None:
     change = at("team/r1/plan", force(0, 3, 0.9e-6))
+    assert failed(check(write_run(SHORT, change=change) / "run.mcap")) == set()
+
+
+def test_a_plan_that_is_held_is_no_older_than_it_may_be(write_run: WriteRun) -> None:
+    """Three steps shifted, five held, one more until the next: 9 · 40 ms."""
+    change = at("team/r2/status", aged(360.0))
     assert failed(check(write_run(SHORT, change=change) / "run.mcap")) == set()
 
 
