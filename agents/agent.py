@@ -234,7 +234,10 @@ class Agent:
         )
 
     def _velocity_ahead(self, outlook: Array, progress: float) -> Array:
-        """Mean planned velocity until the middle of the stance to come, (2,), m/s."""
+        """Mean planned velocity until the middle of the stance to come, (2,), m/s.
+
+        Or as far as the plan reaches: it ends before that early in a swing.
+        """
         samples = round((1.5 - progress) * self._stance_ms / SAMPLE_MS)
         mean: Array = outlook[: max(1, samples)].mean(axis=0)
         return mean

@@ -63,12 +63,16 @@ class Follower:
         )
 
     def _take(self, state: PilotState, plan: Plan, heard: Heard) -> PilotState:
-        factor = 1.0
+        factor, outputs = 1.0, plan.y
         if state.own:
             now, _ = in_force(heard.references, heard.tick, self._config.reference.height)
-            factor = fading(self._config.planner, state.own[0].y - commanded_outputs(now))
+            asked = commanded_outputs(now)
+            factor = fading(self._config.planner, state.own[0].y - asked)
+            # What the outputs come to without the plan's forces is not in the plan: the speeds of
+            # one that fades out give way to those asked for.
+            outputs = asked + factor * (plan.y - asked)
         du = plan.u - nominal_forces(horizon_stance(self._config, self._index, plan.step))
-        flight = Flight(heard.tick, plan.tick, factor * du, plan.y)
+        flight = Flight(heard.tick, plan.tick, factor * du, outputs)
         return replace(state, flights=launched(state.flights, flight), newest=plan.serial)
 
 

@@ -14,7 +14,7 @@ from shared.robot import OUTPUTS
 
 NOTHING: Final = "–"
 _WIDE: Final = 180  # characters a line may have where no terminal says how many there are
-# Unit of each output and its factor from SI.
+# Unit of each output, and of each of `quadriga.trial.ERRORS`, and its factor from SI.
 UNITS: Final = {
     "z": ("mm", 1e3), "z-felt": ("mm", 1e3), "vx": ("mm/s", 1e3), "vy": ("mm/s", 1e3),
     "roll": ("mrad", 1e3), "pitch": ("mrad", 1e3), "wz": ("mrad/s", 1e3),
@@ -81,7 +81,7 @@ def text(value: float | None, digits: str = ".3g", factor: float = 1.0) -> str:
 
 
 def output_text(name: str, value: float | None) -> str:
-    """A figure of an output in the unit of its label."""
+    """A figure of an output or an error in the unit of its label."""
     return text(value, ".1f", UNITS[name][1])
 
 

@@ -280,8 +280,8 @@ class PlannerConfig:
 
     preset: str = key(
         "usual", "-",
-        "usual: plans every 40 ms, as in the paper; fast: every 10 ms, for a network whose "
-        "messages take less: replaces the defaults below",
+        "usual: plans every 40 ms, as in the paper; fast: every 10 ms and with weights of its own, "
+        "for a network whose messages take less: replaces the defaults below",
         choices=("usual", "fast"),
     )  # fmt: skip
     kind: str = key(
@@ -323,7 +323,7 @@ class PlannerConfig:
     footholds: str = key(
         "measured", "-",
         "velocity that footholds count on: measured, or as planned until the middle of the stance "
-        "to come",
+        "to come, as far as the plan reaches",
         choices=("measured", "planned"),
     )  # fmt: skip
     N: int = key(25, "samples", "control horizon", low=4, high=100)

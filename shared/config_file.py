@@ -14,7 +14,7 @@ from typing import Any, Final
 from shared.config import Config
 from shared.errors import ConfigError
 from shared.payload import carriers
-from shared.presets import PRESETS
+from shared.presets import PRESETS, preset_keys
 from shared.robot import robot_names
 
 _SAMPLE_MS: Final = 10  # of measurements and plans; gait times must be whole samples
@@ -60,9 +60,9 @@ def overlaid(given: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, A
     Raises:
         ConfigError: an override names no key.
     """
-    for section, presets in PRESETS.items():
+    for section in PRESETS:
         if f"{section}.preset" in overrides and isinstance(given.get(section), dict):
-            replaced = {key for preset in presets.values() for key in preset}
+            replaced = preset_keys(section)
             given[section] = {k: v for k, v in given[section].items() if k not in replaced}
     for name, value in overrides.items():
         section, dot, key = name.partition(".")

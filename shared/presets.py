@@ -29,11 +29,11 @@ _SOFT: Final = MappingProxyType(
 )  # fmt: skip
 
 # Replans every 10 ms, and weighs more what feed-forward can still correct on a stiff low level.
-# Peers' plans are held as long as with the usual rate.
+# Peers' plans are held, and what was learned is kept, as long as with the usual rate.
 _FAST: Final = MappingProxyType(
     {
         "applied": 1, "latency_ms": 1, "Q": (1e7, 1e5, 6e5, 1.8e6, 2e6, 2e3),
-        "max_peer_age": 12, "hold_steps": 20,
+        "max_peer_age": 12, "hold_steps": 20, "forgetting": 0.99875,
     }
 )  # fmt: skip
 
@@ -44,3 +44,8 @@ PRESETS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = MappingProxyType
         "planner": MappingProxyType({"usual": _USUAL, "fast": _FAST}),
     }
 )
+
+
+def preset_keys(section: str) -> frozenset[str]:
+    """Keys of a section that its presets set; a preset given later replaces them."""
+    return frozenset(key for preset in PRESETS[section].values() for key in preset)

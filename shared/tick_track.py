@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from shared.config import Config
+from shared.config import CENTRAL, Config
 from shared.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, STATE, STATUS, TABLE, TRUTH
 
 _SAMPLE: Final = 10  # ms, of measurements, truth and the planner
@@ -31,6 +31,19 @@ def periods(config: Config) -> dict[str, int]:
         REFERENCE.name: round(1000 / REFERENCE.rate_hz),
         TRUTH.name: 1 if config.estimator.kind == "truth" else _SAMPLE,
     }
+
+
+def max_ages(config: Config) -> dict[str, int]:
+    """Greatest age of a message that an agent still uses, by its topic's name, ms; 0: none.
+
+    A plan is used until who made it is given up. Those of peers are of the step before; those of
+    a central planner come its latency after their data.
+    """
+    planner = config.planner
+    late = max(1, planner.latency_ms) if planner.kind in CENTRAL else 0
+    steps = 1 + planner.max_peer_age + planner.hold_steps
+    found = {topic.name: topic.max_age_ms for topic in TABLE}
+    return found | {PLAN.name: steps * _SAMPLE * planner.applied + late}
 
 
 class TickTrack:

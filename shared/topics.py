@@ -17,7 +17,8 @@ class Topic:
         name: last part of the key; `per_robot` tells whether a robot's name stands before it.
         type: the message's dataclass.
         rate_hz: nominal rate; 0 means on event.
-        max_age_ms: the input's age limit in ms of world time; 0 means it never ages.
+        max_age_ms: the input's age limit in ms of world time; 0 means it never ages, or that the
+            configuration says how long it is used: `shared.tick_track.max_ages`.
         recorded: whether the recorder keeps it.
     """
 
@@ -36,7 +37,7 @@ class Topic:
 STATE: Final = Topic("state", msg.State, True, 1000.0, 20)
 COMMAND: Final = Topic("command", msg.Command, True, 1000.0, 20)
 MEASUREMENT: Final = Topic("measurement", msg.Measurement, True, 100.0, 200)
-PLAN: Final = Topic("plan", msg.Plan, True, 25.0, 200)
+PLAN: Final = Topic("plan", msg.Plan, True, 25.0, 0)
 STATUS: Final = Topic("status", msg.Status, True, 10.0, 1000)
 INPUTS: Final = Topic("inputs", msg.Consumed, True, 0.0, 0)
 REFERENCE: Final = Topic("reference", msg.Reference, False, 10.0, 500)

@@ -12,7 +12,7 @@ from quadriga.campaign.plan import Group
 from quadriga.campaign.statistics import Interval, Pairs, median, wilson
 from quadriga.trial import ERRORS
 
-COST: Final = "cost"  # the ratio of control costs, beside those of the outputs' RMSE
+COST: Final = "cost"  # the ratio of control costs, beside those of the RMSE
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class Against:
     Attributes:
         fell: pairs by who fell; the first is the variant.
         upright: pairs in which both walked to the end.
-        ratios: of control cost and of each output's RMSE, variant over baseline, of these
+        ratios: of control cost and of the RMSE of each of `ERRORS`, variant over baseline, of these
             pairs.
         alone: worlds' seeds in which the variant fell alone.
         spared: those in which the baseline fell alone.

@@ -14,6 +14,7 @@ from quadriga.campaign.choice import Sweep, Variant
 from shared.config import Config
 from shared.config_file import build, layers, overlaid
 from shared.errors import ConfigError
+from shared.presets import PRESETS, preset_keys
 from sim_server.world import World
 
 _OURS: Final = ("world.seed", "world.mode")  # keys that a campaign sets itself
@@ -93,9 +94,10 @@ def build_plan(
     configs = {}
     for name, points, variant in product(files, _points(sweeps), variants):
         keys = dict(zip((sweep.key for sweep in sweeps), points, strict=True))
-        for key in variant.keys.keys() & {*keys, *_OURS}:
+        for key in variant.keys.keys() & {*keys, *_OURS, *_replaced(keys)}:
             raise ConfigError(f"variant {variant.name}: {key}", repr(variant.keys[key]),
-                              "a key that is neither swept nor the seed")  # fmt: skip
+                              "a key that is neither swept, nor the seed, nor of a preset that is "
+                              "swept")  # fmt: skip
         changes = {key: value for key, (_, value) in keys.items()}
         changes |= {"world.seed": 0, "world.mode": "lockstep"}
         config = build(_over(_over(given[name], variant.keys), changes))
@@ -122,6 +124,12 @@ def _files(names: Sequence[str]) -> dict[str, Path]:
 
 def _over(given: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
     return overlaid(deepcopy(given), keys)
+
+
+def _replaced(swept: Iterable[str]) -> set[str]:
+    """Keys that a swept preset would take back from a variant."""
+    sections = [section for section in PRESETS if f"{section}.preset" in swept]
+    return {f"{section}.{key}" for section in sections for key in preset_keys(section)}
 
 
 def _points(sweeps: Sequence[Sweep]) -> Iterable[tuple[tuple[str, Any], ...]]:

@@ -38,7 +38,7 @@ def outcome_sheets(manifest: Manifest, rows: Rows) -> list[Sheet]:
 
 
 def tracking_sheets(manifest: Manifest, rows: Rows) -> list[Sheet]:
-    """RMSE of each output, a table for each scenario."""
+    """The RMSE of each of `ERRORS`, a table for each scenario."""
     columns = tuple(label(name) for name in ERRORS)
     notes = (
         "Root mean square errors over the steady part, all robots; medians over the walks to the "

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from typing import Final
 
-from agents.planner.horizon import step_ms
 from quadriga.checks.finding import Finding, Item
 from shared.config import Config
 from shared.messages import Plan, Status
 from shared.robot import robot_names
-from shared.tick_track import TickTrack, periods
+from shared.tick_track import TickTrack, max_ages, periods
 from shared.topics import (
     COMMAND,
     ESTOP,
     EVENT,
     MEASUREMENT,
-    PLAN,
     REFERENCE,
     STATE,
     STATUS,
-    TABLE,
     TRUTH,
 )
 
@@ -117,17 +114,12 @@ class Gaps:
 
 
 class Ages:
-    """Nothing is older than it may be: between two messages, and by the agents' word.
-
-    What a topic allows; plans are used until their maker is given up, which the planner's keys say.
-    """
+    """Nothing is older than it may be: between two messages, and by the agents' word."""
 
     def __init__(self, config: Config) -> None:
         """Of a recording made with this configuration."""
         self.finding = Finding("ages", "messages")
-        kept = 1 + config.planner.max_peer_age + config.planner.hold_steps
-        self._limits = {topic.name: topic.max_age_ms for topic in TABLE}
-        self._limits[PLAN.name] = kept * step_ms(config)
+        self._limits = max_ages(config)
         self._last: dict[str, int] = {}
         self._oldest: dict[str, float] = {}
 

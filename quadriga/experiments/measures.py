@@ -60,7 +60,7 @@ class Measure:
 
 
 def ratio(name: str) -> str:
-    """The measure of the paired ratio of the control cost or of an output's RMSE."""
+    """The measure of the paired ratio of the control cost or of one of `ERRORS`."""
     return f"ratio-{name}"
 
 

@@ -30,7 +30,10 @@ In brackets: 95 % intervals. Success rates: Wilson. Differences of fall rates, o
 method 10, with the p of McNemar's exact two-sided test. Ratios: medians over the pairs that both
 walked to the end, with the exact interval by order statistics. Each p and interval is that of a
 single figure, not corrected for their number. Cost of transport, control cost and times of planning
-are medians over walks; times are of the machine that walked, under load. A requirement is held
+are medians over walks; times are of the machine that walked, under load. Errors are by the world's
+truth: z is the height over the terrain under the hips, and jumps where a hip passes the edge of a
+block; z-felt is that over the ground which the standing feet feel, by the robots' own word (a test
+holds it against the truth), and what they are asked to keep. A requirement is held
 against the figure itself unless it names a bound of its interval; behind *met* and *missed* stands
 how far the figure, or that bound, is from the limit.
 """
@@ -55,7 +58,7 @@ def page(entries: Sequence[Entry]) -> str:
 
 
 def overview(entries: Sequence[Entry], link: str) -> str:
-    """A row for each requirement: where it stands worst, and whether it is met.
+    """A row for each requirement: what was found, where it stands worst, and whether it is met.
 
     Args:
         entries: experiments, in order.

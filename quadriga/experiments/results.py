@@ -31,7 +31,8 @@ class Beside:
     Attributes:
         fell: pairs by who fell; the first is the variant.
         upright: pairs in which both walked to the end.
-        ratios: of control cost and of each output's RMSE, variant over baseline, of these pairs.
+        ratios: of control cost and of the RMSE of each of `ERRORS`, variant over baseline, of
+            these pairs.
     """
 
     fell: Pairs

@@ -15,6 +15,7 @@ from agents.planner.horizon import horizon_stance
 from shared.config import Config, PlannerConfig, TeamConfig
 from shared.messages import Measurement, Plan
 from shared.robot import Array
+from shared.tick_track import max_ages
 from tests.agents.duet import asked
 
 CONFIG = Config(team=TeamConfig(robots=2), planner=PlannerConfig(kind="centralised", latency_ms=0))
@@ -77,6 +78,27 @@ def test_a_plan_fades_out_beyond_the_range_of_the_data() -> None:
     far = ON_COURSE + np.array([0.0, 1.5 * CONFIG.planner.fade[1], 0.0, 0.0, 0.0, 0.0])
     _, planned = follow(Follower(CONFIG, 1), PilotState(), 321, plan_of(8), y=far)
     assert planned.present.deviation.max() == pytest.approx(4.0)
+
+
+def test_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for() -> None:
+    follower, faster = Follower(CONFIG, 1), plan_of(8)
+    faster = replace(faster, y=faster.y + np.array([0.0, 0.2, 0.1, 0.0, 0.0, 0.0]))
+    off = np.array([0.0, CONFIG.planner.fade[1], 0.0, 0.0, 0.0, 0.0])
+    for times, share in ((0.0, 1.0), (1.5, 0.5), (2.0, 0.0)):
+        _, planned = follow(follower, PilotState(), 321, faster, y=ON_COURSE + times * off)
+        outlook = planned.present.outlook
+        assert outlook is not None
+        expected = np.tile([0.3 + 0.2 * share, 0.1 * share], (N, 1))
+        np.testing.assert_allclose(outlook, expected, atol=1e-12)
+
+
+def test_no_plan_is_used_that_is_older_than_check_allows() -> None:
+    late = replace(CONFIG, planner=replace(CONFIG.planner, latency_ms=16))
+    follower, limit = Follower(late, 1), max_ages(late)["plan"]
+    state, _ = follow(follower, PilotState(), 336, plan_of(8))
+    _, used = follow(follower, state, 320 + limit - 1)
+    _, given_up = follow(follower, state, 320 + limit)
+    assert (used.stop_reason, given_up.stop_reason) == ("", "planner-lost")
 
 
 def test_without_plans_the_robot_stops_with_a_name_for_it() -> None:

@@ -67,9 +67,13 @@ def test_planned_speeds_are_tracked_with_the_interface_force(
 def test_by_default_speeds_are_the_operators_and_footholds_count_on_what_is_measured(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for _, _, task, _ in Watched(monkeypatch).walk(600).asked:
+    seen = Watched(monkeypatch).walk(600).asked
+    assert len(seen) > 200
+    for tick, _, task, _ in seen:
+        asked = every_100_ms(tick - tick % 100)
+        assert asked is not None
+        assert (task.vx, task.vy) == (asked.vx, asked.vy)
         assert task.ahead is None
-        assert task.vy == 0.0
 
 
 def test_planned_footholds_count_on_the_way_to_the_middle_of_the_stance_to_come(
@@ -77,12 +81,15 @@ def test_planned_footholds_count_on_the_way_to_the_middle_of_the_stance_to_come(
 ) -> None:
     seen = Watched(monkeypatch, footholds="planned").walk(800).asked
     assert len(seen) > 400
-    told = set()
+    told, reached = set(), set()
     for tick, schedule, task, plan in seen:
         ahead_ms = (1.0 - schedule.progress) * STANCE_MS + 0.5 * STANCE_MS
         assert task.ahead is not None
-        planned = outlook(tick, plan)[: max(1, round(ahead_ms / SAMPLE_MS))]
+        wanted = max(1, round(ahead_ms / SAMPLE_MS))
+        planned = outlook(tick, plan)[:wanted]
+        reached.add(len(planned) == wanted)
         np.testing.assert_allclose(task.ahead, planned.mean(axis=0), atol=1e-12)
         assert task.vy == 0.0
         told.add(float(task.ahead[0]))
     assert len(told) > 50
+    assert reached == {True, False}, "plans that reach so far, and plans that end before"

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadriga.summary import summary_of
+from quadriga.summary import steady_from, summary_of
 from quadriga.traces import Traces
 from quadriga.trial import Walk, figures
 from quadriga.trial_walk import recorded
 from shared.messages import Event
 from shared.robot import OUTPUTS
-from tests.quadriga.conftest import SPEED
+from tests.quadriga.conftest import ESTIMATOR_ERROR, SPEED
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +33,23 @@ def test_tracking_errors_are_those_of_the_summary(walk: Walk) -> None:
     assert found.solves == summary["planner_solves"]
     assert not found.fallen
     assert not found.stopped
+
+
+def test_the_felt_height_is_what_the_robots_say(walk: Walk) -> None:
+    """A sine of whole periods and the estimator's error, over the steady part of all robots."""
+    expected = (0.004**2 / 2 + ESTIMATOR_ERROR[0] ** 2) ** 0.5
+    assert figures(walk).rmse["z-felt"] == pytest.approx(expected, rel=0.01)
+    found = dict(walk.traces.measurements)
+    begun, off = steady_from(walk.traces), 0.01
+    for name, trace in found.items():
+        y = trace.y.copy()
+        y[trace.tick < begun, 0] = 1.0  # before it, nothing counts
+        y[trace.tick >= begun, 0] = walk.traces.config.reference.height + off
+        found[name] = replace(trace, y=y)
+        off = 0.0  # of all but the first
+    n = walk.traces.config.team.robots
+    moved = figures(replace(walk, traces=replace(walk.traces, measurements=found)))
+    assert moved.rmse["z-felt"] == pytest.approx(0.01 / n**0.5, rel=1e-6)
 
 
 def test_the_cost_is_the_weighted_mean_of_the_known_errors(walk: Walk) -> None:

@@ -65,6 +65,17 @@ def test_later_values_of_a_key_win(scenario: str, tmp_path: Path) -> None:
     assert plan.configs[Group("steps", "none", ())].controller.kp_tilt == 1000.0
 
 
+def test_a_preset_replaces_what_was_said_before_it_and_not_what_is_said_with_it(
+    scenario: str,
+) -> None:
+    names = ["fast:planner.preset=fast", "late:planner.preset=fast;planner.latency_ms=5"]
+    given = {"planner.latency_ms": 20, "planner.N": 20}
+    plan = build_plan([scenario], variants_of(names, None), (), (0,), None, None, given)
+    fast, late = (plan.configs[Group("steps", name, ())].planner for name in ("fast", "late"))
+    assert (fast.applied, fast.latency_ms, fast.N) == (1, 1, 20)
+    assert (late.applied, late.latency_ms) == (1, 5)
+
+
 @pytest.mark.parametrize(
     ("planners", "sweeps", "given", "message"),
     [
@@ -75,6 +86,12 @@ def test_later_values_of_a_key_win(scenario: str, tmp_path: Path) -> None:
         ("none", [], {"world__push": "r9:80:90:3:0.2"}, "r9"),
         ("none", ["world.payload_on=team,r7"], {"world__payload": 2.0}, "r7"),
         ("later:world.seed=3", [], {}, "variant later: world.seed"),
+        (
+            "now:planner.latency_ms=0",
+            ["planner.preset=usual,fast"],
+            {},
+            "variant now: planner.latency_ms",
+        ),
     ],
 )
 def test_what_cannot_be_compared_is_refused(
