@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from agents.controller import swing
+from agents.controller.rotation import heading
 from shared.jit import compiled
 from shared.robot import Array
 
@@ -76,8 +77,7 @@ def _feet_anchors(
 def _desired_force(contact: Array, deviation: Array, R: Array, mass: float) -> Array:
     """Nominal weight on the feet in contact plus the planned deviation, (4, 3), N."""
     count = max(1.0, np.sum(contact))
-    norm = np.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2)
-    c, s = R[0, 0] / norm, R[1, 0] / norm
+    c, s = heading(R)
     force = np.zeros((4, 3))
     for leg in range(4):
         if contact[leg] > 0.5:

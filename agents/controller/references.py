@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from agents.controller.rotation import cross, roll_pitch_yaw, wrap_angle
+from agents.controller.rotation import cross, heading, roll_pitch_yaw, wrap_angle
 from shared.config import ControllerConfig
 from shared.jit import compiled
 from shared.robot import GRAVITY, Array
@@ -76,8 +76,7 @@ def single_rigid_body(
     Schedule, not contact, decides which legs count: a contact that comes early or late must
     not put a jump into the feed-forward.
     """
-    norm = np.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2)
-    c, s = R[0, 0] / norm, R[1, 0] / norm
+    c, s = heading(R)
     centre = position + R @ com
     force, torque = np.zeros(3), np.zeros(3)
     for leg in range(4):

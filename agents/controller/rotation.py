@@ -34,10 +34,16 @@ def roll_pitch_yaw(R: Array) -> Array:
 
 
 @compiled
+def heading(R: Array) -> tuple[float, float]:
+    """Cosine and sine of the yaw of R."""
+    norm = np.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2)
+    return R[0, 0] / norm, R[1, 0] / norm
+
+
+@compiled
 def from_yaw_frame(plane: Array, R: Array) -> Array:
     """A horizontal vector (2,) of the yaw frame of R in the frame that R leads to. Shape (3,)."""
-    norm = np.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2)
-    c, s = R[0, 0] / norm, R[1, 0] / norm
+    c, s = heading(R)
     return np.array([c * plane[0] - s * plane[1], s * plane[0] + c * plane[1], 0.0])
 
 

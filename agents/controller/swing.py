@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from agents.controller.kinematics import hip_neutral
+from agents.controller.rotation import heading
 from shared.jit import compiled
 from shared.robot import FOOT_RADIUS, Array
 
@@ -23,8 +24,7 @@ def foothold(
     yaw rate `wz` [rad/s] is added. `remaining` is the time to touchdown [s].
     """
     hip = hip_neutral()[leg]
-    norm = np.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2)
-    c, s = R[0, 0] / norm, R[1, 0] / norm
+    c, s = heading(R)
     rx, ry = c * hip[0] - s * hip[1], s * hip[0] + c * hip[1]
     ahead = remaining + 0.5 * stance_time
     out = np.empty(2)

@@ -129,7 +129,7 @@ def test_tolerances_are_a_millionth_of_a_newton(write_run: WriteRun) -> None:
 
 
 def test_a_plan_that_is_held_is_no_older_than_it_may_be(write_run: WriteRun) -> None:
-    """Three steps shifted, five held, one more until the next: 9 · 40 ms."""
+    """Of the step before, shifted by three steps, held for five: 9 · 40 ms."""
     change = at("team/r2/status", aged(360.0))
     assert failed(check(write_run(SHORT, change=change) / "run.mcap")) == set()
 
