@@ -14,7 +14,7 @@ from shared.robot import OUTPUTS
 
 NOTHING: Final = "–"
 _WIDE: Final = 180  # characters a line may have where no terminal says how many there are
-# Unit of each output, and of each of `quadriga.trial.ERRORS`, and its factor from SI.
+# Unit of each output, and of each of `quadriga.traces.ERRORS`, and its factor from SI.
 UNITS: Final = {
     "z": ("mm", 1e3), "z-felt": ("mm", 1e3), "vx": ("mm/s", 1e3), "vy": ("mm/s", 1e3),
     "roll": ("mrad", 1e3), "pitch": ("mrad", 1e3), "wz": ("mrad/s", 1e3),

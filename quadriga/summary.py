@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from math import isnan
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,7 +12,15 @@ import numpy as np
 
 from quadriga.gaps import end_of_world, missing_ticks, repeated_ticks
 from quadriga.table import print_table
-from quadriga.traces import Traces, estimate_errors, in_force, read_traces
+from quadriga.traces import (
+    ERRORS,
+    FELT,
+    Traces,
+    estimate_errors,
+    felt_height_errors,
+    in_force,
+    read_traces,
+)
 from quadriga.truth_trace import distance
 from shared.messages import Status
 from shared.recording import Recording
@@ -112,23 +121,34 @@ def _tracking(traces: Traces) -> dict[str, Any]:
     wanted[:, [1, 2, 5, 0]] = reference
     y = truth.y[steady]
     error = y - wanted[steady, None]
+    felt = [_felt_heights(traces, robot, begin) for robot in traces.robots]
     return {
         "steady_from": begin / 1000.0,
         **{f"mean_{name}": _mean(y[..., OUTPUTS.index(name)]) for name in ("vx", "vy", "wz")},
-        "rmse": _rmse(error),
+        "rmse": _with_felt(_rmse(error), _joined(felt)),
         "rmse_per_robot": {
-            robot: _rmse(error[:, i : i + 1]) for i, robot in enumerate(traces.robots)
+            robot: _with_felt(_rmse(error[:, i : i + 1]), felt[i])
+            for i, robot in enumerate(traces.robots)
         },
     }
 
 
+def _felt_heights(traces: Traces, robot: str, begin: int) -> Array:
+    tick, error = felt_height_errors(traces, robot)
+    return error[tick >= begin]
+
+
 def _estimator(traces: Traces) -> dict[str, Any]:
-    """Error of the agents' own outputs against truth at the same tick, steady part."""
+    """Error of the agents' own outputs against truth at the same tick, steady part.
+
+    None of what cannot be compared (`quadriga.traces.estimate_errors`).
+    """
     begin, errors = steady_from(traces), []
     for i in range(len(traces.robots)):
         tick, error = estimate_errors(traces, i)
         errors.append(error[tick >= begin])
-    return {"estimator_rmse": _rmse(np.concatenate(errors)[:, None])}
+    rmse = _rmse(np.concatenate(errors)[:, None])
+    return {"estimator_rmse": {k: None if v is None or isnan(v) else v for k, v in rmse.items()}}
 
 
 def _agents(traces: Traces) -> dict[str, Any]:
@@ -205,6 +225,12 @@ def _traffic(traces: Traces) -> dict[str, Any]:
 def _rmse(error: Array) -> dict[str, float | None]:
     """Root mean square over samples and robots of errors of shape (T, n, 6), by output."""
     return {name: _root(_mean(error[..., i] ** 2)) for i, name in enumerate(OUTPUTS)}
+
+
+def _with_felt(rmse: Mapping[str, float | None], felt: Array) -> dict[str, float | None]:
+    """RMSE by name of `ERRORS`, with that of the height over the felt ground."""
+    every = {**rmse, FELT: _root(_mean(felt**2))}
+    return {name: every[name] for name in ERRORS}
 
 
 def _root(value: float | None) -> float | None:

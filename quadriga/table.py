@@ -10,11 +10,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from shared.robot import OUTPUTS
-
-# Unit and factor of each output's errors.
+# Unit and factor of each of `quadriga.traces.ERRORS`.
 _ERRORS = {
-    "z": ("mm", 1e3), "vx": ("m/s", 1.0), "vy": ("m/s", 1.0),
+    "z": ("mm", 1e3), "z-felt": ("mm", 1e3), "vx": ("m/s", 1.0), "vy": ("m/s", 1.0),
     "roll": ("rad", 1.0), "pitch": ("rad", 1.0), "wz": ("rad/s", 1.0),
 }  # fmt: skip
 
@@ -109,13 +107,13 @@ def _planner(s: Mapping[str, Any]) -> str:
     return f"{s['planner']}, {_times(s, 'planner_ms', 'ms', '.2f')}"
 
 
-def _errors(rmse: dict[str, float | None]) -> str:
+def _errors(rmse: Mapping[str, float | None]) -> str:
     parts = []
-    for name in OUTPUTS:
+    for name, value in rmse.items():
         unit, factor = _ERRORS[name]
         digits = ".1f" if factor > 1.0 else ".4f"
-        parts.append(f"{name} {_text(rmse[name], digits, factor)} {unit}")
-    half = len(parts) // 2
+        parts.append(f"{name} {_text(value, digits, factor)} {unit}")
+    half = (len(parts) + 1) // 2
     return ", ".join(parts[:half]) + "\n" + ", ".join(parts[half:])
 
 

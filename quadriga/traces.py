@@ -23,6 +23,11 @@ from shared.yokes import yoke_pairs
 
 # Up to 1 kHz each: only their ticks are read.
 _TIMED_ONLY: Final = (STATE.name, COMMAND.name, INPUTS.name)
+# What a walk is judged by: the outputs by the world's truth, the height over the terrain under the
+# hips, and the height over the ground that the robot's feet feel, by its own word: what it is asked
+# to keep. Where a hip passes the edge of a block the former jumps, whatever the robot does.
+FELT: Final = "z-felt"
+ERRORS: Final = (OUTPUTS[0], FELT, *OUTPUTS[1:])
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,14 +159,30 @@ def estimate_errors(traces: Traces, index: int) -> tuple[Ticks, Array]:
     """What the agent at `index` estimated, less the truth at the same ticks.
 
     Returns:
-        Ticks (K,) and errors (K, 6); that of the roll is the shorter way round.
+        Ticks (K,) and errors (K, 6); that of the roll is the shorter way round, that of z NaN on
+        uneven ground, where the one is a height over what the feet feel, the other over the
+        terrain under the hips.
     """
     own, truth = traces.measurements[traces.robots[index]], traces.truth
     tick, mine, true = np.intersect1d(own.tick, truth.tick, return_indices=True)
     error = own.y[mine] - truth.y[true, index]
     roll = OUTPUTS.index("roll")
     error[:, roll] = (error[:, roll] + np.pi) % (2 * np.pi) - np.pi
+    if traces.config.world.uneven:
+        error[:, OUTPUTS.index("z")] = np.nan
     return tick, error
+
+
+def felt_height_errors(traces: Traces, robot: str) -> tuple[Ticks, Array]:
+    """A robot's height over the ground that its feet feel, by its own word, less the one asked for.
+
+    Returns:
+        Ticks (K,) at which one was asked for, and errors (K,), m.
+    """
+    own = traces.measurements[robot]
+    error = own.y[:, OUTPUTS.index("z")] - in_force(traces.references, own.tick)[:, 3]
+    asked = np.isfinite(error)
+    return own.tick[asked], error[asked]
 
 
 def _fits(truth: Truth, config: Config) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
@@ -11,18 +11,13 @@ from numpy.typing import NDArray
 
 from agents.gait import nominal_forces
 from quadriga.summary import FALL_HEIGHT, FALL_TILT, steady_from
-from quadriga.traces import Traces, in_force
+from quadriga.traces import ERRORS, FELT, Traces, felt_height_errors, in_force
 from quadriga.trials import Trial
 from quadriga.truth_trace import distance
 from shared.config import Config
 from shared.messages import Measurement
 from shared.robot import GRAVITY, N_LEGS, OUTPUTS, TOTAL_MASS, Array
 
-# What a walk is judged by: the outputs by the world's truth, the height over the terrain under the
-# hips, and the height over the ground that the robot's feet feel, by its own word: what it is asked
-# to keep. Where a hip passes the edge of a block the former jumps, whatever the robot does.
-FELT: Final = "z-felt"
-ERRORS: Final = (OUTPUTS[0], FELT, *OUTPUTS[1:])
 _SHORTEST: Final = 0.5  # m; over a shorter way a cost of transport is that of starting
 
 
@@ -55,8 +50,9 @@ class Figures:
         fallen: when each robot that fell did so, s.
         stopped: why each robot that stopped for another reason did so.
         mean: of each output over the steady part, all robots; m, m/s, rad, rad/s.
-        rmse: the same, of each of `ERRORS`.
-        cost: mean of ‖y − y_des‖²_Q + ‖u − u_nominal‖²_R over samples of 10 ms and robots.
+        rmse: the same, of each of `quadriga.traces.ERRORS`.
+        cost: mean of ‖y − y_des‖²_Q + ‖u − u_nominal‖²_R over samples of 10 ms and robots, where
+            the height is that over the felt ground.
         cost_outputs, cost_forces: its two parts.
         planner_ms_median, planner_ms_p99: time of one planning step, ms.
         solves: planning steps timed.
@@ -117,9 +113,10 @@ def figures(walk: Walk) -> Figures:
     wanted = np.zeros((len(truth.tick), 1, len(OUTPUTS)))
     wanted[:, 0, [1, 2, 5, 0]] = reference
     y, error = truth.y[steady], (truth.y - wanted)[steady]
-    outputs = _mean((error**2 @ np.array(planner.Q)).ravel())
+    squares = {name: _mean(error[..., i] ** 2) for i, name in enumerate(OUTPUTS)}
+    squares[FELT] = _felt_height(traces, begin, end)
+    outputs = _output_cost(planner.Q, squares)
     forces = _mean(_force_cost(walk, begin, end, np.tile(planner.R, N_LEGS)))
-    squares = [_mean(error[..., i] ** 2) for i in range(len(OUTPUTS))]
     every = [status for found in traces.statuses.values() for status in found]
     planner_ms = np.concatenate([np.zeros(0), *(status.planner_ms for status in every)])
     return Figures(
@@ -127,13 +124,7 @@ def figures(walk: Walk) -> Figures:
         fallen=fallen,
         stopped=_stopped(traces, fallen),
         mean={name: _mean(y[..., i]) for i, name in enumerate(OUTPUTS)},
-        rmse={
-            name: None if square is None else square**0.5
-            for name, square in [
-                *zip(OUTPUTS, squares, strict=True),
-                (FELT, _felt_height(traces, begin, end)),
-            ]
-        },
+        rmse={name: None if (of := squares[name]) is None else of**0.5 for name in ERRORS},
         cost=None if outputs is None or forces is None else outputs + forces,
         cost_outputs=outputs,
         cost_forces=forces,
@@ -173,12 +164,17 @@ def _stopped(traces: Traces, fallen: Mapping[str, float]) -> dict[str, str]:
 def _felt_height(traces: Traces, begin: int, end: int) -> float | None:
     """Mean square of the height over the felt ground less the one asked for, m²."""
     parts = [np.zeros(0)]
-    for found in traces.measurements.values():
-        kept = _within(found.tick, begin, end)
-        asked = in_force(traces.references, found.tick[kept])[:, 3]
-        parts.append(found.y[kept, 0] - asked)
-    error = np.concatenate(parts)
-    return _mean(error[np.isfinite(error)] ** 2)
+    for robot in traces.robots:
+        tick, error = felt_height_errors(traces, robot)
+        parts.append(error[_within(tick, begin, end)])
+    return _mean(np.concatenate(parts) ** 2)
+
+
+def _output_cost(Q: Sequence[float], squares: Mapping[str, float | None]) -> float | None:
+    """∑ q e², with the height over the felt ground: what the planner can do something about."""
+    found = [squares[FELT], *(squares[name] for name in OUTPUTS[1:])]
+    terms = [q * square for q, square in zip(Q, found, strict=True) if square is not None]
+    return sum(terms) if len(terms) == len(OUTPUTS) else None
 
 
 def _force_cost(walk: Walk, begin: int, end: int, R: Array) -> Array:

@@ -131,6 +131,11 @@ class WorldConfig:
         200, "ms", "realtime: a command older than this is replaced by damping", low=1, high=10000
     )
 
+    @property
+    def uneven(self) -> bool:
+        """Whether the ground is anything but a plane."""
+        return self.terrain != "flat" and self.terrain_height > 0.0
+
 
 @dataclass(frozen=True, slots=True)
 class SensorsConfig:

@@ -71,7 +71,7 @@ def build_terrain(config: Config, places: Array) -> Terrain:
         places: spawn positions of the trunks, shape (n, 2), m.
     """
     world = config.world
-    if world.terrain == "flat" or world.terrain_height == 0.0:
+    if not world.uneven:
         return Terrain(None)
     build: Mapping[str, Callable[[Course, float, np.random.Generator], Blocks | HeightField]]
     build = {

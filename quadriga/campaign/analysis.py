@@ -10,7 +10,7 @@ from typing import Final
 from quadriga.campaign.outcome import Outcome
 from quadriga.campaign.plan import Group
 from quadriga.campaign.statistics import Interval, Pairs, median, wilson
-from quadriga.trial import ERRORS
+from quadriga.traces import ERRORS
 
 COST: Final = "cost"  # the ratio of control costs, beside those of the RMSE
 

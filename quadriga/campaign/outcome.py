@@ -7,7 +7,8 @@ from dataclasses import dataclass, fields
 from typing import Any, Final
 
 from quadriga.campaign.plan import Group
-from quadriga.trial import ERRORS, Figures
+from quadriga.traces import ERRORS
+from quadriga.trial import Figures
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +29,8 @@ class Outcome:
         distance_m: length of the way, mean over the robots.
         energy_j: ∑ |τ q̇| dt of all motors over the whole walk.
         cost_of_transport: energy over weight (robots and payload) and distance.
-        control_cost: mean of ‖y − y_des‖²_Q + ‖u − u_nominal‖²_R per sample and robot.
+        control_cost: mean of ‖y − y_des‖²_Q + ‖u − u_nominal‖²_R per sample and robot, the height
+            over the felt ground.
         planner_ms_p50, planner_ms_p99, solves: of planning steps, wall time.
         plans: how many plans had which status.
         seconds: world time walked.

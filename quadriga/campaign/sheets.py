@@ -11,7 +11,7 @@ from quadriga.campaign.outcome import Outcome
 from quadriga.campaign.plan import Group
 from quadriga.campaign.statistics import mcnemar, median, median_interval, paired_difference
 from quadriga.sheet import NOTHING, Sheet, label, output_text, text
-from quadriga.trial import ERRORS
+from quadriga.traces import ERRORS
 
 ALL: Final = "all worlds"
 POOLED_NOTE: Final = (

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from quadriga.campaign.analysis import COST
 from quadriga.campaign.sheets import number
 from quadriga.experiments.experiment import Experiment
 from quadriga.experiments.measures import MEASURES, Estimate, ratio
@@ -53,7 +54,8 @@ def _ratios(experiment: Experiment, results: Results) -> Figure | None:
     """For each world rows of errors over those of the baseline, of every other variant."""
     measures = [ratio(name) for name in experiment.published.ratios]
     panels = _panels(experiment, results, measures, experiment.others())
-    across = f"RMSE, or control cost, over that of {experiment.baseline}"
+    what = "RMSE, or control cost," if COST in experiment.published.ratios else "RMSE"
+    across = f"{what} over that of {experiment.baseline}"
     return _rows(panels, across, experiment, at=1.0)
 
 

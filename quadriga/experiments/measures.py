@@ -11,7 +11,7 @@ from quadriga.campaign.analysis import COST
 from quadriga.campaign.sheets import p_text, unbroken
 from quadriga.campaign.statistics import mcnemar, paired_difference, wilson
 from quadriga.experiments.results import Line
-from quadriga.trial import ERRORS
+from quadriga.traces import ERRORS
 
 
 @dataclass(frozen=True, slots=True)

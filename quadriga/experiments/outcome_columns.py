@@ -9,7 +9,7 @@ from quadriga.campaign.analysis import Tally
 from quadriga.campaign.sheets import unbroken
 from quadriga.experiments.results import Line
 from quadriga.sheet import label, output_text, text
-from quadriga.trial import ERRORS
+from quadriga.traces import ERRORS
 
 Column = tuple[str, Callable[[Line], str]]  # its heading, and a line's cell
 

@@ -22,7 +22,7 @@ from quadriga.experiments.experiment import (
 from quadriga.experiments.figures import FIGURES
 from quadriga.experiments.measures import MEASURES
 from quadriga.experiments.outcome_columns import COLUMNS
-from quadriga.trial import ERRORS
+from quadriga.traces import ERRORS
 from quadriga.variants import seeds_of
 from shared.config_file import flattened, read_toml
 from shared.errors import ConfigError

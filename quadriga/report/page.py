@@ -166,7 +166,11 @@ def _trunks(run: Run) -> Iterator[Section]:
     if run.has_truth:
         yield "paths", "Paths from above", figure(tracks.top_view(run), named)
         if any(len(measured.tick) for measured in run.traces.measurements.values()):
-            text = "<p>What the agent estimated, less the truth at the same tick.</p>"
+            text = "<p>What the agent estimated, less the truth at the same tick"
+            if run.traces.config.world.uneven:
+                text += ". The height is not compared: it is that over the ground which the feet "
+                text += "feel, the truth's that over the terrain under the hips"
+            text += ".</p>"
             yield (
                 "estimator",
                 "Estimator errors",

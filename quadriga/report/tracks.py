@@ -112,6 +112,8 @@ def estimator_errors(run: Run) -> str:
     robots, panels = range(len(run.traces.robots)), []
     errors = [estimate_errors(run.traces, index) for index in robots]
     for i in _ORDER:
+        if OUTPUTS[i] == "z" and run.traces.config.world.uneven:
+            continue  # these are heights over two different things
         curves = []
         for index in robots:
             tick, error = errors[index]

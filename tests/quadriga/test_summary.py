@@ -13,6 +13,7 @@ import pytest
 from rich.console import Console
 
 from quadriga.summary import print_table, summarise
+from quadriga.traces import ERRORS
 from shared import messages as msg
 from shared.config import Config, PlannerConfig
 from shared.config_text import config_sha256
@@ -103,6 +104,20 @@ def test_a_roll_that_is_off_by_a_whole_turn_is_no_error(write_run: WriteRun) -> 
 
     summary = summarise(write_run(run_config(2, 3.3), change=change))
     assert summary["estimator_rmse"]["roll"] == pytest.approx(0.004, abs=APPROX)
+
+
+def test_on_uneven_ground_the_estimated_height_is_compared_with_nothing(
+    write_run: WriteRun,
+) -> None:
+    """The robots tell the height over what they feel, the truth that over the terrain."""
+    config = run_config(2, 3.3)
+    rough = replace(config, world=replace(config.world, terrain="boxes"))
+    summary = summarise(write_run(rough))
+    assert summary["estimator_rmse"]["z"] is None
+    assert summary["estimator_rmse"]["vx"] == pytest.approx(ESTIMATOR_ERROR[1], abs=APPROX)
+    felt = (0.004**2 / 2 + ESTIMATOR_ERROR[0] ** 2) ** 0.5
+    assert summary["rmse"]["z-felt"] == pytest.approx(felt, rel=0.05)
+    assert "z –" in table(summary)
 
 
 def test_every_lost_message_is_a_gap(write_run: WriteRun) -> None:
@@ -214,7 +229,7 @@ def test_why_a_robot_stopped_is_told(write_run: WriteRun) -> None:
 def test_a_walk_too_short_has_no_steady_part(write_run: WriteRun) -> None:
     summary = summarise(write_run(run_config(2, 1.0)))
     assert summary["mean_vx"] is None
-    assert summary["rmse"] == dict.fromkeys(OUTPUTS)
+    assert summary["rmse"] == dict.fromkeys(ERRORS)
     assert summary["estimator_rmse"] == dict.fromkeys(OUTPUTS)
     assert summary["distance"] == pytest.approx(SPEED, rel=1e-9)
     assert "vx –" in table(summary)

@@ -6,7 +6,7 @@ from typing import Any
 
 from quadriga.campaign.manifest import GroupEntry, Manifest, SweepEntry
 from quadriga.campaign.outcome import Outcome
-from quadriga.trial import ERRORS
+from quadriga.traces import ERRORS
 
 
 def row(variant: str = "none", seed: int = 0, **changes: Any) -> Outcome:
