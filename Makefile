@@ -45,7 +45,7 @@ format: $(TOOLS)
 docs: $(STAMP)
 	$(BIN)/quadriga config --markdown > docs/configuration.md
 
-# Every figure and table of results in README and docs; two cores walk some 20 times a minute.
+# Every figure and table of results in README and docs; two cores walk 15 times a minute.
 # It goes on where it ended; ARGS=--only-publish walks nothing, ARGS='hard --seeds 0:2' only looks.
 figures: $(STAMP)
 	$(BIN)/quadriga experiments $(ARGS)

@@ -24,7 +24,7 @@ from quadriga.collect import Dataset, collect, training_seconds
 from shared.blas import one_blas_thread
 from shared.config import Config
 from shared.config_text import config_sha256
-from shared.errors import PredictorError
+from shared.errors import PredictorError, PredictorFileError
 from shared.robot import N_FORCES, Array
 
 _FIELDS = (*SIGNALS, "first_tick")
@@ -155,7 +155,7 @@ def read_data(path: Path) -> Dataset:
     """Collected data from a file.
 
     Raises:
-        PredictorError: no such file, or not a file of collected data.
+        PredictorFileError: no such file, or not a file of collected data.
     """
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
@@ -166,7 +166,7 @@ def read_data(path: Path) -> Dataset:
             parts[part] = tuple(_episode(arrays, f"{part}.{k}") for k in range(count))
         seeds = tuple(arrays["seeds"].tolist())
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise PredictorError(
+        raise PredictorFileError(
             f"data {path}", str(error) or type(error).__name__, "a file of `quadriga collect`",
             "delete it to collect anew",
         ) from None  # fmt: skip

@@ -105,7 +105,8 @@ class Row:
 def figures(walk: Walk) -> Figures:
     """The figures of merit of a walk."""
     traces, truth = walk.traces, walk.traces.truth
-    planner, fallen = traces.config.planner, _fallen(traces)
+    config, fallen = traces.config, _fallen(traces)
+    planner = config.planner
     end = round(1000 * min(fallen.values())) if fallen else int(truth.tick.max(initial=0))
     begin = steady_from(traces)
     reference = in_force(traces.references, truth.tick)
@@ -132,9 +133,9 @@ def figures(walk: Walk) -> Figures:
         planner_ms_p99=_quantile(planner_ms, 0.99),
         solves=len(planner_ms),
         plans=dict(sorted(walk.plans.items())),
-        distance=(way := distance(truth, 2 * traces.config.gait.stance_ms)),
+        distance=(way := distance(truth, 2 * config.gait.stance_ms, end if fallen else None)),
         work=walk.work,
-        cost_of_transport=_cost_of_transport(traces.config, walk.work, way),
+        cost_of_transport=_cost_of_transport(config, walk.work, way),
     )
 
 

@@ -75,15 +75,16 @@ def build_truth_trace(messages: Sequence[Truth], config: Config) -> TruthTrace:
     )  # fmt: skip
 
 
-def distance(truth: TruthTrace, stride_ms: int) -> float | None:
+def distance(truth: TruthTrace, stride_ms: int, before: int | None = None) -> float | None:
     """Length of the trunks' ways, mean over the robots, m; None without a sample.
 
-    Sampled once a stride, so that sway within it does not count.
+    Sampled once a stride, so that sway within it does not count; up to the tick `before`, if any.
     """
-    if not len(truth.tick):
+    count = len(truth.tick) if before is None else int(np.searchsorted(truth.tick, before))
+    tick, pos = truth.tick[:count], truth.base_pos[:count]
+    if not count:
         return None
-    strides = truth.base_pos[truth.tick % stride_ms == 0]
-    way = np.concatenate([strides, truth.base_pos[-1:]])[..., :2]
+    way = np.concatenate([pos[tick % stride_ms == 0], pos[-1:]])[..., :2]
     return float(np.linalg.norm(np.diff(way, axis=0), axis=-1).sum(axis=0).mean())
 
 

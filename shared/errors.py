@@ -39,6 +39,10 @@ class PredictorError(QuadrigaError):
     """A predictor file is missing, foreign, or fails one of its gates."""
 
 
+class PredictorFileError(PredictorError):
+    """The file of a predictor, or of the data it is fitted to, is missing, foreign or damaged."""
+
+
 class RecordingError(QuadrigaError):
     """A recording cannot be read or written."""
 

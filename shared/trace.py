@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import sys
 from dataclasses import dataclass
 from functools import lru_cache
@@ -53,12 +54,32 @@ def trace_of(config: Config) -> Trace | None:
     Raises:
         ConfigError: the file cannot be read, or is no trace.
     """
-    name, shift = config.reference.trace, config.reference.trace_shift
-    if not name:
+    path, shift = _path(config), config.reference.trace_shift
+    if path is None:
         return None
-    path = Path(name) if "/" in name else scenario_folder() / name
     begin = np.random.default_rng((config.world.seed, _STREAM)).uniform(0.0, shift)
     return _read(path, begin)
+
+
+def trace_sha256(config: Config) -> str:
+    """Digest of the trace's file, empty without one: a configuration holds only its name.
+
+    Raises:
+        ConfigError: the file cannot be read.
+    """
+    path = _path(config)
+    try:
+        return "" if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise _refused(Path(config.reference.trace), error.strerror or str(error),
+                       "a file that can be read") from None  # fmt: skip
+
+
+def _path(config: Config) -> Path | None:
+    name = config.reference.trace
+    if not name:
+        return None
+    return Path(name) if "/" in name else scenario_folder() / name
 
 
 @lru_cache(maxsize=8)

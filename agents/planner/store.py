@@ -19,7 +19,7 @@ from agents.planner.best_response import best_response_radius
 from agents.planner.gates import GateReport
 from agents.planner.predictor import Predictor, PredictorMeta
 from shared.config import Config
-from shared.errors import PredictorError
+from shared.errors import PredictorFileError
 
 FORMAT: Final = 2
 _PACKAGES: Final = ("quadriga", "numpy", "scipy", "mujoco", "pin", "daqp")
@@ -83,7 +83,7 @@ def save(path: Path, predictor: Predictor, provenance: Provenance) -> str:
         The predictor's digest (`predictor_sha256`).
 
     Raises:
-        PredictorError: the file cannot be written.
+        PredictorFileError: the file cannot be written.
     """
     digest = predictor_sha256(predictor)
     document = {
@@ -97,7 +97,7 @@ def save(path: Path, predictor: Predictor, provenance: Provenance) -> str:
             np.savez(file, G=predictor.G, document=np.array(json.dumps(document, sort_keys=True)))
         partial.replace(path)
     except OSError as error:
-        raise PredictorError(
+        raise PredictorFileError(
             str(path), error.strerror or str(error), "a file that can be written"
         ) from None
     return digest
@@ -110,8 +110,9 @@ def load(path: Path, config: Config) -> tuple[Predictor, Provenance]:
     radius was computed for, it is computed anew.
 
     Raises:
-        PredictorError: no such file, not a predictor, corrupt, fitted for another team, gait,
-            horizon, interface or low level, or beyond a gate's limit.
+        PredictorFileError: no such file, not a predictor, corrupt, fitted for another team, gait,
+            horizon, interface or low level.
+        PredictorError: beyond a gate's limit.
     """
     predictor, provenance = read(path)
     _check_meta(path, predictor.meta, PredictorMeta.of(config))
@@ -131,21 +132,21 @@ def read(path: Path) -> tuple[Predictor, Provenance]:
     """Read a predictor file whatever it was fitted for (to show what is in it).
 
     Raises:
-        PredictorError: no such file, not a predictor, or corrupt.
+        PredictorFileError: no such file, not a predictor, or corrupt.
     """
     try:
         # An own handle: numpy leaves its open when the archive turns out to be broken.
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             G, document = archive["G"], json.loads(str(archive["document"]))
         if document["format"] != FORMAT:
-            raise PredictorError(
+            raise PredictorFileError(
                 f"predictor {path}", f"format {document['format']}", f"format {FORMAT}", _REMEDY
             )
         meta = PredictorMeta.from_dict(document["meta"])
         provenance = Provenance.from_dict(document["provenance"])
         predictor = Predictor(meta, np.asarray(G, dtype=np.float64), provenance.gates.condition)
     except FileNotFoundError:
-        raise PredictorError(f"predictor {path}", "no such file", "a file", _REMEDY) from None
+        raise PredictorFileError(f"predictor {path}", "no such file", "a file", _REMEDY) from None
     except (
         OSError,
         ValueError,
@@ -155,12 +156,12 @@ def read(path: Path) -> tuple[Predictor, Provenance]:
         EOFError,
         zipfile.BadZipFile,
     ) as error:
-        raise PredictorError(
+        raise PredictorFileError(
             f"predictor {path}", f"something else ({type(error).__name__})",
             "a predictor that quadriga wrote", f"truncated or not a predictor; {_REMEDY}",
         ) from None  # fmt: skip
     if document["sha256"] != predictor_sha256(predictor):
-        raise PredictorError(
+        raise PredictorFileError(
             f"predictor {path}", "content that its digest does not match", "an unchanged file",
             f"corrupt; {_REMEDY}",
         )  # fmt: skip
@@ -173,7 +174,7 @@ def _check_meta(path: Path, got: PredictorMeta, expected: PredictorMeta) -> None
     pairs += [(f"controller.{k}", fitted.get(k), wanted) for k, wanted in expected.controller]
     for name, found, wanted in pairs:
         if found != wanted:
-            raise PredictorError(
+            raise PredictorFileError(
                 f"predictor {path}: {name}", repr(found), f"{wanted!r} as configured",
                 f"fitted for another setting; {_REMEDY}",
             )  # fmt: skip

@@ -9,6 +9,7 @@ from typing import Final
 
 from rich.console import Console
 
+from quadriga.campaign.job import origin
 from quadriga.campaign.manifest import Manifest
 from quadriga.campaign.outcome import Outcome
 from quadriga.campaign.plan import seeded
@@ -44,9 +45,10 @@ def record(folder: Path, manifest: Manifest, rows: Sequence[Outcome], console: C
     """Walk trials again over the bus, unless they are recorded; each with its page.
 
     Raises:
-        ConfigError: the predictor, or the code, is no longer the one they were walked with.
+        ConfigError: predictor, code or libraries are no longer those they were walked with.
         ProcessError: a process failed, or the walk came to something else.
     """
+    manifest.check_versions(origin(), folder)
     shas = {entry.group: entry.predictor_sha256 for entry in manifest.groups}
     for number, row in enumerate(rows, 1):
         run_dir = _run_dir(folder, row)
@@ -56,18 +58,19 @@ def record(folder: Path, manifest: Manifest, rows: Sequence[Outcome], console: C
         (fitted,) = prepared([config], console).values()
         if fitted.sha256 != shas[row.group]:
             raise ConfigError(f"predictor of {row.group.name}", fitted.sha256[:12] or "none",
-                              shas[row.group][:12] or "none", "the cache was emptied, or the code "
-                              "changed")  # fmt: skip
+                              shas[row.group][:12] or "none", "the cache was emptied"
+                              )  # fmt: skip
         console.print(f"recording {number}/{len(rows)}: {run_dir}", markup=False, highlight=False)
         (run_dir / RECORDING).unlink(missing_ok=True)  # of a walk that was interrupted
         walk = figures(over_the_bus(config, run_dir, fitted.path, fitted.sha256))
         if fitted.path is not None:
             keep(fitted.path, run_dir)
-        fell = min(walk.fallen.values(), default=None)
-        if fell != row.time_to_fall_s:
-            raise ProcessError(f"{run_dir}", f"a fall at {fell} s",
-                               f"{row.time_to_fall_s} s, as in the campaign",
-                               "other code or libraries than those it was walked with")  # fmt: skip
+        found = min(walk.fallen.values(), default=None), walk.distance
+        told = row.time_to_fall_s, row.distance_m
+        if found != told:
+            raise ProcessError(f"{run_dir}", "time to fall and distance {} s, {} m".format(*found),
+                               "{} s, {} m, as in the campaign".format(*told),
+                               "another trace than it was walked with?")  # fmt: skip
         report(run_dir, pictures=False, console=Console(quiet=True))
 
 

@@ -6,6 +6,7 @@ import os
 from collections.abc import Generator, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from threading import Lock
 from typing import Any, Final
@@ -29,10 +30,10 @@ _ONE_WALK: Final = Lock()  # of this process: planners keep memory of their own
 class Shipped(WorkerPlugin):
     """Brings files to every worker, also to one that joins later: they are named by content."""
 
-    name = "quadriga-files"
-
     def __init__(self, files: Iterable[Path]) -> None:
         self._files = {f"{file_sha256(path)}{path.suffix}": path.read_bytes() for path in files}
+        # A plugin takes the place of one of the same name: two campaigns have their own.
+        self.name = f"quadriga-{sha256(''.join(sorted(self._files)).encode()).hexdigest()[:16]}"
 
     def setup(self, worker: Any) -> None:
         """Write the files where `_here` looks for them; `worker` is given by Dask."""

@@ -7,7 +7,8 @@ import fcntl
 import io
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
@@ -106,20 +107,37 @@ def read_rows(folder: Path, manifest: Manifest) -> list[Outcome]:
         raise ConfigError(str(path), error.strerror or str(error), "a readable file") from None
     whole = text[: text.rfind(b"\n") + 1].decode("utf-8", errors="replace")
     found: dict[tuple[object, int], Outcome] = {}
-    for number, cells in enumerate(csv.reader(io.StringIO(whole)), 1):
-        try:
-            if number == 1:
+    lines = csv.reader(io.StringIO(whole))
+    try:
+        for cells in lines:
+            if lines.line_num == 1:
                 if cells != columns([sweep.key for sweep in manifest.sweeps]):
                     raise ValueError("other columns")
                 continue
             row = from_cells(cells)
             if (row.group, row.seed) in found:
                 raise ValueError(f"a second row of {row.group.name}, seed {row.seed}")
+            if row.versions != manifest.versions:
+                raise ValueError(f"a trial with code and versions {row.versions}")
             found[row.group, row.seed] = row
-        except ValueError as error:
-            raise ConfigError(f"{path}, line {number}", str(error), "a row of this campaign",
-                              "edited by hand?") from None  # fmt: skip
+    except (ValueError, csv.Error) as error:
+        raise ConfigError(f"{path}, line {lines.line_num}", str(error), "a row of this campaign",
+                          "edited by hand?") from None  # fmt: skip
     return list(found.values())
+
+
+@contextmanager
+def kept_in(folder: Path) -> Iterator[None]:
+    """What cannot be written into a campaign's folder is one error; what was written is kept.
+
+    Raises:
+        ConfigError: no place, or no permission.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise ConfigError(str(error.filename or folder), error.strerror or str(error),
+                          "a place that can be written to") from None  # fmt: skip
 
 
 def write_text(path: Path, text: str) -> None:

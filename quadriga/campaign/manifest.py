@@ -17,7 +17,10 @@ _REMEDY: Final = "trials of both must not be mixed: use a new folder"
 
 @dataclass(frozen=True, slots=True)
 class GroupEntry:
-    """A group: its names, its configuration's digest with seed 0, its predictor's, its seeds."""
+    """A group: its names, seeds, and digests.
+
+    `config_sha256` is that of its configuration with seed 0, and of the trace that this names.
+    """
 
     scenario: str
     variant: str

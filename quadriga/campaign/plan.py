@@ -85,8 +85,7 @@ def build_plan(
         baseline = "none" if "none" in known else known[0]
     elif baseline not in {variant.name for variant in variants}:
         raise ConfigError("--baseline", repr(baseline), "one of the variants compared")
-    if len({sweep.key for sweep in sweeps}) < len(sweeps):
-        raise ConfigError("--sweep", "a key twice", "different keys")
+    _check_sweeps(sweeps)
     given = {
         name: layers(file, {scenarios.LABEL: name, **overrides}, beneath=path)
         for name, path in files.items()
@@ -102,6 +101,7 @@ def build_plan(
         changes |= {"world.seed": 0, "world.mode": "lockstep"}
         config = build(_over(_over(given[name], variant.keys), changes))
         configs[Group(name, variant.name, tuple(label for label, _ in points))] = config
+    _check_names(configs)
     for config in {(c.team, c.world): c for c in configs.values()}.values():
         World(config)  # its errors are better known before anything is collected and fitted
     return Plan(files, variants, sweeps, seeds, baseline, configs)
@@ -110,6 +110,28 @@ def build_plan(
 def seeded(config: Config, seed: int) -> Config:
     """The configuration of one trial of a group."""
     return replace(config, world=replace(config.world, seed=seed))
+
+
+def _check_sweeps(sweeps: Sequence[Sweep]) -> None:
+    if len({sweep.key for sweep in sweeps}) < len(sweeps):
+        raise ConfigError("--sweep", "a key twice", "different keys")
+    for sweep in sweeps:
+        if sweep.key in _OURS:
+            raise ConfigError(f"--sweep {sweep.key}", "a key that a campaign sets itself",
+                              "another key", "--seeds chooses the seeds")  # fmt: skip
+        values = [value for _, value in sweep.values]
+        if any(value in values[:place] for place, value in enumerate(values)):
+            raise ConfigError(f"--sweep {sweep.key}", "a value twice", "different values")
+
+
+def _check_names(configs: Mapping[Group, Config]) -> None:
+    """Files and recordings of groups are told apart by their names."""
+    by_name: dict[str, Group] = {}
+    for group in configs:
+        other = by_name.setdefault(group.name, group)
+        if other != group:
+            raise ConfigError("variants and swept values", f"{other} and {group}",
+                              "names that differ in more than punctuation")  # fmt: skip
 
 
 def _files(names: Sequence[str]) -> dict[str, Path]:

@@ -14,7 +14,7 @@ from quadriga.cache import data_path, predictor_path
 from quadriga.fit_report import reason
 from quadriga.identify import ensure_predictor
 from shared.config import Config
-from shared.errors import PredictorError
+from shared.errors import PredictorError, PredictorFileError
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,11 @@ class Fitted:
 
 
 def prepared(configs: Iterable[Config], console: Console) -> dict[Config, Fitted]:
-    """The predictor of each configuration, from the cache or made now."""
+    """The predictor of each configuration, from the cache or made now.
+
+    Raises:
+        PredictorFileError: a file cannot be read or written; all else refuses a predictor alone.
+    """
     found: dict[Config, Fitted] = {}
     made: dict[tuple[Path, str], Fitted] = {}
     for config in configs:
@@ -65,6 +69,8 @@ def _made(config: Config, console: Console) -> Fitted:
     try:
         path = ensure_predictor(config, console)
         sha256 = predictor_sha256(load(path, config)[0])
+    except PredictorFileError:
+        raise  # of which no other predictor is to blame
     except PredictorError as error:
         return Fitted(refused=reason(error))
     return Fitted(path, sha256, data_path(config) if config.planner.kind == "deepc" else None)

@@ -13,7 +13,7 @@ from rich.console import Console
 from quadriga.campaign import charts, sheets
 from quadriga.campaign.again import command, record, recorded
 from quadriga.campaign.analysis import against, by_group, worst
-from quadriga.campaign.ledger import read_manifest, read_rows, write_text
+from quadriga.campaign.ledger import kept_in, read_manifest, read_rows, write_text
 from quadriga.campaign.manifest import Manifest
 from quadriga.campaign.outcome import Outcome
 from quadriga.campaign.run import config_file
@@ -60,7 +60,8 @@ def report(
         The page.
 
     Raises:
-        ConfigError: the folder is no campaign's, or holds no row; an unknown baseline.
+        ConfigError: the folder is no campaign's, holds no row, or cannot be written to; an unknown
+            baseline.
         ProcessError: a trial could not be recorded.
     """
     manifest = read_manifest(folder)
@@ -75,8 +76,9 @@ def report(
         wanted = [row for found in rows.values() for row in worst(found, record_worst)]
         record(folder, manifest, wanted, console)
     first, rest = _tables(campaign)
-    write_text(folder / PAGE, _page(campaign))
-    write_text(folder / TABLES, _markdown(campaign, [*first, *rest]))
+    with kept_in(folder):
+        write_text(folder / PAGE, _page(campaign))
+        write_text(folder / TABLES, _markdown(campaign, [*first, *rest]))
     if shown:
         show(first)
     return folder / PAGE
@@ -183,7 +185,7 @@ def _worst(campaign: Campaign) -> str:
 def _line(campaign: Campaign, row: Outcome) -> tuple[str, ...]:
     page = recorded(campaign.folder, row)
     link = f'<a href="{escape(page.as_posix())}">recording</a>' if page else "–"
-    again = f"<code>{escape(command(campaign.folder, row))}</code>"
+    again = "–" if page else f"<code>{escape(command(campaign.folder, row))}</code>"
     return str(row.seed), escape(_what(row)), link, again
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
 from importlib import import_module
@@ -12,7 +13,7 @@ from rich.console import Console
 
 from quadriga.campaign.bar import Bar
 from quadriga.campaign.job import Job, origin, walk
-from quadriga.campaign.ledger import Ledger, read_manifest, write_text
+from quadriga.campaign.ledger import Ledger, kept_in, read_manifest, write_text
 from quadriga.campaign.manifest import FILE, GroupEntry, Manifest, SweepEntry
 from quadriga.campaign.outcome import Outcome, to_columns
 from quadriga.campaign.plan import Group, Plan
@@ -22,6 +23,7 @@ from quadriga.workers import each_done
 from shared.config import Config
 from shared.config_text import config_sha256, to_toml
 from shared.errors import ConfigError
+from shared.trace import trace_sha256
 
 Walks = Callable[[Sequence[Job], int, str], Generator[tuple[Job, Outcome], None, None]]
 
@@ -43,7 +45,9 @@ def run(
         console: for progress.
 
     Raises:
-        ConfigError: the folder is in use or holds trials that do not belong to these.
+        ConfigError: the folder is in use, cannot be written to, or holds trials that do not belong
+            to these.
+        PredictorFileError: a predictor's file, or that of its data, is gone or damaged.
         ProcessError: a worker died, or is not of this version.
     """
     walks = each_walk if dask is None else _dask()
@@ -52,11 +56,19 @@ def run(
     warm_up(next(iter(plan.configs.values())), console)
     fitted = prepared(plan.configs.values(), console)
     manifest = _manifest(plan, fitted, typed)
-    with Ledger(out, manifest) as ledger:
+    with Ledger(out, manifest) as ledger, kept_in(out):
         _write_configs(out, plan.configs)
         done = {(row.group, row.seed) for row in ledger.rows}
+        traces = {group: trace_sha256(config) for group, config in plan.configs.items()}
         todo = [
-            Job(group, seed, plan.configs[group], fitted[plan.configs[group]], manifest.versions)
+            Job(
+                group,
+                seed,
+                plan.configs[group],
+                fitted[plan.configs[group]],
+                manifest.versions,
+                traces[group],
+            )
             for group, seed in plan.trials()
             if (group, seed) not in done
         ]
@@ -111,13 +123,20 @@ def _manifest(plan: Plan, fitted: Mapping[Config, Fitted], typed: str) -> Manife
         sweeps=tuple(SweepEntry(sweep.key, sweep.name) for sweep in plan.sweeps),
         groups=tuple(
             GroupEntry(
-                group.scenario, group.variant, group.swept, config_sha256(config),
+                group.scenario, group.variant, group.swept, _digest(config),
                 fitted[config].sha256, tuple(sorted(plan.seeds)),
             )
             for group, config in plan.configs.items()
         ),
         versions=origin(),
     )  # fmt: skip
+
+
+def _digest(config: Config) -> str:
+    """Of the configuration, and of the trace that it names."""
+    trace = trace_sha256(config)
+    mine = config_sha256(config)
+    return mine if not trace else hashlib.sha256(f"{mine}{trace}".encode()).hexdigest()
 
 
 def _dask() -> Walks:

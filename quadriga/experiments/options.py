@@ -23,7 +23,9 @@ def add_experiments(add: Add) -> None:
     option("--only-publish", action="store_true",
            help="walk nothing: draw tables and figures from the runs there are, or from what is "
            "published")  # fmt: skip
-    option("--seeds", metavar="LIST", help="instead of an experiment's own, for a quick look: 0:2")
+    option(
+        "--seeds", metavar="LIST", help="a quick look at these instead, 0:2: shown, not published"
+    )
     add_where(command)
     option("--out", type=Path, default=Path("runs/experiments"), metavar="DIR",
            help="where campaigns are kept, to go on with (%(default)s)")  # fmt: skip

@@ -35,7 +35,8 @@ truth: z is the height over the terrain under the hips, and jumps where a hip pa
 block; z-felt is that over the ground which the standing feet feel, by the robots' own word (a test
 holds it against the truth), and what they are asked to keep. A requirement is held
 against the figure itself unless it names a bound of its interval; behind *met* and *missed* stands
-how far the figure, or that bound, is from the limit.
+how far the figure, or that bound, is from the limit. What an experiment was walked with is named by
+versions and by a digest of the code; walked with later code it may come to other figures.
 """
 
 

@@ -73,13 +73,7 @@ def results_of(experiment: Experiment, runs: Path, into: Path) -> Results:
         ConfigError: a folder or a file is not what was written there.
     """
     kept = into / KEPT / f"{experiment.name}.json"
-    folders = [folder_of(runs, experiment, part.folder) for part in experiment.parts]
-    campaigns = []
-    for folder in folders:
-        if (folder / FILE).is_file():
-            manifest = read_manifest(folder)
-            campaigns.append((manifest, read_rows(folder, manifest)))
-    found = summarise(experiment, campaigns)
+    found = walked(experiment, runs)
     if found.lines:
         text = to_json(found)
         kept.parent.mkdir(parents=True, exist_ok=True)
@@ -88,6 +82,21 @@ def results_of(experiment: Experiment, runs: Path, into: Path) -> Results:
     if not kept.is_file():
         return Results()
     return fitting(experiment, from_json(kept.read_bytes().decode(errors="replace"), str(kept)))
+
+
+def walked(experiment: Experiment, runs: Path) -> Results:
+    """What came of an experiment's runs.
+
+    Raises:
+        ConfigError: a folder is not what was written there.
+    """
+    campaigns = []
+    for part in experiment.parts:
+        folder = folder_of(runs, experiment, part.folder)
+        if (folder / FILE).is_file():
+            manifest = read_manifest(folder)
+            campaigns.append((manifest, read_rows(folder, manifest)))
+    return summarise(experiment, campaigns)
 
 
 def folder_of(runs: Path, experiment: Experiment, part: str) -> Path:

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
-from quadriga.campaign.analysis import Tally
+from quadriga.campaign.analysis import COST, Tally
 from quadriga.campaign.statistics import Pairs
+from quadriga.traces import ERRORS
 from shared.errors import ConfigError
 
 FORMAT: Final = 1
@@ -138,6 +139,9 @@ def _rounded(value: Any) -> Any:
 def _line(body: Mapping[str, Any]) -> Line:
     beside = body["beside"]
     if beside is not None:
-        ratios = {name: Ratio(**found) for name, found in beside["ratios"].items()}
+        ratios = {name: Ratio(**beside["ratios"][name]) for name in (COST, *ERRORS)}
         beside = Beside(Pairs(**beside["fell"]), beside["upright"], ratios)
-    return Line(**{**body, "tally": Tally(**body["tally"]), "beside": beside})
+    tally = Tally(**body["tally"])
+    if set(tally.rmse) != set(ERRORS):
+        raise ValueError(f"errors {', '.join(tally.rmse)}")
+    return Line(**{**body, "tally": tally, "beside": beside})

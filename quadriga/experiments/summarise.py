@@ -23,33 +23,31 @@ Walked = tuple[Manifest, Sequence[Outcome]]  # what a campaign's folder holds
 def summarise(experiment: Experiment, campaigns: Sequence[Walked]) -> Results:
     """What came of an experiment so far.
 
-    Trials of worlds or variants that its file does not name, or names with other keys, are left
-    out: they are of an experiment that it was before.
+    Trials of worlds, variants or seeds that its file does not name, or names with other keys, are
+    left out: they are of an experiment that it was before.
     """
     keys = {variant.name: dict(variant.keys) for variant in experiment.variants}
-    groups = set(experiment.groups())
+    groups, seeds = _groups_by_sweep(experiment), set(experiment.seeds)
     rows: list[Outcome] = []
-    seeds: dict[Group, set[int]] = {group: set(experiment.seeds) for group in groups}
     for manifest, found in campaigns:
         same = {name for name in keys if _same(keys[name], manifest.variants.get(name))}
-        rows += [row for row in found if row.group in groups and row.variant in same]
-        for entry in manifest.groups:
-            if entry.group in groups and entry.variant in same:
-                seeds[entry.group].update(entry.seeds)
-    wanted = {group: len(mine) for group, mine in seeds.items()}
+        mine = groups.get(tuple(sweep.name for sweep in manifest.sweeps), set())
+        rows += [row for row in found
+                 if row.group in mine and row.variant in same and row.seed in seeds]  # fmt: skip
+    wanted = len(seeds)
     base = [row for row in rows if row.variant == experiment.baseline]
     beside = {name: None if name == experiment.baseline else base for name in keys}
     found_rows = by_group(rows)
     lines = [
-        _line(group.world, group.variant, wanted[group], found_rows[group], beside[group.variant])
+        _line(group.world, group.variant, wanted, found_rows[group], beside[group.variant])
         for group in experiment.groups()
         if group in found_rows
     ]
     if len(experiment.worlds()) > 1 and not any(part.sweep for part in experiment.parts):
         for name in keys:
-            mine = [row for row in rows if row.variant == name]
-            total = sum(count for group, count in wanted.items() if group.variant == name)
-            lines += [_line(POOLED, name, total, mine, beside[name])] if mine else []
+            of_name = [row for row in rows if row.variant == name]
+            total = wanted * len(experiment.worlds())
+            lines += [_line(POOLED, name, total, of_name, beside[name])] if of_name else []
     return Results(
         versions=tuple(dict.fromkeys(manifest.versions for manifest, _ in campaigns)),
         baseline=experiment.baseline,
@@ -84,6 +82,18 @@ def done(experiment: Experiment, results: Results) -> tuple[int, int]:
         sum(line.done for line in found if line is not None),
         sum(len(experiment.seeds) if line is None else line.wanted for line in found),
     )
+
+
+def _groups_by_sweep(experiment: Experiment) -> dict[tuple[str, ...], set[Group]]:
+    """Its groups by what is swept in them: the same values of another key are other worlds."""
+    found: dict[tuple[str, ...], set[Group]] = {}
+    for part in experiment.parts:
+        worlds = set(part.worlds())
+        swept = tuple(sweep.name for sweep in part.sweeps)
+        found.setdefault(swept, set()).update(
+            group for group in experiment.groups() if group.world in worlds
+        )
+    return found
 
 
 def _times(line: Line, worlds: Sequence[tuple[str, ...]]) -> int:

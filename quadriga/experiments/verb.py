@@ -3,51 +3,85 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 from rich.console import Console
 
 from shared.config import Config
 from shared.errors import ConfigError
 
+if TYPE_CHECKING:
+    from quadriga.experiments.experiment import Experiment
+    from quadriga.experiments.walk import Named
+    from quadriga.sheet import Sheet
+
+LOOKS: Final = "looks"  # the folder of walks that are not published
+
 
 def experiments(arguments: argparse.Namespace, _config: Config, _given: dict[str, Any]) -> int:
-    """Walk what is missing of experiments, then publish what came of all."""
+    """Walk what is missing of experiments and publish what came of all; or only take a look."""
     from quadriga.campaign.options import dask_of
     from quadriga.experiments.catalogue import CHECKOUT, load
-    from quadriga.experiments.publish import PAGE, checked, publish
-    from quadriga.experiments.sheets import requirement_sheet
-    from quadriga.experiments.walk import check_folders, plans_of, walk
-    from quadriga.sheet import show
+    from quadriga.experiments.publish import PAGE, publish, walked
+    from quadriga.experiments.sheets import requirement_sheet, sheets
     from quadriga.variants import seeds_of
 
     _check_options(arguments)
     every, asked = load(arguments.names)
+    chosen = [experiment for experiment in every if experiment.name in asked]
+    dask = dask_of(arguments, "names")
+    if arguments.seeds:
+        seeds, runs = seeds_of("--seeds", arguments.seeds), arguments.out / LOOKS
+        for experiment, plans in _planned([replace(one, seeds=seeds) for one in chosen], runs):
+            _walk(arguments, experiment, plans, runs, dask)
+            _show(experiment, sheets(experiment, walked(experiment, runs)))
+        return 0
+    todo = [] if arguments.only_publish else _planned(chosen, arguments.out)
     into = arguments.into or CHECKOUT
-    checked(into)  # this and the folders: better known before hours of walking
-    if not arguments.only_publish:
-        dask = dask_of(arguments, "names")
-        seeds = seeds_of("--seeds", arguments.seeds) if arguments.seeds else ()
-        console = Console(stderr=True)
-        known = {experiment.name: experiment for experiment in every}
-        plans = {name: plans_of(known[name], seeds) for name in asked}
-        for name in asked:
-            check_folders(known[name], arguments.out)
-        for name in asked:
-            walk(known[name], plans[name], arguments.out, jobs=arguments.jobs, dask=dask,
-                 typed=arguments.typed, console=console)  # fmt: skip
-            publish(every, arguments.out, into)
+    # That all can be read and written is better known before hours of walking.
     entries = publish(every, arguments.out, into)
-    found = [(entry.experiment, requirement_sheet(entry.experiment, entry.results))
-             for entry in entries if entry.experiment.name in asked]  # fmt: skip
-    show(
-        replace(sheet, title=experiment.title,
-                rows=tuple(tuple(cell.replace("**", "") for cell in row) for row in sheet.rows))
-        for experiment, sheet in found if sheet.rows
-    )  # fmt: skip
+    for experiment, plans in todo:
+        _walk(arguments, experiment, plans, arguments.out, dask)
+        entries = publish(every, arguments.out, into)
+    for entry in entries:
+        if entry.experiment.name in asked:
+            _show(entry.experiment, [requirement_sheet(entry.experiment, entry.results)])
     print(into / PAGE)
     return 0
+
+
+def _planned(chosen: Iterable[Experiment], runs: Path) -> list[tuple[Experiment, list[Named]]]:
+    """Campaigns of experiments that can be walked, or gone on with."""
+    from quadriga.experiments.walk import check_folders, plans_of
+
+    planned = [(experiment, plans_of(experiment)) for experiment in chosen]
+    for experiment, _ in planned:
+        check_folders(experiment, runs)
+    return planned
+
+
+def _walk(
+    arguments: argparse.Namespace, experiment: Experiment, plans: list[Named], runs: Path,
+    dask: str | None,
+) -> None:  # fmt: skip
+    from quadriga.experiments.walk import walk
+
+    walk(experiment, plans, runs, jobs=arguments.jobs, dask=dask, typed=arguments.typed,
+         console=Console(stderr=True))  # fmt: skip
+
+
+def _show(experiment: Experiment, tables: Iterable[Sheet]) -> None:
+    """Tables made for Markdown, on a terminal."""
+    from quadriga.sheet import show
+
+    show(
+        replace(sheet, title=f"{experiment.title}: {sheet.title}",
+                rows=tuple(tuple(cell.replace("**", "") for cell in row) for row in sheet.rows))
+        for sheet in tables if sheet.rows
+    )  # fmt: skip
 
 
 def _check_options(arguments: argparse.Namespace) -> None:

@@ -19,20 +19,15 @@ from quadriga.experiments.publish import folder_of
 Named = tuple[str, Plan]  # the folder of a campaign within that of the experiment, and its trials
 
 
-def plans_of(experiment: Experiment, seeds: Sequence[int]) -> list[Named]:
+def plans_of(experiment: Experiment) -> list[Named]:
     """The campaigns of an experiment.
-
-    Args:
-        experiment: what its file says.
-        seeds: instead of its own, if any.
 
     Raises:
         ConfigError: a key or a value is wrong, or a world cannot be built.
     """
-    chosen = tuple(seeds) or experiment.seeds
     return [
-        (part.folder, build_plan(part.scenarios, experiment.variants, part.sweeps, chosen,
-                                 experiment.baseline, None, {}))
+        (part.folder, build_plan(part.scenarios, experiment.variants, part.sweeps,
+                                 experiment.seeds, experiment.baseline, None, {}))
         for part in experiment.parts
     ]  # fmt: skip
 

@@ -115,6 +115,8 @@ def test_what_would_not_belong_together_is_refused(tmp_path: Path) -> None:
         (lambda text: text + text.splitlines(keepends=True)[1], "line 3: got a second row of"),
         (lambda text: text.replace("scenario", "where"), "line 1: got other columns"),
         (lambda text: text + "one,two\n", "line 3: got"),
+        (lambda text: text + "one\rtwo\n", "line 3: got"),
+        (lambda text: text.replace("code 1", "code 2"), "line 2: got a trial with code and versi"),
     ],
 )
 def test_rows_edited_by_hand_cost_one_line(tmp_path: Path, change: Any, message: str) -> None:

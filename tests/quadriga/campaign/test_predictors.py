@@ -7,9 +7,12 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from quadriga.cache import predictor_path
 from quadriga.campaign.job import Job, origin, walk
 from quadriga.campaign.plan import Group
 from quadriga.campaign.predictors import Fitted, prepared
+from shared.errors import PredictorFileError, ProcessError
+from shared.trace import trace_sha256
 from tests.quadriga.linear_data import config_of, put_data
 
 
@@ -31,3 +34,27 @@ def test_predictors_are_made_once_and_refusals_become_rows(
     row = walk(job)
     assert row.refused == found[strict].refused
     assert (row.success, row.seconds, row.rmse_z) == (False, 0.0, None)
+
+
+def test_a_file_that_is_gone_is_an_error_and_no_row(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A row would be kept, and the trial never be walked."""
+    put_data(tmp_path, monkeypatch)
+    config = config_of()
+    gone = Fitted(tmp_path / "gone.npz", "ab" * 32)
+    with pytest.raises(PredictorFileError, match="no such file"):
+        walk(Job(Group("flat", "distributed", ()), 3, config, gone, origin()))
+    predictor_path(config).write_bytes(b"not a predictor")
+    with pytest.raises(PredictorFileError, match="a predictor that quadriga wrote"):
+        prepared([config], Console(stderr=True))
+
+
+def test_another_trace_than_the_campaigns_is_an_error(tmp_path: Path) -> None:
+    trace = tmp_path / "mine.csv"
+    trace.write_text("t,vx,vy,wz\n0,0,0,0\n1,0.3,0,0\n", encoding="utf-8")
+    config = config_of(planner__kind="none", reference__trace=str(trace))
+    job = Job(Group("flat", "none", ()), 3, config, Fitted(), origin(), trace_sha256(config))
+    trace.write_text("t,vx,vy,wz\n0,0,0,0\n1,0.2,0,0\n", encoding="utf-8")
+    with pytest.raises(ProcessError, match=r"reference\.trace"):
+        walk(job)

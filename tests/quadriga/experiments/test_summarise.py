@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from quadriga.campaign.choice import Variant
+from quadriga.campaign.choice import Variant, sweep_of
 from quadriga.campaign.plan import Group
 from quadriga.campaign.statistics import Pairs
-from quadriga.experiments.experiment import Experiment
+from quadriga.experiments.experiment import Experiment, Part
 from quadriga.experiments.results import Ratio, Results, from_json, to_json
 from quadriga.experiments.summarise import POOLED, done, fitting, summarise
 from shared.errors import ConfigError
@@ -74,14 +74,21 @@ def test_what_is_not_walked_yet_is_counted() -> None:
     assert done(more, of(more, range(2), fate)) == (8, 8)
 
 
-def test_seeds_beyond_those_of_the_file_are_wanted_too() -> None:
-    """A campaign that was asked for 0:12 is not finished with 0:10."""
+def test_seeds_beyond_those_of_the_file_are_left_out() -> None:
     experiment = experiment_of("ice")
-    manifest = manifest_of(experiment)
-    groups = tuple(replace(entry, seeds=tuple(range(12))) for entry in manifest.groups)
-    rows = rows_of(experiment.groups(), range(10), upright)
-    found = summarise(experiment, [(replace(manifest, groups=groups), rows)])
-    assert done(experiment, found) == (20, 24)
+    found = of(experiment, range(5, 15), upright)
+    assert found.seeds == "5 … 9"
+    assert done(experiment, found) == (10, 20)
+
+
+def test_the_same_values_of_another_swept_key_are_other_worlds() -> None:
+    heights, frictions = (
+        experiment_of("ice", parts=(Part("ice", ("ice",), sweep_of(f"world.{key}=0.1,0.2"), key),))
+        for key in ("terrain_height", "friction")
+    )
+    walked = manifest_of(heights), rows_of(heights.groups(), range(10), upright)
+    assert done(heights, summarise(heights, [walked])) == (40, 40)
+    assert done(frictions, summarise(frictions, [walked])) == (0, 40)
 
 
 def test_trials_of_other_keys_worlds_or_variants_are_left_out() -> None:
