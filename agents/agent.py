@@ -31,17 +31,18 @@ from agents.planner.predictor import Predictor
 from agents.planner.qp_solver import SOLVED
 from agents.planning import LocalPilot
 from agents.references import in_force, remember_references
-from agents.sampling import SAMPLE_MS, measured
+from agents.sampling import measured
 from shared.config import CENTRAL, Config
 from shared.messages import Command, EStop, Measurement, Plan, Reference, State, Truth
 from shared.record import record
 from shared.robot import Array, robot_names
-from shared.topics import REFERENCE
+from shared.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
 
 _ZERO = np.zeros(12)
 _STANDING = Schedule(stance_of_half(-1).astype(float), 0.5, -1)
+_TRUTH_AGE_MS = 20  # of the simulator's word, where it stands in for an estimator
 _LONGEST_DT = 0.02  # s, after a gap in the ticks the filters advance by no more than this
-REFERENCE_EPOCH_MS = 100  # the operator speaks at multiples of this
+NO_ESTIMATE = "no-estimate"  # why a robot damps its joints: its orientation is not a number
 
 
 @record
@@ -163,8 +164,8 @@ class Agent:
         mode = self._mode(state, inputs, reference_age)
         schedule = self._schedule(tick, mode)
         seen = self._sense(state, inputs, schedule, dt)
-        if seen.upright < self._fallen_cosine and not mode.limp:
-            mode = go_limp(mode, tick, DAMPING, "fall")
+        if not seen.upright >= self._fallen_cosine and not mode.limp:
+            mode = go_limp(mode, tick, DAMPING, NO_ESTIMATE if math.isnan(seen.upright) else "fall")
 
         measurement = None
         if tick % SAMPLE_MS == 0 and tick > 0:
@@ -243,8 +244,10 @@ class Agent:
         return mean
 
     def _sense(self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float) -> Seen:
-        if self._by_truth and inputs.truth is not None:  # a lost one is bridged by the filter
-            estimate = trunk_from_truth(inputs.truth, self.index, inputs.state)
+        truth = inputs.truth
+        # One that is lost or late is bridged by the filter.
+        if self._by_truth and truth is not None and inputs.state.tick - truth.tick <= _TRUTH_AGE_MS:
+            estimate = trunk_from_truth(truth, self.index, inputs.state)
             return self._controller.place(
                 state.low_level, estimate, inputs.state.imu_quat_wxyz, schedule, dt
             )
@@ -286,6 +289,7 @@ def _counted(
     names = []
     if planned.plan is not None and planned.plan.status != SOLVED:
         names.append(f"plan_{planned.plan.status.partition(':')[0]}")
+    names += planned.unusual
     if solution.status != UNCONSTRAINED:
         names.append("qp_constrained" if solution.solved else "qp_failed")
     if not names:

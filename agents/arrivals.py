@@ -8,12 +8,13 @@ from typing import Any, Final
 
 from agents.agent import Inputs
 from agents.pilot import NOTHING, Awaited
+from agents.references import allowed
 from shared.barrier import PLANNER
 from shared.codec import decode
 from shared.config import CENTRAL, Config
 from shared.errors import MessageError
-from shared.messages import EStop, Event, Message, Plan, State
-from shared.topics import ESTOP, EVENT, MEASUREMENT, PLAN, REFERENCE, STATE, TRUTH, Topic
+from shared.messages import EStop, Event, Message, Plan, Reference, State
+from shared.topics import ESTOP, EVENT, MEASUREMENT, PLAN, REFERENCE, SAMPLE_MS, STATE, TRUTH, Topic
 
 OPERATOR: Final = "operator"
 WORLD: Final = "sim"
@@ -21,7 +22,8 @@ Source = tuple[str, str]  # name of a topic, name of who sends it
 Order = tuple[int, int]  # a tick, or the step and exchange of a plan
 Wanted = tuple[Source, Order]  # a message of a source, and all before it
 _NEVER: Final = (-1, 0)
-_HELD: Final = 256  # messages of one topic; more can only be a flood
+_HELD: Final = 256  # messages of one source beyond those of the stand; more can only be a flood
+_UPRIGHT: Final = (0.5, 2.0)  # |q|² of an orientation; far from 1 it is none
 
 
 class Arrivals:
@@ -66,6 +68,9 @@ class Arrivals:
         self.flooded = self.ended = False
         self._newest: dict[Source, Order] = {}
         self._held: dict[str, list[tuple[str, Any]]] = {}  # sender and message by topic
+        self._count: Counter[Source] = Counter()  # of these
+        # In lock-step nobody asks for what peers measure while they stand until they walk.
+        self._most = _HELD + config.gait.stand_ms // SAMPLE_MS
         self._state: State | None = None
         self._estop: EStop | None = None
 
@@ -81,9 +86,12 @@ class Arrivals:
             self.counters["dropped_foreign"] += 1
             return
         topic, sender = row
+        message: Message | None
         try:
             message = decode(payload, topic.type)
         except MessageError:
+            message = None
+        if message is None or not _believable(message):
             self.counters[f"dropped_{topic.name}"] += 1
             return
         self.heard[topic.name, sender] += 1
@@ -99,13 +107,13 @@ class Arrivals:
         elif isinstance(message, Event):
             self.ended = self.ended or message.kind == "stop"
         else:
-            held = self._held.setdefault(topic.name, [])
-            if len(held) >= _HELD:
+            source = (topic.name, sender)
+            if self._count[source] >= self._most:
                 self.counters[f"flooded_{topic.name}"] += 1
                 self.flooded = True
                 return
-            held.append((sender, message))
-            source = (topic.name, sender)
+            self._held.setdefault(topic.name, []).append((sender, message))
+            self._count[source] += 1
             self._newest[source] = max(self._newest.get(source, _NEVER), order_of(message))
 
     def state(self) -> State | None:
@@ -155,7 +163,16 @@ class Arrivals:
             on_time = not self._lockstep or limit is None or order_of(item[1]) <= limit
             (due if on_time else later).append(item)
         self._held[topic.name] = later
+        self._count.subtract((topic.name, sender) for sender, _ in due)
         return sorted(due, key=lambda item: (item[0], order_of(item[1])))
+
+
+def _believable(message: Message) -> bool:
+    """Whether numbers that are finite can be meant: an orientation, a reference within limits."""
+    if isinstance(message, State):
+        quat = message.imu_quat_wxyz
+        return _UPRIGHT[0] < float(quat @ quat) < _UPRIGHT[1]
+    return not isinstance(message, Reference) or allowed(message)
 
 
 def order_of(message: Message) -> Order:

@@ -9,13 +9,14 @@ import numpy as np
 
 from agents.planner.central import TeamPlanner
 from agents.planner.episode import commanded_outputs, output_base
-from agents.planner.horizon import SAMPLE_MS, step_ms
+from agents.planner.horizon import step_ms
 from agents.planner.planner import PlannerInputs
 from agents.planning import first_step
 from agents.references import base_of_window, in_force, remember_references
 from shared.config import Config
 from shared.messages import Measurement, Plan, Reference
 from shared.robot import robot_names
+from shared.topics import SAMPLE_MS
 
 Windows = Mapping[str, tuple[Measurement, ...]]
 

@@ -9,10 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from agents.agent import REFERENCE_EPOCH_MS as EPOCH_MS
 from agents.central import Central, CentralOutputs, CentralState
 from agents.planner.central import TeamPlanner
 from agents.planner.horizon import step_ms
+from agents.references import allowed
 from agents.rehearsal import rehearse_central
 from shared.barrier import PLANNER, SIM, meet
 from shared.blas import one_blas_thread
@@ -26,6 +26,7 @@ from shared.robot import robot_names
 from shared.scheduling import take_priority
 from shared.signals import stop_on_signals
 from shared.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS
+from shared.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 
 _WORKING: Final = "plan"
 
@@ -116,6 +117,9 @@ class _Shell:
                 self._ended = self._ended or decode(payload, Event).kind == "stop"
             else:
                 reference = decode(payload, Reference)
+                if not allowed(reference):
+                    self._counters[f"dropped_{REFERENCE.name}"] += 1
+                    return
                 self._references.append(reference)
                 self._newest_reference = max(self._newest_reference, reference.tick)
         except MessageError:

@@ -6,10 +6,10 @@ from dataclasses import field
 
 import numpy as np
 
-from agents.planner.horizon import SAMPLE_MS
 from shared.config import PlannerConfig
 from shared.record import record
 from shared.robot import Array
+from shared.topics import SAMPLE_MS
 
 _NO_FORCE = np.zeros(12)
 
@@ -60,7 +60,7 @@ def present(flights: tuple[Flight, ...], tick: int) -> Present:
     for flight in reversed(flights):
         if flight.start <= tick:
             sample = (tick - flight.plan_tick) // SAMPLE_MS
-            if sample >= len(flight.deviation):
+            if not 0 <= sample < len(flight.deviation):
                 break
             return Present(flight.deviation[sample], flight.outputs[sample:, 1:3])
     return _NOTHING

@@ -8,13 +8,14 @@ from typing import Final
 from agents.flight import Flight, fading, launched, present
 from agents.gait import nominal_forces
 from agents.modes import WALK
-from agents.pilot import Awaited, Heard, PilotState, Planned
+from agents.pilot import NOTHING, Awaited, Heard, PilotState, Planned
 from agents.planner.episode import commanded_outputs
 from agents.planner.horizon import horizon_stance, step_ms
-from agents.planning import first_step
+from agents.planning import FADED, REFUSED, first_step
 from agents.references import in_force
 from shared.config import Config
 from shared.messages import Plan
+from shared.topics import SAMPLE_MS
 
 LOST: Final = "planner-lost"
 
@@ -41,28 +42,41 @@ class Follower:
         """The plan of a step, the configured latency after its data."""
         step, rest = divmod(tick - self._latency, self._step_ms)
         due = rest == 0 and step >= self._first_step
-        return Awaited(plan=(step, 0) if due else None)
+        return Awaited(plan=(step, 0)) if due else NOTHING
 
     def step(self, state: PilotState, heard: Heard) -> tuple[PilotState, Planned]:
         """Take the newest plan into force; say what to apply now."""
         tick, planner = heard.tick, self._config.planner
         if heard.measurement is not None:
             state = replace(state, own=(heard.measurement,))
+        unusual: list[str] = []
         for _, plan in heard.plans:
-            if state.newest < plan.serial and len(plan.u) == planner.N:
-                state = self._take(state, plan, heard)
+            if not self._usable(plan, tick):
+                unusual.append(REFUSED)
+            elif state.newest < plan.serial:
+                state, factor = self._take(state, plan, heard)
+                unusual += [f"plan_{FADED}"] if factor < 1.0 else []
         if heard.mode.name != WALK:
-            return state, Planned()
+            return state, Planned(unusual=tuple(unusual))
         due = (tick - self._latency) // self._step_ms
         age = due - max(state.newest[0], self._first_step - 1)
+        planned = self._step_ms * state.newest[0]
         lost = age > planner.max_peer_age + planner.hold_steps
         return state, Planned(
             present=present(state.flights, tick),
             stop_reason=LOST if lost else "",
-            ages_ms={"plan": float(tick - self._step_ms * state.newest[0])} if heard.plans else {},
+            ages_ms={"plan": float(tick - planned)} if planned >= 0 else {},
+            unusual=tuple(unusual),
         )
 
-    def _take(self, state: PilotState, plan: Plan, heard: Heard) -> PilotState:
+    def _usable(self, plan: Plan, tick: int) -> bool:
+        """Whether a plan is one of this team's at this time: else it is foreign, or forged."""
+        samples = self._config.planner.N
+        begun = plan.tick == plan.step * self._step_ms
+        return begun and 0 <= tick - plan.tick < SAMPLE_MS * samples and len(plan.u) == samples
+
+    def _take(self, state: PilotState, plan: Plan, heard: Heard) -> tuple[PilotState, float]:
+        """Take a plan into force; with the share of it that is applied."""
         factor, outputs = 1.0, plan.y
         if state.own:
             now, _ = in_force(heard.references, heard.tick, self._config.reference.height)
@@ -73,7 +87,8 @@ class Follower:
             outputs = asked + factor * (plan.y - asked)
         du = plan.u - nominal_forces(horizon_stance(self._config, self._index, plan.step))
         flight = Flight(heard.tick, plan.tick, factor * du, outputs)
-        return replace(state, flights=launched(state.flights, flight), newest=plan.serial)
+        state = replace(state, flights=launched(state.flights, flight), newest=plan.serial)
+        return state, factor
 
 
 def central_latency(config: Config) -> int:

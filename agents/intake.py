@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from agents.agent import REFERENCE_EPOCH_MS, Inputs
+from agents.agent import Inputs
 from agents.arrivals import OPERATOR, WORLD, Arrivals, Order, Source, order_of
 from agents.pilot import NOTHING, Awaited
 from shared.config import Config
 from shared.messages import Consumed, Message
-from shared.topics import ESTOP, MEASUREMENT, PLAN, REFERENCE, TRUTH
+from shared.topics import ESTOP, MEASUREMENT, PLAN, REFERENCE, REFERENCE_EPOCH_MS, TRUTH
 
 ANYONE: Final = "anyone"  # who sent an emergency stop
 _FIRST: Final = (-1, 0)

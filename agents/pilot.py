@@ -25,6 +25,7 @@ class Planned:
         stop_reason: why the robot must stop, or "".
         planner_ns: time that the planner took by the agent's clock; None: no QP was solved.
         ages_ms: age of each plan in use.
+        unusual: names of counters of what was out of the ordinary.
     """
 
     plan: Plan | None = None
@@ -32,6 +33,7 @@ class Planned:
     stop_reason: str = ""
     planner_ns: int | None = None
     ages_ms: Mapping[str, float] = field(default_factory=dict)
+    unusual: tuple[str, ...] = ()
 
 
 @record

@@ -13,17 +13,21 @@ from agents.flight import Flight, fading, launched, present
 from agents.modes import WALK
 from agents.pilot import NOTHING, Awaited, Heard, PilotState, Planned
 from agents.planner.episode import commanded_outputs, output_base
-from agents.planner.horizon import SAMPLE_MS, exchange_ms, step_ms
+from agents.planner.horizon import exchange_ms, step_ms
 from agents.planner.neighbours import Neighbours, PeerMemory
 from agents.planner.planner import PeerTerms, Planner, PlannerInputs, PlanResult
 from agents.planner.predictor import Predictor
+from agents.planner.qp_solver import SOLVED
 from agents.planner.recursive import Correction
 from agents.references import base_of_samples, base_of_window, in_force
 from shared.config import Config
 from shared.messages import Measurement, Plan, Reference
 from shared.robot import Array
+from shared.topics import SAMPLE_MS
 
 FADED: Final = "faded"
+WINDOW_GAP: Final = "window_gap"  # counted: no plan, for a sample of the robot's own is missing
+REFUSED: Final = "refused_by_planner"  # counted: a peer's message from another time or horizon
 ALONE: Final = "decentralised"
 
 
@@ -71,25 +75,38 @@ class LocalPilot:
         """Take in what arrived; plan, or answer the peers' plans, if it is time to."""
         tick = heard.tick
         memory = state.memory or self._neighbours.initial()
+        unusual: tuple[str, ...] = ()
         news = bool(heard.plans or heard.measurements)
         if news:
+            before = memory.refused
             memory = self._neighbours.remember(memory, tick, heard.measurements, heard.plans)
+            unusual = (REFUSED,) * (memory.refused - before)
         own = state.own
         if heard.measurement is not None:
             own = (*own, heard.measurement)[-self._kept :]
         if own is not state.own or memory is not state.memory:
             state = replace(state, own=own, memory=memory)
         if heard.mode.name != WALK:
-            return state, Planned()
+            return state, Planned(unusual=unusual)
+        state, planned = self._planned(state, memory, heard, news)
+        return state, replace(planned, unusual=(*planned.unusual, *unusual)) if unusual else planned
+
+    def _planned(
+        self, state: PilotState, memory: PeerMemory, heard: Heard, news: bool
+    ) -> tuple[PilotState, Planned]:
+        tick = heard.tick
+        unusual: tuple[str, ...] = ()
         step, rest = divmod(tick, self._step_ms)
-        if rest == 0 and step >= self._first_step and self._window_complete(state, tick):
-            return self._plan(state, memory, step, heard)
+        if rest == 0 and step >= self._first_step:
+            if self._window_complete(state, tick):
+                return self._plan(state, memory, step, heard)
+            unusual = (WINDOW_GAP,)
         turn, off = divmod(rest, self._exchange_ms)
         if off == 0 and 1 <= turn <= self._config.planner.exchanges:
             return self._answer(state, memory, (step, turn), heard)
         if news and state.terms_for != step + 1:
             state = self._prepare(state, memory, step + 1, heard.references)
-        return state, Planned(present=present(state.flights, tick))
+        return state, Planned(present=present(state.flights, tick), unusual=unusual)
 
     def _window_complete(self, state: PilotState, tick: int) -> bool:
         return _gapless(state.own, self._config.planner.T_ini, tick)
@@ -222,7 +239,7 @@ def _peers(config: Config, index: int, predictor: Predictor) -> frozenset[int]:
 
 def faded_plan(result: PlanResult, factor: float, serial: tuple[int, int], tick: int) -> Plan:
     """The plan as published: what is applied is what the peers are told."""
-    status = result.status if factor == 1.0 else FADED
+    status = FADED if result.status == SOLVED and factor < 1.0 else result.status
     u = result.u - (1.0 - factor) * result.du
     y = result.y_nominal + factor * (result.y - result.y_nominal)
     step, exchange = serial

@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Final
 
 import numpy as np
 
 from agents.planner.episode import output_base
-from agents.planner.horizon import SAMPLE_MS
-from shared.config import Config
+from shared.config import Config, ReferenceConfig
 from shared.messages import Reference
 from shared.robot import Array
+from shared.topics import SAMPLE_MS
 
+# What an operator may ask for, whoever he is: the limits of the configuration's own reference.
+_LIMITS: Final = {
+    name: (key.metadata["low"], key.metadata["high"])
+    for name, key in ReferenceConfig.__dataclass_fields__.items()
+    if name in ("vx", "vy", "wz", "height")
+}
 _KEPT_MS = 2000  # long enough for the windows of the oldest plan that may still be used
+
+
+def allowed(reference: Reference) -> bool:
+    """Whether a reference is within the limits of `ReferenceConfig`."""
+    return all(low <= getattr(reference, name) <= high for name, (low, high) in _LIMITS.items())
 
 
 def remember_references(

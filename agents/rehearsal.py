@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from agents.agent import REFERENCE_EPOCH_MS, Agent, AgentState, Inputs
+from agents.agent import Agent, AgentState, Inputs
 from agents.central import Central, CentralState
 from agents.gait import nominal_forces, scheduled_stance
-from agents.planner.horizon import SAMPLE_MS, step_ms
+from agents.planner.horizon import step_ms
 from agents.planning import first_step
 from shared.config import Config
 from shared.messages import Measurement, Reference, State
@@ -23,6 +23,7 @@ from shared.robot import (
     q_stand,
     robot_names,
 )  # fmt: skip
+from shared.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 
 _LEAN = 0.8  # of the tilt that is a fall
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from shared.messages import Measurement
 from shared.robot import Array
 
-SAMPLE_MS = 10
-
 
 def measured(tick: int, force: Array, outputs: Array, stance: Array) -> Measurement:
     """The sample that ends at `tick`, with the mean force over it."""

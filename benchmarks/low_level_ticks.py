@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.agent import REFERENCE_EPOCH_MS, Agent, AgentState, Inputs, Outputs
+from agents.agent import Agent, AgentState, Inputs, Outputs
 from agents.planner.predictor import Predictor
 from quadriga.operator import reference_at
 from quadriga.rollout import Rollout
 from shared.codec import encode
 from shared.config import Config
 from shared.messages import Reference
+from shared.topics import REFERENCE_EPOCH_MS
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.agent import REFERENCE_EPOCH_MS
 from agents.gait import nominal_forces
 from agents.planner.episode import commanded_outputs, output_base
-from agents.planner.horizon import SAMPLE_MS, horizon_stance, step_ms
+from agents.planner.horizon import horizon_stance, step_ms
 from agents.planner.neighbours import FRESH, PeerData, Selection
 from agents.planner.planner import PlannerInputs
 from agents.planner.predictor import Predictor
@@ -19,6 +18,7 @@ from quadriga.rollout import Rollout
 from shared.config import Config
 from shared.messages import Measurement, Plan, Reference
 from shared.robot import Array, robot_names
+from shared.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from low_level import collector_off
 
-from agents.agent import REFERENCE_EPOCH_MS, Agent, AgentState, Inputs, Outputs
+from agents.agent import Agent, AgentState, Inputs, Outputs
 from agents.planner.predictor import Predictor
 from agents.planner.store import predictor_sha256
 from quadriga.endpoint import free_endpoint
@@ -24,7 +24,7 @@ from shared.codec import decode
 from shared.config import Config
 from shared.config_text import to_toml
 from shared.messages import Reference, Truth
-from shared.topics import TRUTH
+from shared.topics import REFERENCE_EPOCH_MS, TRUTH
 
 
 def alone(config: Config, predictor: Predictor | None) -> dict[str, float]:

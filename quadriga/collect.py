@@ -11,18 +11,18 @@ from multiprocessing import resource_tracker
 
 import numpy as np
 
-from agents.agent import REFERENCE_EPOCH_MS as EPOCH_MS
 from agents.gait import nominal_forces
 from agents.modes import DAMPING
 from agents.planner.episode import SIGNALS, Episode, output_base
 from agents.planner.hankel import required_samples
-from agents.sampling import SAMPLE_MS
 from quadriga.rollout import Rollout
 from shared.config import Config, WorldConfig
 from shared.errors import PredictorError
 from shared.messages import Reference
 from shared.robot import N_FORCES, Array, robot_names
 from shared.signals import die_with_parent, interrupts_held
+from shared.topics import REFERENCE_EPOCH_MS as EPOCH_MS
+from shared.topics import SAMPLE_MS
 
 _LEAST = 2000  # samples, whatever the rule says
 _MARGIN = 2  # times what the rule asks for: data far in excess average the noise out

@@ -11,12 +11,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from agents.sampling import SAMPLE_MS
 from quadriga.traces import Traces, in_force, read_traces
 from shared.messages import Plan
 from shared.recording import Recording
 from shared.robot import OUTPUTS, Array, Leg
-from shared.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS, TRUTH
+from shared.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, SAMPLE_MS, STATUS, TRUTH
 from shared.yokes import yoke_pairs
 
 TRAJECTORY: Final = "trajectory.png"

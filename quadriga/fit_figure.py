@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from agents.planner.horizon import SAMPLE_MS
 from quadriga.fit_report import FitReport
 from quadriga.sheet import LABELS, UNITS
 from shared.robot import OUTPUTS
+from shared.topics import SAMPLE_MS
 
 
 def draw(reports: Sequence[FitReport], path: Path) -> None:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from agents.planner.episode import Episode
 from agents.planner.gates import GateReport
-from agents.planner.horizon import SAMPLE_MS, gait_phase
+from agents.planner.horizon import gait_phase
 from agents.planner.predictor import Predictor, PredictorMeta
 from agents.planner.store import Provenance
 from shared.errors import PredictorError, QuadrigaError
 from shared.robot import N_OUTPUTS, OUTPUTS, Array
+from shared.topics import SAMPLE_MS
 
 
 @dataclass(frozen=True, slots=True)

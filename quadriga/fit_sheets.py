@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from agents.planner.horizon import SAMPLE_MS
 from quadriga.fit_report import FitReport, Unfit, reason
 from quadriga.sheet import LABELS, NOTHING, Sheet, output_text, text
 from shared.robot import OUTPUTS, robot_names
+from shared.topics import SAMPLE_MS
 
 _SHOWN = 5  # samples of the horizon that a terminal shows
 

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
 
 import numpy as np
 
 from quadriga.truth_trace import Ticks
 from shared.config import Config
 from shared.robot import robot_names
-from shared.topics import COMMAND, MEASUREMENT, PLAN, STATE, TRUTH, Topic
-
-_SAMPLE: Final = 10  # ms, of measurements, truth and the planner
+from shared.topics import COMMAND, MEASUREMENT, PLAN, SAMPLE_MS, STATE, TRUTH, Topic
 
 
 def missing_ticks(config: Config, ticks: Mapping[str, Ticks]) -> dict[str, int]:
@@ -33,13 +30,13 @@ def missing_ticks(config: Config, ticks: Mapping[str, Ticks]) -> dict[str, int]:
     states = [_found(ticks, STATE.key(team, name)) for name in names]
     # No later than the configured end: a forged tick must not ask for years of messages.
     last = min(max((int(f.max()) for f in states if len(f)), default=-1), end_of_world(config))
-    step = _SAMPLE * config.planner.applied
-    gaps = {TRUTH.key(team): _missing(_found(ticks, TRUTH.key(team)), 0, _SAMPLE, last)}
+    step = SAMPLE_MS * config.planner.applied
+    gaps = {TRUTH.key(team): _missing(_found(ticks, TRUTH.key(team)), 0, SAMPLE_MS, last)}
     for name in names:
         for topic in (STATE, COMMAND):
             gaps[topic.key(team, name)] = _missing(_found(ticks, topic.key(team, name)), 0, 1, last)
         key = MEASUREMENT.key(team, name)
-        gaps[key] = _missing(_found(ticks, key), _first(config, ticks, key), _SAMPLE, last)
+        gaps[key] = _missing(_found(ticks, key), _first(config, ticks, key), SAMPLE_MS, last)
         if config.planner.kind != "none":
             key = PLAN.key(team, name)
             found = _found(ticks, key)

@@ -15,9 +15,9 @@ from shared.messages import EStop, Event, Reference, Truth
 from shared.robot import robot_names
 from shared.signals import stop_on_signals
 from shared.topics import ESTOP, EVENT, REFERENCE, TRUTH
+from shared.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 from shared.trace import trace_of
 
-EPOCH_MS: Final = 100  # a reference is published for every epoch
 _AHEAD: Final = 4  # epochs; agents in lock-step wait for the one in force
 _ESTOP_WAIT: Final = 5.0  # s, longest search for the team
 

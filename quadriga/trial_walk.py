@@ -10,11 +10,10 @@ from typing import Final
 
 import numpy as np
 
-from agents.agent import REFERENCE_EPOCH_MS, Agent
+from agents.agent import Agent
 from agents.planner.central import TeamPlanner, TeamResult
 from agents.planner.planner import PlannerInputs
 from agents.planner.predictor import Predictor
-from agents.sampling import SAMPLE_MS
 from quadriga.endpoint import free_endpoint
 from quadriga.launch import Launch, table
 from quadriga.operator import reference_at
@@ -31,7 +30,16 @@ from shared.config_text import to_toml
 from shared.messages import Event, Measurement, Reference, Status, Truth
 from shared.recording import Recording
 from shared.robot import robot_names
-from shared.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS, TRUTH
+from shared.topics import (
+    EVENT,
+    MEASUREMENT,
+    PLAN,
+    REFERENCE,
+    REFERENCE_EPOCH_MS,
+    SAMPLE_MS,
+    STATUS,
+    TRUTH,
+)
 from sim_server.team_model import NV
 from sim_server.world import World
 

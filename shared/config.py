@@ -258,19 +258,24 @@ class ControllerConfig:
         0.1, "1", "share of swing in which a foot rises before it goes forward", low=0.0, high=0.5
     )
     swing_acceleration: float = key(
-        80.0, "m/s²", "footholds of swings begun late are near enough for this", low=1.0, high=1e4
-    )
+        80.0, "m/s²",
+        "footholds of swings begun late are near enough for this, were all the time left spent on "
+        "the way; less is, so that the reference's greatest is 1.6 times this",
+        low=1.0, high=1e4,
+    )  # fmt: skip
     ground_filter_ms: float = key(50.0, "ms", "filter of the ground height", low=0.0, high=1e3)
     swing_height: float = key(
         0.09, "m", "apex above the highest foothold (paper: above the ground)", low=0.01, high=0.2
     )
     raibert_gain: float = key(0.03, "s", "foothold per velocity error", low=0.0, high=0.5)
-    damping: float = key(2.0, "N·m·s/rad", "joint damping in the safe stop", low=0.1, high=10.0)
+    damping: float = key(
+        2.0, "N·m·s/rad", "of joints in mode damping, and while QPs fail", low=0.1, high=10.0
+    )
     fall_tilt: float = key(0.9, "rad", "a tilt beyond this is a fall: damping", low=0.3, high=1.5)
     max_failures: int = key(
         20,
         "ms",
-        "failed QPs in a row before damping; until then the last torques",
+        "failed QPs in a row before damping; until then the last torques, with that damping",
         low=1,
         high=1000,
     )

@@ -16,8 +16,8 @@ from shared.errors import ConfigError
 from shared.payload import carriers
 from shared.presets import PRESETS, preset_keys
 from shared.robot import robot_names
+from shared.topics import SAMPLE_MS
 
-_SAMPLE_MS: Final = 10  # of measurements and plans; gait times must be whole samples
 _TEAM_NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
 _PAIRS: Final = ("identification.vx", "identification.vy", "identification.wz",
                  "identification.gain_range")  # fmt: skip
@@ -202,8 +202,8 @@ def _check_together(config: Config) -> None:
         raise ConfigError("team.name", repr(config.team.name), "1 to 64 letters, digits, . _ or -",
                           "it is the first part of every key")  # fmt: skip
     for name, value in (("stance_ms", config.gait.stance_ms), ("stand_ms", config.gait.stand_ms)):
-        if value % _SAMPLE_MS:
-            raise ConfigError(f"gait.{name}", str(value), f"a multiple of {_SAMPLE_MS} ms",
+        if value % SAMPLE_MS:
+            raise ConfigError(f"gait.{name}", str(value), f"a multiple of {SAMPLE_MS} ms",
                               "the planner's samples")  # fmt: skip
     names = robot_names(config.team.robots)
     carriers(config.world.payload_on, names)

@@ -130,7 +130,11 @@ class Command(Flat):
 
 @record
 class Measurement(Message):
-    """One 100 Hz sample: mean foot forces over the 10 ms that end at `tick`, outputs at `tick`."""
+    """One 100 Hz sample: mean planned forces over the 10 ms that end at `tick`, outputs at `tick`.
+
+    Forces are those that predictors are made for: nominal ones of the scheduled feet with what a
+    plan adds; not what the whole-body controller made of them.
+    """
 
     u: Array = array(12, unit="N", frame="yaw frame, legs FL FR RL RR")
     y: Array = array(6, unit="m, m/s, m/s, rad, rad, rad/s", frame="yaw frame")

@@ -6,9 +6,18 @@ from collections.abc import Mapping
 from typing import Final
 
 from shared.config import CENTRAL, Config
-from shared.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, STATE, STATUS, TABLE, TRUTH
+from shared.topics import (
+    COMMAND,
+    MEASUREMENT,
+    PLAN,
+    REFERENCE,
+    SAMPLE_MS,
+    STATE,
+    STATUS,
+    TABLE,
+    TRUTH,
+)
 
-_SAMPLE: Final = 10  # ms, of measurements, truth and the planner
 _JUMP: Final = 600_000  # ms: a longer jump is another clock or a forged tick, not a loss
 _KEPT: Final = 1000  # gaps that are remembered one by one
 
@@ -25,16 +34,16 @@ def periods(config: Config) -> dict[str, int]:
     return found | {
         STATE.name: 1,
         COMMAND.name: 1,
-        MEASUREMENT.name: _SAMPLE,
-        PLAN.name: _SAMPLE * config.planner.applied,
+        MEASUREMENT.name: SAMPLE_MS,
+        PLAN.name: SAMPLE_MS * config.planner.applied,
         STATUS.name: round(1000 / STATUS.rate_hz) if lockstep else 0,
         REFERENCE.name: round(1000 / REFERENCE.rate_hz),
-        TRUTH.name: 1 if config.estimator.kind == "truth" else _SAMPLE,
+        TRUTH.name: 1 if config.estimator.kind == "truth" else SAMPLE_MS,
     }
 
 
 def max_ages(config: Config) -> dict[str, int]:
-    """Greatest age of a message that an agent still uses, by its topic's name, ms; 0: none.
+    """Longest gap, and greatest age in use, that is nothing unusual, by topic, ms; 0: none.
 
     A plan is used until who made it is given up. Those of peers are of the step before; those of
     a central planner come its latency after their data.
@@ -43,7 +52,7 @@ def max_ages(config: Config) -> dict[str, int]:
     late = max(1, planner.latency_ms) if planner.kind in CENTRAL else 0
     steps = 1 + planner.max_peer_age + planner.hold_steps
     found = {topic.name: topic.max_age_ms for topic in TABLE}
-    return found | {PLAN.name: steps * _SAMPLE * planner.applied + late}
+    return found | {PLAN.name: steps * SAMPLE_MS * planner.applied + late}
 
 
 class TickTrack:

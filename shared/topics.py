@@ -17,8 +17,9 @@ class Topic:
         name: last part of the key; `per_robot` tells whether a robot's name stands before it.
         type: the message's dataclass.
         rate_hz: nominal rate; 0 means on event.
-        max_age_ms: the input's age limit in ms of world time; 0 means it never ages, or that the
-            configuration says how long it is used: `shared.tick_track.max_ages`.
+        max_age_ms: longest gap between two of them, in world time, that is nothing unusual; of a
+            reference also how long it is obeyed. 0: none, or the configuration says it:
+            `shared.tick_track.max_ages`.
         recorded: whether the recorder keeps it.
     """
 
@@ -34,15 +35,18 @@ class Topic:
         return f"{team}/{robot}/{self.name}" if self.per_robot else f"{team}/{self.name}"
 
 
+SAMPLE_MS: Final = 10  # one sample of u and y: forces are means over it, outputs taken at its end
+REFERENCE_EPOCH_MS: Final = 100  # the operator speaks at multiples of this
+
 STATE: Final = Topic("state", msg.State, True, 1000.0, 20)
 COMMAND: Final = Topic("command", msg.Command, True, 1000.0, 20)
-MEASUREMENT: Final = Topic("measurement", msg.Measurement, True, 100.0, 200)
+MEASUREMENT: Final = Topic("measurement", msg.Measurement, True, 1000.0 / SAMPLE_MS, 200)
 PLAN: Final = Topic("plan", msg.Plan, True, 25.0, 0)
 STATUS: Final = Topic("status", msg.Status, True, 10.0, 1000)
 INPUTS: Final = Topic("inputs", msg.Consumed, True, 0.0, 0)
-REFERENCE: Final = Topic("reference", msg.Reference, False, 10.0, 500)
+REFERENCE: Final = Topic("reference", msg.Reference, False, 1000.0 / REFERENCE_EPOCH_MS, 500)
 ESTOP: Final = Topic("estop", msg.EStop, False, 0.0, 0)
-TRUTH: Final = Topic("sim/truth", msg.Truth, False, 100.0, 0)
+TRUTH: Final = Topic("sim/truth", msg.Truth, False, 1000.0 / SAMPLE_MS, 0)
 EVENT: Final = Topic("sim/event", msg.Event, False, 0.0, 0)
 
 TABLE: Final = (

@@ -72,7 +72,8 @@ def contacts_by_force(
         dt: time since the last tick, s.
         lift: progress at which each swing began, −1 while it has not, (4,); updated in place.
         stumble: time for which each swing foot will give way, (4,), s; updated in place.
-        felt: acceleration each foot off the ground was kept from at the last tick, (4, 3), m/s².
+        felt: from where each foot off the ground was stopped at the last tick: the acceleration
+            that was to bring it back to its reference, turned round, (4, 3), m/s².
         hold: share of the half period for which a foot waits for those that shall stand.
         give_way: time for which a foot gives way once nothing stops it any more, s; 0: never.
         tell_sides: whether a foot stopped from the side is no contact, and one that landed early

@@ -179,7 +179,7 @@ class Controller:
         """Torques for what the robot is asked to do.
 
         Where no limit of the QP is active, as at most ticks, this is one compiled call; a singular
-        problem is no solution.
+        problem, whose numbers are NaN, is no solution.
 
         Args:
             seen: what `sense` gave for this tick.
@@ -189,19 +189,16 @@ class Controller:
             new_sample: whether a sample of forces begins with this tick.
         """
         new, asked, x = np.empty(SIZE), np.empty(_ASKED), np.zeros(42)
-        try:
-            rows = _act(
-                seen.memory.flat, seen.flat, schedule.row, task.vx, task.vy, task.wz, task.height,
-                task.deviation, task.feedforward, _NOW if task.ahead is None else task.ahead, dt,
-                new_sample, self.body.links, self._acting, new, asked, x,
-            )  # fmt: skip
-            if rows:
-                return Acted(Memory(new), asked, Solution(x, whole_body_qp.UNCONSTRAINED, rows))
-            goal = _goal(asked, legs_of(new)[0])
-            problem = self.problem(seen, Memory(new), goal)
-            solution = whole_body_qp.unpack(problem, goal.contact, *whole_body_qp.solve(problem))
-        except np.linalg.LinAlgError:
-            solution = whole_body_qp.singular()
+        rows = _act(
+            seen.memory.flat, seen.flat, schedule.row, task.vx, task.vy, task.wz, task.height,
+            task.deviation, task.feedforward, _NOW if task.ahead is None else task.ahead, dt,
+            new_sample, self.body.links, self._acting, new, asked, x,
+        )  # fmt: skip
+        if rows:
+            return Acted(Memory(new), asked, Solution(x, whole_body_qp.UNCONSTRAINED, rows))
+        goal = _goal(asked, legs_of(new)[0])
+        problem = self.problem(seen, Memory(new), goal)
+        solution = whole_body_qp.unpack(problem, goal.contact, *whole_body_qp.solve(problem))
         return Acted(Memory(new), asked, solution)
 
     def problem(self, seen: Seen, memory: Memory, goal: Goal) -> Problem:
@@ -211,9 +208,6 @@ class Controller:
             seen: what `sense` gave for it.
             memory: after it.
             goal: what was asked for.
-
-        Raises:
-            numpy.linalg.LinAlgError: it is singular.
         """
         terms = self.body.terms(seen.flat[0:19], seen.flat[19:37], memory.load)
         weights = replace(self.weights, mu=self.weights.mu - memory.caution)
@@ -238,7 +232,7 @@ def _begun(flat: Array, seen: Array) -> Seen:
 
 @compiled
 def note_forces(memory: Array, planned: Array, stance: Array, new_sample: bool) -> Array:
-    """The deviation of the legs scheduled to stand, (12,); counts the forces applied with it."""
+    """The deviation of the legs scheduled to stand, (12,); counts the planned forces with it."""
     total = forces_of(memory)
     if new_sample:
         total[:] = 0.0

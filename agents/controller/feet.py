@@ -7,7 +7,7 @@ import numpy as np
 from agents.controller import swing
 from agents.controller.rotation import heading
 from shared.jit import compiled
-from shared.robot import Array
+from shared.robot import GRAVITY, Array
 
 _LONGEST = 0.37  # m, how far under the hip a foot is lowered; legs end at 0.4
 _SHORTEST = 0.1  # m, how near to the hip a foot is lifted
@@ -84,7 +84,7 @@ def _desired_force(contact: Array, deviation: Array, R: Array, mass: float) -> A
             dx, dy, dz = deviation[3 * leg], deviation[3 * leg + 1], deviation[3 * leg + 2]
             force[leg, 0] = c * dx - s * dy
             force[leg, 1] = s * dx + c * dy
-            force[leg, 2] = mass * 9.81 / count + dz
+            force[leg, 2] = mass * GRAVITY / count + dz
     return force
 
 

@@ -149,7 +149,7 @@ class Memory:
 
     @property
     def felt(self) -> Array:
-        """Acceleration that each foot off the ground seems to be kept from, (4, 3), m/s²."""
+        """From where each foot off the ground was stopped, see `contact.py`, (4, 3), m/s²."""
         return swings_of(self.flat)[2]
 
     @property
@@ -174,7 +174,7 @@ class Memory:
 
     @property
     def mean_force(self) -> Array:
-        """Mean of the forces applied so far in the present sample, (12,), N, yaw frame."""
+        """Mean of the planned forces so far in the present sample, (12,), N, yaw frame."""
         mean: Array = self.flat[106:118] / max(1.0, self.flat[COUNT])
         return mean
 

@@ -97,8 +97,8 @@ class Solution:
 
     Attributes:
         x: torques (12), forces (12), defect (6 + 3 for each foot not in contact), the rest zero.
-        status: "unconstrained" (closed form), "constrained" (active set) or, with x zero,
-            "infeasible:<solver's flag>" or "infeasible:singular".
+        status: "unconstrained" (closed form), "constrained" (active set) or, with no torques and
+            the rest of no use, "infeasible:<solver's flag>" or "infeasible:singular".
         rows: length of the defect.
     """
 
@@ -127,18 +127,10 @@ class Solution:
         return not self.status.startswith("infeasible")
 
 
-def singular() -> Solution:
-    """Of a problem that has no answer."""
-    return Solution(np.zeros(42), "infeasible:singular")
-
-
 def solve_goal(terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights) -> Solution:
     """Build, solve, unpack; numbers beyond all bounds or a singular problem are no solution."""
-    try:
-        problem = build(terms, R, p_foot, goal, weights)
-        return unpack(problem, goal.contact, *solve(problem))
-    except np.linalg.LinAlgError:
-        return singular()
+    problem = build(terms, R, p_foot, goal, weights)
+    return unpack(problem, goal.contact, *solve(problem))
 
 
 def build(terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights) -> Problem:

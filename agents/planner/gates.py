@@ -11,18 +11,13 @@ from scipy import linalg
 
 from agents.planner.best_response import best_response_radius
 from agents.planner.episode import Y_SCALE, Episode
-from agents.planner.horizon import (
-    SAMPLE_MS,
-    gait_phase,
-    horizon_stance,
-    phase_of,
-    walking_steps,
-)
+from agents.planner.horizon import gait_phase, horizon_stance, phase_of, walking_steps
 from agents.planner.predictor import Predictor
 from agents.planner.regression import scaled_blocks
 from shared.config import Config, ControllerConfig
 from shared.errors import PredictorError
 from shared.robot import N_LEGS, N_OUTPUTS, OUTPUTS, TOTAL_MASS, Array
+from shared.topics import SAMPLE_MS
 
 _GAIN_FORCE = 10.0  # N, on the robot looked at
 _GAIN_TIMES = (0.1, 0.25)  # s

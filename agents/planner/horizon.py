@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from math import lcm
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agents.gait import scheduled_stance
 from shared.config import Config
-
-SAMPLE_MS: Final = 10  # one sample of u and y; forces are means over it, outputs taken at its end
+from shared.topics import SAMPLE_MS
 
 
 def step_ms(config: Config) -> int:

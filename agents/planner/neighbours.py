@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.gait import nominal_forces, scheduled_stance
-from agents.planner.horizon import SAMPLE_MS, horizon_stance, sample_starts, step_ms
+from agents.planner.horizon import horizon_stance, sample_starts, step_ms
 from shared.config import Config
 from shared.messages import Measurement, Message, Plan
 from shared.record import record
 from shared.robot import N_FORCES, N_OUTPUTS, Array, robot_names
+from shared.topics import SAMPLE_MS
 
 M = TypeVar("M", bound=Message)
 K = TypeVar("K", int, tuple[int, int])

@@ -46,7 +46,7 @@ class Residuals:
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """What a solver answered; with any status but "solved" `v` is zero: no deviation."""
+    """What a solver answered; with any status but "solved" `x` is zero: no deviation."""
 
     status: str
     x: Array

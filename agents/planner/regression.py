@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from agents.planner.cyclic import cyclic_grams
 from agents.planner.episode import U_SCALE, Y_SCALE, Episode
 from agents.planner.hankel import columns, gram
-from agents.planner.horizon import SAMPLE_MS, gait_phase
+from agents.planner.horizon import gait_phase
 from agents.planner.predictor import PredictorMeta
 from shared.errors import PredictorError
 from shared.robot import N_FORCES, N_OUTPUTS, Array
+from shared.topics import SAMPLE_MS
 
 Index = NDArray[np.int64]
 

@@ -6,13 +6,12 @@ from typing import Final
 
 import numpy as np
 
-from agents.sampling import SAMPLE_MS
 from quadriga.figures import stitched
 from quadriga.traces import in_force, read_traces
 from quadriga.truth_trace import Ticks
 from shared.recording import Recording
 from shared.robot import OUTPUTS, Array
-from shared.topics import MEASUREMENT, PLAN, REFERENCE, TRUTH
+from shared.topics import MEASUREMENT, PLAN, REFERENCE, SAMPLE_MS, TRUTH
 
 NAMES: Final = (
     *(f"{what}.{output}" for what in ("true", "estimated", "planned") for output in OUTPUTS),

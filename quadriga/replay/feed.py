@@ -10,11 +10,10 @@ from agents.agent import Agent, Inputs
 from agents.arrivals import Arrivals, Order, Source, Wanted
 from agents.intake import expected, reference_to, referred
 from agents.pilot import NOTHING
-from agents.sampling import SAMPLE_MS
 from quadriga.replay.tape import Tape
 from shared.config import Config
 from shared.messages import Consumed, State
-from shared.topics import INPUTS, MEASUREMENT, STATE
+from shared.topics import INPUTS, MEASUREMENT, SAMPLE_MS, STATE
 
 _BEFORE: Final = (-1, 0)
 

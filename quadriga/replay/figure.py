@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from agents.sampling import SAMPLE_MS
 from shared.errors import RecordingError
 from shared.messages import Command, Measurement, Message, Plan
 from shared.robot import JOINT_NAMES, OUTPUTS, Array, Leg
+from shared.topics import SAMPLE_MS
 
 _BLUE, _ORANGE = "#1f77b4", "#e6550d"
 _TINY: Final = 1e-9

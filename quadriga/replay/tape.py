@@ -10,7 +10,6 @@ from typing import Final
 from agents.agent import Agent
 from agents.arrivals import Arrivals, Order, Source, order_of
 from agents.intake import ANYONE
-from agents.sampling import SAMPLE_MS
 from shared.codec import decode
 from shared.config import CENTRAL, Config
 from shared.errors import MessageError, RecordingError
@@ -23,6 +22,7 @@ from shared.topics import (
     INPUTS,
     MEASUREMENT,
     PLAN,
+    SAMPLE_MS,
     STATE,
     Topic,
 )

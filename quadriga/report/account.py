@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from agents.gait import nominal_forces, scheduled_stance
-from agents.planner.horizon import SAMPLE_MS, step_ms
+from agents.planner.horizon import step_ms
 from quadriga.report.run import Run
 from quadriga.report.samples import Samples, slipping
 from quadriga.report.second import (
@@ -24,7 +24,7 @@ from quadriga.report.second import (
 from shared.config import CENTRAL
 from shared.messages import Plan
 from shared.robot import N_LEGS, Leg
-from shared.topics import REFERENCE
+from shared.topics import REFERENCE, SAMPLE_MS
 
 _AT_LIMIT: Final = 0.99  # share of a planned force's limit
 

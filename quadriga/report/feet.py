@@ -7,7 +7,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from agents.sampling import SAMPLE_MS
 from quadriga.figures import stitched
 from quadriga.report.chart import draw
 from quadriga.report.panel import Bars, Curve, Panel
@@ -16,6 +15,7 @@ from quadriga.report.run import Run
 from quadriga.report.tracks import falls, until
 from quadriga.truth_trace import Ticks
 from shared.robot import Leg
+from shared.topics import SAMPLE_MS
 
 _GAP: Final = 1.5e-3 * SAMPLE_MS
 _STRIDES: Final = 4  # enlarged

@@ -8,7 +8,6 @@ from typing import Final
 
 import numpy as np
 
-from agents.sampling import SAMPLE_MS
 from quadriga.report.account import Account, build_account
 from quadriga.report.moments import FALL, Moment
 from quadriga.report.path import spells
@@ -25,6 +24,7 @@ from quadriga.report.second import (
     window_before,
 )
 from shared.robot import Leg
+from shared.topics import SAMPLE_MS
 
 _TELLING: Final = ("push", "plan", "counted", "gap", "mode")  # kinds of moments that are signs
 

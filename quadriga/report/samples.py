@@ -11,7 +11,6 @@ import numpy as np
 
 from agents.controller.kinematics import leg_kinematics
 from agents.gait import scheduled_stance
-from agents.sampling import SAMPLE_MS
 from quadriga.traces import Traces
 from quadriga.truth_trace import Ticks, stack, ticks_of
 from shared.codec import decode
@@ -19,7 +18,7 @@ from shared.errors import MessageError
 from shared.messages import Measurement, State
 from shared.recording import Recording
 from shared.robot import FOOT_RADIUS, N_FORCES, N_LEGS, TORQUE_LIMIT, Array, robot_names
-from shared.topics import MEASUREMENT, STATE, topic_of
+from shared.topics import MEASUREMENT, SAMPLE_MS, STATE, topic_of
 
 _STALE_MS: Final = 100  # a stance said longer ago than this is not that of now
 _LOADED: Final = 10.0  # N of true force that is a contact

@@ -6,7 +6,6 @@ from typing import Final
 
 import numpy as np
 
-from agents.sampling import SAMPLE_MS
 from quadriga.figures import stitched
 from quadriga.report.axis import nice
 from quadriga.report.chart import WIDTH, draw
@@ -15,6 +14,7 @@ from quadriga.report.run import Run
 from quadriga.traces import estimate_errors, in_force
 from quadriga.truth_trace import Ticks
 from shared.robot import OUTPUTS, Array
+from shared.topics import SAMPLE_MS
 from shared.yokes import yoke_pairs
 
 NAMES: Final = ("z [m]", "vx [m/s]", "vy [m/s]", "roll [rad]", "pitch [rad]", "wz [rad/s]")

@@ -270,6 +270,14 @@ def test_a_tilt_beyond_the_limit_is_a_fall(sign: float) -> None:
         outputs = robot.step()
 
 
+def test_an_orientation_that_is_no_number_damps_the_joints_at_once() -> None:
+    robot = Robot()
+    robot.run(400)
+    outputs = robot.step(replace(standing(400), imu_quat_wxyz=np.full(4, np.nan)))
+    assert is_damping(outputs)
+    assert (outputs.mode, outputs.reason) == ("damping", "no-estimate")
+
+
 def fail(monkeypatch: pytest.MonkeyPatch) -> None:
     def no_solution(problem: Problem) -> tuple[Array, str]:
         return np.zeros(12), "infeasible:-1"
@@ -383,7 +391,10 @@ def test_with_the_truth_the_outputs_are_the_truth_and_a_lost_one_is_bridged() ->
         velocity = pin.utils.rotate("z", yaw).T @ truth.base_vel[0]
         np.testing.assert_allclose(measurement.y[1:3], velocity[:2], atol=1e-9)
         assert measurement.y[5] == pytest.approx(truth.base_omega[0, 2], abs=1e-9)
-        _, without = agent.step(step.before, replace(step.inputs, truth=None))
+        late = replace(truth, tick=truth.tick - 21)
+        _, without = agent.step(step.before, replace(step.inputs, truth=late))
+        _, without_any = agent.step(step.before, replace(step.inputs, truth=None))
+        assert sent(without) == sent(without_any), "too old to be used"
         assert without.measurement is not None
         np.testing.assert_allclose(without.measurement.y[:3], measurement.y[:3], atol=0.02)
 

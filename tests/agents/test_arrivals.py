@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -13,6 +14,7 @@ from agents.rehearsal import standing
 from shared.codec import encode
 from shared.config_file import load
 from shared.messages import EStop, Event, Measurement, Message, Plan, Reference
+from shared.robot import Array
 from shared.topics import TABLE, Topic
 
 NOTHING = Awaited()
@@ -154,4 +156,44 @@ def test_an_emergency_stop_and_the_end_are_never_held_back() -> None:
 def test_a_flood_is_bounded_and_counted() -> None:
     box = arrivals()
     feed(box, *(("r1/measurement", measurement(10 * k)) for k in range(1000)))
-    assert box.counters["flooded_measurement"] == 1000 - 256
+    most = 256 + 300 // 10  # what is measured while the team stands belongs to no flood
+    assert box.counters["flooded_measurement"] == 1000 - most
+    feed(box, ("r3/measurement", measurement(0)))
+    assert box.heard["measurement", "r3"] == 1
+    assert box.counters["flooded_measurement"] == 1000 - most, "nobody pays for another's flood"
+    taken = box.inputs(standing(5000), Awaited(measurement_tick=10**6))
+    assert len(taken.measurements) == most + 1
+    feed(box, *(("r1/measurement", measurement(10 * k)) for k in range(1000, 1000 + most)))
+    assert box.counters["flooded_measurement"] == 1000 - most, "there is room again"
+
+
+@pytest.mark.parametrize(("robots", "stand_ms"), [(10, 300), (3, 10_000)])
+def test_nothing_that_is_measured_during_the_stand_is_refused(robots: int, stand_ms: int) -> None:
+    """In lock-step nobody asks for it before the first planning step."""
+    config = load(None, {"team.robots": robots, "gait.stand_ms": stand_ms})
+    peers = [f"r{k}" for k in range(2, robots + 1)]
+    box, last = Arrivals(config, "r1", peers), stand_ms + 10
+    for peer in peers:
+        feed(box, *((f"{peer}/measurement", measurement(t)) for t in range(10, last + 1, 10)))
+    assert not box.flooded
+    assert not box.owing(last, Awaited(measurement_tick=last))
+
+
+@pytest.mark.parametrize(
+    "change", [{"vx": 50.0}, {"vy": -0.6}, {"wz": 1.01}, {"height": 5.0}, {"height": 0.0}]
+)
+def test_a_reference_that_nobody_may_configure_is_dropped(change: dict[str, float]) -> None:
+    box = arrivals()
+    feed(box, ("reference", replace(reference(0), **change)))
+    assert box.counters["dropped_reference"] == 1
+    feed(box, ("reference", replace(reference(0), vx=1.2, vy=0.5, wz=-1.0, height=0.32)))
+    assert box.counters["dropped_reference"] == 1
+    assert len(box.inputs(standing(0), Awaited(reference_tick=0)).references) == 1
+
+
+@pytest.mark.parametrize("quat", [np.zeros(4), np.full(4, 1e-3), np.full(4, 10.0)])
+def test_a_state_with_an_orientation_that_is_none_is_dropped(quat: Array) -> None:
+    box = arrivals()
+    feed(box, ("r2/state", replace(standing(5), imu_quat_wxyz=quat)))
+    assert box.state() is None
+    assert box.counters["dropped_state"] == 1

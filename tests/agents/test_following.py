@@ -74,10 +74,31 @@ def test_older_and_repeated_plans_and_those_of_another_horizon_are_passed_over()
         assert planned.present.deviation.max() == pytest.approx(9.0)
 
 
+@pytest.mark.parametrize(
+    "change", [{"tick": 400, "step": 10}, {"tick": 0, "step": 0}, {"step": 10**9}, {"tick": 327}]
+)
+def test_a_plan_from_another_time_is_not_used_and_blocks_none(change: dict[str, int]) -> None:
+    follower = Follower(CONFIG, 1)
+    state, planned = follow(follower, PilotState(), 365, replace(plan_of(8), **change))
+    assert not planned.present.deviation.any()
+    assert planned.unusual == ("refused_by_planner",)
+    _, planned = follow(follower, state, 366, plan_of(9))
+    assert planned.present.deviation.max() == pytest.approx(9.0)
+    assert planned.unusual == ()
+
+
+def test_the_age_of_the_plan_in_use_is_told_at_every_tick() -> None:
+    follower = Follower(CONFIG, 1)
+    state, _ = follow(follower, PilotState(), 321, plan_of(8))
+    for tick in (330, 401, 600):
+        assert follow(follower, state, tick)[1].ages_ms == {"plan": tick - 320.0}
+
+
 def test_a_plan_fades_out_beyond_the_range_of_the_data() -> None:
     far = ON_COURSE + np.array([0.0, 1.5 * CONFIG.planner.fade[1], 0.0, 0.0, 0.0, 0.0])
     _, planned = follow(Follower(CONFIG, 1), PilotState(), 321, plan_of(8), y=far)
     assert planned.present.deviation.max() == pytest.approx(4.0)
+    assert planned.unusual == ("plan_faded",)
 
 
 def test_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for() -> None:

@@ -11,7 +11,9 @@ import pytest
 from agents.gait import nominal_forces, scheduled_stance
 from agents.modes import STAND, STOPPING, WALK, Mode
 from agents.pilot import Heard, PilotState, Planned
-from agents.planning import LocalPilot
+from agents.planner.planner import PlanResult
+from agents.planner.qp_solver import Residuals
+from agents.planning import LocalPilot, faded_plan
 from shared.config import Config, PlannerConfig, TeamConfig
 from shared.messages import Measurement
 from shared.robot import Array
@@ -97,6 +99,24 @@ def test_without_a_whole_window_of_own_samples_nothing_is_planned(missing: int) 
         _, planned = flight.pilot.step(flight.state, Heard(FIRST, WALKING, (REFERENCE,)))
     assert planned.plan is None
     assert planned.planner_ns is None
+    assert planned.unusual == ("window_gap",)
+
+
+def test_a_message_from_another_time_is_counted() -> None:
+    pair = replace(ALONE, team=TeamConfig(robots=2))
+    stray = Measurement(10_000, 0, np.zeros(12), ON_COURSE, np.ones(4))
+    heard = Heard(400, WALKING, (REFERENCE,), measurements=(("r2", stray),))
+    _, planned = pilot_of(pair).step(PilotState(), heard)
+    assert planned.unusual.count("refused_by_planner") == 1
+
+
+def test_a_fallback_is_told_by_its_name_and_not_as_faded() -> None:
+    u, y = np.ones((25, 12)), np.zeros((25, 6))
+    residuals = Residuals(0.0, 0.0, 0.0)
+    for status, told in (("solved", "faded"), ("nominal:infeasible", "nominal:infeasible")):
+        result = PlanResult(status, u, np.zeros((25, 12)), y, y, {}, (), residuals, 0)
+        assert faded_plan(result, 0.5, (8, 0), 320).status == told
+        assert faded_plan(result, 1.0, (8, 0), 320).status == status
 
 
 @pytest.mark.parametrize("mode", [Mode(STAND, 0), Mode(STOPPING, 300, "why")])

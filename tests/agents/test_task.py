@@ -10,11 +10,11 @@ import pytest
 
 from agents.agent import Agent, Outputs
 from agents.controller.controller import Acted, Schedule, Task
-from agents.planner.horizon import SAMPLE_MS
 from quadriga.rollout import Rollout
 from shared.config import Config, TeamConfig
 from shared.messages import Plan
 from shared.robot import Array
+from shared.topics import SAMPLE_MS
 from tests.agents.duet import every_100_ms, simple_predictor
 
 ALONE = Config(team=TeamConfig(robots=1))

@@ -9,7 +9,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from agents.agent import REFERENCE_EPOCH_MS
 from agents.planner.predictor import Predictor
 from quadriga.operator import reference_at
 from quadriga.rollout import Rollout
@@ -18,7 +17,7 @@ from shared.config import Config
 from shared.config_file import load
 from shared.messages import Message, State
 from shared.robot import robot_names
-from shared.topics import COMMAND, EVENT, MEASUREMENT, PLAN, REFERENCE, STATE
+from shared.topics import COMMAND, EVENT, MEASUREMENT, PLAN, REFERENCE, REFERENCE_EPOCH_MS, STATE
 from sim_server.world import World
 
 FOLDER: Final = Path(__file__).parent
