@@ -11,6 +11,7 @@ from shared.robot import GRAVITY, Array
 
 _Z_LIMIT = 0.05  # m·s, height integrator
 _SPEED_LIMIT = 0.15  # m, speed integrator
+_YAW_LIMIT = 0.3  # rad, of the heading error that is acted on
 
 
 def trunk_gains(config: ControllerConfig) -> Array:
@@ -119,8 +120,10 @@ def _feedback(
         push[axis] = kd_xy * error[axis] + ki_xy * speed[axis] + kp_xy * lead[axis]
     trunk[0], trunk[1] = c * push[0] - s * push[1], s * push[0] + c * push[1]
 
-    yaw = wrap_angle(yaw0 + dt * wz)
-    yaw_error = min(0.3, max(-0.3, wrap_angle(yaw - rpy[2])))
+    # A robot that cannot turn must not be asked for a heading that goes round behind it.
+    waits = wz * wrap_angle(yaw0 - rpy[2]) > abs(wz) * _YAW_LIMIT
+    yaw = yaw0 if waits else wrap_angle(yaw0 + dt * wz)
+    yaw_error = min(_YAW_LIMIT, max(-_YAW_LIMIT, wrap_angle(yaw - rpy[2])))
     # Tilt error about the horizontal axes of the yaw frame, taken to the odometry frame.
     roll_push = -kp_tilt * rpy[0] - kd_tilt * (c * omega[0] + s * omega[1])
     pitch_push = -kp_tilt * rpy[1] - kd_tilt * (-s * omega[0] + c * omega[1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 import pytest
@@ -182,7 +183,7 @@ def test_nothing_that_is_measured_during_the_stand_is_refused(robots: int, stand
 @pytest.mark.parametrize(
     "change", [{"vx": 50.0}, {"vy": -0.6}, {"wz": 1.01}, {"height": 5.0}, {"height": 0.0}]
 )
-def test_a_reference_that_nobody_may_configure_is_dropped(change: dict[str, float]) -> None:
+def test_a_reference_that_nobody_may_configure_is_dropped(change: dict[str, Any]) -> None:
     box = arrivals()
     feed(box, ("reference", replace(reference(0), **change)))
     assert box.counters["dropped_reference"] == 1

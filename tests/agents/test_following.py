@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -77,7 +78,7 @@ def test_older_and_repeated_plans_and_those_of_another_horizon_are_passed_over()
 @pytest.mark.parametrize(
     "change", [{"tick": 400, "step": 10}, {"tick": 0, "step": 0}, {"step": 10**9}, {"tick": 327}]
 )
-def test_a_plan_from_another_time_is_not_used_and_blocks_none(change: dict[str, int]) -> None:
+def test_a_plan_from_another_time_is_not_used_and_blocks_none(change: dict[str, Any]) -> None:
     follower = Follower(CONFIG, 1)
     state, planned = follow(follower, PilotState(), 365, replace(plan_of(8), **change))
     assert not planned.present.deviation.any()
