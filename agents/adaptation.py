@@ -7,8 +7,7 @@ import numpy as np
 from agents.gait import nominal_forces
 from agents.planner.horizon import gait_phase
 from agents.planner.predictor import Predictor
-from agents.planner.recursive import Correction, Forgetting, begin, take_in
-from agents.planner.regression import scales
+from agents.planner.recursive import Correction, Forgetting, begin, block_correction, take_in
 from shared.config import Config
 from shared.messages import Measurement
 from shared.robot import Array
@@ -60,7 +59,5 @@ class Adapter:
 
     def block(self, learned: Correction, phase: int) -> Array:
         """The corrected G_ii. Shape (6 N, 18 T_ini + 12 N)."""
-        z_scale, y_scale = scales(self._predictor.meta)
         G_ii = self._predictor.block(self._index, self._index, phase)
-        corrected: Array = G_ii + learned.D * y_scale[:, None] / z_scale
-        return corrected
+        return G_ii + block_correction(self._predictor.meta, learned)

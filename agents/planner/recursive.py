@@ -138,12 +138,9 @@ def update(state: Correction, z: Array, left: Array, how: Forgetting) -> Correct
     return replace(state, D=D, P=P, updates=state.updates + 1)
 
 
-def corrected(predictor: Predictor, state: Correction) -> Predictor:
-    """The predictor with the correction in its blocks."""
-    meta = predictor.meta
+def block_correction(meta: PredictorMeta, state: Correction, place: int = 0) -> Array:
+    """What the correction adds to the block of one of its sources. (6 N, 18 T_ini + 12 N)."""
     z_scale, y_scale = scales(meta)
-    G = predictor.G.copy()
-    for place, source in enumerate(state.sources):
-        columns = slice(place * meta.width, (place + 1) * meta.width)
-        G[:, state.robot, source] += state.D[:, columns] * y_scale[:, None] / z_scale
-    return Predictor(meta, G, predictor.condition)
+    columns = slice(place * meta.width, (place + 1) * meta.width)
+    added: Array = state.D[:, columns] * y_scale[:, None] / z_scale
+    return added

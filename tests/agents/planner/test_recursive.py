@@ -11,7 +11,14 @@ import pytest
 
 from agents.planner.fits import fit_ridge
 from agents.planner.predictor import Predictor, PredictorMeta
-from agents.planner.recursive import Correction, Forgetting, begin, corrected, take_in, update
+from agents.planner.recursive import (
+    Correction,
+    Forgetting,
+    begin,
+    block_correction,
+    take_in,
+    update,
+)
 from shared.config import Config
 from shared.errors import PredictorError
 from shared.robot import Array
@@ -76,6 +83,14 @@ def heavier(team: Any, seed: int, samples: int, share: float) -> Any:
     episode = team.episode(samples, seed)
     du, _ = episode.deviations()
     return replace(episode, y=episode.y_base + team.respond(share * du))
+
+
+def corrected(predictor: Predictor, state: Correction) -> Predictor:
+    """The predictor with the correction in its blocks."""
+    G = predictor.G.copy()
+    for place, source in enumerate(state.sources):
+        G[:, state.robot, source] += block_correction(predictor.meta, state, place)
+    return Predictor(predictor.meta, G, predictor.condition)
 
 
 def mean_error(predictor: Predictor, episode: Any, robot: int) -> float:
