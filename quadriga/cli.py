@@ -17,7 +17,7 @@ from quadriga.recording_cli import add_file
 from quadriga.scenarios import LABEL, label, path
 from shared.config import Config
 from shared.config_file import build, layers, parse_assignment
-from shared.errors import ProcessError, QuadrigaError
+from shared.errors import ConfigError, ProcessError, QuadrigaError
 from shared.signals import die_with_parent, interrupt_on_sigterm
 
 FAILED: Final = 1  # a robot fell or a process failed
@@ -56,6 +56,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # of `quadriga config | head`
         sys.stdout = None
         return 0
+    except OSError as error:  # a disk that is full, a folder that is read-only
+        what, reason = error.filename or "a file", error.strerror or str(error)
+        return _complain(ConfigError(str(what), reason, "a place that can be read and written"),
+                         WRONG)  # fmt: skip
     return status
 
 

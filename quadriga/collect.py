@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import closing
 from dataclasses import dataclass, replace
-from multiprocessing import resource_tracker
+from functools import partial
 
 import numpy as np
 
@@ -16,11 +14,11 @@ from agents.modes import DAMPING
 from agents.planner.episode import SIGNALS, Episode, output_base
 from agents.planner.hankel import required_samples
 from quadriga.rollout import Rollout
+from quadriga.workers import each_done
 from shared.config import Config, WorldConfig
 from shared.errors import PredictorError
 from shared.messages import Reference
 from shared.robot import N_FORCES, Array, robot_names
-from shared.signals import die_with_parent, interrupts_held
 from shared.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 from shared.topics import SAMPLE_MS
 
@@ -74,6 +72,7 @@ def collect(config: Config, jobs: int, progress: Progress) -> Dataset:
 
     Raises:
         PredictorError: so many walks ended in a fall that too little is left.
+        ProcessError: a worker died.
     """
     wanted = training_seconds(config)
     count = max(2, round(wanted / config.identification.episode))
@@ -81,20 +80,10 @@ def collect(config: Config, jobs: int, progress: Progress) -> Dataset:
     plan.append((count, config.identification.held_out))
     episodes: dict[int, Episode | None] = {}
     progress(0, len(plan))
-    # Spawn: a forked child would share the parent's threads' locks.
-    context = multiprocessing.get_context("spawn")
-    resource_tracker.ensure_running()  # before signals are held: its start lets them through
-    with ProcessPoolExecutor(jobs, context, die_with_parent, (os.getpid(),)) as pool:
-        try:
-            with interrupts_held():
-                futures = {pool.submit(collect_episode, config, k, length): k for k, length in plan}
-            for future in as_completed(futures):
-                episodes[futures[future]] = future.result()
-                progress(len(episodes), len(plan))
-        except KeyboardInterrupt:  # the pool would first finish every episode
-            for worker in multiprocessing.active_children():
-                worker.terminate()
-            raise
+    with closing(each_done(partial(_planned_episode, config), plan, jobs)) as found:
+        for (k, _), episode in found:
+            episodes[k] = episode
+            progress(len(episodes), len(plan))
     return kept(config, episodes, wanted)
 
 
@@ -122,6 +111,10 @@ def kept(config: Config, episodes: Mapping[int, Episode | None], wanted: float) 
         )  # fmt: skip
     seeds = tuple(config.identification.seed + k for k in training)
     return Dataset(tuple(training.values()), (held_out,), seeds)
+
+
+def _planned_episode(config: Config, planned: tuple[int, float]) -> Episode | None:
+    return collect_episode(config, *planned)
 
 
 def collect_episode(config: Config, number: int, seconds: float) -> Episode | None:

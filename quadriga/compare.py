@@ -30,7 +30,13 @@ from quadriga.warm_up import warm_up
 from quadriga.workers import each_done
 from shared.config import CENTRAL, Config
 from shared.config_text import config_sha256, to_toml
-from shared.errors import ConfigError, QuadrigaError
+from shared.errors import (
+    ConfigError,
+    PredictorError,
+    PredictorFileError,
+    ProcessError,
+    QuadrigaError,
+)
 
 Reports = dict[str, FitReport | Unfit]
 
@@ -66,6 +72,7 @@ def run(
     Raises:
         ConfigError: the folder holds a comparison, or cannot be made.
         PredictorError: there are too little data, or they are not exciting.
+        ProcessError: some trials failed; the rest is kept.
     """
     make_folder(out)
     dataset = ensure_data(config, console)
@@ -86,6 +93,9 @@ def run(
         sheets = [predictor_sheet(list(reports.values())), *comparison_sheets(rows)]
         _keep(config, out, rows, reports, sheets)
     show(sheets)
+    if failed := [row for row in rows if row.failed]:
+        raise ProcessError(f"{len(failed)} of {len(rows)} trials", failed[0].failed, "figures",
+                           f"the notes in {out / PAGE} name each")  # fmt: skip
     console.print(f"comparison: {out}", markup=False, highlight=False)
 
 
@@ -143,7 +153,7 @@ def walk_alone(job: Job) -> Row:
     try:
         return Row(job.trial, walked(job.config, job.predictor))
     except QuadrigaError as error:
-        return Row(job.trial, refused=reason(error))
+        return _unwalked(job.trial, error)
 
 
 def _one_by_one(todo: Sequence[Job], out: Path) -> Generator[Row, None, None]:
@@ -153,7 +163,14 @@ def _one_by_one(todo: Sequence[Job], out: Path) -> Generator[Row, None, None]:
             walk = over_the_bus(job.config, out / name, job.predictor, job.sha256)
             yield Row(job.trial, figures(walk))
         except QuadrigaError as error:
-            yield Row(job.trial, refused=reason(error))
+            yield _unwalked(job.trial, error)
+
+
+def _unwalked(trial: Trial, error: QuadrigaError) -> Row:
+    """The row of a trial that came to nothing: DeePC may refuse the data, all else has failed."""
+    if isinstance(error, PredictorError) and not isinstance(error, PredictorFileError):
+        return Row(trial, refused=reason(error))
+    return Row(trial, failed=str(error))
 
 
 def _progress(console: Console) -> Progress:

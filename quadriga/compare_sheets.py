@@ -66,8 +66,9 @@ def _cells(
         if row.walked and row.walked.cost is not None and row.trial.seed in baseline
     ]
     plans = sum((Counter(f.plans) for f in found), Counter[str]())
+    failed = sum(bool(row.failed) for row in rows)
     return (
-        name, _falls(found), text(_mean([f.mean["vx"] for f in upright]), ".3f"),
+        name, _falls(found, failed), text(_mean([f.mean["vx"] for f in upright]), ".3f"),
         *(output_text(key, _mean([f.rmse[key] for f in upright])) for key in OUTPUTS),
         text(_mean([f.cost for f in upright]), ".0f"), text(_mean(ratios), ".2f"),
         text(_mean([f.planner_ms_median for f in found]), ".2f"),
@@ -75,16 +76,21 @@ def _cells(
     )  # fmt: skip
 
 
-def _falls(found: Sequence[Figures]) -> str:
+def _falls(found: Sequence[Figures], failed: int) -> str:
     fallen = sum(bool(f.fallen) for f in found)
     stopped = sum(bool(f.stopped) and not f.fallen for f in found)
-    return f"{fallen}/{len(found)}" + (f", {stopped} stopped" if stopped else "")
+    more = [
+        f"{count} {what}" for count, what in ((stopped, "stopped"), (failed, "failed")) if count
+    ]
+    return ", ".join([f"{fallen}/{len(found) + failed}", *more])
 
 
 def _failures(rows: Sequence[Row]) -> list[str]:
-    """Who fell or stopped when and why, a line for each walk."""
+    """Who fell or stopped when and why, and what failed, a line for each walk."""
     lines = []
     for row in rows:
+        if row.failed:
+            lines.append(f"{label(row)}, seed {row.trial.seed}: failed: {row.failed}.")
         if row.figures is None or row.walked:
             continue
         fell = [f"{robot} fell at {s:.2f} s" for robot, s in row.figures.fallen.items()]

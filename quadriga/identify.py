@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -54,6 +55,9 @@ def ensure_data(config: Config, console: Console) -> Dataset:
     path = data_path(config)
     if path.is_file():
         return read_data(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=path.parent):
+        pass  # that nothing can be kept there is better known before minutes of walking
     seconds = training_seconds(config) + config.identification.held_out
     label = f"collecting {seconds:.0f} s of walking, {config.team.robots} robots"
     columns = (

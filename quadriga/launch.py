@@ -23,7 +23,6 @@ _ONE_THREAD: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREAD
 QUADRIGA: Final = (sys.executable, "-m", "quadriga")
 _LAST_WORDS: Final = 12  # lines of a failed process's log that are shown
 _LOOK: Final = 0.05  # s
-_GRACE: Final = 5.0  # s from SIGTERM to SIGKILL
 _EARLY: Final = 4.0  # s, by which others may leave before the sim server: it closes politely
 
 
@@ -34,7 +33,7 @@ class Row:
     Attributes:
         name: its name on the bus and of its log file.
         command: its command line; `--parent PID` is added.
-        grace: how long it may take to leave once the walk is over, s.
+        grace: how long it may take to leave once the walk is over or it is told to, s.
     """
 
     name: str
@@ -140,10 +139,22 @@ class Launch:
 
         The sim server then tells the others that the walk is over, and the recorder hears it.
         """
-        recorder = self._running.pop(RECORDER, None)
-        _terminate(self._running.values())
-        _terminate([recorder] if recorder else [])
+        last = [RECORDER] if RECORDER in self._running else []
+        self._terminate([name for name in self._running if name != RECORDER])
+        self._terminate(last)
         self._running.clear()
+
+    def _terminate(self, names: Collection[str]) -> None:
+        begun = monotonic()
+        for name in names:
+            self._running[name].terminate()
+        for name in names:
+            process, deadline = self._running[name], begun + self._rows[name].grace
+            try:
+                process.wait(max(deadline - monotonic(), 0.0))
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
 
     def __enter__(self) -> Self:
         return self
@@ -155,15 +166,3 @@ class Launch:
         trace: TracebackType | None,
     ) -> None:
         self.stop()
-
-
-def _terminate(processes: Collection[subprocess.Popen[bytes]]) -> None:
-    for process in processes:
-        process.terminate()
-    deadline = monotonic() + _GRACE
-    for process in processes:
-        try:
-            process.wait(max(deadline - monotonic(), 0.0))
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()

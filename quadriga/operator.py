@@ -7,10 +7,11 @@ from typing import Final
 
 from shared.barrier import OPERATOR, SIM, meet
 from shared.bus import HERE, POLL, READY, Bus
+from shared.clock import monotonic
 from shared.codec import decode, encode
 from shared.config import Config
 from shared.envelope import envelope
-from shared.errors import MessageError
+from shared.errors import BusError, MessageError
 from shared.messages import EStop, Event, Reference, Truth
 from shared.robot import robot_names
 from shared.signals import stop_on_signals
@@ -96,13 +97,25 @@ def stop_team(config: Config, reason: str) -> None:
     Raises:
         BusError: the bus cannot be opened, or some robots were not reached.
     """
-    team = config.team.name
+    team, names = config.team.name, robot_names(config.team.robots)
     with Bus.open(config.bus, team, "estop") as bus:
         put = bus.publisher(ESTOP.key(team))
         bus.subscribe(TRUTH.key(team))
-        try:
-            bus.wait_for(HERE, robot_names(config.team.robots), _ESTOP_WAIT, lambda: False)
-        finally:  # those who are there must hear it, whoever is absent
+        reached: frozenset[str] = frozenset()
+        tick, stamp_ns, deadline = 0, 0, monotonic() + _ESTOP_WAIT
+        while reached < frozenset(names) and monotonic() < deadline:
             truth = bus.get(POLL)
-            tick, stamp_ns = (truth and envelope(truth[1])) or (0, 0)
-            put(encode(EStop(tick, stamp_ns, reason)))
+            tick, stamp_ns = (truth and envelope(truth[1])) or (tick, stamp_ns)
+            there = frozenset(names) & bus.present(HERE)
+            if there > reached:  # at once, whoever is still absent: to hear it twice is no harm
+                put(encode(EStop(tick, stamp_ns, reason)))
+                reached = there
+        if absent := [name for name in names if name not in reached]:
+            put(encode(EStop(tick, stamp_ns, reason)))  # one who is there but does not say so hears
+            others = ", ".join(sorted(reached)) or "nobody"
+            raise BusError(
+                f"emergency stop of team {team!r}",
+                f"no {', '.join(absent)} on the bus after {_ESTOP_WAIT:g} s",
+                f"all of {', '.join(names)}",
+                f"{others} heard it at once; another bus.endpoint, team.name or team.robots?",
+            )

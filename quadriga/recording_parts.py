@@ -58,6 +58,7 @@ class Parts:
         self._lost: Counter[str] = Counter()
         self._first: dict[str, int] = {}
         self._begun, self._messages = now(), 0
+        self._last: dict[str, int] = {}  # tick of the newest message of each key in earlier files
         self._writer = self._next({})
 
     def write(self, key: str, payload: bytes, log_time_ns: int) -> None:
@@ -113,7 +114,9 @@ class Parts:
         self._messages += before.messages
         self._lost += Counter(lost_by_key(before.tracks))
         self._begun = self._now()
-        self._writer = self._next({key: track.last for key, track in before.tracks.items()})
+        # Also of a key that was silent for a whole part: what it then misses was lost.
+        self._last |= {key: track.last for key, track in before.tracks.items()}
+        self._writer = self._next(self._last)
 
     def _next(self, after: Mapping[str, int]) -> RecordingWriter:
         number = len(self.paths)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Generator, Iterator
 from contextlib import AbstractContextManager, closing
@@ -28,9 +29,9 @@ def wanted(arguments: argparse.Namespace) -> Wanted:
     from quadriga.recording_parts import Limits
 
     size, seconds = arguments.max_size, arguments.max_duration
-    if size and not size >= _SMALLEST:
+    if size and not _SMALLEST <= size < math.inf:
         raise ConfigError("--max-size", f"{size:g} MB", f"at least {_SMALLEST:g}")
-    if seconds and not seconds >= _SMALLEST:
+    if seconds and not _SMALLEST <= seconds < math.inf:
         raise ConfigError("--max-duration", f"{seconds:g} s", f"at least {_SMALLEST:g}")
     limits = Limits(round(1e6 * size), seconds)
     if arguments.report and limits != Limits():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from rich.console import Console
 
@@ -19,26 +19,42 @@ from shared.clock import wall_ns
 from shared.errors import ConfigError, ProcessError
 from shared.recording import Recording
 
+RUNS: Final = Path("runs")
+
 
 def make_run_dir(out: Path | None) -> Path:
     """A new run folder, or an existing one without a recording.
 
     Args:
-        out: the folder; None takes `runs/<date>-<time>`.
+        out: the folder; None takes `runs/<date>-<time>`, with a number if there is one already.
 
     Raises:
         ConfigError: it holds a recording already, or cannot be made.
     """
-    now = datetime.fromtimestamp(1e-9 * wall_ns(), UTC).astimezone()
-    run_dir = out or Path("runs") / f"{now:%Y%m%d-%H%M%S}"
-    if (run_dir / RECORDING).exists():
-        raise ConfigError(f"--out {run_dir}", "a folder with a recording", "a new folder")
+    if out is not None and (out / RECORDING).exists():
+        raise ConfigError(f"--out {out}", "a folder with a recording", "a new folder")
     try:
-        run_dir.mkdir(parents=True, exist_ok=True)
+        if out is None:
+            return _folder_of_its_own()
+        out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise ConfigError(f"--out {run_dir}", reason, "a folder that can be made") from None
-    return run_dir
+        raise ConfigError(f"--out {out or RUNS}", reason, "a folder that can be made") from None
+    return out
+
+
+def _folder_of_its_own() -> Path:
+    """`runs/<date>-<time>`, with a number where another walk began in the same second."""
+    now = datetime.fromtimestamp(1e-9 * wall_ns(), UTC).astimezone()
+    name, number = f"{now:%Y%m%d-%H%M%S}", 1
+    while True:
+        run_dir = RUNS / (f"{name}-{number}" if number > 1 else name)
+        try:
+            run_dir.mkdir(parents=True)
+        except FileExistsError:
+            number += 1
+        else:
+            return run_dir
 
 
 def report(run_dir: Path, *, pictures: bool, console: Console) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
+from unicodedata import category
 
 from rich.console import Console
 from rich.markup import escape
@@ -53,7 +54,7 @@ class Sheet:
         for k, column in enumerate(self.columns):
             table.add_column(escape(column), justify="right" if k else "left", no_wrap=not k)
         for row in self.rows:
-            table.add_row(*(escape(cell) for cell in row))
+            table.add_row(*(escape(printable(cell)) for cell in row))
         return table
 
     def to_markdown(self, level: int = 2) -> str:
@@ -73,6 +74,12 @@ def show(sheets: Iterable[Sheet]) -> None:
         console.print(sheet.to_rich())
         for note in sheet.notes:
             console.print(note, style="dim", markup=False, highlight=False)
+
+
+def printable(text: str) -> str:
+    """Text that comes from elsewhere, without what a terminal would obey."""
+    return "".join("\N{REPLACEMENT CHARACTER}" if category(c) == "Cc" and c != "\n" else c
+                   for c in text)  # fmt: skip
 
 
 def text(value: float | None, digits: str = ".3g", factor: float = 1.0) -> str:

@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from quadriga.sheet import printable
+
 # Unit and factor of each of `quadriga.traces.ERRORS`.
 _ERRORS = {
     "z": ("mm", 1e3), "z-felt": ("mm", 1e3), "vx": ("m/s", 1.0), "vy": ("m/s", 1.0),
@@ -22,7 +24,8 @@ def print_table(summary: dict[str, Any], console: Console) -> None:
     table = Table(show_header=False, title=_title(summary), title_justify="left")
     table.add_column(style="bold", no_wrap=True)
     table.add_column()
-    for name, text in rows(summary):
+    for name, told in rows(summary):
+        text = printable(told)
         marked = f"[red]{escape(text)}[/red]" if _is_bad(name, text) else escape(text)
         table.add_row(name, marked)
     console.print(table)

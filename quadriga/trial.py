@@ -85,11 +85,12 @@ class Figures:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A trial with what came of it: figures, or why it was refused."""
+    """A trial with what came of it: figures, why a gate refused its predictor, or what failed."""
 
     trial: Trial
     figures: Figures | None = None
     refused: str = ""
+    failed: str = ""
 
     @property
     def walked(self) -> Figures | None:

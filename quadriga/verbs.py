@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as installed_version
@@ -194,6 +195,8 @@ def replay(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
     if arguments.stop_at is not None:
         if arguments.all:
             raise ConfigError("--break", "--all", "--robot NAME", "one debugger, one robot")
+        if not math.isfinite(arguments.stop_at):
+            raise ConfigError("--break", f"{arguments.stop_at}", "a time [s]")
         outcomes = [break_in(path, arguments.robot, *options, arguments.stop_at)]
     else:
         robots = () if arguments.all else (arguments.robot,)

@@ -440,7 +440,8 @@ class ReferenceConfig:
     trace: str = key(
         "", "-",
         "CSV with columns t [s], vx, vy, wz that replaces these three, over and over: a path with "
-        "a '/', or the name of a file beside the scenarios",
+        "a '/', which is read at once, its lines kept here with a ';' between them; or the name of "
+        "a file beside the scenarios",
     )  # fmt: skip
     trace_shift: float = key(
         0.0, "s", "the trace begins at a time from 0 to this, drawn from world.seed",

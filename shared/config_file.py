@@ -17,6 +17,7 @@ from shared.payload import carriers
 from shared.presets import PRESETS, preset_keys
 from shared.robot import robot_names
 from shared.topics import SAMPLE_MS
+from shared.trace import ROW_END, inlined
 
 _TEAM_NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
 _PAIRS: Final = ("identification.vx", "identification.vy", "identification.wz",
@@ -56,9 +57,10 @@ def overlaid(given: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, A
 
     A preset that comes with the overrides also replaces what the file says of the keys that
     presets set, so that a file with every key written out can still be walked with another one.
+    The path of a trace gives way to what the file says.
 
     Raises:
-        ConfigError: an override names no key.
+        ConfigError: an override names no key, or there is no such trace.
     """
     for section in PRESETS:
         if f"{section}.preset" in overrides and isinstance(given.get(section), dict):
@@ -69,6 +71,10 @@ def overlaid(given: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, A
         if not dot or not isinstance(given.setdefault(section, {}), dict):
             raise ConfigError(name, "a value", "section.key")
         given[section][key] = value
+    reference = given.get("reference")
+    trace = reference.get("trace") if isinstance(reference, dict) else None
+    if isinstance(trace, str) and "/" in trace and ROW_END not in trace:
+        given["reference"]["trace"] = inlined(Path(trace))
     return given
 
 
@@ -170,6 +176,13 @@ def _text(name: str, choices: tuple[str, ...], value: Any) -> str:
     return value
 
 
+def _finite(value: float) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer beyond all floating-point numbers
+        return False
+
+
 def _number(name: str, meta: Mapping[str, Any], kind: type, value: Any) -> Any:
     low, high = meta["low"], meta["high"]
     what = "an integer" if kind is int else "a finite number"
@@ -179,7 +192,7 @@ def _number(name: str, meta: Mapping[str, Any], kind: type, value: Any) -> Any:
         what += f" ≥ {low:g}"
     what += _unit(meta)
     right_type = type(value) is int or (kind is float and type(value) is float)
-    if not right_type or not math.isfinite(value):
+    if not right_type or not _finite(value):
         raise ConfigError(name, repr(value), what)
     if (low is not None and value < low) or (high is not None and value > high):
         raise ConfigError(name, f"{value!r}", what, "out of range")

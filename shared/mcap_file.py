@@ -3,8 +3,9 @@
 The library's own writer spends several times as long on each message; this one leaves the hot
 path to `struct` and everything else to the library's records.
 
-Every chunk repeats the channels it may use, so that it can be read whatever became of those before
-it; chunks, data section and summary carry checksums, so that no flipped bit goes unnoticed.
+Every chunk repeats the channels, up to 16 KiB of them, so that it can be read whatever became of
+those before it; chunks, data section and summary carry checksums, so that no flipped bit goes
+unnoticed.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ _MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence,
 _MESSAGE_FIELDS: Final = 22  # bytes of a message record's content before the payload
 _FOOTER: Final = struct.Struct("<BQQQ")  # opcode, length, summary, offsets; a checksum follows
 _ENTRY: Final = 24  # bytes that a message takes in the index, with its share of what is around it
-_REPEATED: Final = 4096  # bytes of channels that a chunk repeats, enough for a team of ten
+_REPEATED: Final = 16384  # bytes of channels that a chunk repeats: those of ten robots and others
 _INDEX_HEAD: Final = struct.Struct("<BQHI")  # opcode, length, channel, bytes of entries
 
 

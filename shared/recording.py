@@ -92,7 +92,11 @@ class Recording:
         """
         wanted: dict[int, str | None] = {}
         for chunk in self._chunks():
-            yield from messages_of(chunk, wanted, str(self.path), names, keys)
+            try:
+                yield from messages_of(chunk, wanted, str(self.path), names, keys)
+            except CORRUPT as error:  # of another program: its checksum is right
+                self.cut = f"a chunk holds what are no records ({error})"
+                return
 
     def messages(self, kind: type[M], robot: str = "") -> Iterator[M]:
         """Decoded messages of a type (of one robot, or of all).

@@ -1,4 +1,4 @@
-"""The table of topics: key, message type, rate, maximum age, whether it is recorded."""
+"""The table of topics: key, message type, rate, maximum age."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ class Topic:
         max_age_ms: longest gap between two of them, in world time, that is nothing unusual; of a
             reference also how long it is obeyed. 0: none, or the configuration says it:
             `shared.tick_track.max_ages`.
-        recorded: whether the recorder keeps it.
     """
 
     name: str
@@ -28,7 +27,6 @@ class Topic:
     per_robot: bool
     rate_hz: float
     max_age_ms: int
-    recorded: bool = True
 
     def key(self, team: str, robot: str = "") -> str:
         """The Zenoh key of this topic; `robot` may be `*`."""

@@ -17,6 +17,7 @@ from shared.errors import ConfigError
 from shared.robot import Array
 
 COLUMNS: Final = ("t", "vx", "vy", "wz")
+ROW_END: Final = ";"  # where a trace stands in a configuration, in one line
 _STREAM: Final = 6  # of the seed
 _SOURCE: Final = Path(__file__).parents[1] / "deploy" / "scenarios"
 _INSTALLED: Final = Path(sys.prefix) / "share" / "quadriga" / "scenarios"
@@ -54,15 +55,16 @@ def trace_of(config: Config) -> Trace | None:
     Raises:
         ConfigError: the file cannot be read, or is no trace.
     """
-    path, shift = _path(config), config.reference.trace_shift
-    if path is None:
+    asked = config.reference
+    if not asked.trace:
         return None
-    begin = np.random.default_rng((config.world.seed, _STREAM)).uniform(0.0, shift)
-    return _read(path, begin)
+    path = _path(config)
+    begin = np.random.default_rng((config.world.seed, _STREAM)).uniform(0.0, asked.trace_shift)
+    return _read(path, asked.trace if path is None else "", begin)
 
 
 def trace_sha256(config: Config) -> str:
-    """Digest of the trace's file, empty without one: a configuration holds only its name.
+    """Digest of the trace's file, empty where the configuration holds more than its name.
 
     Raises:
         ConfigError: the file cannot be read.
@@ -71,49 +73,76 @@ def trace_sha256(config: Config) -> str:
     try:
         return "" if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
-        raise _refused(Path(config.reference.trace), error.strerror or str(error),
-                       "a file that can be read") from None  # fmt: skip
+        raise ConfigError(f"reference.trace {path}", error.strerror or str(error),
+                          "a file that can be read") from None  # fmt: skip
+
+
+def inlined(path: Path) -> str:
+    """A trace's file as one line, as `reference.trace` holds it: nothing then depends on the file.
+
+    Raises:
+        ConfigError: the file cannot be read, or is no trace.
+    """
+    rows = _rows(_text(path))
+    _values(f"reference.trace {path}", rows)
+    return ROW_END.join(",".join(row) for row in rows)
 
 
 def _path(config: Config) -> Path | None:
+    """The file of a trace that comes with the project; None of one that is given itself."""
     name = config.reference.trace
-    if not name:
+    if not name or ROW_END in name:
         return None
-    return Path(name) if "/" in name else scenario_folder() / name
+    if "/" in name:  # of a recording from elsewhere: what it names here is something else
+        raise ConfigError("reference.trace", repr(name), "the trace itself, or the name of one "
+                          "beside the scenarios", "recorded before traces were kept")  # fmt: skip
+    return scenario_folder() / name
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path, begin: float) -> Trace:
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "bytes that are not UTF-8"
-        raise _refused(path, reason, "a file that can be read") from None
-    rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
-    if not rows or tuple(word.strip() for word in rows[0]) != COLUMNS:
-        raise _refused(path, ",".join(rows[0]) if rows else "nothing", ",".join(COLUMNS))
-    try:
-        values = np.array([[float(word) for word in row] for row in rows[1:]])
-    except ValueError as error:
-        raise _refused(path, str(error), "four numbers a line") from None
-    if values.ndim != 2 or values.shape[1] != len(COLUMNS) or len(values) < 2:
-        raise _refused(path, f"numbers of shape {values.shape}", "at least two lines of four")
-    _check(path, values)
+def _read(path: Path | None, given: str, begin: float) -> Trace:
+    text = given.replace(ROW_END, "\n") if path is None else _text(path)
+    values = _values(f"reference.trace{f' {path}' if path else ''}", _rows(text))
     values.setflags(write=False)
     return Trace(values[:, 0], values[:, 1:], begin)
 
 
-def _check(path: Path, values: Array) -> None:
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "bytes that are not UTF-8"
+        raise ConfigError(f"reference.trace {path}", reason, "a file that can be read") from None
+
+
+def _rows(text: str) -> list[list[str]]:
+    lines = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
+    return [[word.strip() for word in row] for row in csv.reader(lines)]
+
+
+def _values(name: str, rows: list[list[str]]) -> Array:
+    """Checked lines t, vx, vy, wz."""
+    if not rows or tuple(rows[0]) != COLUMNS:
+        raise ConfigError(name, ",".join(rows[0]) if rows else "nothing", ",".join(COLUMNS))
+    try:
+        values = np.array([[float(word) for word in row] for row in rows[1:]])
+    except ValueError as error:
+        raise ConfigError(name, str(error), "four numbers a line") from None
+    if values.ndim != 2 or values.shape[1] != len(COLUMNS) or len(values) < 2:
+        raise ConfigError(name, f"numbers of shape {values.shape}", "at least two lines of four")
+    _check(name, values)
+    return values
+
+
+def _check(name: str, values: Array) -> None:
     t = values[:, 0]
     if not np.isfinite(values).all() or t[0] != 0.0 or (np.diff(t) <= 0.0).any():
-        raise _refused(path, f"times from {t[0]:g} to {t[-1]:g}", "finite numbers, t rising from 0")
-    for column, name in enumerate(COLUMNS[1:], start=1):
-        limits = ReferenceConfig.__dataclass_fields__[name].metadata
+        raise ConfigError(name, f"times from {t[0]:g} to {t[-1]:g}",
+                          "finite numbers, t rising from 0")  # fmt: skip
+    for column, key in enumerate(COLUMNS[1:], start=1):
+        limits = ReferenceConfig.__dataclass_fields__[key].metadata
         low, high = values[:, column].min(), values[:, column].max()
         if low < limits["low"] or high > limits["high"]:
-            raise _refused(path, f"{name} of {low:g} … {high:g}",
-                           f"{limits['low']:g} … {limits['high']:g} {limits['unit']}")  # fmt: skip
-
-
-def _refused(path: Path, got: str, expected: str) -> ConfigError:
-    return ConfigError(f"reference.trace {path}", got, expected)
+            raise ConfigError(name, f"{key} of {low:g} … {high:g}",
+                              f"{limits['low']:g} … {limits['high']:g} {limits['unit']}"
+                              )  # fmt: skip

@@ -62,4 +62,5 @@ class _Motors:
                 chosen[name] = self._held[name]
             else:
                 self.deadlines.late[f"{name} damped"] += 1
+                self._held.pop(name, None)  # where it was then is no place to go back to
         return chosen

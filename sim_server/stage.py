@@ -74,13 +74,14 @@ class Stage:
                 self._last_tick = min(self._last_tick, event.tick + FALL_LINGER_MS)
         if self.world.tick < self._last_tick:
             return ""
+        self._report_malformed(at_once=True)
         fallen = self.world.fallen()
         return f"fall of {', '.join(fallen)}" if fallen else "end of world.seconds"
 
-    def _report_malformed(self) -> None:
-        """Announce malformed commands once in a second of world time at most."""
+    def _report_malformed(self, *, at_once: bool = False) -> None:
+        """Announce malformed commands once in a second of world time at most, and at the end."""
         count = self.commands.malformed
-        if count != self._malformed and self.world.tick % 1000 == 0:
+        if count != self._malformed and (at_once or self.world.tick % 1000 == 0):
             self._malformed = count
             self.announce("fault", "", f"{count} commands dropped: {self.commands.last_error}")
 

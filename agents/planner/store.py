@@ -158,12 +158,13 @@ def read(path: Path) -> tuple[Predictor, Provenance]:
     ) as error:
         raise PredictorFileError(
             f"predictor {path}", f"something else ({type(error).__name__})",
-            "a predictor that quadriga wrote", f"truncated or not a predictor; {_REMEDY}",
+            "a predictor that quadriga wrote",
+            f"truncated or not a predictor: delete it; {_REMEDY}",
         ) from None  # fmt: skip
     if document["sha256"] != predictor_sha256(predictor):
         raise PredictorFileError(
             f"predictor {path}", "content that its digest does not match", "an unchanged file",
-            f"corrupt; {_REMEDY}",
+            f"corrupt: delete it; {_REMEDY}",
         )  # fmt: skip
     return predictor, provenance
 

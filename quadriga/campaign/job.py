@@ -59,7 +59,7 @@ def walk(job: Job) -> Outcome:
                            "install the same version there")  # fmt: skip
     if trace_sha256(job.config) != job.trace_sha256:
         raise ProcessError("a worker's reference.trace", f"another {job.config.reference.trace}",
-                           "the campaign's", "copy it to the same place there")  # fmt: skip
+                           "the campaign's", "install the same version there")  # fmt: skip
     config, begun = seeded(job.config, job.seed), monotonic()
     try:
         found = job.fitted.refused or walked(config, job.fitted.path, job.fitted.data)

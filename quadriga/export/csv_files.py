@@ -10,7 +10,7 @@ from typing import Any
 
 from quadriga.export.source import Source
 from quadriga.export.tables import build_columns, rows
-from quadriga.export.written import Progress, file_of, make_folder
+from quadriga.export.written import Progress, file_of
 
 
 def write_csv(source: Source, out: Path, progress: Progress) -> tuple[Path, ...]:
@@ -18,7 +18,7 @@ def write_csv(source: Source, out: Path, progress: Progress) -> tuple[Path, ...]
 
     Entries that a message does not have are empty, lists are numbers separated by spaces.
     """
-    make_folder(out)
+    out.mkdir(parents=True)
     writers: dict[str, Any] = {}
     with ExitStack() as files:
         for item in source.items():

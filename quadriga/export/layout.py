@@ -59,11 +59,13 @@ class Layout:
         """
         arrays = [np.asarray(getattr(message, name)) for name in self._arrays]
         rows = len(arrays[0]) if self.by_sample else 1
-        parts = [array.reshape(rows, -1) for array in arrays]
+        parts = [array.reshape(rows, -1) for array in arrays if rows]
         for name, entries in self._maps:
             known = getattr(message, name)
             row = [[float(known.get(entry, np.nan)) for entry in entries]]
             parts.append(np.repeat(row, rows, axis=0))
+        if not rows:  # a plan of nothing
+            return np.zeros((0, len(self.numbers)))
         found: Array = np.concatenate(parts, axis=1) if parts else np.zeros((rows, 0))
         return found if found.shape[1] == len(self.numbers) else None
 

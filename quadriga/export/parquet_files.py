@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 
 from quadriga.export.source import Item, Source
 from quadriga.export.tables import Columns, build_columns, rows
-from quadriga.export.written import Progress, file_of, make_folder
+from quadriga.export.written import Progress, file_of
 
 _BATCH: Final = 10_000  # rows that are kept in memory
 _TYPES: Final = {int: pa.int64(), float: pa.float64(), str: pa.string()}
@@ -21,7 +21,7 @@ _TYPES: Final = {int: pa.int64(), float: pa.float64(), str: pa.string()}
 
 def write_parquet(source: Source, out: Path, progress: Progress) -> tuple[Path, ...]:
     """Write one file per key into the new folder `out`; missing numbers are null."""
-    make_folder(out)
+    out.mkdir(parents=True)
     tables: dict[str, _Table] = {}
     with ExitStack() as files:
         for item in source.items():

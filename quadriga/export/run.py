@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
@@ -63,15 +64,21 @@ def run(path: Path, form: str, out: Path | None, console: Console) -> None:
                 shown = tick
                 bar.update(task, completed=tick / 1000)
 
+        # Under a name of its own, so that what others wrote meanwhile is neither mixed nor removed.
+        partial = out.with_name(f".{out.name}.{os.getpid()}.partial")
         try:
-            files = write(source, out, progress)
+            written = write(source, partial, progress)
+            if out.exists():
+                raise ConfigError("--output", f"{out}, which exists by now", "a new file or folder")
+            partial.rename(out)
         except BaseException as error:
-            remove(out)
+            remove(partial)
             if isinstance(error, OSError):
                 raise ConfigError(
                     "--output", f"{out}: {error.strerror or error}", "a writable place with room"
                 ) from None
             raise
+    files = [out / file.relative_to(partial) for file in written]
     size = sum(file.stat().st_size for file in files)
     count = f" with {len(files)} files" if len(files) > 1 else ""
     lines = [f"{out}{count}, {size / 1e6:.1f} MB in {monotonic() - begun:.1f} s"]

@@ -7,21 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from shared.errors import ConfigError
-
 Progress = Callable[[int], None]  # told the tick that was reached
-
-
-def make_folder(out: Path) -> None:
-    """Create the folder of an export that is several files.
-
-    Raises:
-        ConfigError: it exists or cannot be created.
-    """
-    try:
-        out.mkdir(parents=True)
-    except OSError as error:
-        raise ConfigError("--output", f"{out}: {error.strerror}", "a new folder") from None
 
 
 def remove(out: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import zipfile
 from pathlib import Path
@@ -30,10 +29,7 @@ def keep(predictor: Path, run_dir: Path) -> None:
     kept = run_dir / PREDICTOR
     try:
         kept.unlink(missing_ok=True)
-        try:
-            os.link(predictor, kept)  # a file of the cache is replaced, never written to
-        except OSError:  # another file system, or one without links
-            shutil.copyfile(predictor, kept)
+        shutil.copyfile(predictor, kept)
     except OSError as error:
         reason = error.strerror or str(error)
         raise RecordingError(str(kept), reason, "room for the predictor") from None

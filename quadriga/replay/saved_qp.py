@@ -14,6 +14,7 @@ or `python -m quadriga.replay.saved_qp FILE`, which does just that and says how 
 from __future__ import annotations
 
 import sys
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -86,7 +87,7 @@ def load(path: Path) -> SavedQp:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in ("H", "f", "A", "lower", "upper", "x")}
             return SavedQp(**arrays, about=str(archive["about"]))
-    except (OSError, ValueError, KeyError, EOFError) as error:
+    except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise RecordingError(str(path), str(error) or "another file", "a saved problem") from None
 
 

@@ -13,6 +13,7 @@ from quadriga.report.run import Run
 from shared.config import Config
 from shared.config_text import departures
 from shared.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, STATE, STATUS, TRUTH
+from shared.trace import ROW_END
 
 _DIGITS: Final = 12  # of a digest
 
@@ -64,7 +65,8 @@ def facts(run: Run) -> Iterator[tuple[str, str]]:
         yield "weak motors", f"{world.weak_motor} at {100 * world.weak_share:g} %"
     asked = config.reference
     speeds = f"vx {asked.vx:g} m/s, vy {asked.vy:g} m/s, wz {asked.wz:g} rad/s"
-    yield "asked for", asked.trace or speeds
+    rows = asked.trace.count(ROW_END)
+    yield "asked for", f"a trace of {rows} lines" if rows else asked.trace or speeds
     yield "planner", f"{config.planner.kind}, {config.planner.interface}"
     digest = traces.metadata.get("predictor_sha256", "")
     kind = config.identification.predictor

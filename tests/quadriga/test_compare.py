@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -173,3 +174,10 @@ def test_means_are_of_the_walks_without_a_fall_and_ratios_of_the_same_worlds() -
     assert damped["z [mm]"] == "750.0"
     assert damped["plans"] == "solved 100 %"
     assert "damped · ridge, seed 2: r2 fell at 5.00 s." in sheet.notes
+
+
+def test_a_walk_that_failed_is_counted_and_named() -> None:
+    failed = replace(row("damped", 2, None), figures=None, failed="process r2: got signal 9")
+    (sheet,) = comparison_sheets([row("damped", 0, 50.0), failed])
+    assert sheet.rows[0][1] == "0/2, 1 failed"
+    assert "damped · ridge, seed 2: failed: process r2: got signal 9." in sheet.notes

@@ -86,9 +86,8 @@ def test_who_stays_after_the_walk_is_named(tmp_path: Path) -> None:
         running.watch(never)
 
 
-def test_stopping_kills_who_does_not_obey(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(launch, "_GRACE", 0.5)
-    with Launch([row("sim", STUBBORN), row("recorder", LAST)], tmp_path) as running:
+def test_stopping_kills_who_does_not_obey_in_his_time(tmp_path: Path) -> None:
+    with Launch([row("sim", STUBBORN, 0.5), row("recorder", LAST, 20.0)], tmp_path) as running:
         pids = running.pids
         deadline = monotonic() + 10.0
         while not (tmp_path / "sim.log").read_text() and monotonic() < deadline:

@@ -52,3 +52,17 @@ def test_no_file_exceeds_its_size(tmp_path: Path) -> None:
     for path in parts.paths:
         Recording(path).require_whole()
         assert path.stat().st_size <= 150_000
+
+
+def test_what_a_key_misses_while_it_is_silent_for_a_whole_file_is_counted(tmp_path: Path) -> None:
+    clock, other = ManualClock(), "team/r2/state"
+    with Parts(tmp_path / "run.mcap", METADATA, 16, {"state": 1}, Limits(seconds=2.0),
+               clock.monotonic) as parts:  # fmt: skip
+        for tick in range(60):
+            parts.write(KEY, encode(state(tick)), tick)
+            if not 5 <= tick < 45:
+                parts.write(other, encode(state(tick)), tick)
+            clock.now += 0.1
+            parts.flush()
+    assert len(parts.paths) == 3
+    assert parts.all_lost() == {other: 40}

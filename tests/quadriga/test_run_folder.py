@@ -37,6 +37,9 @@ def test_a_new_folder_is_named_by_date_and_time(
     made = make_run_dir(None)
     assert made.parent == Path("runs")
     assert [len(part) for part in made.name.split("-")] == [8, 6]
+    monkeypatch.setattr("quadriga.run_folder.wall_ns", lambda: 10**18)
+    names = [make_run_dir(None).name for _ in range(3)]  # of walks begun in the same second
+    assert names == [names[0], f"{names[0]}-2", f"{names[0]}-3"]
 
 
 def test_a_finished_walk_is_summed_up_and_drawn(write_run: WriteRun) -> None:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shared.config import Config
-from shared.config_file import load
+from shared.config import Config, ReferenceConfig
+from shared.config_file import build, load
+from shared.config_text import to_toml
 from shared.errors import ConfigError
-from shared.trace import Trace, scenario_folder, trace_of
+from shared.trace import Trace, scenario_folder, trace_of, trace_sha256
 
 GOOD = "# a comment\nt,vx,vy,wz\n0,0,0,0\n1.0,0.4,0.1,-0.2\n2.0,0.4,0.0,0.0\n4.0,0,0,0\n"
 
@@ -93,3 +95,26 @@ def test_the_joystick_of_the_scenarios_is_smooth_and_moderate() -> None:
     rate = np.diff(trace.v, axis=0) / np.diff(trace.t)[:, None]
     assert np.abs(rate).max() < 0.5  # m/s² and rad/s²
     np.testing.assert_array_equal(trace.v[[0, -1]], 0.0)
+
+
+def test_a_configuration_holds_what_the_file_says_and_needs_it_no_more(good: Path) -> None:
+    found = config(good)
+    before = trace_of(found)
+    good.unlink()
+    assert found.reference.trace == (
+        "t,vx,vy,wz;0,0,0,0;1.0,0.4,0.1,-0.2;2.0,0.4,0.0,0.0;4.0,0,0,0"
+    )
+    assert trace_sha256(found) == ""
+    again = build(tomllib.loads(to_toml(found)))
+    assert again == found
+    after = trace_of(again)
+    assert before is not None
+    assert after is not None
+    np.testing.assert_array_equal(after.t, before.t)
+    np.testing.assert_array_equal(after.v, before.v)
+
+
+def test_a_path_in_a_configuration_from_elsewhere_is_not_opened(good: Path) -> None:
+    foreign = Config(reference=ReferenceConfig(trace=str(good)))
+    with pytest.raises(ConfigError, match="the trace itself, or the name of one"):
+        trace_of(foreign)

@@ -11,8 +11,8 @@ from quadriga.cache import predictor_path
 from quadriga.campaign.job import Job, origin, walk
 from quadriga.campaign.plan import Group
 from quadriga.campaign.predictors import Fitted, prepared
+from shared import trace
 from shared.errors import PredictorFileError, ProcessError
-from shared.trace import trace_sha256
 from tests.quadriga.linear_data import config_of, put_data
 
 
@@ -50,11 +50,15 @@ def test_a_file_that_is_gone_is_an_error_and_no_row(
         prepared([config], Console(stderr=True))
 
 
-def test_another_trace_than_the_campaigns_is_an_error(tmp_path: Path) -> None:
-    trace = tmp_path / "mine.csv"
-    trace.write_text("t,vx,vy,wz\n0,0,0,0\n1,0.3,0,0\n", encoding="utf-8")
-    config = config_of(planner__kind="none", reference__trace=str(trace))
-    job = Job(Group("flat", "none", ()), 3, config, Fitted(), origin(), trace_sha256(config))
-    trace.write_text("t,vx,vy,wz\n0,0,0,0\n1,0.2,0,0\n", encoding="utf-8")
+def test_another_trace_than_the_campaigns_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(trace, "scenario_folder", lambda: tmp_path)
+    file = tmp_path / "mine.csv"
+    file.write_text("t,vx,vy,wz\n0,0,0,0\n1,0.3,0,0\n", encoding="utf-8")
+    config = config_of(planner__kind="none", reference__trace="mine.csv")
+    sha256 = trace.trace_sha256(config)
+    job = Job(Group("flat", "none", ()), 3, config, Fitted(), origin(), sha256)
+    file.write_text("t,vx,vy,wz\n0,0,0,0\n1,0.2,0,0\n", encoding="utf-8")
     with pytest.raises(ProcessError, match=r"reference\.trace"):
         walk(job)

@@ -9,7 +9,10 @@ from pathlib import Path
 import pytest
 
 from quadriga.cli import main, parser
+from quadriga.export import csv_files
 from quadriga.export.run import FORMATS
+from quadriga.export.source import Source
+from quadriga.export.written import Progress
 from quadriga.recorder import metadata
 from shared.config import Config
 from shared.recording import RecordingWriter
@@ -91,3 +94,20 @@ def test_without_an_output_it_goes_beside_the_recording(
 def test_the_command_line_offers_every_format() -> None:
     for form in FORMATS:
         assert parser().parse_args(["export", "f", "--to", form]).to == form
+
+
+def test_what_somebody_else_writes_meanwhile_is_neither_mixed_nor_removed(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, file: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    mine = csv_files.write_csv
+
+    def meanwhile(source: Source, to: Path, progress: Progress) -> tuple[Path, ...]:
+        out.mkdir()
+        (out / "theirs").write_text("precious")
+        return mine(source, to, progress)
+
+    monkeypatch.setattr(csv_files, "write_csv", meanwhile)
+    assert "exists by now" in failed(capsys, file, "--to", "csv", "-o", out)
+    assert [path.name for path in tmp_path.glob("*out*")] == ["out"]
+    assert (out / "theirs").read_text() == "precious"

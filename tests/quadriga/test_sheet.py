@@ -1,0 +1,20 @@
+"""Tables for people: what a recording from elsewhere says is shown, and not obeyed."""
+
+from __future__ import annotations
+
+import pytest
+
+from quadriga.sheet import Sheet, printable, show
+
+
+def test_control_characters_do_not_reach_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    show([Sheet("Events", ("what", "said"), (("stop", "\x1b]0;mine\x07\x1b[2J done"),))])
+    said = capsys.readouterr().out
+    assert "done" in said
+    assert "\x1b" not in said
+    assert "\x07" not in said
+
+
+def test_all_else_stays() -> None:
+    text = "r2: 0.5 m · τ ≤ 33 N·m,\N{NO-BREAK SPACE}– \n next"
+    assert printable(text) == text
