@@ -33,7 +33,7 @@ def check(path: Path) -> list[Finding]:
     schema = Finding("schema", "messages")
     checks: tuple[Check, ...] = (
         Order(), Gaps(config, filtered=filtered), Delay(config, whole=error is None),
-        Friction(config), Torques(), Ages(config),
+        Friction(config), Torques(config), Ages(config),
     )  # fmt: skip
     times = Finding("log times", "messages")
     for item in _items(source.entries(), schema, times):

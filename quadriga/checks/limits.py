@@ -66,10 +66,11 @@ def _excess(
 
 
 class Torques:
-    """No commanded torque exceeds what the motor gives."""
+    """No commanded torque exceeds what the motor gives, and no gain adds more than damping."""
 
-    def __init__(self) -> None:
+    def __init__(self, config: Config) -> None:
         self.finding = Finding("torques", "commands")
+        self._damping = config.controller.damping
         self._largest = 0.0
 
     def look(self, item: Item) -> None:
@@ -85,6 +86,12 @@ class Torques:
             self.finding.object(
                 command.tick, item.key, f"{largest:.6g} N·m of {joint}", f"{TORQUE_LIMIT:g} N·m"
             )
+        kp, kd = float(np.abs(command.kp).max()), float(command.kd.max())
+        if kp > 0.0 or kd > self._damping or float(command.kd.min()) < 0.0:
+            self.finding.object(
+                command.tick, item.key, f"gains kp up to {kp:.6g}, kd up to {kd:.6g}",
+                f"no kp, kd from 0 to {self._damping:g}",
+            )  # fmt: skip
 
     def finish(self) -> None:
         """Say how large the largest is."""

@@ -70,7 +70,8 @@ def agent_messages(config: Config, index: int, tick: int) -> Iterator[Packet]:
     """What agent `index` sends in one tick."""
     key = f"team/r{index + 1}/"
     head = (tick, tick * 1_000_000)
-    yield key + "command", msg.Command(*head, np.zeros(12), q_stand(), *(np.ones(12),) * 3)
+    still, damping = np.zeros(12), np.ones(12)
+    yield key + "command", msg.Command(*head, still, q_stand(), still, still, damping)
     stance = scheduled_stance(config, index, tick + 10 * np.arange(25))
     if tick % 10 == 0:
         u = nominal_forces(stance[0])

@@ -38,6 +38,14 @@ def tau(torque: float) -> Callable[[msg.Message], msg.Message]:
     return alter
 
 
+def gains(kp: float, kd: float) -> Callable[[msg.Message], msg.Message]:
+    def alter(message: msg.Message) -> msg.Message:
+        assert isinstance(message, msg.Command)
+        return replace(message, kp=np.full(12, kp), kd=np.full(12, kd))
+
+    return alter
+
+
 def force(sample: int, column: int, value: float) -> Callable[[msg.Message], msg.Message]:
     def alter(message: msg.Message) -> msg.Message:
         assert isinstance(message, msg.Plan)
@@ -102,6 +110,8 @@ def test_a_good_recording_passes(known_run: Path, capsys: pytest.CaptureFixture[
         (at("team/r1/plan", force(3, 2, -0.5)), "friction", "fz -0.5 N of FL at sample 3",
          "at least 0 N"),
         (at("team/r2/command", tau(33.6)), "torques", "33.6 N·m of FL_hip", "33.5 N·m"),
+        (at("team/r2/command", gains(80.0, 0.0)), "torques", "kp up to 80", "no kp, kd"),
+        (at("team/r2/command", gains(0.0, 3.0)), "torques", "kd up to 3", "no kp, kd"),
         (at("team/r2/status", aged(400.0)), "ages", "plan.r1 400 ms old", "360 ms"),
         (lambda k, m: None if k == "team/reference" and 500 < m.tick < 1100 else m, "ages",
          "600 ms since", "500 ms"),
