@@ -57,9 +57,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout = None
         return 0
     except OSError as error:  # a disk that is full, a folder that is read-only
-        what, reason = error.filename or "a file", error.strerror or str(error)
-        return _complain(ConfigError(str(what), reason, "a place that can be read and written"),
-                         WRONG)  # fmt: skip
+        what, reason = error.filename or "a file or a connection", error.strerror or str(error)
+        return _complain(ConfigError(str(what), reason, "one that can be used"), WRONG)
     return status
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import math
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as installed_version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
@@ -16,6 +15,9 @@ from shared.config_text import to_markdown, to_toml
 from shared.errors import ConfigError
 from shared.robot import robot_names
 from shared.signals import stop_flag
+
+if TYPE_CHECKING:
+    from agents.planner.predictor import Predictor
 
 Given = dict[str, Any]
 
@@ -56,19 +58,14 @@ def sim(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 
 def agent(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """One agent's process."""
-    from agents.planner.store import load
     from agents.process import run
-    from quadriga.cache import await_predictor, predictor_path
 
     names = robot_names(config.team.robots)
     if arguments.robot not in names:
         raise ConfigError("--robot", repr(arguments.robot), f"one of {', '.join(names)}")
     predictor = None
     if config.planner.kind not in ("none", *CENTRAL):
-        path = arguments.predictor or predictor_path(config)
-        if arguments.wait:
-            await_predictor(path, arguments.wait)
-        predictor, _ = load(path, config)
+        predictor = _predictor(config, arguments)
     run(config, arguments.robot, predictor)
     return 0
 
@@ -76,18 +73,24 @@ def agent(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 def plan(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """The process of a planner that plans for the whole team."""
     from agents.central_process import run
-    from agents.planner.store import load
-    from quadriga.cache import await_predictor, predictor_path
     from quadriga.identify import team_planner
 
     if config.planner.kind not in CENTRAL:
         raise ConfigError("planner.kind", repr(config.planner.kind), f"one of {', '.join(CENTRAL)}",
                           "in all other kinds each agent plans for itself")  # fmt: skip
+    run(config, team_planner(config, _predictor(config, arguments)))
+    return 0
+
+
+def _predictor(config: Config, arguments: argparse.Namespace) -> Predictor:
+    """The predictor of `--predictor`, or this machine's for `config`, once it is there."""
+    from agents.planner.store import load
+    from quadriga.cache import await_predictor, predictor_path
+
     path = arguments.predictor or predictor_path(config)
     if arguments.wait:
         await_predictor(path, arguments.wait)
-    run(config, team_planner(config, load(path, config)[0]))
-    return 0
+    return load(path, config)[0]
 
 
 def record(arguments: argparse.Namespace, config: Config, given: Given) -> int:
@@ -195,8 +198,6 @@ def replay(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
     if arguments.stop_at is not None:
         if arguments.all:
             raise ConfigError("--break", "--all", "--robot NAME", "one debugger, one robot")
-        if not math.isfinite(arguments.stop_at):
-            raise ConfigError("--break", f"{arguments.stop_at}", "a time [s]")
         outcomes = [break_in(path, arguments.robot, *options, arguments.stop_at)]
     else:
         robots = () if arguments.all else (arguments.robot,)

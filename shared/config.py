@@ -260,7 +260,8 @@ class ControllerConfig:
     swing_acceleration: float = key(
         80.0, "m/s²",
         "footholds of swings begun late are near enough for this, were all the time left spent on "
-        "the way; less is, so that the reference's greatest is 1.6 times this",
+        "the way; less is, so that the reference's greatest is 1.6 times this with the default "
+        "swing_delay",
         low=1.0, high=1e4,
     )  # fmt: skip
     ground_filter_ms: float = key(50.0, "ms", "filter of the ground height", low=0.0, high=1e3)

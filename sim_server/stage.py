@@ -79,7 +79,7 @@ class Stage:
         return f"fall of {', '.join(fallen)}" if fallen else "end of world.seconds"
 
     def _report_malformed(self, *, at_once: bool = False) -> None:
-        """Announce malformed commands once in a second of world time at most, and at the end."""
+        """Announce malformed commands, once in a second of world time at most unless `at_once`."""
         count = self.commands.malformed
         if count != self._malformed and (at_once or self.world.tick % 1000 == 0):
             self._malformed = count

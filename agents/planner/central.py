@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from agents.gait import nominal_forces
 from agents.planner.deepc import select
 from agents.planner.horizon import horizon_stance, phase_of, walking_steps
-from agents.planner.planner import PlannerInputs, check_sizes
+from agents.planner.planner import PlannerInputs
 from agents.planner.planner_qp import (
     NO_BOUNDS,
     Condensed,
@@ -21,7 +21,7 @@ from agents.planner.planner_qp import (
     stance_columns,
     unpack,
 )
-from agents.planner.predictor import Predictor
+from agents.planner.predictor import Predictor, check_sizes
 from agents.planner.qp_solver import SOLVED, SOLVERS, Residuals, Solver
 from shared.config import Config
 from shared.errors import ConfigError

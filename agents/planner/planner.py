@@ -15,10 +15,9 @@ from agents.planner.free_step import FreeStep
 from agents.planner.horizon import horizon_stance, phase_of, walking_steps
 from agents.planner.neighbours import Selection
 from agents.planner.planner_qp import Problem, build_problem, unpack
-from agents.planner.predictor import Predictor
+from agents.planner.predictor import Predictor, check_sizes
 from agents.planner.qp_solver import SOLVED, SOLVERS, Residuals, Solver, no_solution
 from shared.config import Config
-from shared.errors import PredictorError
 from shared.record import record
 from shared.robot import Array
 
@@ -285,20 +284,3 @@ def _unbounded(free: FreeStep, inputs: PlannerInputs, peers: PeerTerms) -> PlanR
     if plan is None:
         return None
     return PlanResult(SOLVED, *plan, peers.used, peers.lost, free.residuals, 0)
-
-
-def check_sizes(config: Config, predictor: Predictor) -> None:
-    """Refuse a predictor whose sizes are not the configuration's.
-
-    Raises:
-        PredictorError: it is of another team or horizon.
-    """
-    meta, planner = predictor.meta, config.planner
-    got, expected = (
-        (meta.robots, meta.N, meta.T_ini),
-        (config.team.robots, planner.N, planner.T_ini),
-    )
-    if got != expected:
-        raise PredictorError(
-            "predictor", f"(robots, N, T_ini) = {got}", f"{expected}", "of another team?"
-        )

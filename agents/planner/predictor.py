@@ -133,3 +133,20 @@ class Predictor:
         stacked = z.reshape(-1, *z.shape[2:])
         rows = [np.concatenate(list(row), axis=1) @ stacked for row in self.G[phase]]
         return np.stack(rows)
+
+
+def check_sizes(config: Config, predictor: Predictor) -> None:
+    """Refuse a predictor whose sizes are not the configuration's.
+
+    Raises:
+        PredictorError: it is of another team or horizon.
+    """
+    meta, planner = predictor.meta, config.planner
+    got, expected = (
+        (meta.robots, meta.N, meta.T_ini),
+        (config.team.robots, planner.N, planner.T_ini),
+    )
+    if got != expected:
+        raise PredictorError(
+            "predictor", f"(robots, N, T_ini) = {got}", f"{expected}", "of another team?"
+        )

@@ -7,6 +7,7 @@ import gc
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -138,9 +139,12 @@ def break_in(
     """Replay one robot with a stop in the debugger before the step at a time, s.
 
     Raises:
+        ConfigError: that is no time.
         QuadrigaError: as `replay`.
         KeyboardInterrupt: the user has left the debugger.
     """
+    if not isfinite(seconds):
+        raise ConfigError("--break", f"{seconds}", "a time [s]")
     _known((robot,), robot_names(recorded_config(Recording(path)).team.robots))
     job = Job(path, robot, given, predictor, _folder(path, out))
     try:

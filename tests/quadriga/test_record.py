@@ -284,6 +284,8 @@ def test_at_once_waits_for_no_team(config: Config, start: Start, tmp_path: Path)
         (("--topics", "a//b"), "--topics: got 'a//b'"),
         (("--max-size", "0.01"), "--max-size: got 0.01 MB, expected at least 0.1"),
         (("--max-duration", "-1"), "--max-duration: got -1 s"),
+        (("--max-size", "inf"), "--max-size: got inf MB"),
+        (("--max-duration", "nan"), "--max-duration: got nan s"),
         (("--report", "--max-size", "5", "-o", "x/run.mcap"), "--report: got a recording in parts"),
     ],
 )

@@ -58,6 +58,17 @@ def test_a_walk_that_was_cut_short_is_a_failure_but_summed_up(write_run: WriteRu
     assert (folder / SUMMARY).is_file()
 
 
+def test_a_file_that_cannot_be_written_costs_one_line(
+    write_run: WriteRun, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = write_run(run_config(1, 2.0), extra=event("stop", "", "end of world.seconds"))
+    (folder / "summary.json").mkdir()
+    assert main(["report", str(folder), "--no-render"]) == 2
+    said = capsys.readouterr().err
+    assert "summary.json: got Is a directory" in said
+    assert said.count("\n") == 1
+
+
 def test_the_exit_status_of_a_report_tells_of_a_fall(
     write_run: WriteRun, capsys: pytest.CaptureFixture[str]
 ) -> None:

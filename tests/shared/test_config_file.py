@@ -69,7 +69,7 @@ def test_the_hash_is_blind_to_the_network_alone() -> None:
 def test_every_key_refuses_another_type(section: str, item: Any) -> None:
     wrong: list[Any] = [None, {"a": 1}, [[]]]
     wrong += [1.5, "1"] if type(item.default) is int else []
-    wrong += ["1", float("nan"), float("inf"), True] if type(item.default) is float else []
+    wrong += ["1", float("nan"), float("inf"), True, 10**400] if type(item.default) is float else []
     wrong += [1, "true"] if type(item.default) is bool else []
     wrong += [[*item.default, 1.0], item.default[:-1]] if type(item.default) is tuple else []
     wrong += [1, True, "line\nbreak"] if type(item.default) is str else []

@@ -13,8 +13,11 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from shared.codec import decode, encode
 from shared.errors import RecordingError
+from shared.mcap_file import McapFile
 from shared.messages import Command, Reference, State
 from shared.recording import MAX_CHANNELS, Recording, RecordingWriter
+from shared.recording_seal import seal
+from shared.recording_writer import PROFILE
 from shared.topics import COMMAND, TABLE
 
 METADATA = {"team": "team", "config_sha256": "ab" * 32}
@@ -198,3 +201,20 @@ def test_an_mcap_file_of_others_is_refused(tmp_path: Path) -> None:
         Recording(tmp_path / "foreign.mcap")
     assert decode(sent[1][1], Command).tick == 0
     assert COMMAND.key("team", "r1") == sent[1][0]
+
+
+def test_a_chunk_whose_checksum_is_right_but_which_holds_no_records_ends_the_reading(
+    tmp_path: Path,
+) -> None:
+    """As another program, or somebody with bad intentions, might write one."""
+    path = tmp_path / "run.mcap"
+    with path.open("xb") as file:
+        out = McapFile(file, 1 << 20, PROFILE, "other")
+        out.metadata(PROFILE, seal(METADATA))
+        channel = out.channel("team/reference", "msgpack", 0)
+        out.message(channel, 0, 1, 1, encode(Reference(3, 3_000_000, 0.5, 0.0, 0.0, 0.26)))
+        out._append(b"\x05\xff\xff\xff\xff")  # a message that is cut off in its head
+        out.finish()
+    recording = Recording(path)
+    assert [entry.tick for entry in recording.entries()] == [3]
+    assert "what are no records" in recording.cut

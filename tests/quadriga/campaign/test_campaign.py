@@ -127,3 +127,11 @@ def test_a_fall_ends_a_trial_and_its_recording_falls_too(
     before = page.stat().st_mtime_ns
     assert main(["campaign", "--report", str(out), "--record-worst", "1"]) == 0
     assert page.stat().st_mtime_ns == before, "recorded once"
+    for name in ("campaign.json", "trials.csv"):
+        text = (out / name).read_text(encoding="utf-8")
+        (out / name).write_text(text.replace("quadriga 0", "quadriga 9"), encoding="utf-8")
+    capsys.readouterr()
+    assert main(["campaign", "--report", str(out), "--record-worst", "1"]) == 2
+    told = capsys.readouterr().err
+    assert "trials with code and versions" in told
+    assert told.count("\n") == 1

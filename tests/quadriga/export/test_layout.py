@@ -53,6 +53,13 @@ def test_numbers_stand_under_their_names() -> None:
     assert other.numbers_of(truth) is None, "of another team"
 
 
+def test_a_plan_of_nothing_has_no_row() -> None:
+    nothing = Plan(40, 0, 1, np.zeros((0, 12)), np.zeros((0, 6)), "solved", {"r2": 0}, 0)
+    numbers = build_layout(Plan, Config(), {"used": ("r2",)}).numbers_of(nothing)
+    assert numbers is not None
+    assert len(numbers) == 0
+
+
 def test_maps_have_the_names_that_occur_whatever_they_are() -> None:
     entries = {"ages_ms": ("plan.r1", "plan_r1", "", "état"), "counters": ("n",)}
     layout = build_layout(Status, Config(), entries)

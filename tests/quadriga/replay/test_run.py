@@ -78,6 +78,7 @@ def test_mistakes_on_the_command_line(run: Path, capsys: pytest.CaptureFixture[s
         ((run, "--robot", "r2"), "--robot: got 'r2', expected one of r1"),
         ((run.parent / "no.mcap", "--all"), "no.mcap: got No such file"),
         ((run, "--all", "--break", "1"), "--break: got --all, expected --robot NAME"),
+        ((run, "--robot", "r1", "--break", "nan"), "--break: got nan, expected a time [s]"),
         ((run, "--robot", "r1", "--break", "9"), "--break: got 9 s, expected a time up to 0.004 s"),
         ((run, "--all", "--set", "controller.kp_swng=1"), "did you mean 'controller.kp_swing'?"),
         ((run, "--all", "--set", "team.robots=2"), "team.robots: got 2, expected 1 as recorded"),
@@ -190,7 +191,9 @@ def test_a_saved_problem_can_be_solved_on_its_own(tmp_path: Path) -> None:
     save_qp(tmp_path / "qp.npz", qp)
     np.testing.assert_allclose(load_qp(tmp_path / "qp.npz").solve(), [0.25, 0.75])
     (tmp_path / "bad.npz").write_bytes(b"nothing")
-    for name in ("bad.npz", "none.npz"):
+    (tmp_path / "cut.npz").write_bytes((tmp_path / "qp.npz").read_bytes()[:-40])
+    np.save(tmp_path / "array.npy", np.eye(2))
+    for name in ("bad.npz", "none.npz", "cut.npz", "array.npy"):
         with pytest.raises(RecordingError):
             load_qp(tmp_path / name)
 
