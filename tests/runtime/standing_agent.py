@@ -23,7 +23,7 @@ from shared.topics import COMMAND, EVENT, STATE
 
 
 def run(config: Config, robot: str) -> None:
-    """Answer every state until the walk is over."""
+    """Answer the newest state until the walk is over."""
     stopped = stop_on_signals()
     team, ended = config.team.name, False
     zero, kp, kd = np.zeros(N_JOINTS), np.full(N_JOINTS, 80.0), np.full(N_JOINTS, 3.0)
@@ -38,14 +38,18 @@ def run(config: Config, robot: str) -> None:
             if packet is None:
                 ended = SIM not in bus.present(HERE)
                 continue
-            try:
-                if packet[0] == EVENT.key(team):
-                    ended = decode(packet[1], Event).kind == "stop"
-                else:
-                    tick = decode(packet[1], State).tick
-                    put(encode(Command(tick, 10**6 * tick, zero, q_stand(), zero, kp, kd)))
-            except MessageError as error:
-                print(error, flush=True)
+            newest = None
+            for key, payload in (packet, *bus.drain()):
+                try:
+                    if key == EVENT.key(team):
+                        ended = ended or decode(payload, Event).kind == "stop"
+                    else:
+                        newest = decode(payload, State)
+                except MessageError as error:
+                    print(error, flush=True)
+            if newest is not None:
+                tick = newest.tick
+                put(encode(Command(tick, 10**6 * tick, zero, q_stand(), zero, kp, kd)))
 
 
 if __name__ == "__main__":

@@ -4,25 +4,27 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
 
 import pytest
 
 from quadriga.cli import main
+from shared.bus import Bus
 from tests.runtime.conftest import Make
+from tests.runtime.frozen import PATIENCE, freeze
 
 
 def test_a_walk_with_a_frozen_robot_comes_out_equal(
-    make_team: Make, capsys: pytest.CaptureFixture[str]
+    make_team: Make, watcher: Callable[..., Bus], capsys: pytest.CaptureFixture[str]
 ) -> None:
     team = make_team(
-        recorder__enabled=True, world__seconds=600.0, world__command_timeout=0.3,
+        recorder__enabled=True, world__seconds=600.0, world__command_timeout=PATIENCE,
         world__push="r1:50:90:0.3:0.1",
     )  # fmt: skip
     with team.launch() as running:
         team.await_log("sim", "start")
-        os.kill(running.pids["r2"], signal.SIGSTOP)
-        team.await_log("sim", "fault r2 silent for 0.3 s")
-        os.kill(running.pids["r2"], signal.SIGCONT)
+        freeze(running, watcher(team), "r2", tick=100, ticks=300)
+        team.await_log("sim", f"fault r2 silent for {PATIENCE:g} s")
         team.await_log("sim", "fault r2 answers again")
         os.kill(running.pids["sim"], signal.SIGTERM)
         running.watch(lambda: False)
