@@ -18,7 +18,7 @@ from shared.topics import COMMAND, EVENT, TRUTH
 from tests.runtime.conftest import WAIT
 
 TEAM: Final = "team"
-PATIENCE: Final = 3.0  # s, `world.command_timeout`: no other robot is ever that slow
+PATIENCE: Final = 3.0  # s, `world.command_timeout`: more than a busy machine takes for a tick
 
 
 def payloads(bus: Bus, key: str) -> Iterator[bytes]:
