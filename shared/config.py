@@ -203,10 +203,11 @@ class ControllerConfig:
     mu_least: float = key(0.35, "1", "friction always counted on, slide as feet may", low=0.05,
                           high=2.0)  # fmt: skip
     mu_recovery: float = key(
-        0.5, "1/s", "how fast friction is counted on again after feet slid", low=0.0, high=10.0
+        2.0, "1/s", "how fast friction is counted on again after feet slid", low=0.0, high=10.0
     )
+    slip_load: float = key(20.0, "N", "a foot that bears less may slide", low=0.0, high=200.0)
     slip_speed: float = key(
-        0.0, "m/s", "a stance foot faster than this slides: the QP uses less friction; 0: never",
+        0.3, "m/s", "a stance foot faster than this slides: the QP uses less friction; 0: never",
         low=0.0, high=5.0,
     )  # fmt: skip
     force_min: float = key(5.0, "N", "least normal force of a stance foot", low=0.0, high=50.0)
@@ -255,13 +256,10 @@ class ControllerConfig:
         high=100.0,
     )  # fmt: skip
     swing_delay: float = key(
-        0.1, "1", "share of swing in which a foot rises before it goes forward", low=0.0, high=0.5
+        0.0, "1", "share of swing in which a foot rises before it goes forward", low=0.0, high=0.5
     )
     swing_acceleration: float = key(
-        80.0, "m/s²",
-        "footholds of swings begun late are near enough for this, were all the time left spent on "
-        "the way; less is, so that the reference's greatest is 1.6 times this with the default "
-        "swing_delay",
+        100.0, "m/s²", "footholds of swings begun late are near enough for no more than this",
         low=1.0, high=1e4,
     )  # fmt: skip
     ground_filter_ms: float = key(50.0, "ms", "filter of the ground height", low=0.0, high=1e3)

@@ -48,6 +48,7 @@ from agents.controller.sensing import (
     Seen,
     coordinates_of,
     feet_of,
+    foot_force_of,
     place,
     sense,
     sensing_constants,
@@ -137,7 +138,7 @@ class Controller:
                 self.weights.as_array(),
                 [
                     float(controller.flight), controller.slip_speed, controller.mu_least,
-                    controller.mu_recovery,
+                    controller.mu_recovery, controller.slip_load,
                 ],
             ]
         )  # fmt: skip
@@ -279,8 +280,8 @@ def _act(
         fall_freely(trunk, contact)
     v_foot = foot_velocities(J, v, p_foot)
     memory[CAUTION] = caution(
-        memory0[CAUTION], contact, stance, progress, v_foot, constants[43], weights[3],
-        constants[44], constants[45], dt,
+        memory0[CAUTION], contact, stance, progress, v_foot, foot_force_of(seen), constants[43],
+        constants[46], weights[3], constants[44], constants[45], dt,
     )  # fmt: skip
     weights[3] -= memory[CAUTION]
     lift, stumble, felt = swings_of(memory)

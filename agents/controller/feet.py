@@ -143,7 +143,7 @@ def _feet_acceleration(
             apex = highest + height
             if lift[leg] > 0.0:
                 apex = max(apex, swing_start[leg, 2] + _CLEARANCE)
-                swing.within_reach(target, swing_start[leg], nimble, left * duration)
+                swing.within_reach(target, swing_start[leg], nimble, left * duration, delay)
             if in_reach:
                 apex = min(apex, max(position[2] - _SHORTEST, swing_start[leg, 2]))
             reference = swing.swing_reference(

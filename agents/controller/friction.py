@@ -12,7 +12,8 @@ _LOSS = 15.0  # 1/s, of the coefficient counted on while a foot slides
 @compiled
 def caution(
     caution0: float, contact: Array, stance: Array, progress: float, v_foot: Array,
-    slip_speed: float, mu: float, mu_least: float, recovery: float, dt: float,
+    foot_force: Array, slip_speed: float, slip_load: float, mu: float, mu_least: float,
+    recovery: float, dt: float,
 ) -> float:  # fmt: skip
     """What is taken off the friction coefficient `mu`, so that feet that slide find hold again.
 
@@ -27,7 +28,10 @@ def caution(
         stance: scheduled stance, (4,).
         progress: progress of the half period in [0, 1).
         v_foot: velocities of the foot centres, (4, 3), m/s, odometry frame.
+        foot_force: measured normal forces, (4,), N.
         slip_speed: from which on a foot slides, m/s; 0: never.
+        slip_load: force from which on it matters, N: a foot that hardly bears load is easily
+            dragged along, and tells nothing of the ground.
         mu: coefficient counted on where nothing slides.
         mu_least: coefficient that is always counted on.
         recovery: by which c falls, 1/s.
@@ -38,7 +42,7 @@ def caution(
     slides = False
     if progress >= _SETTLED:
         for leg in range(4):
-            if contact[leg] > 0.5 and stance[leg] > 0.5:
+            if contact[leg] > 0.5 and stance[leg] > 0.5 and foot_force[leg] >= slip_load:
                 slides = slides or v_foot[leg, 0] ** 2 + v_foot[leg, 1] ** 2 > slip_speed**2
     rate = _LOSS if slides else -recovery
     return min(max(0.0, mu - mu_least), max(0.0, caution0 + rate * dt))

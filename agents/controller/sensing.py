@@ -16,7 +16,7 @@ from shared.jit import compiled
 from shared.record import record
 from shared.robot import TOTAL_MASS, Array
 
-SEEN_SIZE: Final = 68
+SEEN_SIZE: Final = 72
 SWITCHED: Final = 67  # 1 if stances and swings have just ended
 
 
@@ -38,9 +38,15 @@ def feet_of(flat: Array) -> Array:
     return flat[46:58].reshape(4, 3)
 
 
+@compiled
+def foot_force_of(flat: Array) -> Array:
+    """View of the measured normal forces of the feet, (4,), N."""
+    return flat[68:72]
+
+
 @record
 class Seen:
-    """What a robot sees of itself at one tick; `flat` is (68,) and not to be changed.
+    """What a robot sees of itself at one tick; `flat` is (72,) and not to be changed.
 
     Attributes:
         memory: the low level's memory, its estimator and contacts advanced to this tick.
@@ -148,6 +154,7 @@ def place(
     seen_R[:] = R
     seen_velocity[:] = velocity
     feet_of(seen)[:] = p_foot
+    foot_force_of(seen)[:] = foot_force
     seen[61:67] = outputs_at(position, velocity, R, omega, level0)
 
     memory[:] = memory0

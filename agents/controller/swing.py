@@ -36,14 +36,18 @@ def foothold(
 
 
 @compiled
-def within_reach(target: Array, start: Array, acceleration: float, duration: float) -> None:
+def within_reach(
+    target: Array, start: Array, acceleration: float, duration: float, delay: float
+) -> None:
     """Shorten the way from `start` to the foothold `target`, (2,), to what can be done in time.
 
     Minimum jerk over a way d in a time T has the greatest acceleration 10 d / (√3 T²).
+    `duration` and `delay` are those of `swing_reference`, which has less than the swing for it.
     """
     dx, dy = target[0] - start[0], target[1] - start[1]
     way = np.sqrt(dx * dx + dy * dy)
-    longest = 0.1 * np.sqrt(3.0) * acceleration * duration * duration
+    forward = (_PLANE_DONE - delay) * duration
+    longest = 0.1 * np.sqrt(3.0) * acceleration * forward * forward
     if way > longest:
         target[0] = start[0] + dx * longest / way
         target[1] = start[1] + dy * longest / way

@@ -9,15 +9,17 @@ from agents.controller.friction import caution
 from shared.robot import Array
 
 CONTACT, STANCE = np.array([1.0, 0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0, 1.0])
-MU, LEAST, SPEED, RECOVERY, DT = 0.6, 0.25, 0.25, 0.02, 1e-3
+MU, LEAST, SPEED, LOAD, RECOVERY, DT = 0.6, 0.25, 0.25, 20.0, 0.02, 1e-3
 
 
 def after(
     ticks: int, v_foot: Array, before: float = 0.0, progress: float = 0.5, speed: float = SPEED,
-    contact: Array = CONTACT,
+    contact: Array = CONTACT, force: float = LOAD,
 ) -> float:  # fmt: skip
+    foot_force = np.full(4, force)
     for _ in range(ticks):
-        before = caution(before, contact, STANCE, progress, v_foot, speed, MU, LEAST, RECOVERY, DT)
+        before = caution(before, contact, STANCE, progress, v_foot, foot_force, speed, LOAD, MU,
+                         LEAST, RECOVERY, DT)  # fmt: skip
     return before
 
 
@@ -50,3 +52,7 @@ def test_swing_feet_landing_feet_and_the_plain_setting_do_not_count() -> None:
     assert after(100, moving(0, 2.0), contact=np.zeros(4)) == 0.0
     assert after(100, moving(0, 2.0), progress=0.1) == 0.0
     assert after(100, moving(0, 2.0), speed=0.0) == 0.0
+
+
+def test_a_foot_that_hardly_bears_load_may_slide() -> None:
+    assert after(100, moving(0, 2.0), force=0.99 * LOAD) == 0.0
