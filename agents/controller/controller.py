@@ -54,7 +54,7 @@ from agents.controller.sensing import (
     sensing_constants,
     trunk_of,
 )
-from agents.controller.whole_body_qp import Goal, Problem, Solution, Weights, closed_form
+from agents.controller.whole_body_qp import MU, Goal, Problem, Solution, Weights, closed_form
 from shared.config import Config
 from shared.jit import compiled
 from shared.messages import State
@@ -123,7 +123,7 @@ class Controller:
         feet = np.array(
             [
                 1e-3 * config.gait.stance_ms, controller.raibert_gain, controller.swing_height,
-                controller.descent_speed, controller.kp_swing, controller.kd_swing, self.body.mass,
+                controller.descent_speed, controller.kp_swing, controller.kd_swing,
                 controller.swing_delay, controller.stumble_lift, controller.swing_acceleration,
                 float(controller.follow_fall),
             ]
@@ -137,8 +137,8 @@ class Controller:
                 trunk_gains(controller), feet, self.body.com, self.body.inertia_inverse.ravel(),
                 self.weights.as_array(),
                 [
-                    float(controller.flight), controller.slip_speed, controller.mu_least,
-                    controller.mu_recovery, controller.slip_load,
+                    self.body.mass, float(controller.flight), controller.slip_speed,
+                    controller.slip_load, controller.mu_least, controller.mu_recovery,
                 ],
             ]
         )  # fmt: skip
@@ -255,13 +255,14 @@ def _act(
     constants: Array, memory: Array, asked: Array, x: Array,
 ) -> int:  # fmt: skip
     """Fill the new memory, what is asked and the answer `closed_form` gives, with its result."""
-    gains, feet, com = constants[0:12], constants[12:23], constants[23:26]
-    inertia_inverse, weights = constants[26:35].reshape(3, 3), constants[35:42].copy()
+    gains, feet, com = constants[0:12], constants[12:22], constants[22:25]
+    inertia_inverse, weights = constants[25:34].reshape(3, 3), constants[34:41].copy()
+    bare_mass, flight, slip_speed, slip_load, mu_least, mu_recovery = constants[41:47]
     stance, progress = schedule[0:4], schedule[4]
     position, v_trunk, R, omega = trunk_of(seen)
     q, v = coordinates_of(seen)
     p_foot, load = feet_of(seen), memory0[LOAD]
-    mass = feet[6] + load
+    mass = bare_mass + load
     M_inverse, nle = np.empty((18, 18)), np.empty(18)
     J, dJ = np.empty((6, 18)), np.empty((6, 18))
     rigid_body_terms(q, v, loaded(links, load), M_inverse, nle, J, dJ)
@@ -276,14 +277,14 @@ def _act(
     start, goal = anchors_of(memory)
     legs = legs_of(memory)
     contact, ground = legs[0], legs[4]
-    if constants[42] > 0.5:
+    if flight > 0.5:
         fall_freely(trunk, contact)
     v_foot = foot_velocities(J, v, p_foot)
     memory[CAUTION] = caution(
-        memory0[CAUTION], contact, stance, progress, v_foot, foot_force_of(seen), constants[43],
-        constants[46], weights[3], constants[44], constants[45], dt,
+        memory0[CAUTION], contact, stance, progress, v_foot, foot_force_of(seen), slip_speed,
+        slip_load, weights[MU], mu_least, mu_recovery, dt,
     )  # fmt: skip
-    weights[3] -= memory[CAUTION]
+    weights[MU] -= memory[CAUTION]
     lift, stumble, felt = swings_of(memory)
     v_ahead = v_trunk if np.isnan(ahead[0]) else from_yaw_frame(ahead, R)
     demand = feet_demand(

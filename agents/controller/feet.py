@@ -27,18 +27,19 @@ def feet_demand(
     `lift`, `stumble` and `felt` are those of `Memory`; what each foot feels is updated in place.
     `v_ahead` is the velocity that footholds count on.
     """
-    duration, raibert_gain, height, descent_speed, kp, kd = constants[:6]
+    (duration, raibert_gain, height, descent_speed, kp, kd, delay, stumble_lift, nimble,
+     follow_fall) = constants  # fmt: skip
     swing_start, foot_goal = _feet_anchors(
         swing_start0, foot_goal0, p_foot, contact, stance, switched, progress, early, lift,
-        position, velocity, descent_speed * dt, dt, constants[10] > 0.5,
+        position, velocity, descent_speed * dt, dt, follow_fall > 0.5,
     )  # fmt: skip
     out = np.empty((4, 4, 3))
     out[0], out[1] = swing_start, foot_goal
     out[2] = _feet_acceleration(
         contact, stance, progress, early, lift, stumble, felt, swing_start, foot_goal, ground,
         position, v_ahead, R, p_foot, v_foot, v_des, wz, duration,
-        raibert_gain, height, descent_speed, kp, kd, constants[7], constants[8], constants[9],
-        constants[10] > 0.5,
+        raibert_gain, height, descent_speed, kp, kd, delay, stumble_lift, nimble,
+        follow_fall > 0.5,
     )  # fmt: skip
     out[3] = _desired_force(contact, deviation, R, mass)
     return out

@@ -94,9 +94,9 @@ def sensing_constants(config: Config) -> Array:
         [
             estimator.trust_ramp, estimator.contact_force, float(controller.contact_detection),
             controller.contact_force, 1e-3 * controller.lost_contact_ms,
-            1e-3 * controller.ground_filter_ms, *noise_parameters(estimator),
+            1e-3 * controller.ground_filter_ms,
             controller.liftoff_hold_ms / config.gait.stance_ms, 1e-3 * controller.give_way_ms,
-            float(controller.tell_sides), controller.load_time,
+            float(controller.tell_sides), controller.load_time, *noise_parameters(estimator),
         ]
     )  # fmt: skip
 
@@ -119,11 +119,12 @@ def sense(
     `sensing_constants`.
     """
     q_joint, v_joint, quat, gyro, accel, foot_force = sensors_of(state)
-    stance, progress, noise = schedule[0:4], schedule[4], constants[6:11]
-    trust = foot_trust(stance, progress, foot_force, constants[0], constants[1])
+    stance, progress = schedule[0:4], schedule[4]
+    ramp, least_force = constants[0:2]
+    trust = foot_trust(stance, progress, foot_force, ramp, least_force)
     mean0, covariance0 = filter_of(memory0)
     mean, covariance, frame = filter_step(
-        mean0, covariance0, quat, gyro, accel, q_joint, v_joint, trust, noise, dt
+        mean0, covariance0, quat, gyro, accel, q_joint, v_joint, trust, constants[10:15], dt
     )
     place(
         memory0, mean, covariance, quat, frame[:3], gyro, frame[3:], q_joint, v_joint, foot_force,
@@ -162,13 +163,15 @@ def place(
     new_mean[:], new_covariance[:] = mean, covariance
     switched = half != memory0[HALF]
     seen[SWITCHED] = 1.0 if switched else 0.0
-    rate = dt / (constants[5] + dt)
-    if constants[2] > 0.5:
+    (by_force, least_force, lost_after, ground_filter, hold, give_way, tell_sides,
+     load_time) = constants[2:10]  # fmt: skip
+    rate = dt / (ground_filter + dt)
+    if by_force > 0.5:
         lift, stumble, felt = swings_of(memory)
         legs, level = contacts_by_force(
             legs_of(memory0), level0, switched, stance, progress, foot_force, p_foot[:, 2],
-            constants[3], constants[4], rate, dt, lift, stumble, felt, constants[11],
-            constants[12], constants[13] > 0.5,
+            least_force, lost_after, rate, dt, lift, stumble, felt, hold, give_way,
+            tell_sides > 0.5,
         )  # fmt: skip
     else:
         legs, level = contacts_by_schedule(
@@ -176,8 +179,8 @@ def place(
         )  # fmt: skip
     legs_of(memory)[:] = legs
     memory[LEVEL], memory[HALF] = level, half
-    if constants[14] > 0.0:
-        memory[LOAD] = felt_load(memory0[LOAD], foot_force, TOTAL_MASS, dt / (constants[14] + dt))
+    if load_time > 0.0:
+        memory[LOAD] = felt_load(memory0[LOAD], foot_force, TOTAL_MASS, dt / (load_time + dt))
 
 
 @compiled

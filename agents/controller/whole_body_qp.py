@@ -35,6 +35,7 @@ from shared.record import record
 from shared.robot import TORQUE_LIMIT, Array
 
 UNCONSTRAINED: Final = "unconstrained"
+MU: Final = 3  # place of the friction coefficient in `Weights.as_array`
 _TOLERANCE = 1e-9
 
 
