@@ -18,7 +18,7 @@ from agents.controller.estimator import (
     standing_mean,
     sure,
 )
-from agents.controller.feet import feet_demand, foot_velocities
+from agents.controller.feet import feet_constants, feet_demand, foot_velocities
 from agents.controller.friction import caution
 from agents.controller.load import loaded
 from agents.controller.memory import (
@@ -36,7 +36,6 @@ from agents.controller.memory import (
     forces_of,
     legs_of,
     speed_of,
-    swings_of,
 )
 from agents.controller.model import RigidBody
 from agents.controller.references import fall_freely, trunk_acceleration, trunk_gains
@@ -44,7 +43,6 @@ from agents.controller.rigid_body import rigid_body_terms
 from agents.controller.rotation import from_yaw_frame, roll_pitch_yaw
 from agents.controller.sensing import (
     SEEN_SIZE,
-    SWITCHED,
     Seen,
     coordinates_of,
     feet_of,
@@ -120,21 +118,14 @@ class Controller:
         controller = config.controller
         self.body = RigidBody()
         self._sensing = sensing_constants(config)
-        feet = np.array(
-            [
-                1e-3 * config.gait.stance_ms, controller.raibert_gain, controller.swing_height,
-                controller.descent_speed, controller.kp_swing, controller.kd_swing,
-                controller.swing_delay, controller.stumble_lift, controller.swing_acceleration,
-                float(controller.follow_fall),
-            ]
-        )  # fmt: skip
         self.weights = Weights(
             controller.gamma_tau, controller.gamma_force, controller.gamma_defect, controller.mu,
             controller.force_min, controller.tilt_length, controller.swing_weight,
         )  # fmt: skip
         self._acting = np.concatenate(
             [
-                trunk_gains(controller), feet, self.body.com, self.body.inertia_inverse.ravel(),
+                trunk_gains(controller), feet_constants(config), self.body.com,
+                self.body.inertia_inverse.ravel(),
                 self.weights.as_array(),
                 [
                     self.body.mass, float(controller.flight), controller.slip_speed,
@@ -274,9 +265,7 @@ def _act(
         np.array([vx, vy]), wz, memory0[LEVEL] + height, dt, feedforward, deviation, stance,
         p_foot, mass, com, inertia_inverse,
     )  # fmt: skip
-    start, goal = anchors_of(memory)
-    legs = legs_of(memory)
-    contact, ground = legs[0], legs[4]
+    contact = legs_of(memory)[0]
     if flight > 0.5:
         fall_freely(trunk, contact)
     v_foot = foot_velocities(J, v, p_foot)
@@ -285,14 +274,11 @@ def _act(
         slip_load, weights[MU], mu_least, mu_recovery, dt,
     )  # fmt: skip
     weights[MU] -= memory[CAUTION]
-    lift, stumble, felt = swings_of(memory)
     v_ahead = v_trunk if np.isnan(ahead[0]) else from_yaw_frame(ahead, R)
-    demand = feet_demand(
-        start, goal, contact, stance, progress, seen[SWITCHED] > 0.5, legs[1], lift, stumble, felt,
-        ground, position, v_trunk, v_ahead, R, p_foot, v_foot, v_des, wz, deviation, dt, feet, mass,
-    )  # fmt: skip
-    start[:], goal[:] = demand[0], demand[1]
-    asked[:6], asked[6:18], asked[18:] = trunk, demand[2].ravel(), demand[3].ravel()
+    swing, force = feet_demand(
+        memory, seen, schedule, v_foot, v_ahead, v_des, wz, deviation, mass, dt, feet
+    )
+    asked[:6], asked[6:18], asked[18:] = trunk, swing.ravel(), force.ravel()
     return closed_form(
-        M_inverse, nle, J, dJ, v, R, p_foot, contact, trunk, demand[2], demand[3], weights, x
+        M_inverse, nle, J, dJ, v, R, p_foot, contact, trunk, swing, force, weights, x
     )

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from agents.controller import swing
+from agents.controller.memory import anchors_of, legs_of, swings_of
 from agents.controller.rotation import heading
+from agents.controller.sensing import SWITCHED, feet_of, trunk_of
+from shared.config import Config
 from shared.jit import compiled
 from shared.robot import GRAVITY, Array
 
@@ -17,45 +20,58 @@ _BACK = 0.3  # of the speed at which a foot that stumbled rises: away from what 
 
 @compiled
 def feet_demand(
-    swing_start0: Array, foot_goal0: Array, contact: Array, stance: Array, progress: float,
-    switched: bool, early: Array, lift: Array, stumble: Array, felt: Array, ground: Array,
-    position: Array, velocity: Array, v_ahead: Array, R: Array, p_foot: Array, v_foot: Array,
-    v_des: Array, wz: float, deviation: Array, dt: float, constants: Array, mass: float,
-) -> Array:  # fmt: skip
-    """New swing starts and foot goals, desired accelerations and forces, rows of (4, 4, 3).
+    memory: Array, seen: Array, schedule: Array, v_foot: Array, v_ahead: Array, v_des: Array,
+    wz: float, deviation: Array, mass: float, dt: float, constants: Array,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Desired accelerations of the feet off the ground and desired forces of the others, (4, 3).
 
-    `lift`, `stumble` and `felt` are those of `Memory`; what each foot feels is updated in place.
-    `v_ahead` is the velocity that footholds count on.
+    Where swings begin, where feet are lowered to and what each foot feels change in `memory`.
+
+    Args:
+        memory: of this tick, see `Memory`.
+        seen: at this tick, see `Seen`.
+        schedule: `Schedule.row`.
+        v_foot: velocities of the feet, (4, 3), m/s, odometry frame.
+        v_ahead: velocity that footholds count on, (3,), m/s, odometry frame.
+        v_des: desired velocity, (3,), m/s, odometry frame.
+        wz: desired yaw rate, rad/s.
+        deviation: planned deviation from the nominal forces, (12,), N, yaw frame.
+        mass: of robot and load, kg.
+        dt: time since the last tick, s.
+        constants: `feet_constants`.
     """
-    (duration, raibert_gain, height, descent_speed, kp, kd, delay, stumble_lift, nimble,
-     follow_fall) = constants  # fmt: skip
-    swing_start, foot_goal = _feet_anchors(
-        swing_start0, foot_goal0, p_foot, contact, stance, switched, progress, early, lift,
-        position, velocity, descent_speed * dt, dt, follow_fall > 0.5,
+    _lower(memory, seen, schedule, dt, constants)
+    acceleration = _feet_acceleration(memory, seen, schedule, v_foot, v_ahead, v_des, wz, constants)
+    _, _, R, _ = trunk_of(seen)
+    return acceleration, _desired_force(legs_of(memory)[0], deviation, R, mass)
+
+
+def feet_constants(config: Config) -> Array:
+    """What `feet_demand` needs of the configuration. Shape (10,)."""
+    controller = config.controller
+    return np.array(
+        [
+            1e-3 * config.gait.stance_ms, controller.raibert_gain, controller.swing_height,
+            controller.descent_speed, controller.kp_swing, controller.kd_swing,
+            controller.swing_delay, controller.stumble_lift, controller.swing_acceleration,
+            float(controller.follow_fall),
+        ]
     )  # fmt: skip
-    out = np.empty((4, 4, 3))
-    out[0], out[1] = swing_start, foot_goal
-    out[2] = _feet_acceleration(
-        contact, stance, progress, early, lift, stumble, felt, swing_start, foot_goal, ground,
-        position, v_ahead, R, p_foot, v_foot, v_des, wz, duration,
-        raibert_gain, height, descent_speed, kp, kd, delay, stumble_lift, nimble,
-        follow_fall > 0.5,
-    )  # fmt: skip
-    out[3] = _desired_force(contact, deviation, R, mass)
-    return out
 
 
 @compiled
-def _feet_anchors(
-    swing_start: Array, foot_goal: Array, p_foot: Array, contact: Array, stance: Array,
-    switched: bool, progress: float, early: Array, lift: Array, position: Array, velocity: Array,
-    descent: float, dt: float, follow_fall: bool,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Where swings begin and where feet without ground are being lowered to, (4, 3) each.
+def _lower(memory: Array, seen: Array, schedule: Array, dt: float, constants: Array) -> None:
+    """Note where swings begin; lower the feet that shall stand and have no ground.
 
     With `follow_fall` they are lowered as seen from a trunk that sinks, as far as legs reach.
     """
-    start, goal = swing_start.copy(), foot_goal.copy()
+    descent, follow_fall = constants[3] * dt, constants[9] > 0.5
+    stance, progress, switched = schedule[0:4], schedule[4], seen[SWITCHED] > 0.5
+    start, goal = anchors_of(memory)
+    legs, (lift, _, _) = legs_of(memory), swings_of(memory)
+    contact, early = legs[0], legs[1]
+    position, velocity, _, _ = trunk_of(seen)
+    p_foot = feet_of(seen)
     for leg in range(4):
         if stance[leg] < 0.5 and (switched or lift[leg] == progress):
             start[leg] = p_foot[leg]
@@ -71,7 +87,6 @@ def _feet_anchors(
             goal[leg, 2] = max(goal[leg, 2], position[2] - _LONGEST)
         elif follow_fall:
             goal[leg] = p_foot[leg]
-    return start, goal
 
 
 @compiled
@@ -108,13 +123,19 @@ def foot_velocities(J: Array, v: Array, p_foot: Array) -> Array:
 
 @compiled
 def _feet_acceleration(
-    contact: Array, stance: Array, progress: float, early: Array, lift: Array, stumble: Array,
-    felt: Array, swing_start: Array, foot_goal: Array, ground: Array, position: Array,
-    velocity: Array, R: Array, p_foot: Array, v_foot: Array, v_des: Array, wz: float,
-    duration: float, raibert_gain: float, height: float, descent_speed: float, kp: float,
-    kd: float, delay: float, stumble_lift: float, nimble: float, in_reach: bool,
+    memory: Array, seen: Array, schedule: Array, v_foot: Array, v_ahead: Array, v_des: Array,
+    wz: float, constants: Array,
 ) -> Array:  # fmt: skip
-    """Desired accelerations of the feet not in contact, (4, 3), m/s²; `felt` is updated."""
+    """Desired accelerations of the feet not in contact, (4, 3), m/s²; what they feel is updated."""
+    (duration, raibert_gain, height, descent_speed, kp, kd, delay, stumble_lift, nimble,
+     in_reach) = constants  # fmt: skip
+    stance, progress = schedule[0:4], schedule[4]
+    legs = legs_of(memory)
+    contact, early, ground = legs[0], legs[1], legs[4]
+    lift, stumble, felt = swings_of(memory)
+    swing_start, foot_goal = anchors_of(memory)
+    position, _, R, _ = trunk_of(seen)
+    p_foot = feet_of(seen)
     out = np.zeros((4, 3))
     expected = 0.0  # the ground at the foothold: what the feet now standing feel
     count = 0.0
@@ -137,7 +158,7 @@ def _feet_acceleration(
             reference[1] = _away(felt[leg], stumble_lift)
         else:
             target = swing.foothold(
-                leg, position, velocity, R, v_des, wz, (1.0 - progress) * duration, duration,
+                leg, position, v_ahead, R, v_des, wz, (1.0 - progress) * duration, duration,
                 raibert_gain,
             )  # fmt: skip
             left = 1.0 - lift[leg]
@@ -145,7 +166,7 @@ def _feet_acceleration(
             if lift[leg] > 0.0:
                 apex = max(apex, swing_start[leg, 2] + _CLEARANCE)
                 swing.within_reach(target, swing_start[leg], nimble, left * duration, delay)
-            if in_reach:
+            if in_reach > 0.5:
                 apex = min(apex, max(position[2] - _SHORTEST, swing_start[leg, 2]))
             reference = swing.swing_reference(
                 swing_start[leg], target, expected, apex, (progress - lift[leg]) / left,
