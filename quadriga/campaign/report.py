@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -223,3 +224,12 @@ def span(seeds: Sequence[int]) -> str:
         else:
             parts.append([seed])
     return ", ".join(f"{p[0]} … {p[-1]}" if len(p) > 2 else ", ".join(map(str, p)) for p in parts)
+
+
+def spanned(text: str) -> set[int]:
+    """The seeds of which `span` made the text."""
+    return {
+        seed
+        for first, last in re.findall(r"(\d+)(?: … (\d+))?", text)
+        for seed in range(int(first), int(last or first) + 1)
+    }

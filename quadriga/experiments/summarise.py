@@ -10,7 +10,7 @@ from quadriga.campaign.analysis import against, by_group, tally
 from quadriga.campaign.manifest import Manifest
 from quadriga.campaign.outcome import Outcome
 from quadriga.campaign.plan import Group
-from quadriga.campaign.report import span
+from quadriga.campaign.report import span, spanned
 from quadriga.campaign.sheets import ALL
 from quadriga.campaign.statistics import median, median_interval
 from quadriga.experiments.experiment import Experiment
@@ -60,6 +60,8 @@ def summarise(experiment: Experiment, campaigns: Sequence[Walked]) -> Results:
 
 def fitting(experiment: Experiment, results: Results) -> Results:
     """What of published results the experiment's file, which may have changed, still stands for."""
+    if not spanned(results.seeds) <= set(experiment.seeds):
+        return Results()
     keys = {variant.name: dict(variant.keys) for variant in experiment.variants}
     same = {name for name in keys if _same(keys[name], results.variants.get(name))}
     compared = results.baseline == experiment.baseline and experiment.baseline in same

@@ -6,11 +6,13 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from quadriga.campaign.ledger import Ledger
 from quadriga.campaign.manifest import Manifest
 from quadriga.campaign.outcome import Outcome
-from quadriga.campaign.report import span
+from quadriga.campaign.report import span, spanned
 from quadriga.cli import main
 from tests.quadriga.campaign.rows import manifest, row
 from tests.quadriga.report.outline import Outline
@@ -81,6 +83,11 @@ def test_what_is_no_campaign_costs_one_line(capsys: Said, tmp_path: Path) -> Non
 def test_spans_of_seeds_are_short() -> None:
     assert span([3, 0, 1, 2, 7, 9, 10]) == "0 … 3, 7, 9, 10"
     assert span([]) == ""
+
+
+@given(st.sets(st.integers(0, 50)) | st.sets(st.integers(0, 10**6)))
+def test_a_span_says_which_seeds_it_is_of(seeds: set[int]) -> None:
+    assert spanned(span(sorted(seeds))) == seeds
 
 
 def test_a_manifest_survives_json(tmp_path: Path) -> None:

@@ -128,6 +128,7 @@ def test_published_results_of_another_file_are_left_out() -> None:
     more = replace(experiment, seeds=tuple(range(30)))
     assert [line.wanted for line in fitting(more, kept).lines] == [30] * 4 + [60] * 2
     assert fitting(experiment_of("snow"), kept) == Results()
+    assert fitting(replace(experiment, seeds=tuple(range(1, 11))), kept) == Results()
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 2}', '{"format": 1, "lines": [3]}'])
