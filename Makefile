@@ -7,7 +7,7 @@ TOOLS := $(VENV)/.tools
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install walk test lint format docs figures acceptance bench bench-planner bench-recorder
+.PHONY: install walk test lint format docs figures clip acceptance bench bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -47,8 +47,14 @@ docs: $(STAMP)
 
 # Every figure and table of results in README and docs; two cores walk 15 times a minute.
 # It goes on where it ended; ARGS=--only-publish walks nothing, ARGS='hard --seeds 0:2' only looks.
-figures: $(STAMP)
+figures: clip
 	$(BIN)/quadriga experiments $(ARGS)
+
+# The clip of the README.
+clip: $(STAMP)
+	folder=$$(mktemp -d) && trap 'rm -rf $$folder' EXIT && $(BIN)/quadriga walk --seconds 10 \
+		--scenario hard-blocks --seed 601 --set planner.preset=fast --out $$folder/run && \
+		cp $$folder/run/walk.webp docs/figures/
 
 # Every scenario the project promises, on three seeds; about an hour.
 acceptance: $(STAMP)
