@@ -32,7 +32,7 @@ _SOFT: Final = MappingProxyType(
 # Peers' plans are held, and what was learned is kept, as long as with the usual rate.
 _FAST: Final = MappingProxyType(
     {
-        "applied": 1, "latency_ms": 1, "Q": (2e7, 2e5, 1.6e6, 7.2e6, 4e6, 1.6e4),
+        "applied": 1, "latency_ms": 1, "Q": (1.2e7, 1e5, 6e5, 2.4e6, 2e6, 3e3),
         "max_peer_age": 12, "hold_steps": 20, "forgetting": 0.99875,
     }
 )  # fmt: skip
