@@ -45,10 +45,12 @@ format: $(TOOLS)
 docs: $(STAMP)
 	$(BIN)/quadriga config --markdown > docs/configuration.md
 
-# Every figure and table of results in README and docs; two cores walk 15 times a minute.
-# It goes on where it ended; ARGS=--only-publish walks nothing, ARGS='hard --seeds 0:2' only looks.
-figures: clip
+# Every figure and table of results in README and docs, and the clip; two cores walk 15 times a
+# minute. It goes on where it ended; of the experiments ARGS=--only-publish walks nothing, and
+# ARGS='hard --seeds 0:2' only looks.
+figures: $(STAMP)
 	$(BIN)/quadriga experiments $(ARGS)
+	$(MAKE) clip
 
 # The clip of the README.
 clip: $(STAMP)

@@ -125,8 +125,7 @@ class Controller:
         self._acting = np.concatenate(
             [
                 trunk_gains(controller), feet_constants(config), self.body.com,
-                self.body.inertia_inverse.ravel(),
-                self.weights.as_array(),
+                self.body.inertia_inverse.ravel(), self.weights.as_array(),
                 [
                     self.body.mass, float(controller.flight), controller.slip_speed,
                     controller.slip_load, controller.mu_least, controller.mu_recovery,
