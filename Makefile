@@ -28,9 +28,10 @@ walk: $(STAMP)
 	$(BIN)/quadriga walk $(ARGS)
 
 # What several tests need is compiled, collected and fitted once, before they run side by side.
+# Whoever tests is not started again after a test that hung, which would hang again.
 test: $(TOOLS)
 	$(BIN)/quadriga prepare --robots 2
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --max-worker-restart 0 $(ARGS)
 
 lint: $(TOOLS)
 	$(BIN)/ruff check .

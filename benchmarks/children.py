@@ -49,6 +49,8 @@ def running(*processes: SpawnProcess) -> Iterator[None]:
         for process in started:
             process.terminate()
         for process in started:
+            process.join(_GRACE)
+            process.kill()
             process.join()
     if failed := [f"{p.name}: exit code {p.exitcode}" for p in processes if p.exitcode]:
         raise ChildProcessError(f"a process of the benchmark failed: {', '.join(failed)}")

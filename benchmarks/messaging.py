@@ -54,6 +54,7 @@ def _world(config: Config, place: str, ticks: int) -> dict[str, dict[str, float]
     names, team = robot_names(config.team.robots), config.team.name
     state = _state()
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
+        listener.settimeout(_PATIENCE)
         listener.bind(place)
         listener.listen(len(names))
         with Bus.open(config.bus, team, SIM) as bus:

@@ -39,6 +39,7 @@ from shared.recording import Recording
 
 KEYS = 10  # of each publisher
 PROBE = "probe"  # sent until the recorder has heard every publisher
+PATIENCE = 60.0  # s, for every publisher to be heard, and for the recorder to close its file
 BURST = 0.001  # s, what is due is sent this often: as a world of many robots does
 
 
@@ -84,8 +85,7 @@ def measure(rate: float, seconds: float, publishers: int, folder: Path) -> dict[
     ]
     file = folder / "bench.mcap"
     with running(*senders), recording(file, folder / "bench.toml") as pid:
-        while probed(file) < publishers:
-            sleep(0.1)
+        await_probes(file, publishers)
         before = processor_time(pid)
         go.set()
         sleep(seconds + 1.0)
@@ -107,7 +107,26 @@ def recording(file: Path, config: Path) -> Iterator[int]:
         yield recorder.pid
     finally:
         recorder.send_signal(signal.SIGINT)
-        recorder.wait()
+        try:
+            recorder.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            recorder.kill()
+            recorder.wait()
+
+
+def await_probes(file: Path, publishers: int) -> None:
+    """Wait until the recorder hears every publisher.
+
+    Raises:
+        ChildProcessError: it does not, since it or a publisher has failed.
+    """
+    deadline = monotonic() + PATIENCE
+    while (heard := probed(file)) < publishers:
+        if monotonic() > deadline:
+            raise ChildProcessError(
+                f"the recorder heard {heard} of {publishers} publishers within {PATIENCE:g} s"
+            )
+        sleep(0.1)
 
 
 def probed(file: Path) -> int:

@@ -26,6 +26,7 @@ _ACK: Final = "received"  # key of the question whether everything before it has
 _ACK_TIMEOUT: Final = 2.0  # s
 _LINK_TIMEOUT: Final = 5.0  # s
 _NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
+_left_open: list[zenoh.Session] = []
 
 
 class Bus:
@@ -46,6 +47,7 @@ class Bus:
         self._inbox: SimpleQueue[zenoh.Sample] = SimpleQueue()
         self._tokens: set[tuple[str, str, str]] = set()  # name, stage, session of the others
         self._declared: dict[str, zenoh.LivelinessToken] = {}
+        self._closed = False
         self._kept: list[Any] = []  # Zenoh drops publishers and subscribers nobody refers to
         self._kept.append(
             session.liveliness().declare_subscriber(
@@ -210,11 +212,21 @@ class Bus:
         return True
 
     def close(self) -> None:
-        """Leave the network once the others have received what this process published."""
-        if not self._session.is_closed():
-            self.withdraw()
-            self._flush()
+        """Leave the network once the others have received what this process published.
+
+        Zenoh takes ten seconds to close a session from which a frozen process has yet to read, and
+        then fails. Such a session hears nothing any more, and ends with the process.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        self.withdraw()
+        if self._flush():
             self._session.close()  # type: ignore[no-untyped-call]
+            return
+        for declared in self._kept:
+            declared.undeclare()
+        _left_open.append(self._session)  # Zenoh closes one that nobody refers to
 
     def __enter__(self) -> Self:
         return self
@@ -227,8 +239,8 @@ class Bus:
     ) -> None:
         self.close()
 
-    def _flush(self) -> None:
-        """Wait until all others, frozen ones aside, have received what was published so far.
+    def _flush(self) -> bool:
+        """Wait until all others have received what was published so far; whether they have.
 
         Zenoh's close drops what a busy receiver or router has not yet taken. A query travels
         behind the publications on each link, so its answers say that they have arrived.
@@ -237,8 +249,7 @@ class Bus:
             f"{self.team}/*/{_ACK}", target=zenoh.QueryTarget.ALL, timeout=_ACK_TIMEOUT,
             consolidation=zenoh.ConsolidationMode.NONE, express=True,
         )  # fmt: skip
-        for _ in asked:
-            pass
+        return all(reply.ok is not None for reply in asked)
 
     def _note_token(self, sample: zenoh.Sample) -> None:
         _, name, stage, session = str(sample.key_expr).split("/")

@@ -40,6 +40,16 @@ def test_a_frozen_robot_is_named_and_the_world_goes_on_until_it_returns(
         running.watch(lambda: True)
 
 
+def test_who_is_frozen_to_the_end_is_named_and_nobody_else(make_team: Make) -> None:
+    team = make_team(world__seconds=FOREVER, world__command_timeout=0.5)
+    with team.launch() as running:
+        team.await_log("sim", "start")
+        os.kill(running.pids["r2"], signal.SIGSTOP)
+        with pytest.raises(ProcessError, match="process r2: got no end after the walk"):
+            running.watch(never)
+    assert "stop  fall of" in team.log("sim").splitlines()[-1], "and then nothing, no traceback"
+
+
 @pytest.mark.parametrize("name", ["sim", "r2", "operator"])
 def test_kill_9_of_one_stops_the_walk_and_names_it(make_team: Make, name: str) -> None:
     team = make_team(world__seconds=FOREVER)

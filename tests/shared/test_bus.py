@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
@@ -94,6 +97,36 @@ def test_what_was_sent_before_closing_arrives(opened: Open) -> None:
         put(b"%d" % k)
     r1.close()
     assert numbers(sim, 5000) == list(range(5000))
+
+
+FROZEN = """
+import sys
+from shared.bus import HERE, Bus
+from shared.config import BusConfig
+with Bus.open(BusConfig(endpoint=sys.argv[1]), "team", "r1") as bus:
+    bus.subscribe("team/**")
+    bus.declare(HERE)
+    while True:
+        bus.get(1.0)
+"""
+
+
+def test_who_is_frozen_keeps_nobody_from_leaving(opened: Open, endpoint: str) -> None:
+    """Zenoh fails to close a session from which a frozen process has yet to read this much."""
+    sim, r2 = opened("sim"), opened("r2")
+    r2.subscribe("team/**")
+    meet(sim, r2)
+    with subprocess.Popen([sys.executable, "-c", FROZEN, endpoint]) as r1:
+        try:
+            assert sim.wait_for(HERE, {"r1"}, WAIT, never)
+            r1.send_signal(signal.SIGSTOP)
+            put = sim.publisher("team/sim/x")
+            for k in range(2000):
+                put(b"%500d" % k)
+            sim.close()
+            assert numbers(r2, 2000) == list(range(2000))
+        finally:
+            r1.kill()
 
 
 def test_presence_comes_and_goes_by_stage(opened: Open) -> None:
