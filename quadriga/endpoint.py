@@ -2,11 +2,34 @@
 
 from __future__ import annotations
 
+import secrets
 import socket
+from contextlib import suppress
+from typing import Final
+
+_PORT: Final = 7447  # Zenoh's own
 
 
 def free_endpoint() -> str:
-    """An endpoint on this machine that nobody listens on at the moment."""
+    """An endpoint on this machine that nobody listens on at the moment.
+
+    It has a loopback address of its own (127.0.0.0/8, RFC 1122), where the system permits one:
+    a port at 127.0.0.1 may be given to another process, even of the same team, before the sim
+    server listens there, which would end one walk in some thousands.
+    """
+    address = (f"127.{'.'.join(map(str, secrets.token_bytes(2)))}.2", _PORT)
+    with suppress(OSError):
+        return _free(address)
+    return _free(("127.0.0.1", 0))
+
+
+def _free(address: tuple[str, int]) -> str:
+    """The endpoint at an address whose port may be 0: any free one.
+
+    Raises:
+        OSError: it cannot be listened on.
+    """
     with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        probe.bind(address)
+        host, port = probe.getsockname()
+        return f"tcp/{host}:{port}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from quadriga.endpoint import free_endpoint
 from shared.barrier import OPERATOR, SIM
 from shared.bus import HERE, READY, Bus
 from shared.codec import encode
@@ -38,10 +38,7 @@ except QuadrigaError as error:
 
 @pytest.fixture
 def config() -> Config:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    bus = BusConfig(endpoint=f"tcp/127.0.0.1:{port}", barrier_timeout=WAIT)
+    bus = BusConfig(endpoint=free_endpoint(), barrier_timeout=WAIT)
     return Config(team=TeamConfig(name="band", robots=1), bus=bus)
 
 
