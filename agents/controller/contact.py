@@ -9,8 +9,12 @@ for those that shall carry the robot instead; where it is pushed, that keeps it 
 
 from __future__ import annotations
 
-import numpy as np
+from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.controller.memory import Swings
 from shared.jit import compiled
 from shared.robot import FOOT_RADIUS, Array
 
@@ -18,6 +22,8 @@ _EARLIEST_TOUCHDOWN = 0.5  # of swing: before this a load is the foot still leav
 _EARLIEST_STUMBLE = 0.12  # of swing, likewise
 _LATEST_STUMBLE = 0.8  # of swing: after this there is no time to give way
 _BELOW = 0.7  # of what a foot feels, share that must point upwards for the ground to be below it
+
+Flags = NDArray[np.bool_]
 
 
 @compiled
@@ -47,11 +53,29 @@ def from_below(felt: Array) -> bool:
     return bool(felt[2] >= _BELOW * size)
 
 
+class ContactRule(NamedTuple):
+    """When a foot is a contact.
+
+    Attributes:
+        threshold: force from which on a foot is loaded, N.
+        patience: time without load after which a stance foot is no contact, s.
+        hold: share of the half period for which a foot waits for those that shall stand.
+        give_way: time for which a foot gives way once nothing stops it any more, s; 0: never.
+        tell_sides: whether a foot stopped from the side is no contact, and one that landed early
+            and is not loaded any more neither.
+    """
+
+    threshold: float
+    patience: float
+    hold: float
+    give_way: float
+    tell_sides: bool
+
+
 @compiled
 def contacts_by_force(
     legs0: Array, level0: float, switched: bool, stance: Array, progress: float, foot_force: Array,
-    foot_z: Array, threshold: float, patience: float, rate: float, dt: float, lift: Array,
-    stumble: Array, felt: Array, hold: float, give_way: float, tell_sides: bool,
+    foot_z: Array, swings: Swings, rule: ContactRule, rate: float, dt: float,
 ) -> tuple[Array, float]:  # fmt: skip
     """Update the contacts of one robot.
 
@@ -66,43 +90,56 @@ def contacts_by_force(
         progress: progress of the half period in [0, 1).
         foot_force: measured normal forces, (4,), N.
         foot_z: heights of the foot centres, (4,), m, odometry frame.
-        threshold: force from which on a foot is loaded, N.
-        patience: time without load after which a stance foot is no contact, s.
+        swings: lift and stumble are updated in place.
+        rule: when a foot is a contact.
         rate: share of a tick in the filter of the ground's height.
         dt: time since the last tick, s.
-        lift: progress at which each swing began, −1 while it has not, (4,); updated in place.
-        stumble: time for which each swing foot will give way, (4,), s; updated in place.
-        felt: from where each foot off the ground was stopped at the last tick: the acceleration
-            that was to bring it back to its reference, turned round, (4, 3), m/s².
-        hold: share of the half period for which a foot waits for those that shall stand.
-        give_way: time for which a foot gives way once nothing stops it any more, s; 0: never.
-        tell_sides: whether a foot stopped from the side is no contact, and one that landed early
-            and is not loaded any more neither.
 
     Returns:
         The new legs and level.
     """
     legs = legs0.copy()
-    contact, early, unloaded, latched, ground = legs
-    total, count = 0.0, 0
+    loaded = foot_force >= rule.threshold
+    carried = _stand(legs, switched, stance, loaded, swings, rule, dt)
+    _swing(legs, switched, stance, progress, loaded, carried, swings, rule, dt)
+    return legs, _feel_ground(legs, level0, stance, loaded, foot_z, rate)
+
+
+@compiled
+def _stand(
+    legs: Array, switched: bool, stance: Array, loaded: Flags, swings: Swings, rule: ContactRule,
+    dt: float,
+) -> bool:  # fmt: skip
+    """Which of the feet that shall stand are contacts; whether they all carry."""
+    contact, early, unloaded, _, _ = legs
     carried = True
     for leg in range(4):
         if stance[leg] < 0.5:
             continue
-        loaded = foot_force[leg] >= threshold
-        if tell_sides and not switched and contact[leg] < 0.5 and not from_below(felt[leg]):
-            loaded = False
+        carries = loaded[leg]
+        if rule.tell_sides and not switched and contact[leg] < 0.5:
+            carries = carries and from_below(swings.felt[leg])
         if switched:
             early[leg] = 0.0
             unloaded[leg] = 0.0
-        lift[leg], stumble[leg] = 0.0, 0.0
-        unloaded[leg] = 0.0 if loaded else unloaded[leg] + dt
-        contact[leg] = 1.0 if unloaded[leg] <= patience else 0.0
-        carried = carried and loaded
+        swings.lift[leg], swings.stumble[leg] = 0.0, 0.0
+        unloaded[leg] = 0.0 if carries else unloaded[leg] + dt
+        contact[leg] = 1.0 if unloaded[leg] <= rule.patience else 0.0
+        carried = carried and carries
+    return carried
+
+
+@compiled
+def _swing(
+    legs: Array, switched: bool, stance: Array, progress: float, loaded: Flags, carried: bool,
+    swings: Swings, rule: ContactRule, dt: float,
+) -> None:  # fmt: skip
+    """Which of the feet that shall swing stay on the ground, land early or stumble."""
+    contact, early, unloaded, latched, _ = legs
+    lift, stumble, felt = swings
     for leg in range(4):
         if stance[leg] > 0.5:
             continue
-        loaded = foot_force[leg] >= threshold
         if switched:
             latched[leg] = 0.0
             early[leg] = 0.0
@@ -110,35 +147,44 @@ def contacts_by_force(
             stumble[leg] = 0.0
             lift[leg] = -1.0 if contact[leg] > 0.5 else 0.0
         if lift[leg] < 0.0:
-            if carried or not loaded or progress >= hold:
+            if carried or not loaded[leg] or progress >= rule.hold:
                 lift[leg] = 0.0 if switched else progress
             else:
                 contact[leg] = 1.0
                 continue
         contact[leg] = 0.0
         since = (progress - lift[leg]) / (1.0 - lift[leg])
-        below = not tell_sides or from_below(felt[leg])
-        if loaded and below and since > _EARLIEST_TOUCHDOWN:
+        below = not rule.tell_sides or from_below(felt[leg])
+        if loaded[leg] and below and since > _EARLIEST_TOUCHDOWN:
             early[leg] = 1.0
             unloaded[leg] = 0.0
             stumble[leg] = 0.0
         if early[leg] > 0.5:
-            if tell_sides:
-                unloaded[leg] = 0.0 if loaded else unloaded[leg] + dt
-            contact[leg] = 1.0 if unloaded[leg] <= patience else 0.0
-        elif give_way > 0.0:
-            if loaded and not below and since > _EARLIEST_STUMBLE and progress < _LATEST_STUMBLE:
-                stumble[leg] = give_way
+            if rule.tell_sides:
+                unloaded[leg] = 0.0 if loaded[leg] else unloaded[leg] + dt
+            contact[leg] = 1.0 if unloaded[leg] <= rule.patience else 0.0
+        elif rule.give_way > 0.0:
+            stopped = loaded[leg] and not below
+            if stopped and since > _EARLIEST_STUMBLE and progress < _LATEST_STUMBLE:
+                stumble[leg] = rule.give_way
             elif stumble[leg] > 0.0:
                 stumble[leg] -= dt
                 if stumble[leg] <= 0.0:
                     stumble[leg] = 0.0
                     lift[leg] = progress  # the swing begins anew from here
+
+
+@compiled
+def _feel_ground(
+    legs: Array, level0: float, stance: Array, loaded: Flags, foot_z: Array, rate: float
+) -> float:
+    """Where the ground is under the feet in contact; its new filtered height."""
+    contact, _, _, latched, ground = legs
+    total, count = 0.0, 0
     for leg in range(4):
-        loaded = foot_force[leg] >= threshold
         # The ground is where the foot first bore load: latching at the scheduled touchdown
         # would take the height of a foot still in the air, and ratchet upward.
-        if contact[leg] > 0.5 and loaded and latched[leg] < 0.5:
+        if contact[leg] > 0.5 and loaded[leg] and latched[leg] < 0.5:
             latched[leg] = 1.0
             ground[leg] = foot_z[leg] - FOOT_RADIUS
         if contact[leg] > 0.5 and latched[leg] > 0.5:
@@ -147,7 +193,4 @@ def contacts_by_force(
             if stance[leg] > 0.5:
                 total += ground[leg]
                 count += 1
-    level = level0
-    if count > 0:
-        level += rate * (total / count - level0)
-    return legs, level
+    return level0 + rate * (total / count - level0) if count > 0 else level0

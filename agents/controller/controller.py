@@ -19,7 +19,7 @@ from agents.controller.estimator import (
     sure,
 )
 from agents.controller.feet import feet_constants, feet_demand, foot_velocities
-from agents.controller.friction import caution
+from agents.controller.friction import FrictionRule, caution
 from agents.controller.load import loaded
 from agents.controller.memory import (
     CAUTION,
@@ -38,7 +38,15 @@ from agents.controller.memory import (
     speed_of,
 )
 from agents.controller.model import RigidBody
-from agents.controller.references import fall_freely, trunk_acceleration, trunk_gains
+from agents.controller.references import (
+    Asked,
+    Integrators,
+    SingleRigidBody,
+    fall_freely,
+    feedback,
+    feedforward,
+    trunk_gains,
+)
 from agents.controller.rigid_body import rigid_body_terms
 from agents.controller.rotation import from_yaw_frame, roll_pitch_yaw
 from agents.controller.sensing import (
@@ -217,7 +225,7 @@ def _begun(flat: Array, seen: Array) -> Seen:
     """The first tick: feet are anchored where they are, the heading is kept."""
     start, goal = anchors_of(flat)
     start[:] = goal[:] = feet_of(seen)
-    flat[YAW] = roll_pitch_yaw(trunk_of(seen)[2])[2]
+    flat[YAW] = roll_pitch_yaw(trunk_of(seen).R)[2]
     return Seen(Memory(flat), seen)
 
 
@@ -241,7 +249,7 @@ def note_forces(memory: Array, planned: Array, stance: Array, new_sample: bool) 
 @compiled
 def _act(
     memory0: Array, seen: Array, schedule: Array, vx: float, vy: float, wz: float, height: float,
-    planned: Array, feedforward: bool, ahead: Array, dt: float, new_sample: bool, links: Array,
+    planned: Array, feeds_forward: bool, ahead: Array, dt: float, new_sample: bool, links: Array,
     constants: Array, memory: Array, asked: Array, x: Array,
 ) -> int:  # fmt: skip
     """Fill the new memory, what is asked and the answer `closed_form` gives, with its result."""
@@ -249,9 +257,9 @@ def _act(
     inertia_inverse, weights = constants[25:34].reshape(3, 3), constants[34:41].copy()
     bare_mass, flight, slip_speed, slip_load, mu_least, mu_recovery = constants[41:47]
     stance, progress = schedule[0:4], schedule[4]
-    position, v_trunk, R, omega = trunk_of(seen)
+    trunk, p_foot = trunk_of(seen), feet_of(seen)
     q, v = coordinates_of(seen)
-    p_foot, load = feet_of(seen), memory0[LOAD]
+    load = memory0[LOAD]
     mass = bare_mass + load
     M_inverse, nle = np.empty((18, 18)), np.empty(18)
     J, dJ = np.empty((6, 18)), np.empty((6, 18))
@@ -259,25 +267,28 @@ def _act(
     memory[:] = memory0
     deviation = note_forces(memory, planned, stance, new_sample)
     speed, lead = speed_of(memory)
-    memory[HEIGHT], speed[:], lead[:], memory[YAW], trunk, v_des = trunk_acceleration(
-        memory0[HEIGHT], speed, lead, memory0[YAW], gains, position, v_trunk, R, omega,
-        np.array([vx, vy]), wz, memory0[LEVEL] + height, dt, feedforward, deviation, stance,
-        p_foot, mass, com, inertia_inverse,
+    kept, push, v_des = feedback(
+        Integrators(memory0[HEIGHT], speed, lead, memory0[YAW]), gains, trunk,
+        Asked(np.array([vx, vy]), wz, memory0[LEVEL] + height), dt,
     )  # fmt: skip
+    memory[HEIGHT], speed[:], lead[:], memory[YAW] = kept
+    if feeds_forward:
+        body = SingleRigidBody(mass, com, inertia_inverse)
+        push += feedforward(deviation, stance, trunk, p_foot, body)
     contact = legs_of(memory)[0]
     if flight > 0.5:
-        fall_freely(trunk, contact)
+        fall_freely(push, contact)
     v_foot = foot_velocities(J, v, p_foot)
+    rule = FrictionRule(slip_speed, slip_load, weights[MU], mu_least, mu_recovery)
     memory[CAUTION] = caution(
-        memory0[CAUTION], contact, stance, progress, v_foot, foot_force_of(seen), slip_speed,
-        slip_load, weights[MU], mu_least, mu_recovery, dt,
-    )  # fmt: skip
+        memory0[CAUTION], contact, stance, progress, v_foot, foot_force_of(seen), rule, dt
+    )
     weights[MU] -= memory[CAUTION]
-    v_ahead = v_trunk if np.isnan(ahead[0]) else from_yaw_frame(ahead, R)
+    v_ahead = trunk.velocity if np.isnan(ahead[0]) else from_yaw_frame(ahead, trunk.R)
     swing, force = feet_demand(
         memory, seen, schedule, v_foot, v_ahead, v_des, wz, deviation, mass, dt, feet
     )
-    asked[:6], asked[6:18], asked[18:] = trunk, swing.ravel(), force.ravel()
+    asked[:6], asked[6:18], asked[18:] = push, swing.ravel(), force.ravel()
     return closed_form(
-        M_inverse, nle, J, dJ, v, R, p_foot, contact, trunk, swing, force, weights, x
+        M_inverse, nle, J, dJ, v, trunk.R, p_foot, contact, push, swing, force, weights, x
     )

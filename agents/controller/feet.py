@@ -42,7 +42,7 @@ def feet_demand(
     """
     _lower(memory, seen, schedule, dt, constants)
     acceleration = _feet_acceleration(memory, seen, schedule, v_foot, v_ahead, v_des, wz, constants)
-    _, _, R, _ = trunk_of(seen)
+    R = trunk_of(seen).R
     return acceleration, _desired_force(legs_of(memory)[0], deviation, R, mass)
 
 
@@ -68,9 +68,9 @@ def _lower(memory: Array, seen: Array, schedule: Array, dt: float, constants: Ar
     descent, follow_fall = constants[3] * dt, constants[9] > 0.5
     stance, progress, switched = schedule[0:4], schedule[4], seen[SWITCHED] > 0.5
     start, goal = anchors_of(memory)
-    legs, (lift, _, _) = legs_of(memory), swings_of(memory)
+    legs, lift = legs_of(memory), swings_of(memory).lift
     contact, early = legs[0], legs[1]
-    position, velocity, _, _ = trunk_of(seen)
+    trunk = trunk_of(seen)
     p_foot = feet_of(seen)
     for leg in range(4):
         if stance[leg] < 0.5 and (switched or lift[leg] == progress):
@@ -83,8 +83,8 @@ def _lower(memory: Array, seen: Array, schedule: Array, dt: float, constants: Ar
                 continue
             if switched and stance[leg] > 0.5:
                 goal[leg] = p_foot[leg]
-            goal[leg, 2] -= descent - min(0.0, velocity[2]) * dt
-            goal[leg, 2] = max(goal[leg, 2], position[2] - _LONGEST)
+            goal[leg, 2] -= descent - min(0.0, trunk.velocity[2]) * dt
+            goal[leg, 2] = max(goal[leg, 2], trunk.position[2] - _LONGEST)
         elif follow_fall:
             goal[leg] = p_foot[leg]
 

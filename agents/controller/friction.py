@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from shared.jit import compiled
 from shared.robot import Array
 
@@ -9,13 +11,31 @@ _SETTLED = 0.2  # of a half period: before this a foot may still be landing
 _LOSS = 15.0  # 1/s, of the coefficient counted on while a foot slides
 
 
+class FrictionRule(NamedTuple):
+    """How much friction to count on.
+
+    Attributes:
+        slip_speed: from which on a foot slides, m/s; 0: never.
+        slip_load: force from which on it matters, N: a foot that hardly bears load is easily
+            dragged along, and tells nothing of the ground.
+        mu: coefficient counted on where nothing slides.
+        mu_least: coefficient that is always counted on.
+        recovery: by which what is taken off falls, 1/s.
+    """
+
+    slip_speed: float
+    slip_load: float
+    mu: float
+    mu_least: float
+    recovery: float
+
+
 @compiled
 def caution(
     caution0: float, contact: Array, stance: Array, progress: float, v_foot: Array,
-    foot_force: Array, slip_speed: float, slip_load: float, mu: float, mu_least: float,
-    recovery: float, dt: float,
+    foot_force: Array, rule: FrictionRule, dt: float,
 ) -> float:  # fmt: skip
-    """What is taken off the friction coefficient `mu`, so that feet that slide find hold again.
+    """What is taken off the friction coefficient, so that feet that slide find hold again.
 
     A foot in contact slides where it moves along the ground faster than rolling would make it. A
     foot that slides gives less than the QP asks of it, and not in the direction asked; friction
@@ -29,20 +49,15 @@ def caution(
         progress: progress of the half period in [0, 1).
         v_foot: velocities of the foot centres, (4, 3), m/s, odometry frame.
         foot_force: measured normal forces, (4,), N.
-        slip_speed: from which on a foot slides, m/s; 0: never.
-        slip_load: force from which on it matters, N: a foot that hardly bears load is easily
-            dragged along, and tells nothing of the ground.
-        mu: coefficient counted on where nothing slides.
-        mu_least: coefficient that is always counted on.
-        recovery: by which c falls, 1/s.
+        rule: how much friction to count on.
         dt: time since the last tick, s.
     """
-    if slip_speed <= 0.0:
+    if rule.slip_speed <= 0.0:
         return 0.0
     slides = False
     if progress >= _SETTLED:
         for leg in range(4):
-            if contact[leg] > 0.5 and stance[leg] > 0.5 and foot_force[leg] >= slip_load:
-                slides = slides or v_foot[leg, 0] ** 2 + v_foot[leg, 1] ** 2 > slip_speed**2
-    rate = _LOSS if slides else -recovery
-    return min(max(0.0, mu - mu_least), max(0.0, caution0 + rate * dt))
+            if contact[leg] > 0.5 and stance[leg] > 0.5 and foot_force[leg] >= rule.slip_load:
+                slides = slides or v_foot[leg, 0] ** 2 + v_foot[leg, 1] ** 2 > rule.slip_speed**2
+    rate = _LOSS if slides else -rule.recovery
+    return min(max(0.0, rule.mu - rule.mu_least), max(0.0, caution0 + rate * dt))

@@ -5,7 +5,7 @@ The compiled tick takes and gives the array; `Memory` names its parts for everyo
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,21 @@ CAUTION: Final = 139  # what is taken off the friction coefficient
 LOAD: Final = 140  # what the robot carries, kg
 
 
+class Swings(NamedTuple):
+    """Of each foot off the ground.
+
+    Attributes:
+        lift: progress of the half period at which its swing began, (4,); −1: not yet.
+        stumble: time for which it will still give way to what stopped it, (4,), s.
+        felt: from where it was stopped at the last tick: the acceleration that was to bring it back
+            to its reference, turned round, (4, 3), m/s².
+    """
+
+    lift: Array
+    stumble: Array
+    felt: Array
+
+
 @compiled
 def filter_of(flat: Array) -> tuple[Array, Array]:
     """Views of the estimator's mean, (6, 3), and covariance, (6, 6)."""
@@ -36,9 +51,9 @@ def legs_of(flat: Array) -> Array:
 
 
 @compiled
-def swings_of(flat: Array) -> tuple[Array, Array, Array]:
-    """Views of the progress at which each swing began, (4,), of its stumble, (4,), and felt."""
-    return flat[119:123], flat[123:127], flat[127:139].reshape(4, 3)
+def swings_of(flat: Array) -> Swings:
+    """Views of what is remembered of the swings."""
+    return Swings(flat[119:123], flat[123:127], flat[127:139].reshape(4, 3))
 
 
 @compiled
@@ -130,12 +145,12 @@ class Memory:
     @property
     def lift(self) -> Array:
         """Progress of the half period at which each foot's swing began; −1: not yet. (4,)."""
-        return swings_of(self.flat)[0]
+        return swings_of(self.flat).lift
 
     @property
     def stumble(self) -> Array:
         """How long each swing foot will still give way to what stopped it, (4,), s."""
-        return swings_of(self.flat)[1]
+        return swings_of(self.flat).stumble
 
     @property
     def caution(self) -> float:
@@ -150,7 +165,7 @@ class Memory:
     @property
     def felt(self) -> Array:
         """From where each foot off the ground was stopped, see `contact.py`, (4, 3), m/s²."""
-        return swings_of(self.flat)[2]
+        return swings_of(self.flat).felt
 
     @property
     def height(self) -> float:

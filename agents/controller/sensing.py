@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from agents.controller.contact import contacts_by_force, contacts_by_schedule
+from agents.controller.contact import ContactRule, contacts_by_force, contacts_by_schedule
 from agents.controller.estimator import filter_step, foot_trust, noise_parameters
 from agents.controller.load import felt_load
 from agents.controller.memory import HALF, LEVEL, LOAD, Memory, filter_of, legs_of, swings_of
@@ -26,10 +26,26 @@ def coordinates_of(flat: Array) -> tuple[Array, Array]:
     return flat[0:19], flat[19:37]
 
 
+class Trunk(NamedTuple):
+    """Where the trunk is and how it moves.
+
+    Attributes:
+        position: of its origin, (3,), m, odometry frame.
+        velocity: of its origin, (3,), m/s, odometry frame.
+        R: trunk to odometry frame, (3, 3).
+        omega: angular velocity, (3,), rad/s, trunk frame.
+    """
+
+    position: Array
+    velocity: Array
+    R: Array
+    omega: Array
+
+
 @compiled
-def trunk_of(flat: Array) -> tuple[Array, Array, Array, Array]:
-    """Views of the trunk's position, velocity (odometry frame), R (3, 3) and rate (trunk frame)."""
-    return flat[0:3], flat[58:61], flat[37:46].reshape(3, 3), flat[22:25]
+def trunk_of(flat: Array) -> Trunk:
+    """Views of the trunk in what was seen."""
+    return Trunk(flat[0:3], flat[58:61], flat[37:46].reshape(3, 3), flat[22:25])
 
 
 @compiled
@@ -151,9 +167,9 @@ def place(
     v[:3] = R.T @ velocity
     v[3:6] = omega
     v[6:] = v_joint
-    _, seen_velocity, seen_R, _ = trunk_of(seen)
-    seen_R[:] = R
-    seen_velocity[:] = velocity
+    trunk = trunk_of(seen)
+    trunk.R[:] = R
+    trunk.velocity[:] = velocity
     feet_of(seen)[:] = p_foot
     foot_force_of(seen)[:] = foot_force
     seen[61:67] = outputs_at(position, velocity, R, omega, level0)
@@ -167,11 +183,10 @@ def place(
      load_time) = constants[2:10]  # fmt: skip
     rate = dt / (ground_filter + dt)
     if by_force > 0.5:
-        lift, stumble, felt = swings_of(memory)
+        rule = ContactRule(least_force, lost_after, hold, give_way, tell_sides > 0.5)
         legs, level = contacts_by_force(
             legs_of(memory0), level0, switched, stance, progress, foot_force, p_foot[:, 2],
-            least_force, lost_after, rate, dt, lift, stumble, felt, hold, give_way,
-            tell_sides > 0.5,
+            swings_of(memory), rule, rate, dt,
         )  # fmt: skip
     else:
         legs, level = contacts_by_schedule(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from agents.controller.contact import contacts_by_force, contacts_by_schedule
+from agents.controller.contact import ContactRule, contacts_by_force, contacts_by_schedule
 from agents.controller.controller import Task
 from agents.controller.estimator import (
     Estimate,
@@ -15,8 +15,16 @@ from agents.controller.estimator import (
     standing_mean,
     sure,
 )
+from agents.controller.memory import Swings
 from agents.controller.model import RigidBody
-from agents.controller.references import trunk_acceleration as compiled_trunk_acceleration
+from agents.controller.references import (
+    Asked,
+    Integrators,
+    SingleRigidBody,
+    feedback,
+    feedforward,
+)
+from agents.controller.sensing import Trunk
 from shared.config import ControllerConfig
 from shared.messages import State
 from shared.robot import Array
@@ -85,11 +93,14 @@ def step_contact(
     before = np.array([p.contact, p.early, p.unloaded, p.latched, p.ground])
     lift, stumble = p.lift.copy(), p.stumble.copy()
     if config.contact_detection:
-        legs, level = contacts_by_force(
-            before, p.level, half != p.half, stance, progress, foot_force, foot_z,
-            config.contact_force, 1e-3 * config.lost_contact_ms, rate, dt, lift, stumble, p.felt,
+        rule = ContactRule(
+            config.contact_force, 1e-3 * config.lost_contact_ms,
             1e-3 * config.liftoff_hold_ms / stance_time, 1e-3 * config.give_way_ms,
             config.tell_sides,
+        )  # fmt: skip
+        legs, level = contacts_by_force(
+            before, p.level, half != p.half, stance, progress, foot_force, foot_z,
+            Swings(lift, stumble, p.felt), rule, rate, dt,
         )  # fmt: skip
     else:
         legs, level = contacts_by_schedule(p.ground, p.level, stance, foot_z, rate)
@@ -99,19 +110,19 @@ def step_contact(
     )
 
 
-@dataclass(frozen=True)
-class Integrators:
-    """Of height, speed, lead and heading: see `Memory`."""
-
-    height: float
-    speed: Array
-    lead: Array
-    yaw: float
-
-
 def initial_integrators(yaw: float) -> Integrators:
     """All at rest, heading kept."""
     return Integrators(0.0, np.zeros(2), np.zeros(2), yaw)
+
+
+def trunk_at(estimate: Estimate) -> Trunk:
+    """Where the trunk is and how it moves."""
+    return Trunk(estimate.position, estimate.velocity, estimate.R, estimate.omega)
+
+
+def rigid(body: RigidBody) -> SingleRigidBody:
+    """A robot that carries nothing."""
+    return SingleRigidBody(body.mass, body.com, body.inertia_inverse)
 
 
 def trunk_acceleration(
@@ -119,10 +130,9 @@ def trunk_acceleration(
     level: float, stance: Array, dt: float,
 ) -> tuple[Integrators, Array, Array]:  # fmt: skip
     """One step of the trunk's references."""
-    p, e = previous, estimate
-    height, speed, lead, yaw, trunk, v_des = compiled_trunk_acceleration(
-        p.height, p.speed, p.lead, p.yaw, gains, e.position, e.velocity, e.R, e.omega,
-        np.array([task.vx, task.vy]), task.wz, level + task.height, dt, task.feedforward,
-        task.deviation, stance, e.p_foot, body.mass, body.com, body.inertia_inverse,
-    )  # fmt: skip
-    return replace(p, height=height, speed=speed, lead=lead, yaw=yaw), trunk, v_des
+    trunk = trunk_at(estimate)
+    asked = Asked(np.array([task.vx, task.vy]), task.wz, level + task.height)
+    after, push, v_des = feedback(previous, gains, trunk, asked, dt)
+    if task.feedforward:
+        push += feedforward(task.deviation, stance, trunk, estimate.p_foot, rigid(body))
+    return after, push, v_des

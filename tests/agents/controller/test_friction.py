@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agents.controller.friction import caution
+from agents.controller.friction import FrictionRule, caution
 from shared.robot import Array
 
 CONTACT, STANCE = np.array([1.0, 0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0, 1.0])
@@ -16,10 +16,9 @@ def after(
     ticks: int, v_foot: Array, before: float = 0.0, progress: float = 0.5, speed: float = SPEED,
     contact: Array = CONTACT, force: float = LOAD,
 ) -> float:  # fmt: skip
-    foot_force = np.full(4, force)
+    foot_force, rule = np.full(4, force), FrictionRule(speed, LOAD, MU, LEAST, RECOVERY)
     for _ in range(ticks):
-        before = caution(before, contact, STANCE, progress, v_foot, foot_force, speed, LOAD, MU,
-                         LEAST, RECOVERY, DT)  # fmt: skip
+        before = caution(before, contact, STANCE, progress, v_foot, foot_force, rule, DT)
     return before
 
 

@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 
 from agents.controller.controller import Task
 from agents.controller.estimator import Estimate
-from agents.controller.references import fall_freely, single_rigid_body, trunk_gains
+from agents.controller.references import Integrators, fall_freely, feedforward, trunk_gains
 from shared.config import ControllerConfig
 from shared.robot import GRAVITY, STAND_HEIGHT, Array
 from tests.agents.controller.parts import (
-    Integrators,
     initial_integrators,
+    rigid,
     trunk_acceleration,
+    trunk_at,
 )
 from tests.agents.controller.poses import BODY, random_pose, standing_pose
 
@@ -36,10 +37,7 @@ def trunk(
 
 
 def rigid_body(deviation: Array, stance: Array, estimate: Estimate) -> Array:
-    return single_rigid_body(
-        deviation, stance, estimate.R, estimate.position, estimate.p_foot, BODY.mass, BODY.com,
-        BODY.inertia_inverse,
-    )  # fmt: skip
+    return feedforward(deviation, stance, trunk_at(estimate), estimate.p_foot, rigid(BODY))
 
 
 def turned(estimate: Estimate, yaw: float) -> Estimate:
@@ -140,7 +138,7 @@ def test_north_is_nowhere(seed: int, yaw: float) -> None:
     before = Integrators(0.01, random.normal(size=2) * 0.05, random.normal(size=2) * 0.02, heading)
     task = Task(random.normal(), random.normal(), 0.2, 0.25, random.normal(size=12) * 10.0, True)
     here = trunk(estimate, task, before)
-    there = trunk(turned(estimate, yaw), task, replace(before, yaw=heading + yaw))
+    there = trunk(turned(estimate, yaw), task, before._replace(yaw=heading + yaw))
     Z = pin.utils.rotate("z", yaw)
     np.testing.assert_allclose(there[:3], Z @ here[:3], atol=1e-8)
     np.testing.assert_allclose(there[3:], Z @ here[3:], atol=1e-8)
