@@ -7,7 +7,6 @@ import select
 import sys
 import termios
 import tty
-from types import TracebackType
 from typing import Any, Final, Self
 
 from shared.clock import sleep
@@ -70,12 +69,7 @@ class Keyboard:
         self.listens = True
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._before:
             try:
                 termios.tcsetattr(self._stdin, termios.TCSADRAIN, self._before)
