@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
-import sys
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 
-import agents
-import shared
 from shared.config import Config
+from shared.jit import digest
 
 
 def warm_up(config: Config, console: Console) -> None:
     """Rehearse an agent once, unless this code has been compiled on this machine before."""
     from agents.controller.rotation import roll_pitch_yaw
 
-    # Beside what the compiler keeps: __pycache__, or the user's cache if the code is read-only.
+    # Beside what the compiler keeps: in __pycache__, or the user's cache if the code is read-only.
     kept = getattr(roll_pitch_yaw, "stats", None)
     if kept is None:
         return  # numba was told not to compile
-    stamp = Path(kept.cache_path) / f"compiled-{_digest()}"
+    stamp = Path(kept.cache_path) / f"compiled-{digest()}"
     if stamp.exists():
         return
     with console.status("compiling the agents (the first time only)"):
@@ -44,13 +40,3 @@ def _rehearse_alone(config: Config) -> None:
     meta = PredictorMeta.of(alone)
     nothing = Predictor(meta, np.zeros((1, 1, 1, N_OUTPUTS * meta.N, meta.width)))
     rehearse(alone, Agent(alone, "r1", nothing))
-
-
-def _digest() -> str:
-    """What the compiler keys its cache by: files, their sizes and times, and versions."""
-    digest = hashlib.sha256(f"{version('numba')} {sys.version}".encode())
-    for package in (agents, shared):
-        for path in sorted(Path(package.__path__[0]).rglob("*.py")):
-            stat = path.stat()
-            digest.update(f"{path} {stat.st_size} {stat.st_mtime_ns}".encode())
-    return digest.hexdigest()[:16]

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeVar, cast
+import hashlib
+import re
+import shutil
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+from typing import Final, TypeVar, cast
 
 import numba
 
 F = TypeVar("F", bound=Callable[..., object])
+
+_ROOT: Final = Path(__file__).parents[1]
+_PACKAGES: Final = ("agents", "shared", "sim_server")
+_MARK: Final = "@compiled"
+_IMPORT: Final = re.compile(r"^from ([\w.]+) import (\([\w\s,]+\)|[\w ,]+)", re.MULTILINE)
 
 
 def compiled(function: F) -> F:
@@ -17,3 +29,52 @@ def compiled(function: F) -> F:
     on how the compiler reorders sums.
     """
     return cast(F, numba.njit(cache=True)(function))
+
+
+def sources(root: Path) -> Sequence[Path]:
+    """Files that machine code is made of: those with compiled functions, and all they import.
+
+    Args:
+        root: the folder of this project's packages.
+    """
+    found = [path for name in _PACKAGES for path in sorted((root / name).rglob("*.py"))]
+    texts = {path: path.read_text(encoding="utf-8") for path in found}
+    todo = [path for path, text in texts.items() if _MARK in text]
+    wanted = set(todo)
+    while todo:
+        for module, names in _IMPORT.findall(texts[todo.pop()]):
+            place = root.joinpath(*module.split("."))
+            inside = (place / f"{name}.py" for name in re.findall(r"\w+", names))
+            new = {place.with_suffix(".py"), *inside} & texts.keys() - wanted
+            todo += new
+            wanted |= new
+    return sorted(wanted)
+
+
+@lru_cache(maxsize=1)
+def digest() -> str:
+    """Digest of all that machine code is made of, compiler included."""
+    made_of = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
+    for path in sources(_ROOT):
+        made_of.update(path.read_bytes())
+    return made_of.hexdigest()[:16]
+
+
+def _key_by_all_sources() -> None:
+    """Keep machine code by all it is made of.
+
+    numba looks at a function's own file alone: after a change of a function that it calls, or of a
+    constant from another file, it would go on with the old code. Where the code cannot be written
+    to, it does not change either.
+    """
+    folder = _ROOT / "shared" / "__pycache__" / f"compiled-{digest()}"
+    with suppress(OSError):
+        if not folder.exists():
+            for old in folder.parent.glob("compiled-*"):
+                shutil.rmtree(old, ignore_errors=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        numba.config.CACHE_DIR = str(folder)
+
+
+if not numba.config.CACHE_DIR:  # NUMBA_CACHE_DIR
+    _key_by_all_sources()

@@ -1,0 +1,78 @@
+"""Machine code is kept for as long as nothing changes that it is made of."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from shared import jit
+
+FILES = {
+    "shared/__init__.py": "",
+    "shared/jit.py": Path(jit.__file__).read_text(encoding="utf-8"),
+    "shared/numbers.py": "OFFSET = 0.5\n",
+    "agents/__init__.py": "",
+    "agents/idle.py": "NOTHING = 0\n",
+    "agents/called.py": (
+        "from shared.jit import compiled\nfrom shared.numbers import OFFSET\n\n\n"
+        "@compiled\ndef called(x):\n    return 2.0 * x + OFFSET\n"
+    ),
+    "agents/caller.py": (
+        "from agents.called import called\nfrom shared.jit import compiled\n\n\n"
+        "@compiled\ndef caller(x):\n    return called(x)\n"
+    ),
+}
+SCRIPT = (
+    "from agents.caller import caller; found = caller(1.0); "
+    "print(found, sum(caller.stats.cache_hits.values()))"
+)
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    for name, text in FILES.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def run(package: Path) -> tuple[float, int]:
+    """What the caller gives, and how much of it was compiled before."""
+    environment = {**os.environ, "PYTHONPATH": str(package)}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT], env=environment, cwd=package, capture_output=True,
+        text=True, check=True, timeout=120,
+    )  # fmt: skip
+    value, hits = done.stdout.split()
+    return float(value), int(hits)
+
+
+def edit(file: Path, old: str, new: str) -> None:
+    file.write_text(file.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+
+
+def test_what_is_called_and_what_it_counts_with_is_compiled_anew(package: Path) -> None:
+    assert run(package) == (2.5, 0)
+    assert run(package) == (2.5, 1)
+    edit(package / "agents" / "idle.py", "0", "1")
+    assert run(package) == (2.5, 1)
+    edit(package / "agents" / "called.py", "2.0", "3.0")
+    assert run(package) == (3.5, 0)
+    edit(package / "shared" / "numbers.py", "0.5", "0.25")
+    assert run(package) == (3.25, 0)
+    assert run(package) == (3.25, 1)
+    kept = [path.name for path in (package / "shared" / "__pycache__").glob("compiled-*")]
+    assert len(kept) == 1, "no heap of what is of no use any more"
+
+
+def test_the_sources_are_those_with_compiled_functions_and_what_they_import() -> None:
+    root = Path(jit.__file__).parents[1]
+    found = {str(path.relative_to(root)) for path in jit.sources(root)}
+    assert {"agents/controller/controller.py", "agents/controller/swing.py", "agents/gait.py",
+            "shared/robot.py", "sim_server/sensors.py"} <= found  # fmt: skip
+    assert not {"agents/process.py", "shared/bus.py", "sim_server/world.py"} & found
