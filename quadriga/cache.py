@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
-import os
 from collections.abc import Iterable
 from dataclasses import asdict
 from functools import lru_cache
@@ -20,6 +19,7 @@ import sim_server
 from shared.clock import monotonic, sleep
 from shared.config import Config
 from shared.errors import PredictorError
+from shared.places import cache_dir
 
 _LOOK = 0.2  # s, between two looks for a file that another process writes
 # What a recorded walk depends on: the code of the world and of the agent, and what they rest on.
@@ -60,12 +60,6 @@ _FITTED = (
     "predictor", "neighbours", "phases", "phase_ridge", "ridge", "block_weight", "max_radius",
     "gain_range",
 )  # fmt: skip
-
-
-def cache_dir() -> Path:
-    """The user's cache folder: $XDG_CACHE_HOME/quadriga, or ~/.cache/quadriga."""
-    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(base) / "quadriga"
 
 
 def data_key(config: Config) -> str:

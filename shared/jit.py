@@ -14,6 +14,8 @@ from typing import Final, TypeVar, cast
 
 import numba
 
+from shared.places import cache_dir
+
 F = TypeVar("F", bound=Callable[..., object])
 
 _ROOT: Final = Path(__file__).parents[1]
@@ -64,17 +66,19 @@ def _key_by_all_sources() -> None:
     """Keep machine code by all it is made of.
 
     numba looks at a function's own file alone: after a change of a function that it calls, or of a
-    constant from another file, it would go on with the old code. Where the code cannot be written
-    to, it does not change either.
+    constant from another file, it would go on with the old code.
     """
-    folder = _ROOT / "shared" / "__pycache__" / f"compiled-{digest()}"
-    with suppress(OSError):
-        if not folder.exists():
-            for old in folder.parent.glob("compiled-*"):
-                shutil.rmtree(old, ignore_errors=True)
-        folder.mkdir(parents=True, exist_ok=True)
-        numba.config.CACHE_DIR = str(folder)
+    given = numba.config.CACHE_DIR  # NUMBA_CACHE_DIR
+    bases = [Path(given)] if given else [_ROOT / "shared" / "__pycache__", cache_dir()]
+    for base in bases:  # the user's own where the code cannot be written to
+        folder = base / f"compiled-{digest()}"
+        with suppress(OSError):
+            if not folder.exists():
+                for old in base.glob("compiled-*"):
+                    shutil.rmtree(old, ignore_errors=True)
+            folder.mkdir(parents=True, exist_ok=True)
+            numba.config.CACHE_DIR = str(folder)
+            return
 
 
-if not numba.config.CACHE_DIR:  # NUMBA_CACHE_DIR
-    _key_by_all_sources()
+_key_by_all_sources()

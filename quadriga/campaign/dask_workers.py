@@ -14,11 +14,11 @@ from typing import Any, Final
 import distributed
 from distributed import Client, LocalCluster, WorkerPlugin
 
-from quadriga.cache import cache_dir
 from quadriga.campaign.job import Job, walk
 from quadriga.campaign.outcome import Outcome
 from quadriga.campaign.predictors import file_sha256
 from shared.errors import ConfigError, ProcessError
+from shared.places import cache_dir
 from shared.signals import interrupts_held
 
 LOCAL: Final = "local"  # the address of a cluster that is made here and goes with the campaign

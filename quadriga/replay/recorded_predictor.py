@@ -12,9 +12,9 @@ import numpy as np
 
 from agents.planner.predictor import Predictor
 from agents.planner.store import predictor_sha256, read
-from quadriga.cache import cache_dir
 from shared.config import CENTRAL, Config
 from shared.errors import PredictorError, RecordingError
+from shared.places import cache_dir
 from shared.recording import Recording
 
 PREDICTOR: Final = "predictor.npz"  # its name in a run folder

@@ -12,9 +12,10 @@ from typing import Any
 import pytest
 
 from quadriga import cache
-from quadriga.cache import await_predictor, cache_dir, data_key, predictor_key
+from quadriga.cache import await_predictor, data_key, predictor_key
 from shared.config import Config
 from shared.errors import PredictorError
+from shared.places import cache_dir
 
 ALL = [
     f"{section.name}.{key.name}"

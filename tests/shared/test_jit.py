@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from shared import jit
+from shared import jit, places
 
 FILES = {
     "shared/__init__.py": "",
     "shared/jit.py": Path(jit.__file__).read_text(encoding="utf-8"),
+    "shared/places.py": Path(places.__file__).read_text(encoding="utf-8"),
     "shared/numbers.py": "OFFSET = 0.5\n",
     "agents/__init__.py": "",
     "agents/idle.py": "NOTHING = 0\n",
@@ -40,10 +41,9 @@ def package(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def run(package: Path) -> tuple[float, int]:
+def run(package: Path, **variables: str) -> tuple[float, int]:
     """What the caller gives, and how much of it was compiled before."""
-    environment = {**os.environ, "PYTHONPATH": str(package)}
-    environment.pop("NUMBA_CACHE_DIR", None)
+    environment = {**os.environ, "PYTHONPATH": str(package), **variables}
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], env=environment, cwd=package, capture_output=True,
         text=True, check=True, timeout=120,
@@ -68,6 +68,15 @@ def test_what_is_called_and_what_it_counts_with_is_compiled_anew(package: Path) 
     assert run(package) == (3.25, 1)
     kept = [path.name for path in (package / "shared" / "__pycache__").glob("compiled-*")]
     assert len(kept) == 1, "no heap of what is of no use any more"
+
+
+def test_so_it_is_in_a_folder_that_the_user_names(package: Path, tmp_path: Path) -> None:
+    there = str(tmp_path / "there")
+    assert run(package, NUMBA_CACHE_DIR=there) == (2.5, 0)
+    assert run(package, NUMBA_CACHE_DIR=there) == (2.5, 1)
+    edit(package / "agents" / "called.py", "2.0", "3.0")
+    assert run(package, NUMBA_CACHE_DIR=there) == (3.5, 0)
+    assert not list((package / "shared" / "__pycache__").glob("compiled-*"))
 
 
 def test_the_sources_are_those_with_compiled_functions_and_what_they_import() -> None:
