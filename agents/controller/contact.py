@@ -20,7 +20,7 @@ from shared.robot import FOOT_RADIUS, Array
 
 _EARLIEST_TOUCHDOWN = 0.5  # of swing: before this a load is the foot still leaving the ground
 _EARLIEST_STUMBLE = 0.12  # of swing, likewise
-_LATEST_STUMBLE = 0.8  # of swing: after this there is no time to give way
+_LATEST_STUMBLE = 0.67  # of swing: after this a new swing would be a kick, maybe into a gap
 _BELOW = 0.7  # of what a foot feels, share that must point upwards for the ground to be below it
 
 Flags = NDArray[np.bool_]

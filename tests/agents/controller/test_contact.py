@@ -102,6 +102,19 @@ def test_a_foot_stopped_from_the_side_is_no_contact_but_stumbles() -> None:
     assert state.stumble[1] == 0.0
 
 
+def test_late_in_its_swing_a_foot_gives_way_no_more() -> None:
+    """It would have to swing anew in less time than its leg can do it in."""
+    feet = Feet()
+    feet.force[1:3] = 0.0
+    feet.run(50, PAIR, 0.3, 0)
+    feet.force[1] = LOAD
+    feet.state.felt[1] = [-50.0, 0.0, 20.0]
+    state = feet.run(1, PAIR, 0.7, 0)
+    np.testing.assert_array_equal(state.contact, PAIR)
+    assert state.stumble[1] == 0.0
+    assert feet.run(20, PAIR, 0.75, 0).lift[1] == 0.0
+
+
 def test_a_stance_foot_beside_a_block_is_no_contact_until_it_stands_on_something() -> None:
     feet = Feet()
     feet.force[:] = [LOAD, 0.0, 0.0, 0.0]
