@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 import shutil
 import sys
@@ -74,11 +75,12 @@ def _key_by_all_sources() -> None:
         folder = base / f"compiled-{digest()}"
         with suppress(OSError):
             if not folder.exists():
-                for old in base.glob("compiled-*"):
+                for old in {*base.glob("compiled-*")} - {folder}:
                     shutil.rmtree(old, ignore_errors=True)
             folder.mkdir(parents=True, exist_ok=True)
-            numba.config.CACHE_DIR = str(folder)
-            return
+            if os.access(folder, os.W_OK):
+                numba.config.CACHE_DIR = str(folder)
+                return
 
 
 _key_by_all_sources()

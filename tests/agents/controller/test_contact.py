@@ -85,13 +85,19 @@ def test_a_foot_that_lands_early_is_a_contact_until_the_switch(tells_sides: bool
     assert state.ground[1] == pytest.approx(0.03)
 
 
-def test_a_foot_stopped_from_the_side_is_no_contact_but_stumbles() -> None:
-    """And begins its swing anew once nothing has stopped it for the time it gives way."""
+def stopped_from_the_side() -> Feet:
+    """One of two feet that swing."""
     feet = Feet()
     feet.force[1:3] = 0.0
     feet.run(50, PAIR, 0.3, 0)
     feet.force[1] = LOAD
     feet.state.felt[1] = [-50.0, 0.0, 20.0]
+    return feet
+
+
+def test_a_foot_stopped_from_the_side_is_no_contact_but_stumbles() -> None:
+    """And begins its swing anew once nothing has stopped it for the time it gives way."""
+    feet = stopped_from_the_side()
     state = feet.run(1, PAIR, 0.6, 0)
     np.testing.assert_array_equal(state.contact, PAIR)
     assert state.stumble[1] == pytest.approx(1e-3 * DETECTING.give_way_ms)
@@ -104,11 +110,7 @@ def test_a_foot_stopped_from_the_side_is_no_contact_but_stumbles() -> None:
 
 def test_late_in_its_swing_a_foot_gives_way_no_more() -> None:
     """It would have to swing anew in less time than its leg can do it in."""
-    feet = Feet()
-    feet.force[1:3] = 0.0
-    feet.run(50, PAIR, 0.3, 0)
-    feet.force[1] = LOAD
-    feet.state.felt[1] = [-50.0, 0.0, 20.0]
+    feet = stopped_from_the_side()
     state = feet.run(1, PAIR, 0.7, 0)
     np.testing.assert_array_equal(state.contact, PAIR)
     assert state.stumble[1] == 0.0
