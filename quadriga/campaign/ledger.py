@@ -18,6 +18,7 @@ from quadriga.campaign.outcome import Outcome, columns, from_cells, to_cells
 from shared.errors import ConfigError
 
 ROWS: Final = "trials.csv"
+_WRITTEN: Final = "what a campaign wrote there"
 
 
 class Ledger:
@@ -51,7 +52,7 @@ class Ledger:
             kept = read_manifest(folder) if (folder / FILE).is_file() else None
             self.manifest = manifest if kept is None else kept.merged(manifest, folder)
             self.rows = read_rows(folder, self.manifest)
-            write_text(folder / FILE, json.dumps(asdict(self.manifest), indent=1) + "\n")
+            write_text(folder / FILE, manifest_text(self.manifest))
             _mend(folder / ROWS, self.manifest)
             self._file = (folder / ROWS).open("a", encoding="utf-8", newline="")
         except BaseException:
@@ -79,13 +80,29 @@ def read_manifest(folder: Path) -> Manifest:
     Raises:
         ConfigError: it is no campaign's folder, or another version's.
     """
+    path = folder / FILE
     try:
-        body: Mapping[str, Any] = json.loads((folder / FILE).read_text(encoding="utf-8"))
+        return manifest_of(path.read_bytes(), str(path))
+    except OSError as error:
+        raise ConfigError(str(path), error.strerror or str(error), _WRITTEN) from None
+
+
+def manifest_of(text: bytes, name: str) -> Manifest:
+    """What a campaign's file says that it consists of.
+
+    Raises:
+        ConfigError: the text, of the file `name`, is something else, or another version's.
+    """
+    try:
+        body: Mapping[str, Any] = json.loads(text)
         return Manifest.from_dict(body)
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        raise ConfigError(
-            str(folder / FILE), str(error) or type(error).__name__, "what a campaign wrote there"
-        ) from None
+    except (ValueError, TypeError, KeyError) as error:
+        raise ConfigError(name, str(error) or type(error).__name__, _WRITTEN) from None
+
+
+def manifest_text(manifest: Manifest) -> str:
+    """The inverse of `manifest_of`."""
+    return json.dumps(asdict(manifest), indent=1) + "\n"
 
 
 def read_rows(folder: Path, manifest: Manifest) -> list[Outcome]:
@@ -99,6 +116,15 @@ def read_rows(folder: Path, manifest: Manifest) -> list[Outcome]:
         text = path.read_bytes() if path.exists() else b""
     except OSError as error:
         raise ConfigError(str(path), error.strerror or str(error), "a readable file") from None
+    return rows_of(text, str(path), manifest)
+
+
+def rows_of(text: bytes, name: str, manifest: Manifest) -> list[Outcome]:
+    """The rows that the text of the file `name` holds, as `read_rows` gives them.
+
+    Raises:
+        ConfigError: a line is no row, or a trial stands there twice.
+    """
     whole = text[: text.rfind(b"\n") + 1].decode("utf-8", errors="replace")
     found: dict[tuple[object, int], Outcome] = {}
     lines = csv.reader(io.StringIO(whole))
@@ -115,7 +141,7 @@ def read_rows(folder: Path, manifest: Manifest) -> list[Outcome]:
                 raise ValueError(f"a trial with code and versions {row.versions}")
             found[row.group, row.seed] = row
     except (ValueError, csv.Error) as error:
-        raise ConfigError(f"{path}, line {lines.line_num}", str(error), "a row of this campaign",
+        raise ConfigError(f"{name}, line {lines.line_num}", str(error), "a row of this campaign",
                           "edited by hand?") from None  # fmt: skip
     return list(found.values())
 
@@ -136,9 +162,14 @@ def kept_in(folder: Path) -> Iterator[None]:
 
 def write_text(path: Path, text: str) -> None:
     """Write a file that is there whole or not at all."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path, body: bytes) -> None:
+    """Write a file that is there whole or not at all."""
     partial = path.with_name(f"{path.name}.partial")
-    with partial.open("w", encoding="utf-8") as file:
-        file.write(text)
+    with partial.open("wb") as file:
+        file.write(body)
         file.flush()
         os.fsync(file.fileno())
     partial.replace(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final, Literal
 
 from quadriga.campaign.choice import Sweep, Variant
@@ -115,6 +116,10 @@ class Experiment:
     seeds: tuple[int, ...]
     published: Published
     requirements: tuple[Requirement, ...]
+
+    def folder(self, within: Path, part: Part) -> Path:
+        """The folder of one of its campaigns, where `within` has one for each experiment."""
+        return within / self.name / part.folder
 
     def worlds(self) -> list[tuple[str, ...]]:
         """Every world, scenario by scenario."""

@@ -26,6 +26,9 @@ def add_experiments(add: Add) -> None:
     option(
         "--seeds", metavar="LIST", help="a quick look at these instead, 0:2: shown, not published"
     )
+    option("--from-published", action="store_true",
+           help="go on from the published trials, if they are of this code, these libraries and "
+           "the same predictors, instead of walking anew what --out does not hold")  # fmt: skip
     add_where(command)
     option("--out", type=Path, default=Path("runs/experiments"), metavar="DIR",
            help="where campaigns are kept, to go on with (%(default)s)")  # fmt: skip

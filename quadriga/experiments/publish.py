@@ -8,6 +8,7 @@ from typing import Final
 
 from quadriga.campaign.ledger import read_manifest, read_rows, write_text
 from quadriga.campaign.manifest import FILE
+from quadriga.experiments import published_trials
 from quadriga.experiments.experiment import Experiment
 from quadriga.experiments.figures import draw
 from quadriga.experiments.page import BEGIN, END, Entry, fragment, page, replaced
@@ -78,6 +79,7 @@ def results_of(experiment: Experiment, runs: Path, into: Path) -> Results:
         text = to_json(found)
         kept.parent.mkdir(parents=True, exist_ok=True)
         write_text(kept, text)
+        published_trials.keep(experiment, runs, into)
         return from_json(text, str(kept))  # with the digits that the next clone will have
     if not kept.is_file():
         return Results()
@@ -92,16 +94,11 @@ def walked(experiment: Experiment, runs: Path) -> Results:
     """
     campaigns = []
     for part in experiment.parts:
-        folder = folder_of(runs, experiment, part.folder)
+        folder = experiment.folder(runs, part)
         if (folder / FILE).is_file():
             manifest = read_manifest(folder)
             campaigns.append((manifest, read_rows(folder, manifest)))
     return summarise(experiment, campaigns)
-
-
-def folder_of(runs: Path, experiment: Experiment, part: str) -> Path:
-    """The folder of one of an experiment's campaigns."""
-    return runs / experiment.name / part if part else runs / experiment.name
 
 
 def _drawn(experiment: Experiment, results: Results, into: Path) -> list[str]:

@@ -15,7 +15,7 @@ from shared.errors import ConfigError
 
 if TYPE_CHECKING:
     from quadriga.experiments.experiment import Experiment
-    from quadriga.experiments.walk import Named
+    from quadriga.experiments.walk import Planned
     from quadriga.sheet import Sheet
 
 LOOKS: Final = "looks"  # the folder of walks that are not published
@@ -26,6 +26,7 @@ def experiments(arguments: argparse.Namespace, _config: Config, _given: dict[str
     from quadriga.campaign.options import dask_of
     from quadriga.experiments.catalogue import CHECKOUT, load
     from quadriga.experiments.publish import PAGE, publish, walked
+    from quadriga.experiments.published_trials import take_up
     from quadriga.experiments.sheets import requirement_sheet, sheets
     from quadriga.variants import seeds_of
 
@@ -39,8 +40,11 @@ def experiments(arguments: argparse.Namespace, _config: Config, _given: dict[str
             _walk(arguments, experiment, plans, runs, dask)
             _show(experiment, sheets(experiment, walked(experiment, runs)))
         return 0
-    todo = [] if arguments.only_publish else _planned(chosen, arguments.out)
     into = arguments.into or CHECKOUT
+    if arguments.from_published:
+        for experiment in chosen:
+            take_up(experiment, into, arguments.out)
+    todo = [] if arguments.only_publish else _planned(chosen, arguments.out)
     # That all can be read and written is better known before hours of walking.
     entries = publish(every, arguments.out, into)
     for experiment, plans in todo:
@@ -53,7 +57,7 @@ def experiments(arguments: argparse.Namespace, _config: Config, _given: dict[str
     return 0
 
 
-def _planned(chosen: Iterable[Experiment], runs: Path) -> list[tuple[Experiment, list[Named]]]:
+def _planned(chosen: Iterable[Experiment], runs: Path) -> list[tuple[Experiment, list[Planned]]]:
     """Campaigns of experiments that can be walked, or gone on with."""
     from quadriga.experiments.walk import check_folders, plans_of
 
@@ -64,7 +68,7 @@ def _planned(chosen: Iterable[Experiment], runs: Path) -> list[tuple[Experiment,
 
 
 def _walk(
-    arguments: argparse.Namespace, experiment: Experiment, plans: list[Named], runs: Path,
+    arguments: argparse.Namespace, experiment: Experiment, plans: list[Planned], runs: Path,
     dask: str | None,
 ) -> None:  # fmt: skip
     from quadriga.experiments.walk import walk
@@ -92,3 +96,6 @@ def _check_options(arguments: argparse.Namespace) -> None:
                               "those of an experiment stand in its file")  # fmt: skip
     if arguments.only_publish and arguments.seeds:
         raise ConfigError("--seeds", repr(arguments.seeds), "none", "--only-publish walks nothing")
+    if arguments.from_published and (arguments.only_publish or arguments.seeds):
+        raise ConfigError("--from-published", "an option beside it", "neither --only-publish nor "
+                          "--seeds", "it says where walking goes on")  # fmt: skip

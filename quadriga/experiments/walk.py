@@ -13,21 +13,20 @@ from quadriga.campaign.manifest import FILE
 from quadriga.campaign.plan import Plan, build_plan
 from quadriga.campaign.report import report
 from quadriga.campaign.run import run
-from quadriga.experiments.experiment import Experiment
-from quadriga.experiments.publish import folder_of
+from quadriga.experiments.experiment import Experiment, Part
 
-Named = tuple[str, Plan]  # the folder of a campaign within that of the experiment, and its trials
+Planned = tuple[Part, Plan]  # one of an experiment's campaigns, and its trials
 
 
-def plans_of(experiment: Experiment) -> list[Named]:
+def plans_of(experiment: Experiment) -> list[Planned]:
     """The campaigns of an experiment.
 
     Raises:
         ConfigError: a key or a value is wrong, or a world cannot be built.
     """
     return [
-        (part.folder, build_plan(part.scenarios, experiment.variants, part.sweeps,
-                                 experiment.seeds, experiment.baseline, None, {}))
+        (part, build_plan(part.scenarios, experiment.variants, part.sweeps, experiment.seeds,
+                          experiment.baseline, None, {}))
         for part in experiment.parts
     ]  # fmt: skip
 
@@ -39,13 +38,13 @@ def check_folders(experiment: Experiment, runs: Path) -> None:
         ConfigError: a campaign's folder holds such trials, or is none.
     """
     for part in experiment.parts:
-        folder = folder_of(runs, experiment, part.folder)
+        folder = experiment.folder(runs, part)
         if (folder / FILE).is_file():
             read_manifest(folder).check_versions(origin(), folder)
 
 
 def walk(
-    experiment: Experiment, plans: Sequence[Named], runs: Path, *, jobs: int, dask: str | None,
+    experiment: Experiment, plans: Sequence[Planned], runs: Path, *, jobs: int, dask: str | None,
     typed: str, console: Console,
 ) -> None:  # fmt: skip
     """Walk what is missing of an experiment, and leave a report in each campaign's folder.
@@ -55,7 +54,7 @@ def walk(
         ProcessError: a worker died, or is not of this version.
     """
     for part, plan in plans:
-        folder = folder_of(runs, experiment, part)
+        folder = experiment.folder(runs, part)
         console.print(f"{folder}", markup=False, highlight=False)
         run(plan, folder, jobs=jobs, dask=dask, typed=typed, console=console)
         report(folder, baseline=None, record_worst=0, console=console, shown=False)

@@ -13,7 +13,6 @@ from quadriga.campaign.manifest import GroupEntry, Manifest, SweepEntry
 from quadriga.campaign.outcome import Outcome
 from quadriga.campaign.plan import Group
 from quadriga.experiments.experiment import Experiment, Part, Published, Requirement
-from quadriga.experiments.publish import folder_of
 from tests.quadriga.campaign.rows import row
 
 Fate = Callable[[Group, int], dict[str, Any]]  # changes of the row of a trial
@@ -76,7 +75,7 @@ def write_runs(experiment: Experiment, runs: Path, seeds: Iterable[int], fate: F
     for k, part in enumerate(experiment.parts):
         mine = manifest_of(experiment, k)
         rows = rows_of([entry.group for entry in mine.groups], seeds, fate)
-        with Ledger(folder_of(runs, experiment, part.folder), mine) as ledger:
+        with Ledger(experiment.folder(runs, part), mine) as ledger:
             for one in rows:
                 ledger.append(one)
 

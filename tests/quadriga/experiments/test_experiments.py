@@ -47,6 +47,11 @@ def test_walked_published_and_gone_on_with(capsys: Said, experiment: Path, tmp_p
     assert len(finished(runs / "tiny")) == 4
     assert main([*words, "--only-publish"]) == 0
     assert page.read_text(encoding="utf-8") == text
+    elsewhere = ["--out", str(tmp_path / "elsewhere"), "--from-published", "--jobs", "1"]
+    assert main([*words, *elsewhere]) == 0, "all walked and published"
+    again = finished(tmp_path / "elsewhere" / "tiny")
+    assert again == finished(runs / "tiny"), "nothing is walked twice"
+    assert page.read_text(encoding="utf-8") == text
     manifest = runs / "tiny" / "campaign.json"
     manifest.write_text(manifest.read_text(encoding="utf-8").replace("quadriga 0", "quadriga 9"),
                         encoding="utf-8")  # fmt: skip
@@ -100,6 +105,7 @@ def test_a_mistake_costs_one_line(capsys: Said, experiment: Path, tmp_path: Path
         ([name, "--into", str(bare)], "README.md: got No such file"),
         ([name, *where, "--seeds", "x"], "--seeds: got 'x'"),
         ([name, *where, "--seeds", "0", "--only-publish"], "walks nothing"),
+        ([name, *where, "--seeds", "0", "--from-published"], "--from-published: got"),
         ([name, *where, "--vx", "0.3"], "reference.vx: got 0.3"),
         ([name, *where, "--scenario", "flat"], "--scenario: got flat"),
         ([name, *where, "--dask", "paper"], "--dask: got 'paper'"),

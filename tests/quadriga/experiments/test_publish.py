@@ -10,11 +10,15 @@ import pytest
 from matplotlib import image
 
 from quadriga.campaign.choice import sweep_of
+from quadriga.experiments import published_trials
 from quadriga.experiments.catalogue import CHECKOUT, load
 from quadriga.experiments.experiment import Experiment, Part, Published, Requirement
 from quadriga.experiments.measures import MEASURES
 from quadriga.experiments.page import BEGIN, END, overview, replaced
-from quadriga.experiments.publish import PAGE, publish
+from quadriga.experiments.publish import KEPT, PAGE, publish
+from quadriga.experiments.published_trials import kept
+from quadriga.experiments.results import to_json
+from quadriga.experiments.summarise import summarise
 from shared.errors import ConfigError
 from tests.quadriga.experiments.made import checkout, experiment_of, upright, write_runs
 from tests.quadriga.experiments.test_summarise import fate
@@ -52,6 +56,9 @@ def test_the_same_bytes_again_and_from_what_is_published_alone(
         "README.md", "docs/results.md", "docs/results/small.json", "docs/results/swept.json",
         "docs/figures/small-success.png", "docs/figures/small-falls.png",
         "docs/figures/small-ratios.png", "docs/figures/swept-sweep.png",
+        "docs/results/trials/small/campaign.json.gz", "docs/results/trials/small/trials.csv.gz",
+        "docs/results/trials/swept/steps/campaign.json.gz",
+        "docs/results/trials/swept/steps/trials.csv.gz",
     }  # fmt: skip
     publish(experiments, runs, into)
     assert files(into) == first
@@ -174,6 +181,51 @@ def test_what_the_project_publishes_is_what_its_files_give(tmp_path: Path) -> No
         assert same, f"{name}: make figures ARGS=--only-publish"
     for figure in (figure for entry in entries for figure in entry.figures):
         assert (CHECKOUT / "docs" / figure).is_file()
+
+
+def test_what_is_published_follows_from_the_published_trials() -> None:
+    every, _ = load([])
+    for experiment in every:
+        if campaigns := kept(experiment, CHECKOUT):
+            told = (CHECKOUT / KEPT / f"{experiment.name}.json").read_text(encoding="utf-8")
+            assert to_json(summarise(experiment, campaigns)) == told, experiment.name
+            assert all(not manifest.typed for manifest, _ in campaigns)
+
+
+def test_published_trials_are_taken_up_and_gone_on_with(
+    experiments: list[Experiment], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    into, runs, later = checkout(tmp_path / "here"), tmp_path / "runs", tmp_path / "later"
+    monkeypatch.setattr(published_trials, "origin", lambda: "code 1")
+    for experiment in experiments[:2]:
+        write_runs(experiment, runs, range(3), fate)
+    publish(experiments, runs, into)
+    first = files(into)
+    for experiment in experiments:
+        published_trials.take_up(experiment, into, later)
+    for name in ("small/trials.csv", "swept/steps/trials.csv"):
+        assert (later / name).read_bytes() == (runs / name).read_bytes()
+    assert {path.name for path in later.iterdir()} == {"small", "swept"}
+    publish(experiments, later, into)
+    assert files(into) == first
+    write_runs(experiments[0], later, range(3, 5), fate)
+    published_trials.take_up(experiments[0], into, later)
+    (entry, *_) = publish(experiments, later, into)
+    assert {line.done for line in entry.results.lines} == {5, 10}, "what is there wins"
+
+
+def test_published_trials_of_other_code_or_damaged_are_one_error(tmp_path: Path) -> None:
+    experiment, into, runs = experiment_of("ice"), checkout(tmp_path / "here"), tmp_path / "runs"
+    write_runs(experiment, runs, range(3), upright)
+    publish([experiment], runs, into)
+    later = tmp_path / "later"
+    with pytest.raises(ConfigError, match=r"--from-published: small: got .*expected code 1"):
+        published_trials.take_up(experiment, into, later)
+    packed = into / "docs/results/trials/small/trials.csv.gz"
+    packed.write_bytes(packed.read_bytes()[:-20])
+    with pytest.raises(ConfigError, match=r"trials/small: got .*expected published trials"):
+        published_trials.take_up(experiment, into, later)
+    assert not later.exists()
 
 
 def test_an_experiment_without_pairs_has_no_table_of_them(tmp_path: Path) -> None:
