@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from quadriga import recording_cli, verbs
+from quadriga import process_verbs, recording_cli, verbs
 from quadriga.campaign.options import add_campaign
 from quadriga.experiments.options import add_experiments
 from quadriga.recording_cli import add_file
@@ -83,15 +83,14 @@ def parser() -> argparse.ArgumentParser:
     walk.add_argument("--out", type=Path, metavar="DIR", help="run folder (runs/<date>-<time>)")
     walk.add_argument("--no-render", action="store_true", help="no pictures of the walk")
     add("scenarios", verbs.scenarios, "list the scenarios that can be walked, and what they are")
-    add("sim", verbs.sim, "the sim server alone")
-    agent = add("agent", verbs.agent, "the agent of one robot")
+    add("sim", process_verbs.sim, "the sim server alone")
+    agent = add("agent", process_verbs.agent, "the agent of one robot")
     agent.add_argument("--robot", required=True, metavar="NAME", help="r1 … rn")
     agent.add_argument("--predictor", type=Path, metavar="FILE", help="instead of the cached one")
-    plan = add(
-        "plan", verbs.plan, "the planner of the whole team (planner.kind centralised, deepc)"
-    )
+    plan = add("plan", process_verbs.plan,
+               "the planner of the whole team (planner.kind centralised, deepc)")  # fmt: skip
     plan.add_argument("--predictor", type=Path, metavar="FILE", help="instead of the cached one")
-    record = add("record", verbs.record, "record the traffic of a team to an MCAP file")
+    record = add("record", process_verbs.record, "record the traffic of a team to an MCAP file")
     recording_cli.add_record_options(record)
     for waiting in (agent, plan, record):
         waiting.add_argument("--wait", type=float, default=0.0, metavar="S",
@@ -114,11 +113,11 @@ def parser() -> argparse.ArgumentParser:
     recording_cli.add_verbs(add)
     _add_replay(add("replay", verbs.replay,
                     "run recorded agents again and compare what they say to the byte"))  # fmt: skip
-    router = add("router", verbs.router, "the router between processes in client mode")
+    router = add("router", process_verbs.router, "the router between processes in client mode")
     router.add_argument("--listen", metavar="ENDPOINT", help="where (bus.endpoint)")
     router.add_argument("--once", action="store_true", help="leave when the team has walked")
     add("prepare", verbs.prepare, "collect, fit and compile what a walk needs, beforehand")
-    add("operate", verbs.operate, "publish the velocity reference of the configuration")
+    add("operate", process_verbs.operate, "publish the velocity reference of the configuration")
     add("collect", verbs.collect, "collect the data a predictor is fitted to")
     fit = add("fit", verbs.fit, "fit the predictor, hold it against its gates and report on it")
     fit.add_argument("--all", action="store_true",
@@ -127,7 +126,7 @@ def parser() -> argparse.ArgumentParser:
                         "compare planners and predictors in the same worlds"))  # fmt: skip
     add_campaign(add)
     add_experiments(add)
-    estop = add("estop", verbs.estop, "stop the team at once: every joint is damped")
+    estop = add("estop", process_verbs.estop, "stop the team at once: every joint is damped")
     estop.add_argument("--reason", default="operator", help="told to every agent")
     config = add("config", verbs.show_config, "print the configuration in force as TOML")
     config.add_argument("--markdown", action="store_true", help="as documentation instead")

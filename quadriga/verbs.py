@@ -1,4 +1,7 @@
-"""One function per command. Each imports what it needs: a process should start fast."""
+"""One function per command; those of processes: process_verbs, of recordings: recording_verbs.
+
+Each imports what it needs: a process should start fast.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,13 @@ import argparse
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as installed_version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich.console import Console
 
-from shared.config import CENTRAL, Config
+from shared.config import Config
 from shared.config_text import to_markdown, to_toml
 from shared.errors import ConfigError
-from shared.robot import robot_names
-from shared.signals import stop_flag
-
-if TYPE_CHECKING:
-    from agents.planner.predictor import Predictor
 
 Given = dict[str, Any]
 
@@ -46,90 +44,6 @@ def scenarios(_arguments: argparse.Namespace, _config: Config, _given: Given) ->
         table.add_row(name, description(name))
     Console().print(table)
     return 0
-
-
-def sim(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
-    """The sim server's process."""
-    from sim_server.process import run
-
-    run(config)
-    return 0
-
-
-def agent(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
-    """One agent's process."""
-    from agents.process import run
-
-    names = robot_names(config.team.robots)
-    if arguments.robot not in names:
-        raise ConfigError("--robot", repr(arguments.robot), f"one of {', '.join(names)}")
-    predictor = None
-    if config.planner.kind not in ("none", *CENTRAL):
-        predictor = _predictor(config, arguments)
-    run(config, arguments.robot, predictor)
-    return 0
-
-
-def plan(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
-    """The process of a planner that plans for the whole team."""
-    from agents.central_process import run
-    from quadriga.identify import team_planner
-
-    if config.planner.kind not in CENTRAL:
-        raise ConfigError("planner.kind", repr(config.planner.kind), f"one of {', '.join(CENTRAL)}",
-                          "in all other kinds each agent plans for itself")  # fmt: skip
-    run(config, team_planner(config, _predictor(config, arguments)))
-    return 0
-
-
-def _predictor(config: Config, arguments: argparse.Namespace) -> Predictor:
-    """The predictor of `--predictor`, or this machine's for `config`, once it is there."""
-    from agents.planner.store import load
-    from quadriga.cache import await_predictor, predictor_path
-
-    path = arguments.predictor or predictor_path(config)
-    if arguments.wait:
-        await_predictor(path, arguments.wait)
-    return load(path, config)[0]
-
-
-def record(arguments: argparse.Namespace, config: Config, given: Given) -> int:
-    """The recorder's process."""
-    from quadriga.recorder import run
-    from quadriga.recording_verbs import recorded, wanted
-    from quadriga.summary import RECORDING
-
-    path, choice = arguments.output, wanted(arguments)
-    if path is None:
-        from quadriga.run_folder import make_run_dir
-
-        path = make_run_dir(None) / RECORDING
-    elif arguments.report and path.name != RECORDING:
-        raise ConfigError("--output", str(path), f"DIR/{RECORDING}", "--report fills its folder")
-    sha256 = arguments.predictor_sha256 or _fitted_sha256(config, arguments.wait)
-    say = Console(stderr=True, markup=False, highlight=False, soft_wrap=True).print
-    with stop_flag() as stopped:
-        done = run(
-            config, path, predictor_sha256=sha256, stopped=stopped, wanted=choice, say=say
-        )  # fmt: skip
-        if stopped() or not arguments.report:
-            print(recorded(done))
-            return 0
-    arguments.run, arguments.html = path.parent, None
-    return report(arguments, config, given)
-
-
-def _fitted_sha256(config: Config, wait: float) -> str:
-    """Digest of this machine's predictor for `config`, "" if there is none."""
-    if config.planner.kind == "none":
-        return ""
-    from agents.planner.store import load, predictor_sha256
-    from quadriga.cache import await_predictor, predictor_path
-
-    path = predictor_path(config)
-    if wait:
-        await_predictor(path, wait)
-    return predictor_sha256(load(path, config)[0]) if path.is_file() else ""
 
 
 def report(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
@@ -208,22 +122,6 @@ def replay(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
     return int(any(outcome.failed for outcome in outcomes))
 
 
-def operate(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
-    """The operator's process."""
-    from quadriga.operator import run
-
-    run(config)
-    return 0
-
-
-def estop(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
-    """One emergency stop."""
-    from quadriga.operator import stop_team
-
-    stop_team(config, arguments.reason)
-    return 0
-
-
 def collect(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Collect data unless there are some."""
     from quadriga.cache import data_path
@@ -272,14 +170,6 @@ def prepare(_arguments: argparse.Namespace, config: Config, _given: Given) -> in
     warm_up(config, console)
     if config.planner.kind != "none":
         print(ensure_predictor(config, console))
-    return 0
-
-
-def router(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
-    """The router's process."""
-    from quadriga.router import run
-
-    run(config, arguments.listen or config.bus.endpoint, once=arguments.once)
     return 0
 
 
