@@ -146,6 +146,12 @@ def rows_of(text: bytes, name: str, manifest: Manifest) -> list[Outcome]:
     return list(found.values())
 
 
+def rows_text(rows: Sequence[Outcome], manifest: Manifest) -> str:
+    """The inverse of `rows_of`, sorted: equal rows give equal text."""
+    ordered = sorted(rows, key=lambda row: (row.group, row.seed))
+    return _head(manifest) + "".join(_line(to_cells(row)) for row in ordered)
+
+
 @contextmanager
 def kept_in(folder: Path) -> Iterator[None]:
     """What cannot be written into a campaign's folder is one error; what was written is kept.
@@ -167,7 +173,7 @@ def write_text(path: Path, text: str) -> None:
 
 def write_bytes(path: Path, body: bytes) -> None:
     """Write a file that is there whole or not at all."""
-    partial = path.with_name(f"{path.name}.partial")
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     with partial.open("wb") as file:
         file.write(body)
         file.flush()
@@ -181,7 +187,11 @@ def _mend(path: Path, manifest: Manifest) -> None:
         text = path.read_bytes()
         os.truncate(path, text.rfind(b"\n") + 1)
     if not path.exists() or not path.stat().st_size:
-        write_text(path, _line(columns([sweep.key for sweep in manifest.sweeps])))
+        write_text(path, _head(manifest))
+
+
+def _head(manifest: Manifest) -> str:
+    return _line(columns([sweep.key for sweep in manifest.sweeps]))
 
 
 def _line(cells: Sequence[str]) -> str:

@@ -55,7 +55,7 @@ def run(
         read_manifest(out).check_versions(origin(), out)
     warm_up(next(iter(plan.configs.values())), console)
     fitted = prepared(plan.configs.values(), console)
-    manifest = _manifest(plan, fitted, typed)
+    manifest = manifest_for(plan, fitted, typed)
     with Ledger(out, manifest) as ledger, kept_in(out):
         _write_configs(out, plan.configs)
         done = {(row.group, row.seed) for row in ledger.rows}
@@ -115,7 +115,8 @@ def _write_configs(out: Path, configs: Mapping[Group, Config]) -> None:
         write_text(config_file(out, group), to_toml(config))
 
 
-def _manifest(plan: Plan, fitted: Mapping[Config, Fitted], typed: str) -> Manifest:
+def manifest_for(plan: Plan, fitted: Mapping[Config, Fitted], typed: str) -> Manifest:
+    """What a campaign of this plan consists of, walked with these predictors by this code."""
     return Manifest(
         typed=(typed,),
         baseline=plan.baseline,
@@ -145,7 +146,7 @@ def _dask() -> Walks:
     except ModuleNotFoundError as error:
         raise ConfigError(
             "--dask", f"no package {error.name!r}", "the extra 'campaign'",
-            "pip install 'quadriga[campaign]', or leave --dask out",
+            "pip install -e '.[campaign]' in the checkout, or leave --dask out",
         ) from None  # fmt: skip
     found: Walks = module.each_done
     return found

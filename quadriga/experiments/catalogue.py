@@ -38,7 +38,7 @@ def load(given: Sequence[str]) -> tuple[list[Experiment], list[str]]:
     for word in given or known:
         if word.endswith(_SUFFIX):
             name = Path(word).stem
-            if files.setdefault(name, Path(word)) != Path(word):
+            if files.setdefault(name, Path(word)).resolve() != Path(word).resolve():
                 raise ConfigError("experiments", word, "a file of another name",
                                   f"there is an experiment {name!r}")  # fmt: skip
         elif word in known:

@@ -2,33 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Container, Sequence
 from pathlib import Path
 from typing import Final
 
 from quadriga.campaign.ledger import read_manifest, read_rows, write_text
 from quadriga.campaign.manifest import FILE
-from quadriga.experiments import published_trials
-from quadriga.experiments.experiment import Experiment
+from quadriga.experiments.experiment import Experiment, Part
 from quadriga.experiments.figures import draw
 from quadriga.experiments.page import BEGIN, END, Entry, fragment, page, replaced
+from quadriga.experiments.published_trials import keep, outnumbered
 from quadriga.experiments.results import Results, from_json, to_json
-from quadriga.experiments.summarise import fitting, summarise
+from quadriga.experiments.summarise import Walked, fitting, summarise
 from shared.errors import ConfigError
 
 README: Final = "README.md"
 PAGE: Final = Path("docs/results.md")
 KEPT: Final = Path("docs/results")
 FIGURES: Final = Path("docs/figures")
+Say = Callable[[str], None]
 
 
-def publish(experiments: Sequence[Experiment], runs: Path, into: Path) -> list[Entry]:
+def publish(
+    experiments: Sequence[Experiment], runs: Path, into: Path, renewed: Container[str], say: Say
+) -> list[Entry]:
     """Write everything that is published of these experiments.
 
     Args:
         experiments: all of the page.
-        runs: where their campaigns' folders are, if they are; they win over what is published.
+        runs: where their campaigns' folders are, if they are.
         into: the checkout whose README and docs are written.
+        renewed: names of the experiments whose runs win over what is published of them.
+        say: takes what a user should know.
 
     Raises:
         ConfigError: a campaign's folder or published results cannot be read, something cannot be
@@ -38,7 +43,9 @@ def publish(experiments: Sequence[Experiment], runs: Path, into: Path) -> list[E
     entries = []
     try:
         for experiment in experiments:
-            results = results_of(experiment, runs, into)
+            if experiment.name in renewed:
+                renew(experiment, runs, into, say)
+            results = published(experiment, into)
             entries.append(Entry(experiment, results, _drawn(experiment, results, into)))
         write_text(into / PAGE, page(entries))
         write_text(into / README, replaced(readme, fragment(entries)) or readme)
@@ -67,38 +74,52 @@ def checked(into: Path) -> str:
     return text
 
 
-def results_of(experiment: Experiment, runs: Path, into: Path) -> Results:
-    """What came of an experiment: of its runs, which are then published; else as published.
+def renew(experiment: Experiment, runs: Path, into: Path, say: Say) -> None:
+    """Publish what came of an experiment's runs, if there are any and they are not the fewer.
 
     Raises:
         ConfigError: a folder or a file is not what was written there.
+        OSError: a file cannot be written.
+    """
+    campaigns = walked(experiment, runs)
+    found = summarise(experiment, list(campaigns.values()))
+    if not found.lines:
+        return
+    if outnumbered(experiment, campaigns, into):
+        say(f"{experiment.name}: what is published stays; it has more trials, of the same code, "
+            f"than {runs / experiment.name}")  # fmt: skip
+        return
+    kept = into / KEPT / f"{experiment.name}.json"
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    write_text(kept, to_json(found))
+    keep(experiment, campaigns, into)
+
+
+def published(experiment: Experiment, into: Path) -> Results:
+    """What is published of an experiment, with the digits that it is published with.
+
+    Raises:
+        ConfigError: the file is not what was written there.
     """
     kept = into / KEPT / f"{experiment.name}.json"
-    found = walked(experiment, runs)
-    if found.lines:
-        text = to_json(found)
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        write_text(kept, text)
-        published_trials.keep(experiment, runs, into)
-        return from_json(text, str(kept))  # with the digits that the next clone will have
     if not kept.is_file():
         return Results()
     return fitting(experiment, from_json(kept.read_bytes().decode(errors="replace"), str(kept)))
 
 
-def walked(experiment: Experiment, runs: Path) -> Results:
-    """What came of an experiment's runs.
+def walked(experiment: Experiment, runs: Path) -> dict[Part, Walked]:
+    """The campaigns that there are of an experiment.
 
     Raises:
         ConfigError: a folder is not what was written there.
     """
-    campaigns = []
+    found: dict[Part, Walked] = {}
     for part in experiment.parts:
         folder = experiment.folder(runs, part)
         if (folder / FILE).is_file():
             manifest = read_manifest(folder)
-            campaigns.append((manifest, read_rows(folder, manifest)))
-    return summarise(experiment, campaigns)
+            found[part] = (manifest, read_rows(folder, manifest))
+    return found
 
 
 def _drawn(experiment: Experiment, results: Results, into: Path) -> list[str]:

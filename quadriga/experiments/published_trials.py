@@ -3,95 +3,145 @@
 from __future__ import annotations
 
 import gzip
+import zlib
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from quadriga.campaign.job import origin
 from quadriga.campaign.ledger import (
     ROWS,
     kept_in,
     manifest_of,
     manifest_text,
     read_manifest,
+    read_rows,
     rows_of,
+    rows_text,
     write_bytes,
 )
-from quadriga.campaign.manifest import FILE
-from quadriga.experiments.experiment import Experiment
+from quadriga.campaign.manifest import FILE, Manifest
+from quadriga.campaign.outcome import Outcome
+from quadriga.experiments.experiment import Experiment, Part
 from quadriga.experiments.summarise import Walked
 from shared.errors import ConfigError
 
 TRIALS: Final = Path("docs/results/trials")
-_FILES: Final = (ROWS, FILE)  # in this order: what makes a folder a campaign's comes last
+Campaigns = Mapping[Part, Walked]
 
 
-def keep(experiment: Experiment, runs: Path, into: Path) -> None:
-    """Pack an experiment's campaigns; equal trials give equal bytes, whatever was typed.
+def keep(experiment: Experiment, campaigns: Campaigns, into: Path) -> None:
+    """Pack an experiment's campaigns, instead of those packed before.
+
+    Equal trials give equal files, whatever was typed and in which order they were walked.
 
     Args:
         experiment: whose.
-        runs: where their folders are, of those that were begun.
+        campaigns: of those of its parts that were begun.
         into: the checkout to keep them in.
 
     Raises:
-        ConfigError: a folder is not what was written there.
-        OSError: a file cannot be read or written.
+        OSError: a file cannot be written.
     """
-    for part in experiment.parts:
-        folder = experiment.folder(runs, part)
+    written = set()
+    for part, (manifest, rows) in campaigns.items():
         packed = experiment.folder(into / TRIALS, part)
-        if (folder / FILE).is_file():
-            manifest = replace(read_manifest(folder), typed=())  # it names folders of one machine
-            packed.mkdir(parents=True, exist_ok=True)
-            _pack(packed / f"{ROWS}.gz", (folder / ROWS).read_bytes())
-            _pack(packed / f"{FILE}.gz", manifest_text(manifest).encode("utf-8"))
+        packed.mkdir(parents=True, exist_ok=True)
+        alike = replace(manifest, typed=())  # commands name folders of one machine
+        for name, text in ((ROWS, rows_text(rows, manifest)), (FILE, manifest_text(alike))):
+            written.add(path := packed / f"{name}.gz")
+            _pack(path, text.encode("utf-8"))
+    for path in (into / TRIALS / experiment.name).rglob("*.gz"):
+        if path not in written:
+            path.unlink()
 
 
-def kept(experiment: Experiment, into: Path) -> list[Walked]:
+def kept(experiment: Experiment, into: Path) -> Campaigns:
     """An experiment's campaigns as they are kept; none that nobody has published.
 
     Raises:
         ConfigError: a file is not what was written there.
     """
-    found: list[Walked] = []
-    for part in experiment.parts:
-        packed = experiment.folder(into / TRIALS, part)
-        if (packed / f"{FILE}.gz").is_file():
-            texts = _texts(packed)
-            manifest = manifest_of(texts[FILE], str(packed / f"{FILE}.gz"))
-            found.append((manifest, rows_of(texts[ROWS], str(packed / f"{ROWS}.gz"), manifest)))
-    return found
+    found = {part: manifest_kept(experiment, part, into) for part in experiment.parts}
+    return {
+        part: (manifest, _rows(experiment, part, into, manifest))
+        for part, manifest in found.items()
+        if manifest is not None
+    }
 
 
-def take_up(experiment: Experiment, into: Path, runs: Path) -> None:
-    """Unpack an experiment's published campaigns, to go on with; one that is there stays.
+def outnumbered(experiment: Experiment, campaigns: Campaigns, into: Path) -> bool:
+    """Whether more trials than these are published, of the same code and libraries.
 
     Raises:
-        ConfigError: they were walked with other code or libraries, a file is not what was written
-            there, or the folder cannot be written to.
+        ConfigError: a file is not what was written there.
     """
-    for manifest, _ in kept(experiment, into):
-        if manifest.versions != origin():
-            raise ConfigError(f"--from-published: {experiment.name}", f"trials with {origin()}",
-                              manifest.versions, "without the option all is walked anew"
-                              )  # fmt: skip
-    for part in experiment.parts:
-        folder = experiment.folder(runs, part)
-        packed = experiment.folder(into / TRIALS, part)
-        if (packed / f"{FILE}.gz").is_file() and not (folder / FILE).exists():
-            with kept_in(folder):
-                folder.mkdir(parents=True, exist_ok=True)
-                for name, text in _texts(packed).items():
-                    write_bytes(folder / name, text)
+    manifests = [manifest_kept(experiment, part, into) for part in experiment.parts]
+    old = {manifest.versions for manifest in manifests if manifest is not None}
+    if not old or old != {manifest.versions for manifest, _ in campaigns.values()}:
+        return False
+    return _count(kept(experiment, into)) > _count(campaigns)
+
+
+def unpack(experiment: Experiment, part: Part, into: Path, runs: Path) -> int:
+    """Make the folder of one of an experiment's published campaigns, unless it is there.
+
+    Returns:
+        How many trials were unpacked.
+
+    Raises:
+        ConfigError: the folder lacks some of them, cannot be written, or nothing is published.
+    """
+    manifest = manifest_kept(experiment, part, into)
+    if manifest is None:
+        raise ConfigError(f"--from-published: {experiment.name}", "nothing", "published trials")
+    folder, rows = experiment.folder(runs, part), _rows(experiment, part, into, manifest)
+    if (folder / FILE).exists():
+        there = {(row.group, row.seed) for row in read_rows(folder, read_manifest(folder))}
+        missing = sum((row.group, row.seed) not in there for row in rows)
+        if missing:
+            raise ConfigError(f"--from-published: {folder}", f"a folder without {missing:,} of the "
+                              "published trials", "one with all of them, or none",
+                              "--out names another")  # fmt: skip
+        return 0
+    with kept_in(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        write_bytes(folder / ROWS, rows_text(rows, manifest).encode("utf-8"))
+        write_bytes(folder / FILE, manifest_text(manifest).encode("utf-8"))
+    return len(rows)
+
+
+def manifest_kept(experiment: Experiment, part: Part, into: Path) -> Manifest | None:
+    """What one of an experiment's campaigns consists of as it is published, if it is.
+
+    Raises:
+        ConfigError: the file is not what was written there.
+    """
+    path = experiment.folder(into / TRIALS, part) / f"{FILE}.gz"
+    return manifest_of(_unpacked(path), str(path)) if path.is_file() else None
+
+
+def _count(campaigns: Campaigns) -> int:
+    return sum(len(rows) for _, rows in campaigns.values())
+
+
+def _rows(experiment: Experiment, part: Part, into: Path, manifest: Manifest) -> list[Outcome]:
+    path = experiment.folder(into / TRIALS, part) / f"{ROWS}.gz"
+    return rows_of(_unpacked(path), str(path), manifest)
 
 
 def _pack(path: Path, body: bytes) -> None:
-    write_bytes(path, gzip.compress(body, mtime=0))
-
-
-def _texts(packed: Path) -> dict[str, bytes]:
+    """Write it, unless what is there says the same: other versions of zlib pack otherwise."""
     try:
-        return {name: gzip.decompress((packed / f"{name}.gz").read_bytes()) for name in _FILES}
-    except (OSError, EOFError) as error:
-        raise ConfigError(str(packed), str(error), "published trials", "edited by hand?") from None
+        same = gzip.decompress(path.read_bytes()) == body
+    except (OSError, EOFError, zlib.error):
+        same = False
+    if not same:
+        write_bytes(path, gzip.compress(body, mtime=0))
+
+
+def _unpacked(path: Path) -> bytes:
+    try:
+        return gzip.decompress(path.read_bytes())
+    except (OSError, EOFError, zlib.error) as error:
+        raise ConfigError(str(path), str(error), "published trials", "edited by hand?") from None

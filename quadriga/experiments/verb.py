@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -26,8 +27,9 @@ def experiments(arguments: argparse.Namespace, _config: Config, _given: dict[str
     from quadriga.campaign.options import dask_of
     from quadriga.experiments.catalogue import CHECKOUT, load
     from quadriga.experiments.publish import PAGE, publish, walked
-    from quadriga.experiments.published_trials import take_up
     from quadriga.experiments.sheets import requirement_sheet, sheets
+    from quadriga.experiments.summarise import summarise
+    from quadriga.experiments.walk import take_up
     from quadriga.variants import seeds_of
 
     _check_options(arguments)
@@ -38,18 +40,24 @@ def experiments(arguments: argparse.Namespace, _config: Config, _given: dict[str
         seeds, runs = seeds_of("--seeds", arguments.seeds), arguments.out / LOOKS
         for experiment, plans in _planned([replace(one, seeds=seeds) for one in chosen], runs):
             _walk(arguments, experiment, plans, runs, dask)
-            _show(experiment, sheets(experiment, walked(experiment, runs)))
+            found = summarise(experiment, list(walked(experiment, runs).values()))
+            _show(experiment, sheets(experiment, found))
         return 0
-    into = arguments.into or CHECKOUT
-    if arguments.from_published:
-        for experiment in chosen:
-            take_up(experiment, into, arguments.out)
-    todo = [] if arguments.only_publish else _planned(chosen, arguments.out)
+    into, runs = arguments.into or CHECKOUT, arguments.out
+    todo = [] if arguments.only_publish else _planned(chosen, runs)
+    renewed = asked
+    if arguments.only_publish and not arguments.names:
+        renewed = [one.name for one in every if _of_this_code(one, runs)]
     # That all can be read and written is better known before hours of walking.
-    entries = publish(every, arguments.out, into)
+    entries = publish(every, runs, into, renewed, _say)
+    if arguments.from_published:
+        for experiment, plans in todo:
+            taken = take_up(experiment, plans, into, runs, typed=arguments.typed,
+                            console=Console(stderr=True))  # fmt: skip
+            _say(f"{experiment.name}: {taken:,} published trials taken up")
     for experiment, plans in todo:
-        _walk(arguments, experiment, plans, arguments.out, dask)
-        entries = publish(every, arguments.out, into)
+        _walk(arguments, experiment, plans, runs, dask)
+        entries = publish(every, runs, into, renewed, _say)
     for entry in entries:
         if entry.experiment.name in asked:
             _show(entry.experiment, [requirement_sheet(entry.experiment, entry.results)])
@@ -65,6 +73,25 @@ def _planned(chosen: Iterable[Experiment], runs: Path) -> list[tuple[Experiment,
     for experiment, _ in planned:
         check_folders(experiment, runs)
     return planned
+
+
+def _of_this_code(experiment: Experiment, runs: Path) -> bool:
+    """Whether an experiment's runs may be published although nobody named it."""
+    from quadriga.campaign.job import origin
+    from quadriga.campaign.ledger import read_manifest
+    from quadriga.campaign.manifest import FILE
+
+    folders = [experiment.folder(runs, part) for part in experiment.parts]
+    versions = {read_manifest(one).versions for one in folders if (one / FILE).is_file()}
+    if versions <= {origin()}:
+        return True
+    _say(f"{experiment.name}: what is published stays; {runs / experiment.name} was walked with "
+         "other code or libraries (its name publishes it)")  # fmt: skip
+    return False
+
+
+def _say(text: str) -> None:
+    print(f"quadriga: {text}", file=sys.stderr)
 
 
 def _walk(

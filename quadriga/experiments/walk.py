@@ -11,9 +11,12 @@ from quadriga.campaign.job import origin
 from quadriga.campaign.ledger import read_manifest
 from quadriga.campaign.manifest import FILE
 from quadriga.campaign.plan import Plan, build_plan
+from quadriga.campaign.predictors import prepared
 from quadriga.campaign.report import report
-from quadriga.campaign.run import run
+from quadriga.campaign.run import manifest_for, run
 from quadriga.experiments.experiment import Experiment, Part
+from quadriga.experiments.published_trials import manifest_kept, unpack
+from shared.errors import ConfigError
 
 Planned = tuple[Part, Plan]  # one of an experiment's campaigns, and its trials
 
@@ -41,6 +44,36 @@ def check_folders(experiment: Experiment, runs: Path) -> None:
         folder = experiment.folder(runs, part)
         if (folder / FILE).is_file():
             read_manifest(folder).check_versions(origin(), folder)
+
+
+def take_up(
+    experiment: Experiment, plans: Sequence[Planned], into: Path, runs: Path, *, typed: str,
+    console: Console,
+) -> int:  # fmt: skip
+    """Unpack what is published of an experiment, to go on with it.
+
+    Returns:
+        How many trials were unpacked; none where the runs hold them already.
+
+    Raises:
+        ConfigError: published trials are of other code, libraries, configurations or predictors,
+            a folder holds others, or a file cannot be read or written.
+    """
+    taken = 0
+    for part, plan in plans:
+        folder = experiment.folder(runs, part)
+        manifest = manifest_kept(experiment, part, into)
+        if manifest is None:
+            continue
+        try:
+            manifest.check_versions(origin(), folder)  # before anything is collected
+            fitted = prepared(plan.configs.values(), console)
+            manifest.merged(manifest_for(plan, fitted, typed), folder)
+        except ConfigError as error:
+            raise ConfigError(f"--from-published: {experiment.name}", error.got, error.expected,
+                              "without the option all is walked anew") from None  # fmt: skip
+        taken += unpack(experiment, part, into, runs)
+    return taken
 
 
 def walk(

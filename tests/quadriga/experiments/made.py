@@ -13,6 +13,8 @@ from quadriga.campaign.manifest import GroupEntry, Manifest, SweepEntry
 from quadriga.campaign.outcome import Outcome
 from quadriga.campaign.plan import Group
 from quadriga.experiments.experiment import Experiment, Part, Published, Requirement
+from quadriga.experiments.page import Entry
+from quadriga.experiments.publish import publish
 from tests.quadriga.campaign.rows import row
 
 Fate = Callable[[Group, int], dict[str, Any]]  # changes of the row of a trial
@@ -70,16 +72,24 @@ def manifest_of(experiment: Experiment, part: int = 0, **changes: Any) -> Manife
     return Manifest(**told | changes)
 
 
-def write_runs(experiment: Experiment, runs: Path, seeds: Iterable[int], fate: Fate) -> None:
+def write_runs(
+    experiment: Experiment, runs: Path, seeds: Iterable[int], fate: Fate, versions: str = "code 1"
+) -> None:
     """The folders of its campaigns with a row for each of these seeds."""
     for k, part in enumerate(experiment.parts):
-        mine = manifest_of(experiment, k)
+        mine = manifest_of(experiment, k, versions=versions)
         rows = rows_of([entry.group for entry in mine.groups], seeds, fate)
         with Ledger(experiment.folder(runs, part), mine) as ledger:
             for one in rows:
-                ledger.append(one)
+                ledger.append(replace(one, versions=versions))
 
 
 def upright(_group: Group, _seed: int) -> dict[str, Any]:
     """Everybody walks to the end."""
     return {}
+
+
+def publish_all(experiments: Iterable[Experiment], runs: Path, into: Path) -> list[Entry]:
+    """Publish experiments, the runs of each if it has any."""
+    every = list(experiments)
+    return publish(every, runs, into, [one.name for one in every], print)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import signal
 from pathlib import Path
 
@@ -50,14 +51,25 @@ def test_walked_published_and_gone_on_with(capsys: Said, experiment: Path, tmp_p
     elsewhere = ["--out", str(tmp_path / "elsewhere"), "--from-published", "--jobs", "1"]
     assert main([*words, *elsewhere]) == 0, "all walked and published"
     again = finished(tmp_path / "elsewhere" / "tiny")
-    assert again == finished(runs / "tiny"), "nothing is walked twice"
+    assert set(again) == set(finished(runs / "tiny")), "nothing is walked twice"
+    assert "tiny: 4 published trials taken up" in capsys.readouterr().err
     assert page.read_text(encoding="utf-8") == text
+    first = (into / "docs/results/trials/tiny/trials.csv.gz").read_bytes()
+    assert str(tmp_path).encode() not in gzip.decompress(first)
     manifest = runs / "tiny" / "campaign.json"
     manifest.write_text(manifest.read_text(encoding="utf-8").replace("quadriga 0", "quadriga 9"),
                         encoding="utf-8")  # fmt: skip
     capsys.readouterr()
     assert main([*words, "--jobs", "1"]) == 2, "trials of other code"
     assert "use a new folder" in capsys.readouterr().err
+    packed = into / "docs/results/trials/tiny/campaign.json.gz"
+    packed.write_bytes(gzip.compress(manifest.read_bytes()))
+    anew = ["--out", str(tmp_path / "anew"), "--from-published", "--jobs", "1"]
+    assert main([*words, *anew]) == 2, "published trials of other code"
+    complaint = capsys.readouterr().err
+    assert "--from-published: tiny: got trials with code and versions" in complaint
+    assert "without the option all is walked anew" in complaint
+    assert not (tmp_path / "anew").exists()
     kept = (into / "docs" / "results" / "tiny.json").read_text(encoding="utf-8")
     assert str(tmp_path) not in kept
 

@@ -16,11 +16,16 @@ from quadriga.experiments.experiment import Experiment, Part, Published, Require
 from quadriga.experiments.measures import MEASURES
 from quadriga.experiments.page import BEGIN, END, overview, replaced
 from quadriga.experiments.publish import KEPT, PAGE, publish
-from quadriga.experiments.published_trials import kept
 from quadriga.experiments.results import to_json
 from quadriga.experiments.summarise import summarise
 from shared.errors import ConfigError
-from tests.quadriga.experiments.made import checkout, experiment_of, upright, write_runs
+from tests.quadriga.experiments.made import (
+    checkout,
+    experiment_of,
+    publish_all,
+    upright,
+    write_runs,
+)
 from tests.quadriga.experiments.test_summarise import fate
 
 
@@ -50,7 +55,7 @@ def test_the_same_bytes_again_and_from_what_is_published_alone(
     into, runs = checkout(tmp_path / "here"), tmp_path / "runs"
     for experiment in experiments[:2]:
         write_runs(experiment, runs, range(7), fate)
-    publish(experiments, runs, into)
+    publish_all(experiments, runs, into)
     first = files(into)
     assert set(first) == {
         "README.md", "docs/results.md", "docs/results/small.json", "docs/results/swept.json",
@@ -60,11 +65,11 @@ def test_the_same_bytes_again_and_from_what_is_published_alone(
         "docs/results/trials/swept/steps/campaign.json.gz",
         "docs/results/trials/swept/steps/trials.csv.gz",
     }  # fmt: skip
-    publish(experiments, runs, into)
+    publish_all(experiments, runs, into)
     assert files(into) == first
     shutil.rmtree(into / "docs" / "figures")
     (into / PAGE).unlink()
-    publish(experiments, tmp_path / "nowhere", into)
+    publish_all(experiments, tmp_path / "nowhere", into)
     assert files(into) == first, "a fresh clone has no runs"
     for name in first:
         if name.endswith(".png"):
@@ -77,7 +82,7 @@ def test_the_page_says_what_came_of_it(experiments: list[Experiment], tmp_path: 
     into, runs = checkout(tmp_path / "here"), tmp_path / "runs"
     for experiment in experiments[:2]:
         write_runs(experiment, runs, range(7), fate)
-    publish(experiments, runs, into)
+    publish_all(experiments, runs, into)
     page = (into / PAGE).read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     assert "do not edit" in page.partition("\n")[0]
     for text in (
@@ -109,7 +114,7 @@ def test_all_worlds_together_are_told_beside_the_worst(tmp_path: Path) -> None:
     asked = Requirement("success", "least", 97.0, variants=("mine",), pooled=True)
     experiment = experiment_of("steps", "ice", requirements=(asked,))
     write_runs(experiment, tmp_path / "runs", range(7), fate)
-    (entry,) = publish([experiment], tmp_path / "runs", checkout(tmp_path / "here"))
+    (entry,) = publish_all([experiment], tmp_path / "runs", checkout(tmp_path / "here"))
     text = overview([entry], "#").replace("\N{NO-BREAK SPACE}", " ")
     assert "| all worlds: 92.9 [68.5, 98.7] **missed** by 4.1; steps: 85.7 [48.7, 97.4]" in text
     assert "**missed** in 2 of 3 so far" in text
@@ -123,15 +128,60 @@ def test_all_worlds_together_are_told_beside_the_worst(tmp_path: Path) -> None:
 
 def test_runs_win_over_what_is_published(tmp_path: Path) -> None:
     experiment, into = experiment_of("ice"), checkout(tmp_path / "here")
-    write_runs(experiment, tmp_path / "old", range(10), upright)
-    publish([experiment], tmp_path / "old", into)
-    write_runs(experiment, tmp_path / "new", range(4), upright)
-    (entry,) = publish([experiment], tmp_path / "new", into)
-    assert [line.done for line in entry.results.lines] == [4, 4]
+    write_runs(experiment, tmp_path / "old", range(4), upright)
+    publish_all([experiment], tmp_path / "old", into)
+    write_runs(experiment, tmp_path / "new", range(10), upright)
+    (entry,) = publish_all([experiment], tmp_path / "new", into)
+    assert [line.done for line in entry.results.lines] == [10, 10]
     begun = tmp_path / "begun"
     write_runs(experiment, begun, range(0), upright)
-    (entry,) = publish([experiment], begun, into)
-    assert [line.done for line in entry.results.lines] == [4, 4], "begun, but nothing walked yet"
+    (entry,) = publish_all([experiment], begun, into)
+    assert [line.done for line in entry.results.lines] == [10, 10], "begun, but nothing walked yet"
+
+
+def test_fewer_trials_win_only_if_they_are_of_other_code(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    experiment, into, runs = experiment_of("ice"), checkout(tmp_path / "here"), tmp_path / "runs"
+    write_runs(experiment, runs, range(10), upright)
+    publish_all([experiment], runs, into)
+    first = files(into)
+    write_runs(experiment, tmp_path / "few", range(4), upright)
+    publish_all([experiment], tmp_path / "few", into)
+    assert files(into) == first
+    assert "small: what is published stays; it has more trials" in capsys.readouterr().out
+    write_runs(experiment, tmp_path / "later", range(4), upright, versions="code 2")
+    (entry,) = publish_all([experiment], tmp_path / "later", into)
+    assert [line.done for line in entry.results.lines] == [4, 4]
+    assert entry.results.versions == ("code 2",)
+
+
+def test_what_nobody_asks_for_stays_as_published(tmp_path: Path) -> None:
+    experiment, into, runs = experiment_of("ice"), checkout(tmp_path / "here"), tmp_path / "runs"
+    write_runs(experiment, runs, range(4), upright)
+    publish_all([experiment], runs, into)
+    first = files(into)
+    write_runs(experiment, tmp_path / "more", range(10), upright)
+    publish([experiment], tmp_path / "more", into, ["another"], print)
+    assert files(into) == first
+
+
+def test_parts_that_were_not_walked_with_the_others_are_published_no_more(tmp_path: Path) -> None:
+    """Results and trials are of the same campaigns, whatever was published before."""
+    parts = tuple(
+        Part(name, (name,), sweep_of("world.terrain_height=0.04,0.1"), "height [m]")
+        for name in ("ice", "steps")
+    )
+    experiment, into = experiment_of("ice", "steps", parts=parts), checkout(tmp_path / "here")
+    write_runs(experiment, tmp_path / "old", range(4), upright)
+    publish_all([experiment], tmp_path / "old", into)
+    write_runs(replace(experiment, parts=parts[:1]), tmp_path / "new", range(3), upright,
+               versions="code 2")  # fmt: skip
+    publish_all([experiment], tmp_path / "new", into)
+    campaigns = published_trials.kept(experiment, into)
+    assert list(campaigns) == [parts[0]]
+    told = (into / KEPT / "small.json").read_text(encoding="utf-8")
+    assert to_json(summarise(experiment, list(campaigns.values()))) == told
 
 
 @pytest.mark.parametrize("text", ["", BEGIN, f"{END}\n{BEGIN}", f"{BEGIN}{END}{BEGIN}{END}"])
@@ -139,7 +189,7 @@ def test_a_readme_without_a_place_is_one_error(tmp_path: Path, text: str) -> Non
     into = checkout(tmp_path / "here")
     (into / "README.md").write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match=r"README\.md: got no place for results, expected <!-- r"):
-        publish([experiment_of("ice")], tmp_path, into)
+        publish_all([experiment_of("ice")], tmp_path, into)
     assert list(files(into)) == ["README.md"]
 
 
@@ -147,7 +197,7 @@ def test_what_cannot_be_written_is_one_error(tmp_path: Path) -> None:
     into = checkout(tmp_path / "here")
     (into / "docs").write_text("a file", encoding="utf-8")
     with pytest.raises(ConfigError, match="a place that can be written to"):
-        publish([experiment_of("ice")], tmp_path, into)
+        publish_all([experiment_of("ice")], tmp_path, into)
 
 
 def test_only_what_stands_between_the_markers_is_replaced() -> None:
@@ -160,7 +210,7 @@ def test_every_measure_is_told_of_a_line_that_has_it(tmp_path: Path) -> None:
     write_runs(experiment, tmp_path, range(10), lambda group, seed: {
         **fate(group, seed), "planner_ms_p99": 2.0, "planner_ms_p50": 1.0,
     })  # fmt: skip
-    (entry,) = publish([experiment], tmp_path, checkout(tmp_path / "here"))
+    (entry,) = publish_all([experiment], tmp_path, checkout(tmp_path / "here"))
     line = entry.results.find(("steps",), "mine")
     assert line is not None
     for name, measure in MEASURES.items():
@@ -175,7 +225,7 @@ def test_what_the_project_publishes_is_what_its_files_give(tmp_path: Path) -> No
     into = tmp_path / "clone"
     shutil.copytree(CHECKOUT / "docs", into / "docs")
     shutil.copy(CHECKOUT / "README.md", into / "README.md")
-    entries = publish(every, tmp_path / "nowhere", into)
+    entries = publish_all(every, tmp_path / "nowhere", into)
     for name in (Path("README.md"), PAGE):
         same = (into / name).read_bytes() == (CHECKOUT / name).read_bytes()
         assert same, f"{name}: make figures ARGS=--only-publish"
@@ -186,53 +236,60 @@ def test_what_the_project_publishes_is_what_its_files_give(tmp_path: Path) -> No
 def test_what_is_published_follows_from_the_published_trials() -> None:
     every, _ = load([])
     for experiment in every:
-        if campaigns := kept(experiment, CHECKOUT):
+        if campaigns := published_trials.kept(experiment, CHECKOUT):
             told = (CHECKOUT / KEPT / f"{experiment.name}.json").read_text(encoding="utf-8")
-            assert to_json(summarise(experiment, campaigns)) == told, experiment.name
-            assert all(not manifest.typed for manifest, _ in campaigns)
+            assert to_json(summarise(experiment, list(campaigns.values()))) == told, experiment.name
+            assert all(not manifest.typed for manifest, _ in campaigns.values())
 
 
 def test_published_trials_are_taken_up_and_gone_on_with(
-    experiments: list[Experiment], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    experiments: list[Experiment], tmp_path: Path
 ) -> None:
     into, runs, later = checkout(tmp_path / "here"), tmp_path / "runs", tmp_path / "later"
-    monkeypatch.setattr(published_trials, "origin", lambda: "code 1")
     for experiment in experiments[:2]:
         write_runs(experiment, runs, range(3), fate)
-    publish(experiments, runs, into)
+    publish_all(experiments, runs, into)
     first = files(into)
-    for experiment in experiments:
-        published_trials.take_up(experiment, into, later)
-    for name in ("small/trials.csv", "swept/steps/trials.csv"):
-        assert (later / name).read_bytes() == (runs / name).read_bytes()
-    assert {path.name for path in later.iterdir()} == {"small", "swept"}
-    publish(experiments, later, into)
+    for experiment in experiments[:2]:
+        (part,) = experiment.parts
+        assert published_trials.unpack(experiment, part, into, later) == 12
+        assert not published_trials.unpack(experiment, part, into, later), "it is there"
+    assert set(published_trials.kept(experiments[0], into)) == set(experiments[0].parts)
+    publish_all(experiments, later, into)
     assert files(into) == first
     write_runs(experiments[0], later, range(3, 5), fate)
-    published_trials.take_up(experiments[0], into, later)
-    (entry, *_) = publish(experiments, later, into)
-    assert {line.done for line in entry.results.lines} == {5, 10}, "what is there wins"
+    (entry, *_) = publish_all(experiments, later, into)
+    assert {line.done for line in entry.results.lines} == {5, 10}
+    with pytest.raises(ConfigError, match="got a folder without 8 of the published trials"):
+        published_trials.unpack(experiments[0], experiments[0].parts[0], into, runs)
 
 
-def test_published_trials_of_other_code_or_damaged_are_one_error(tmp_path: Path) -> None:
+def test_the_order_of_walking_does_not_show_in_what_is_published(tmp_path: Path) -> None:
+    experiment = experiment_of("ice")
+    for name, seeds in (("one", range(6)), ("other", range(5, -1, -1))):
+        write_runs(experiment, tmp_path / name, seeds, fate)
+        publish_all([experiment], tmp_path / name, checkout(tmp_path / f"of-{name}"))
+    assert files(tmp_path / "of-one") == files(tmp_path / "of-other")
+
+
+@pytest.mark.parametrize("harm", ["cut", "changed"])
+def test_damaged_published_trials_are_one_error(tmp_path: Path, harm: str) -> None:
     experiment, into, runs = experiment_of("ice"), checkout(tmp_path / "here"), tmp_path / "runs"
     write_runs(experiment, runs, range(3), upright)
-    publish([experiment], runs, into)
-    later = tmp_path / "later"
-    with pytest.raises(ConfigError, match=r"--from-published: small: got .*expected code 1"):
-        published_trials.take_up(experiment, into, later)
+    publish_all([experiment], runs, into)
     packed = into / "docs/results/trials/small/trials.csv.gz"
-    packed.write_bytes(packed.read_bytes()[:-20])
-    with pytest.raises(ConfigError, match=r"trials/small: got .*expected published trials"):
-        published_trials.take_up(experiment, into, later)
-    assert not later.exists()
+    body = packed.read_bytes()
+    packed.write_bytes(body[:-20] if harm == "cut" else body[:40] + b"\xff" * 40 + body[80:])
+    with pytest.raises(ConfigError, match=r"trials\.csv\.gz: got .*expected published trials"):
+        published_trials.unpack(experiment, experiment.parts[0], into, tmp_path / "later")
+    assert not (tmp_path / "later").exists()
 
 
 def test_an_experiment_without_pairs_has_no_table_of_them(tmp_path: Path) -> None:
     alone = experiment_of("ice")
     alone = replace(alone, variants=alone.variants[:1])
     write_runs(alone, tmp_path, range(3), upright)
-    publish([alone], tmp_path, checkout(tmp_path / "here"))
+    publish_all([alone], tmp_path, checkout(tmp_path / "here"))
     page = (tmp_path / "here" / PAGE).read_text(encoding="utf-8")
     assert "### Walks" in page
     assert "### Falls" not in page
@@ -245,7 +302,7 @@ def test_a_refused_variant_is_a_row_and_says_why(tmp_path: Path) -> None:
     write_runs(experiment, tmp_path, range(10), lambda group, _seed: (
         refused if group.variant == "mine" else {}
     ))  # fmt: skip
-    publish([experiment], tmp_path, into)
+    publish_all([experiment], tmp_path, into)
     page = (into / PAGE).read_text(encoding="utf-8")
     assert (
         "| ice | mine | refused | – |\n\nmine was refused: radius 0.9, not at most 0.5.\n" in page

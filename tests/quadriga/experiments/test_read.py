@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import chdir
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from quadriga.campaign.plan import Group
-from quadriga.experiments.catalogue import load, names
+from quadriga.experiments.catalogue import CHECKOUT, FOLDER, load, names
 from quadriga.experiments.read import read
 from quadriga.experiments.walk import plans_of
 from quadriga.variants import PLANNERS
@@ -42,6 +43,12 @@ def written(folder: Path, text: str) -> Path:
     path = folder / "small.toml"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def test_a_name_and_its_file_are_the_same() -> None:
+    file = str((FOLDER / "paper.toml").relative_to(CHECKOUT))
+    with chdir(CHECKOUT):
+        assert load([file, "paper"])[1] == ["paper"]
 
 
 def test_a_file_is_a_whole_experiment(tmp_path: Path) -> None:
