@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from typing import Final
+from unicodedata import category
 
 NOTHING: Final = "–"
 
@@ -14,11 +15,11 @@ def columns(
     """One line for each row, its cells side by side.
 
     Args:
-        rows: cells of plain text; the same number in each.
+        rows: cells of text; the same number in each.
         right: columns that are flush right, as numbers are.
         indent: what each line begins with.
     """
-    cells = [tuple(row) for row in rows]
+    cells = [tuple(printable(cell).replace("\n", " ") for cell in row) for row in rows]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     lines = []
     for row in cells:
@@ -28,3 +29,9 @@ def columns(
         ]
         lines.append((indent + "  ".join(padded)).rstrip())
     return lines
+
+
+def printable(text: str) -> str:
+    """Text that comes from elsewhere, without what a terminal would obey."""
+    return "".join("\N{REPLACEMENT CHARACTER}" if category(c) == "Cc" and c != "\n" else c
+                   for c in text)  # fmt: skip

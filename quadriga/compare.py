@@ -20,6 +20,7 @@ from quadriga.fit import fitted, write_json
 from quadriga.fit_report import FitReport, Unfit, reason, refusal
 from quadriga.fit_sheets import comparison as predictor_sheet
 from quadriga.identify import ensure_data
+from quadriga.run_folder import CONFIG
 from quadriga.sheet import Sheet, show
 from quadriga.trial import Row, figures
 from quadriga.trial_job import walked
@@ -188,7 +189,7 @@ def _keep(
         "predictors": {name: report.to_dict() for name, report in reports.items()},
         "trials": [row.to_dict() for row in rows],
     })  # fmt: skip
-    (out / "config.toml").write_text(to_toml(config), encoding="utf-8")
+    (out / CONFIG).write_text(to_toml(config), encoding="utf-8")
     draw(rows, out / FIGURE)
     parts = ["# Planners and predictors\n", *(sheet.to_markdown() for sheet in sheets)]
     parts.append(f"![Figures of each trial]({FIGURE})\n")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from datetime import UTC, datetime
 
 from quadriga.columns import NOTHING, columns
+from quadriga.recorded_metadata import recorded_patterns, recorded_versions
 from quadriga.survey import Survey, type_of
 from shared.config import Config
 from shared.config_text import departures
@@ -46,7 +46,7 @@ def _about(s: Survey) -> Iterator[tuple[str, str]]:
         yield "part", f"{s.metadata['part']} of a recording in several files, counted from 0"
     for name in ("topics", "exclude"):
         if name in s.metadata:
-            yield f"--{name}", " ".join(json.loads(s.metadata[name]))
+            yield f"--{name}", " ".join(recorded_patterns(s.metadata, name)) or NOTHING
     if s.config is not None:
         c = s.config
         robots = "1 robot" if c.team.robots == 1 else f"{c.team.robots} robots"
@@ -61,7 +61,7 @@ def _about(s: Survey) -> Iterator[tuple[str, str]]:
             yield f"{robot} stopped", status.reason
     yield "predictor", s.metadata.get("predictor_sha256", "")[:16] or NOTHING
     yield "configuration", s.metadata.get("config_sha256", "")[:16] or NOTHING
-    versions = json.loads(s.metadata.get("versions", "{}"))
+    versions = recorded_versions(s.metadata)
     yield "versions", ", ".join(f"{name} {of}" for name, of in versions.items()) or NOTHING
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from typing import Final
 
 from quadriga.by_tick import by_tick
 from quadriga.difference import Difference, difference
+from quadriga.recorded_metadata import recorded_versions
 from shared.codec import decode, encode
 from shared.config import Config
 from shared.errors import MessageError, RecordingError
@@ -97,10 +97,7 @@ def resim(recording: Recording) -> Iterator[Resim]:
 
 def other_versions(recording: Recording, here: Mapping[str, str]) -> str:
     """Packages that had another version when recorded, for a difference they may explain."""
-    try:
-        then: dict[str, str] = json.loads(recording.metadata.get("versions", "{}"))
-    except ValueError:
-        return ""
+    then = recorded_versions(recording.metadata)
     return ", ".join(
         f"{name} {version} (here {here.get(name, 'absent')})"
         for name, version in then.items()

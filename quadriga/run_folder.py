@@ -20,6 +20,7 @@ from shared.errors import ConfigError, ProcessError
 from shared.recording import Recording
 
 RUNS: Final = Path("runs")
+CONFIG: Final = "config.toml"  # the configuration in force, in a run folder
 
 
 def make_run_dir(out: Path | None) -> Path:
@@ -41,6 +42,21 @@ def make_run_dir(out: Path | None) -> Path:
         reason = error.strerror or str(error)
         raise ConfigError(f"--out {out or RUNS}", reason, "a folder that can be made") from None
     return out
+
+
+def check_own_config(given: Path | None, out: Path | None) -> None:
+    """Refuse to write the configuration in force over the file that a user wrote.
+
+    Args:
+        given: the file of `--config`.
+        out: the folder asked for.
+
+    Raises:
+        ConfigError: it is `config.toml` in that folder.
+    """
+    if given is not None and out is not None and given.resolve() == (out / CONFIG).resolve():
+        raise ConfigError(f"--out {out}", f"the folder of --config {given}", "another folder",
+                          f"the configuration in force is written to its {CONFIG}")  # fmt: skip
 
 
 def _folder_of_its_own() -> Path:

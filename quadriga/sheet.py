@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
-from unicodedata import category
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from quadriga.columns import printable
 from shared.robot import OUTPUTS
 
 NOTHING: Final = "–"
@@ -74,12 +74,6 @@ def show(sheets: Iterable[Sheet]) -> None:
         console.print(sheet.to_rich())
         for note in sheet.notes:
             console.print(note, style="dim", markup=False, highlight=False)
-
-
-def printable(text: str) -> str:
-    """Text that comes from elsewhere, without what a terminal would obey."""
-    return "".join("\N{REPLACEMENT CHARACTER}" if category(c) == "Cc" and c != "\n" else c
-                   for c in text)  # fmt: skip
 
 
 def text(value: float | None, digits: str = ".3g", factor: float = 1.0) -> str:

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from quadriga.sheet import printable
+from quadriga.columns import printable
 
 # Unit and factor of each of `quadriga.traces.ERRORS`.
 _ERRORS = {

@@ -23,8 +23,10 @@ Given = dict[str, Any]
 def walk(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     """The main job."""
     from quadriga.endpoint import free_endpoint
+    from quadriga.run_folder import check_own_config
     from quadriga.walk import walk
 
+    check_own_config(arguments.config, arguments.out)
     # Several walks on one machine are the rule; only who names an endpoint wants that one.
     if config.bus.mode == "peer" and "endpoint" not in given.get("bus", {}):
         config = replace(config, bus=replace(config.bus, endpoint=free_endpoint()))
@@ -51,11 +53,15 @@ def report(arguments: argparse.Namespace, _config: Config, _given: Given) -> int
     from quadriga.run_folder import report, report_file, went_wrong
     from shared.recording import Recording
 
+    html = arguments.html
+    if html is not None and html.suffix.lower() not in (".html", ".htm"):
+        raise ConfigError("--html", str(html), "a name that ends in .html",
+                          "a recording is never written over")  # fmt: skip
     if arguments.run.is_file():
-        summary = report_file(arguments.run, arguments.html, console=Console())
+        summary = report_file(arguments.run, html, console=Console())
         Recording(arguments.run).require_whole()
-    elif arguments.html is not None:
-        raise ConfigError("--html", str(arguments.html), "a recording's FILE before it",
+    elif html is not None:
+        raise ConfigError("--html", str(html), "a recording's FILE before it",
                           "a run folder's page is its report.html")  # fmt: skip
     else:
         summary = report(arguments.run, pictures=not arguments.no_render, console=Console())
@@ -144,7 +150,7 @@ def fit(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 def compare(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Planners and predictors in the same worlds, on the same data."""
     from quadriga.compare import run
-    from quadriga.run_folder import make_run_dir
+    from quadriga.run_folder import check_own_config, make_run_dir
     from quadriga.trials import Choice
     from quadriga.variants import PLANNERS, PREDICTORS, SCENARIOS, chosen, seeds_of
 
@@ -156,6 +162,7 @@ def compare(arguments: argparse.Namespace, config: Config, _given: Given) -> int
         chosen("--scenarios", arguments.scenarios, SCENARIOS),
         seeds_of("--seeds", arguments.seeds), arguments.product,
     )  # fmt: skip
+    check_own_config(arguments.config, arguments.out)
     out = arguments.out or make_run_dir(None)
     run(config, choice, out, jobs=arguments.jobs, bus=arguments.bus, console=Console(stderr=True))
     return 0

@@ -13,7 +13,7 @@ from quadriga.identify import ensure_predictor
 from quadriga.launch import Launch, Row, table
 from quadriga.progress import WalkProgress
 from quadriga.replay.recorded_predictor import keep
-from quadriga.run_folder import make_run_dir, report, went_wrong
+from quadriga.run_folder import CONFIG, make_run_dir, report, went_wrong
 from quadriga.warm_up import warm_up
 from shared.config import Config
 from shared.config_text import to_toml
@@ -49,7 +49,7 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
         predictor = ensure_predictor(config, console)
         sha256 = predictor_sha256(load(predictor, config)[0])
         keep(predictor, run_dir)
-    (run_dir / "config.toml").write_text(to_toml(config), encoding="utf-8")
+    (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
     rows = table(config, run_dir, predictor, sha256)
     with stop_flag() as stopped:
         fallen = follow(config, rows, run_dir, stopped, console)

@@ -21,8 +21,8 @@ def add_campaign(add: Add) -> None:
            "name:section.key=value;section.key=value (none,distributed)")  # fmt: skip
     option("--variants", type=Path, metavar="FILE", help="TOML: a table of keys for each variant")
     option("--baseline", metavar="NAME", help="what others are compared with (none or the first)")
-    option("--seeds", default="0:20", metavar="LIST",
-           help="of the worlds: 0:20 is 0 … 19; 1,5 is both (%(default)s)")  # fmt: skip
+    option("--seeds", metavar="LIST",
+           help=f"of the worlds: 0:20 is 0 … 19; 1,5 is both ({verb.SEEDS})")  # fmt: skip
     option("--sweep", action="append", default=[], metavar="KEY=V,V",
            help="with each of these values: world.terrain_height=0.04,0.08, or of a text: "
            "'world.push=r1:{80,120}:90:3:0.2'; may be repeated")  # fmt: skip

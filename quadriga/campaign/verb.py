@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from rich.console import Console
 
@@ -12,6 +12,8 @@ from shared.errors import ConfigError
 
 if TYPE_CHECKING:
     from quadriga.campaign.plan import Plan
+
+SEEDS: Final = "0:20"  # of a campaign that names none
 
 
 def campaign(arguments: argparse.Namespace, _config: Config, _given: dict[str, Any]) -> int:
@@ -30,9 +32,7 @@ def campaign(arguments: argparse.Namespace, _config: Config, _given: dict[str, A
             "--scenario", repr(arguments.scenario), "the names of scenarios without an option"
         )
     if arguments.report is not None:
-        if arguments.scenarios:
-            raise ConfigError("--report", f"scenarios {', '.join(arguments.scenarios)}",
-                              "none: it walks nothing")  # fmt: skip
+        _check_only_report(arguments)
         out = arguments.report
     else:
         dask = dask_of(arguments, "scenarios")
@@ -43,14 +43,28 @@ def campaign(arguments: argparse.Namespace, _config: Config, _given: dict[str, A
     return 0
 
 
+def _check_only_report(arguments: argparse.Namespace) -> None:
+    given = {
+        "scenarios": arguments.scenarios, "--planners": arguments.planners,
+        "--variants": arguments.variants, "--seeds": arguments.seeds, "--sweep": arguments.sweep,
+        "--dask": arguments.dask, "--out": arguments.out, "--config": arguments.config,
+        **arguments.overrides,
+    }  # fmt: skip
+    for name, value in given.items():
+        if value:
+            shown = ", ".join(value) if isinstance(value, list) else value
+            raise ConfigError("--report", f"{name} {shown}", "none: it walks nothing")
+
+
 def _plan(arguments: argparse.Namespace) -> Plan:
     from quadriga.campaign.choice import sweep_of, variants_of
     from quadriga.campaign.plan import build_plan
     from quadriga.variants import seeds_of
 
     options = arguments.planners or ([] if arguments.variants else ["none,distributed"])
+    seeds = SEEDS if arguments.seeds is None else arguments.seeds
     return build_plan(
         arguments.scenarios, variants_of(options, arguments.variants),
-        tuple(map(sweep_of, arguments.sweep)), seeds_of("--seeds", arguments.seeds),
+        tuple(map(sweep_of, arguments.sweep)), seeds_of("--seeds", seeds),
         arguments.baseline, arguments.config, arguments.overrides,
     )  # fmt: skip

@@ -34,7 +34,8 @@ class Source:
     Attributes:
         config: the configuration of the run.
         layouts: by type of message.
-        left_out: messages that are not exported, by key: not valid, or of no known topic.
+        left_out: messages that are not exported, by key: not valid, of no known topic, or plans
+            of nothing.
         last: the last tick that was recorded, ms.
         topics: names of the topics that were recorded.
     """
@@ -86,7 +87,7 @@ class Source:
                 continue
             layout = self.layouts[topic.type]
             numbers = layout.numbers_of(message)
-            if numbers is None:
+            if numbers is None or not len(numbers):
                 self.left_out[key] += 1
                 continue
             yield Item(key.partition("/")[2], robot, log_time_ns, message, layout, numbers)

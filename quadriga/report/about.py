@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import Any, Final
 
 import numpy as np
 
+from quadriga.recorded_metadata import recorded_versions
 from quadriga.report.run import Run
 from shared.config import Config
 from shared.config_text import departures
@@ -73,7 +73,8 @@ def facts(run: Run) -> Iterator[tuple[str, str]]:
     yield "predictor", f"{kind}, {digest[:_DIGITS]}" if digest else "none named"
     yield "estimator", config.estimator.kind
     yield "configuration", traces.metadata.get("config_sha256", "")[:_DIGITS] or "unnamed"
-    yield "versions", ", ".join(f"{k} {v}" for k, v in _versions(run).items()) or "not recorded"
+    versions = recorded_versions(traces.metadata)
+    yield "versions", ", ".join(f"{k} {v}" for k, v in versions.items()) or "not recorded"
 
 
 def not_usual(config: Config) -> list[tuple[str, str, str, str]]:
@@ -145,14 +146,6 @@ def _ground(config: Config) -> str:
     if world.terrain == "slope":
         return f"ramps of {world.slope:g}° up to {1000 * world.terrain_height:.0f} mm"
     return f"{world.terrain} up to {1000 * world.terrain_height:.0f} mm"
-
-
-def _versions(run: Run) -> dict[str, Any]:
-    try:
-        found = json.loads(run.traces.metadata.get("versions", "{}"))
-    except ValueError:
-        return {}
-    return found if isinstance(found, dict) else {}
 
 
 def _text(value: Any) -> str:

@@ -106,6 +106,8 @@ def at_limit(run: Run, index: int, plan: Plan) -> float:
     """Share of a plan's applied samples with a force at its friction or deviation limit."""
     planner = run.traces.config.planner
     applied = min(planner.applied, len(plan.u))
+    if not applied:
+        return 0.0
     starts = plan.tick + SAMPLE_MS * np.arange(applied)
     u = plan.u[:applied]
     nominal = nominal_forces(scheduled_stance(run.traces.config, index, starts))

@@ -131,7 +131,8 @@ def _bars(panel: Panel, box: Box) -> Iterator[str]:
                     path.box(left, y + inset * tall, right - left, tall * (1 - 2 * inset))
                 )
             if shapes:
-                yield f'<path class="bar {style}" transform="scale(.1)" d="{"".join(shapes)}"/>'
+                kind = f"bar {escape(style)}"
+                yield f'<path class="{kind}" transform="scale(.1)" d="{"".join(shapes)}"/>'
 
 
 def _curves(panel: Panel, box: Box, points: int) -> Iterator[str]:
@@ -149,7 +150,7 @@ def _curves(panel: Panel, box: Box, points: int) -> Iterator[str]:
     )
     for curve in panel.curves:
         if d := _curve(curve, box, low, high, points, panel):
-            yield f'<path class="curve {curve.kind} {curve.style}" d="{d}"/>'
+            yield f'<path class="curve {curve.kind} {escape(curve.style)}" d="{d}"/>'
     for value, name in panel.levels:
         y = 10 * box.h * float((high - scale(np.array(value))) / (high - low))
         if 0.0 < y < 10 * box.h:

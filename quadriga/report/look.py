@@ -17,9 +17,11 @@ _DARK: Final = """
 --sky:#7cc7f2;--bad:#ff8a80;--badwash:#3a2220;--stance:#2a4257;
 """
 _ROBOTS: Final = ("blue", "orange", "green", "purple", "yellow")
-_MODES: Final = {
+# Styles of bars, and the colour of each.
+BARS: Final = {
     "mode-stand": "--line", "mode-walk": "--stance", "mode-stopping": "--yellow",
     "mode-damping": "--bad", "mode-estop": "--bad", "mode-plan": "--stance",
+    "mode-other": "--soft",
     "stance": "--stance", "contact": "--blue", "faded": "--yellow", "nominal": "--orange",
     "gap": "--bad", "count": "--soft", "event": "--ink", "trouble": "--bad",
 }  # fmt: skip
@@ -97,6 +99,6 @@ def style_sheet() -> str:
         colour = f"var(--{_ROBOTS[k % len(_ROBOTS)]})"
         dashes = ";stroke-dasharray:4 2" if k >= len(_ROBOTS) else ""
         rules.append(f"path.r{k}{{stroke:{colour}{dashes}}}circle.r{k}{{fill:{colour}}}")
-    rules += [f".bar.{name}{{fill:var({colour})}}" for name, colour in _MODES.items()]
-    rules += [f"rect.{name}{{fill:var({colour})}}" for name, colour in _MODES.items()]
+    rules += [f".bar.{name}{{fill:var({colour})}}" for name, colour in BARS.items()]
+    rules += [f"rect.{name}{{fill:var({colour})}}" for name, colour in BARS.items()]
     return "".join(rules).replace("\n", "")

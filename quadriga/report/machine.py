@@ -10,6 +10,7 @@ import numpy as np
 from agents.planner.horizon import step_ms
 from quadriga.report.chart import draw
 from quadriga.report.feet import gait_panel
+from quadriga.report.look import BARS
 from quadriga.report.look_at import Episode
 from quadriga.report.panel import Bars, Curve, Mark, Panel
 from quadriga.report.run import Run
@@ -60,7 +61,8 @@ def _modes(statuses: tuple[Status, ...], last: float) -> Iterator[tuple[float, f
         if following is not None and following.mode == status.mode:
             continue
         stop = following.tick / 1000 if following else last
-        yield statuses[begin].tick / 1000, stop, f"mode-{status.mode}"
+        name = f"mode-{status.mode}"
+        yield statuses[begin].tick / 1000, stop, name if name in BARS else "mode-other"
         begin = k + 1
 
 

@@ -97,6 +97,18 @@ def test_info_names_gaps_and_reasons_to_stop(tmp_path: Path, say: Say) -> None:
     assert re.search(r"^  r2 stopped +peer-lost:r1$", text, re.MULTILINE)
 
 
+@pytest.mark.parametrize("versions", ["not JSON", "[1]", '{"python": "\x1b[31m3"}'])
+def test_metadata_of_anybody_do_no_harm(tmp_path: Path, say: Say, versions: str) -> None:
+    path = tmp_path / "odd.mcap"
+    told = metadata(CONFIG, "") | {"versions": versions, "topics": versions}
+    with RecordingWriter(path, told, 16, periods=periods(CONFIG)) as writer:
+        writer.write("team/sim/event", encode(msg.Event(200, 0, "stop", "", "\x1b[2J\nend")), 0)
+    status, lines, err = say("info", path)
+    assert (status, err) == (0, "")
+    assert "\x1b" not in "".join(lines)
+    assert re.search(r"^  end +\ufffd\[2J end$", "\n".join(lines), re.MULTILINE)
+
+
 def test_echo_is_one_readable_line_a_message(small: Path, say: Say) -> None:
     _, lines, _ = say("echo", "r1/state", "--file", small, "-n", 3)
     assert len(lines) == 3

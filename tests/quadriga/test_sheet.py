@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from quadriga.sheet import Sheet, printable, show
+from quadriga.columns import columns, printable
+from quadriga.sheet import Sheet, show
 
 
 def test_control_characters_do_not_reach_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
@@ -13,6 +14,13 @@ def test_control_characters_do_not_reach_the_terminal(capsys: pytest.CaptureFixt
     assert "done" in said
     assert "\x1b" not in said
     assert "\x07" not in said
+
+
+def test_a_row_of_columns_is_one_line_that_a_terminal_only_shows() -> None:
+    assert columns([("a", "x\x1b[31m\ny"), ("long", "z")]) == [
+        "  a     x\N{REPLACEMENT CHARACTER}[31m y",
+        "  long  z",
+    ]
 
 
 def test_all_else_stays() -> None:

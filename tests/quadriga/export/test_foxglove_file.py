@@ -222,6 +222,15 @@ def test_forged_truths_are_left_out(
     assert len(read(out)["/frames"]) == 51
 
 
+def test_a_plan_of_nothing_is_left_out(
+    write_run: WriteRun, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    nothing = Plan(320, 0, 8, np.zeros((0, 12)), np.zeros((0, 6)), "solved", {}, 0)
+    folder, out = write_run(run_config(1, 0.5), extra=[("team/r1/plan", nothing)]), tmp_path / "o"
+    assert main(["export", str(folder / "run.mcap"), "--to", "foxglove", "-o", str(out)]) == 0
+    assert "left out 1 messages of team/r1/plan" in capsys.readouterr().out
+
+
 def test_rerun_finds_nothing_wrong_and_shows_named_columns(
     exported: Path, file: Path, tmp_path: Path
 ) -> None:

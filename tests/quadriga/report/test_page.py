@@ -184,7 +184,17 @@ def test_what_is_not_a_message_does_no_harm(write_run: WriteRun) -> None:
     def change(key: str, message: msg.Message) -> msg.Message | bytes:
         return b"\xc1noise" if key == "team/r1/state" and message.tick % 7 == 0 else message
 
-    found = outline(write_run(run_config(2, 0.8), change=change, extra=odd))
+    nothing, empty = np.zeros(0), (np.zeros((0, 12)), np.zeros((0, 6)))
+    mode = 'x"/></svg><script>alert(2)</script>'
+    odd += [
+        ("team/r2/status", msg.Status(710, 0, mode, "", "kalman", {}, {}, nothing, nothing)),
+        ("team/r1/plan", msg.Plan(680, 0, 17, *empty, "solved", {}, 0)),
+    ]
+    folder = write_run(run_config(2, 0.8), change=change, extra=odd)
+    page = build_page(read_run(folder / "run.mcap"))
+    assert "<script>alert" not in page
+    assert "nan %" not in page
+    found = Outline(page)
     assert "<script>alert(1)</script>" in found.text, "as text"
     assert "trajectories of r1" in found.figures
 
@@ -201,6 +211,16 @@ def test_a_recording_from_elsewhere_is_a_page_beside_it(
     assert main(["report", str(lab), "--html", str(tmp_path / "other.html")]) == 0
     assert (tmp_path / "other.html").read_bytes() == (tmp_path / "lab 3.html").read_bytes()
     assert sorted(path.suffix for path in tmp_path.iterdir()) == [".html", ".html", ".mcap"]
+
+
+def test_a_page_is_never_written_over_a_recording(
+    write_run: WriteRun, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_run(run_config(1, 0.5)) / "run.mcap"
+    before = path.read_bytes()
+    assert main(["report", str(path), "--html", str(path)]) == 2
+    assert "expected a name that ends in .html" in capsys.readouterr().err
+    assert path.read_bytes() == before
 
 
 def test_the_exit_status_tells_of_a_fall_in_a_file(write_run: WriteRun) -> None:
