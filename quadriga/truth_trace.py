@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,6 @@ from sim_server.team_model import formation
 from sim_server.terrain import build_terrain
 
 Ticks = NDArray[np.int64]
-
-# Where the feet stand under the hips, trunk frame, from the URDF: x and y of FL FR RL RR, m.
-_FEET: Final = np.array(
-    [[0.1805, 0.1308], [0.1805, -0.1308], [-0.1805, 0.1308], [-0.1805, -0.1308]]
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +55,9 @@ def build_truth_trace(messages: Sequence[Truth], config: Config) -> TruthTrace:
     roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
     cos, sin = np.cos(yaw), np.sin(yaw)
+    terrain = build_terrain(config, formation(n, config.team.spacing))
     outputs = [
-        pos[..., 2] - _ground(config, pos, cos, sin),
+        pos[..., 2] - terrain.under(pos[..., 0], pos[..., 1], yaw),
         cos * vel[..., 0] + sin * vel[..., 1],
         cos * vel[..., 1] - sin * vel[..., 0],
         roll, pitch, stack(messages, "base_omega", n, 3)[..., 2],
@@ -86,15 +82,6 @@ def distance(truth: TruthTrace, stride_ms: int, before: int | None = None) -> fl
         return None
     way = np.concatenate([pos[tick % stride_ms == 0], pos[-1:]])[..., :2]
     return float(np.linalg.norm(np.diff(way, axis=0), axis=-1).sum(axis=0).mean())
-
-
-def _ground(config: Config, pos: Array, cos: Array, sin: Array) -> Array:
-    """Mean terrain height where the four feet stand under the hips. Shape (T, n), m."""
-    terrain = build_terrain(config, formation(config.team.robots, config.team.spacing))
-    x = pos[..., :1] + cos[..., None] * _FEET[:, 0] - sin[..., None] * _FEET[:, 1]
-    y = pos[..., 1:2] + sin[..., None] * _FEET[:, 0] + cos[..., None] * _FEET[:, 1]
-    mean: Array = terrain.height(x, y).mean(axis=-1)
-    return mean
 
 
 def yaw_of(quat_wxyz: Array) -> Array:

@@ -20,7 +20,7 @@ from sim_server.team_model import N_SENSORS, NQ, NV, build_team_model
 
 MOTOR_DAMPING: Final = 2.0  # N·m·s/rad, what a motor does without a command
 _FALL_COSINE: Final = math.cos(1.0)  # of the angle between the trunk's z axis and the vertical
-_FALL_HEIGHT: Final = 0.12  # m, trunk origin above the terrain
+_FALL_HEIGHT: Final = 0.12  # m, trunk origin above the mean terrain under the hips
 _ZERO: Final = np.zeros(N_JOINTS)
 _DAMPED: Final = Command(
     tick=0, stamp_ns=0, tau=_ZERO, q_des=_ZERO, v_des=_ZERO, kp=_ZERO,
@@ -155,12 +155,14 @@ class World:
     def _falls(self) -> list[Event]:
         """An event for each robot that fell in this tick."""
         events = []
-        for i, (x, y, z, _, qx, qy, _) in enumerate(self._q[:, :7].tolist()):
+        for i, (x, y, z, qw, qx, qy, qz) in enumerate(self._q[:, :7].tolist()):
             cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
             # Asked this way round, a state that is not a number counts as a fall too.
             if (cosine >= _FALL_COSINE and z >= self._surely_up) or self._fallen[i]:
                 continue
-            above = z - float(self.team.terrain.height(np.array(x), np.array(y)))
+            yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+            # Not the ground under the trunk alone: a robot may stand astride of a block.
+            above = z - float(self.team.terrain.under(np.array(x), np.array(y), np.array(yaw)))
             if not (cosine >= _FALL_COSINE and above >= _FALL_HEIGHT):
                 self._fallen[i] = True
                 detail = f"tilt {math.acos(max(-1.0, cosine)):.2f} rad, height {above:.3f} m"

@@ -209,18 +209,33 @@ def test_a_robot_on_its_side_has_fallen_at_any_height() -> None:
     assert [event.robot for event in events if event.kind == "fall"] == ["r1"]
 
 
-def test_trunk_height_counts_from_the_terrain() -> None:
+def test_trunk_height_counts_from_the_terrain_under_the_hips() -> None:
     world = World(configured(1, terrain="heightfield", terrain_height=0.3, seconds=8.0))
     x = np.linspace(2.0, 5.0, 3000)
-    top = world.team.terrain.height(x, np.zeros_like(x))
-    world.physics.qpos[0] = x[top.argmax()]
+    under = world.team.terrain.under(x, np.zeros_like(x), np.zeros_like(x))
+    world.physics.qpos[0] = x[under.argmax()]
     for above, fallen in ((0.125, ()), (0.115, ("r1",))):
-        world.physics.qpos[2] = top.max() + above
+        world.physics.qpos[2] = under.max() + above
         world.physics.qpos[7:] = np.tile([0.0, 2.6, -2.6], 4)  # feet folded away from the ground
         mujoco.mj_forward(world.team.model, world.physics)
         world.physics.qvel[:] = 0.0
         world.step({})
         assert world.fallen() == fallen
+
+
+def test_who_stands_astride_of_a_block_has_not_fallen() -> None:
+    """The block is under the trunk and nobody touches it; the feet stand on the ground."""
+    world = World(configured(1, terrain="boxes", terrain_height=0.15, seconds=8.0))
+    terrain = world.team.terrain
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(1.5, 5, 0.02), np.arange(-1, 1, 0.02)))
+    astride = terrain.height(x, y) - terrain.under(x, y, np.zeros_like(x))
+    place = astride.argmax()
+    assert astride[place] > 0.145, "no such place"
+    world.physics.qpos[:3] = x[place], y[place], 0.26
+    world.physics.qpos[7:] = q_stand()
+    mujoco.mj_forward(world.team.model, world.physics)
+    world.step({"r1": STAND})
+    assert world.fallen() == ()
 
 
 def test_an_unstable_world_shows_as_a_fall_and_does_not_start_again(
