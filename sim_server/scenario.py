@@ -51,7 +51,8 @@ class Scenario:
         strength = np.ones((self.n, N_JOINTS))
         for motor in self.weak:
             if motor.start <= tick:
-                strength[motor.robot, motor.joint] *= motor.share
+                place = motor.robot, motor.joint
+                strength[place] = min(strength[place], motor.share)
         return strength
 
 

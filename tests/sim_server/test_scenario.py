@@ -54,12 +54,14 @@ def test_what_is_drawn_is_announced() -> None:
     assert push.detail.startswith("90 N towards ")
 
 
-def test_a_motor_is_weak_from_its_tick_on() -> None:
+def test_a_motor_is_weak_from_its_tick_on_and_gives_what_is_announced() -> None:
     config = configured(2, weak_motor="r2:FR_hip:1,r2:FR_hip:2", weak_share=0.5)
     scenario = build_scenario(config, loads(config))
     assert scenario.weakenings() == {1000, 2000}
     assert (scenario.strength(999) == 1.0).all()
-    for tick, share in ((1000, 0.5), (1999, 0.5), (2000, 0.25)):
+    told = [event.detail for event in scenario.events if event.kind == "fault"]
+    assert told == ["FR_hip gives 50 % of its torque"] * 2
+    for tick, share in ((1000, 0.5), (1999, 0.5), (2000, 0.5)):
         strength = scenario.strength(tick)
         assert strength[1, 3] == share
         assert strength.sum() == 23 + share
