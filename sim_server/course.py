@@ -85,14 +85,15 @@ def build_course(config: Config, places: Array) -> Course:
         places: spawn positions of the trunks, shape (n, 2), m.
     """
     low, high = places.min(axis=0) - _HALF_BODY, places.max(axis=0) + _HALF_BODY
-    backward = config.reference.vx < 0.0
+    travelled = _way(config)
+    backward = _begins_backward(config, travelled)
     flat = Rectangle(
         x_low=low[0] - (_FLAT_AHEAD if backward else _FLAT_MARGIN),
         x_high=high[0] + (_FLAT_MARGIN if backward else _FLAT_AHEAD),
         y_low=low[1] - _FLAT_MARGIN,
         y_high=high[1] + _FLAT_MARGIN,
     )
-    way = (low + high) / 2.0 + _way(config)
+    way = (low + high) / 2.0 + travelled
     # A team that turns sweeps a circle; one that walks straight, the width of its formation.
     turning = config.reference.wz != 0.0 or bool(config.reference.trace)
     half = (high - low) / 2.0
@@ -105,19 +106,31 @@ def build_course(config: Config, places: Array) -> Course:
     return Course(flat=flat, extent=extent, way=way, reach=float(np.hypot(*half)))
 
 
+def _begins_backward(config: Config, way: Array) -> bool:
+    """Whether the team leaves the flat place backward: with a trace, in its first metre."""
+    if not config.reference.trace:
+        return config.reference.vx < 0.0
+    left = np.linalg.norm(way, axis=1) >= _FLAT_AHEAD
+    return bool(way[left.argmax() if left.any() else -1, 0] < 0.0)
+
+
 def _way(config: Config) -> Array:
     """Nominal way of the formation's centre from the origin. Shape (m, 2), m."""
     ref, trace = config.reference, trace_of(config)
-    longest = _LONGEST_WAY / max(math.hypot(ref.vx, ref.vy), 0.1)
-    times = np.arange(0.0, min(config.world.seconds, longest), _STEP)
     if trace is None:
+        longest = _LONGEST_WAY / max(math.hypot(ref.vx, ref.vy), 0.1)
+        times = np.arange(0.0, min(config.world.seconds, longest), _STEP)
         vx, vy, yaw = ref.vx, ref.vy, ref.wz * times
     else:
+        times = np.arange(0.0, config.world.seconds, _STEP)
         vx, vy, wz = np.array([trace.at(t) for t in times.tolist()]).T
         yaw = np.cumsum(_STEP * wz)
     step = _STEP * np.stack(
         [vx * np.cos(yaw) - vy * np.sin(yaw), vx * np.sin(yaw) + vy * np.cos(yaw)], axis=1
     )
+    if trace is not None:
+        length = np.cumsum(np.linalg.norm(step, axis=1))
+        step = step[: max(1, int(np.searchsorted(length, _LONGEST_WAY)))]
     speed = float(np.linalg.norm(step[-1]))
     heading = step[-1] / speed if speed > 0.0 else np.array([1.0, 0.0])
     ahead = np.arange(0.0, _AHEAD, 0.2)[:, None] * heading

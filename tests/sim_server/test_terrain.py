@@ -1,4 +1,5 @@
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -7,7 +8,7 @@ import pytest
 
 from shared.config import Config, ReferenceConfig
 from shared.robot import Array
-from shared.trace import trace_of
+from shared.trace import inlined, trace_of
 from sim_server.course import build_course
 from sim_server.height_field import HeightField
 from sim_server.team_model import build_team_model, formation
@@ -114,6 +115,29 @@ def test_course_contains_the_nominal_way(vx: float, vy: float, wz: float) -> Non
     if not wz:
         end = at + 2.5 * np.array([vx, vy]) / np.hypot(vx, vy)
         assert course.extent.depth(end[0], end[1]) > 0.0
+
+
+@pytest.mark.parametrize(("vx", "seconds"), [(1.2, 120.0), (-0.3, 120.0), (0.3, 200.0)])
+def test_terrain_follows_a_trace_and_not_the_speed_it_replaces(
+    vx: float, seconds: float, tmp_path: Path
+) -> None:
+    trace = tmp_path / "trace.csv"
+    trace.write_text(f"t,vx,vy,wz\n0,{vx},0,0\n10,{vx},0,0\n", encoding="utf-8")
+    for asked in (1.0, 0.0):
+        config, _ = laid("flat", vx=asked)
+        config = replace(
+            config, world=replace(config.world, seconds=seconds),
+            reference=replace(config.reference, trace=inlined(trace)),
+        )  # fmt: skip
+        places = formation(3, config.team.spacing)
+        course = build_course(config, places)
+        reach = min(40.0, abs(vx) * seconds)
+        longest = np.abs([course.extent.x_low, course.extent.x_high]).max()
+        assert reach + 2.0 < longest < reach + 7.0
+        assert (course.extent.x_low < -reach) == (vx < 0.0)
+        before = course.flat.x_high - places[:, 0].max()
+        behind = places[:, 0].min() - course.flat.x_low
+        assert (before > behind) == (vx > 0.0)
 
 
 def test_a_very_long_way_is_covered_to_a_bound_only() -> None:
