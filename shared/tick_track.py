@@ -19,6 +19,7 @@ from shared.topics import (
 )
 
 _JUMP: Final = 600_000  # ms: a longer jump is another clock or a forged tick, not a loss
+_LONG: Final = 10_000  # ms: so long a jump, or one back, is believed if the next message follows it
 _KEPT: Final = 1000  # gaps that are remembered one by one
 
 Gap = tuple[int, int]  # last tick before it, first tick after it
@@ -60,12 +61,13 @@ class TickTrack:
 
     Attributes:
         count: messages.
-        first, last: ticks of the first and the newest message, −1 before them.
+        first, last: ticks of the first and the newest message, −1 before them; one out of order,
+            or far ahead, counts as the newest once the next message goes on from it.
         lost: messages that are missing between them, by the topic's period.
         gaps: where, at most the first thousand.
     """
 
-    __slots__ = ("_period", "count", "first", "gaps", "last", "lost")
+    __slots__ = ("_odd", "_period", "count", "first", "gaps", "last", "lost")
 
     def __init__(self, period: int, before: int = -1) -> None:
         """Begin to follow.
@@ -75,6 +77,7 @@ class TickTrack:
             before: tick of the message before the first one here, −1 if unknown.
         """
         self._period, self.last = period, before
+        self._odd = -1  # tick that no other has borne out yet
         self.first = -1
         self.count = self.lost = 0
         self.gaps: list[Gap] = []
@@ -84,15 +87,23 @@ class TickTrack:
         self.count += 1
         if tick < 0:
             return
+        if self.first < 0:
+            self.first = tick
+        if self.last >= 0 and self._period > 0 and not 0 <= tick - self.last < _LONG:
+            if not 0 < tick - self._odd <= self._period or self._odd < 0:
+                self._odd = tick
+                return
+            self._go_on(self._odd)
+        self._go_on(tick)
+
+    def _go_on(self, tick: int) -> None:
         step = tick - self.last
         if step > self._period > 0 <= self.last and step < _JUMP:
             missing = (step - 1) // self._period
             self.lost += missing
             if missing and len(self.gaps) < _KEPT:
                 self.gaps.append((self.last, tick))
-        if self.first < 0:
-            self.first = tick
-        self.last = tick
+        self.last, self._odd = tick, -1
 
 
 def lost_by_key(tracks: Mapping[str, TickTrack]) -> dict[str, int]:

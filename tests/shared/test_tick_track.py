@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -37,6 +38,24 @@ def test_what_is_no_gap() -> None:
     for tick in (5, 500):
         unknown.note(tick)
     assert unknown.lost == 0
+
+
+@pytest.mark.parametrize("odd", [0, 400, 1099, 100_000, 5_000_000])
+def test_one_message_out_of_order_is_no_gap(odd: int) -> None:
+    track = TickTrack(1)
+    for tick in (*range(1100), odd, *range(1100, 1200), *range(1240, 1300)):
+        track.note(tick)
+    assert (track.lost, track.gaps, track.last) == (40, [(1199, 1240)], 1299)
+
+
+def test_a_long_loss_and_another_clock_are_told_apart() -> None:
+    track = TickTrack(10)
+    for tick in (*range(0, 1000, 10), *range(60_000, 60_100, 10)):
+        track.note(tick)
+    assert (track.lost, track.gaps) == (5900, [(990, 60_000)])
+    for tick in (*range(500, 600, 10), *range(9_000_000, 9_000_100, 10)):
+        track.note(tick)
+    assert (track.lost, track.last) == (5900, 9_000_090)
 
 
 def test_a_file_goes_on_where_the_one_before_ended() -> None:
