@@ -6,12 +6,12 @@ Run: python benchmarks/lockstep.py [--robots 1 3 5] [--seconds 4]
 from __future__ import annotations
 
 import argparse
-import multiprocessing
 import resource
 from multiprocessing.synchronize import Event
 from typing import Any
 
 import numpy as np
+from children import SPAWN, child, running
 
 from quadriga.endpoint import free_endpoint
 from shared.barrier import SIM, meet, start_together
@@ -65,14 +65,10 @@ def measure(robots: int, seconds: float) -> None:
         "team.robots": robots, "world.seconds": seconds, "bus.endpoint": free_endpoint(),
         "recorder.enabled": False,
     })  # fmt: skip
-    spawn = multiprocessing.get_context("spawn")
-    ended = spawn.Event()
-    spent = {name: spawn.Value("d", 0.0) for name in robot_names(robots)}
-    others = [
-        spawn.Process(target=stand, args=(config, name, ended, value))
-        for name, value in spent.items()
-    ]
-    others.append(spawn.Process(target=idle, args=(config, "operator", ended)))
+    ended = SPAWN.Event()
+    spent = {name: SPAWN.Value("d", 0.0) for name in robot_names(robots)}
+    others = [child(stand, config, name, ended, value) for name, value in spent.items()]
+    others.append(child(idle, config, "operator", ended))
     world = World(config)
     begun = monotonic()
     for _ in range(1000):
@@ -82,16 +78,13 @@ def measure(robots: int, seconds: float) -> None:
     with Bus.open(config.bus, config.team.name, SIM) as bus:
         bus.subscribe(COMMAND.key(config.team.name, "*"))
         stage = Stage(config, world, bus)
-        for process in others:
-            process.start()
-        meet(bus, config, ended.is_set)
-        start_together(bus, config, ended.is_set)
-        begun, used = monotonic(), processor_time()
-        run_lockstep(stage, ended.is_set)
-        took, used = monotonic() - begun, processor_time() - used
-        ended.set()
-    for process in others:
-        process.join()
+        with running(*others):
+            meet(bus, config, ended.is_set)
+            start_together(bus, config, ended.is_set)
+            begun, used = monotonic(), processor_time()
+            run_lockstep(stage, ended.is_set)
+            took, used = monotonic() - begun, processor_time() - used
+            ended.set()
     agents = sum(value.value for value in spent.values()) / robots
     print(
         f"n = {robots}: {1e3 * took / seconds:.0f} µs a tick, physics {1e3 * physics:.0f}; "
