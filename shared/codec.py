@@ -20,13 +20,15 @@ M = TypeVar("M", bound=Message)
 
 MAX_BYTES = 1 << 20  # a message larger than this is refused before it is parsed
 MAX_TICK = 1 << 42  # 139 years of ms, so that a tick in ns is still an integer of the wire
-_TEXT_LIMIT = 4096
+MAX_INTEGER = 1 << 62  # integers of all other fields are below
+MAX_TEXT = 4096  # characters
+_MOST_SAID = 120  # characters of what is wrong with a message: errors become events and log lines
 _ENVELOPE: Final = ("tick", "stamp_ns")
 _FLOAT64: Final = np.dtype("<f8")
 
 
 def encode(message: Message) -> bytes:
-    """The wire form of a message. Equal messages give equal bytes."""
+    """The wire form of a message. Equal messages give equal bytes. Nothing is checked."""
     layout = _layout(type(message))
     if isinstance(message, Flat) and layout.flat is not None:
         return layout.flat.write(message.tick, message.stamp_ns, message.row)
@@ -37,6 +39,15 @@ def encode(message: Message) -> bytes:
         body[name] = np.ascontiguousarray(getattr(message, name), dtype="<f8").tobytes()
     packed: bytes = msgpack.packb(body)
     return packed
+
+
+def sendable(text: str, limit: int = MAX_TEXT) -> str:
+    """`text` as a message may hold it: cut to `limit` characters, a `?` for what UTF-8 cannot say.
+
+    What was typed in a terminal of another encoding holds such characters.
+    """
+    text = text if len(text) <= limit else f"{text[: limit - 1]}…"
+    return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def decode(payload: bytes, kind: type[M]) -> M:
@@ -66,7 +77,7 @@ def decode(payload: bytes, kind: type[M]) -> M:
     schema = body.pop("schema", None)
     if schema != kind.SCHEMA or isinstance(schema, bool):
         raise _error(
-            kind, f"schema {schema!r}", f"schema {kind.SCHEMA}", "another version of quadriga"
+            kind, f"schema {_shown(schema)}", f"schema {kind.SCHEMA}", "another version of quadriga"
         )
     if tuple(body) != layout.order and body.keys() != layout.names:
         missing = sorted(layout.names - body.keys())
@@ -152,9 +163,9 @@ def _checker(kind: type[Message], name: str, of: type, annotation: Any) -> Calla
     """A function that returns the checked value of a field that is not an array."""
 
     def wrong(value: Any, expected: str) -> MessageError:
-        return _error(kind, repr(value)[:80], expected, "", name)
+        return _error(kind, _shown(value), expected, "", name)
 
-    limit = MAX_TICK if name == "tick" else 1 << 62
+    limit = MAX_TICK if name == "tick" else MAX_INTEGER
 
     def integer(value: Any) -> int:
         if type(value) is not int or not 0 <= value < limit:
@@ -167,8 +178,8 @@ def _checker(kind: type[Message], name: str, of: type, annotation: Any) -> Calla
         return float(value)
 
     def text(value: Any) -> str:
-        if not isinstance(value, str) or len(value) > _TEXT_LIMIT:
-            raise wrong(value, f"text of at most {_TEXT_LIMIT} characters")
+        if not isinstance(value, str) or len(value) > MAX_TEXT:
+            raise wrong(value, f"text of at most {MAX_TEXT} characters")
         return value
 
     def names(value: Any) -> tuple[str, ...]:
@@ -185,8 +196,17 @@ def _checker(kind: type[Message], name: str, of: type, annotation: Any) -> Calla
     return {int: integer, float: number, str: text, list: names, dict: mapping}[of]
 
 
+def _shown(value: Any) -> str:
+    """A value of the wire in a few words; `repr` of what nests deeply would overflow the stack."""
+    if isinstance(value, (str, bytes)):
+        return repr(value[:_MOST_SAID])
+    if value is None or isinstance(value, (bool, int, float)):
+        return repr(value)
+    return f"a {type(value).__name__}"
+
+
 def _error(
     kind: type[Message], got: str, expected: str, cause: str, name: str = ""
 ) -> MessageError:
     label = f"{kind.__name__.lower()}.{name}" if name else kind.__name__.lower()
-    return MessageError(label, got, expected, cause)
+    return MessageError(label, sendable(got, _MOST_SAID), expected, cause)

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.codec import MAX_BYTES, MAX_TICK, decode, encode
+from shared.codec import MAX_BYTES, MAX_INTEGER, MAX_TEXT, MAX_TICK, decode, encode, sendable
 from shared.errors import MessageError
 from shared.messages import Command, Message, Plan, State, Status, Truth
 from shared.robot import Array
@@ -25,7 +25,7 @@ few = settings(max_examples=40)
 _finite = st.floats(allow_nan=False, allow_infinity=False)
 _text = st.text(max_size=20)
 _PLAIN: dict[tuple[type, bool], st.SearchStrategy[Any]] = {
-    (int, True): st.integers(0, (1 << 62) - 1),
+    (int, True): st.integers(0, MAX_INTEGER - 1),
     (float, False): _finite,
     (str, False): _text,
     (list, False): st.lists(_text, max_size=5).map(tuple),
@@ -198,6 +198,48 @@ def test_missing_and_unknown_fields_are_named() -> None:
     body["voltage"] = body.pop("foot_force")
     with pytest.raises(MessageError, match=r"missing=\['foot_force'\] unknown=\['voltage'\]"):
         decode(msgpack.packb(body), State)
+
+
+def nested(depth: int) -> list[Any]:
+    """A list within a list, so many times."""
+    value: list[Any] = []
+    for _ in range(depth):
+        value = [value]
+    return value
+
+
+LONG = 900_001  # characters or bytes, nearly what a message may be, and no whole float64s
+
+
+@of_every_type
+@pytest.mark.parametrize(
+    "wrong", [nested(1000), "x" * LONG, "\x00" * LONG, b"x" * LONG, {"\x00" * LONG: -1}],
+    ids=["nested", "text", "control", "bytes", "map"],
+)  # fmt: skip
+def test_the_error_about_any_value_is_a_short_line(kind: type[Message], wrong: Any) -> None:
+    for name, body in (("schema", body_of(kind)), *((f.name, body_of(kind)) for f in fields(kind))):
+        with pytest.raises(MessageError) as caught:
+            decode(msgpack.packb({**body, name: wrong}), kind)
+        assert len(str(caught.value)) < 300
+        assert str(caught.value).isprintable()
+
+
+def test_the_error_about_foreign_fields_is_a_short_line() -> None:
+    strange = {f"key {i}": i for i in range(50_000)}
+    with pytest.raises(MessageError) as caught:
+        decode(msgpack.packb({**body_of(Command), **strange}), Command)
+    assert len(str(caught.value)) < 300
+    assert "missing=[] unknown=['key 0', " in str(caught.value)
+    with pytest.raises(MessageError) as caught:
+        decode(msgpack.packb({**body_of(Command), "x" * LONG: 1}), Command)
+    assert len(str(caught.value)) < 300
+
+
+def test_text_is_made_fit_for_a_message() -> None:
+    for text in ("", "Stürz", "x" * MAX_TEXT):
+        assert sendable(text) == text
+    assert sendable("x" * (MAX_TEXT + 1)) == "x" * (MAX_TEXT - 1) + "…"
+    assert sendable("St\udcfcrz", 4) == "St?…"
 
 
 def test_a_huge_message_is_refused_before_it_is_parsed() -> None:
