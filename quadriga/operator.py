@@ -8,7 +8,7 @@ from typing import Final
 from shared.barrier import OPERATOR, SIM, meet
 from shared.bus import HERE, POLL, READY, Bus
 from shared.clock import monotonic
-from shared.codec import decode, encode
+from shared.codec import decode, encode, sendable
 from shared.config import Config
 from shared.envelope import envelope
 from shared.errors import BusError, MessageError
@@ -21,6 +21,7 @@ from shared.trace import trace_of
 
 _AHEAD: Final = 4  # epochs; agents in lock-step wait for the one in force
 _ESTOP_WAIT: Final = 5.0  # s, longest search for the team
+_LONGEST_REASON: Final = 200  # characters; it becomes part of every agent's status
 
 
 def reference_at(config: Config, tick: int) -> Reference:
@@ -94,10 +95,13 @@ def _next_tick(bus: Bus, tick: int) -> tuple[int, bool]:
 def stop_team(config: Config, reason: str) -> None:
     """Send one emergency stop to every robot of the team.
 
+    Whatever the reason's text is and whoever else tells the time, agents can read it.
+
     Raises:
         BusError: the bus cannot be opened, or some robots were not reached.
     """
     team, names = config.team.name, robot_names(config.team.robots)
+    reason = sendable(reason, _LONGEST_REASON)
     with Bus.open(config.bus, team, "estop") as bus:
         put = bus.publisher(ESTOP.key(team))
         bus.subscribe(TRUTH.key(team))

@@ -6,10 +6,11 @@ from typing import Any, Final
 
 import msgpack
 
+from shared.codec import MAX_INTEGER, MAX_TICK
+
 _HEAD: Final = b"\xa6schema\x01\xa4tick"  # what `encode` writes after the map's own byte
 _TICK: Final = 1 + len(_HEAD)
 _STAMP: Final = b"\xa8stamp_ns"
-_LIMIT: Final = 1 << 62  # the codec's
 _WIDTH: Final = {0xCC: 1, 0xCD: 2, 0xCE: 4, 0xCF: 8}  # MessagePack's unsigned integers
 
 
@@ -17,7 +18,7 @@ def envelope(payload: bytes) -> tuple[int, int] | None:
     """`(tick, stamp_ns)` of a message, or None if its bytes do not carry them.
 
     Costs about 1 µs for bytes that `shared.codec.encode` wrote, and a full parse for any
-    other order of the same fields. Nothing but these two fields is validated.
+    other order of the same fields. Nothing but these two fields is validated, as the codec would.
     """
     if payload[1:_TICK] == _HEAD:
         try:
@@ -53,4 +54,4 @@ def _parsed(payload: bytes) -> tuple[int, int] | None:
 
 
 def _limited(tick: int, stamp_ns: int) -> tuple[int, int] | None:
-    return (tick, stamp_ns) if 0 <= tick < _LIMIT and 0 <= stamp_ns < _LIMIT else None
+    return (tick, stamp_ns) if 0 <= tick < MAX_TICK and 0 <= stamp_ns < MAX_INTEGER else None

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from threading import Event as Flag
+from threading import Thread
 
 import numpy as np
 import pytest
 
 from quadriga.endpoint import free_endpoint
-from quadriga.operator import _next_tick, reference_at
+from quadriga.operator import _next_tick, reference_at, stop_team
 from shared.barrier import OPERATOR, SIM
 from shared.bus import HERE, Bus
-from shared.codec import encode
+from shared.clock import sleep
+from shared.codec import MAX_TEXT, MAX_TICK, decode, encode
 from shared.config import BusConfig, Config
 from shared.config_file import load
-from shared.messages import Event, Truth
-from shared.topics import EVENT, TRUTH
+from shared.messages import EStop, Event, Truth
+from shared.topics import ESTOP, EVENT, TRUTH
 
 
 def test_stand_then_ramp_then_full_speed() -> None:
@@ -75,3 +78,47 @@ def test_a_walk_ends_at_the_same_tick_for_who_is_behind(late: bool) -> None:
         while not over:
             heard, over = _next_tick(operator, heard)
         assert heard == 799
+
+
+def said_stop(reason: str, tick: int) -> EStop:
+    """What a robot hears of an emergency stop while somebody tells a tick on the truth's key."""
+    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint()})
+    with Bus.open(config.bus, "team", SIM) as sim, Bus.open(config.bus, "team", "r1") as r1:
+        r1.subscribe(ESTOP.key("team"))
+        put, over = sim.publisher(TRUTH.key("team")), Flag()
+        told = encode(Event(tick, 0, "", "", ""))
+
+        def tell() -> None:
+            while not over.wait(0.02):
+                put(told)
+
+        threads = [Thread(target=tell), Thread(target=stop_team, args=(config, reason))]
+        for thread in threads:
+            thread.start()
+        try:
+            sleep(1.0)  # the tick is heard before anybody is there to stop
+            r1.declare(HERE)
+            packet = r1.get(10.0)
+        finally:
+            over.set()
+            for thread in threads:
+                thread.join()
+    assert packet is not None
+    return decode(packet[1], EStop)
+
+
+@pytest.mark.parametrize(
+    ("typed", "sent"),
+    [
+        ("smoke", "smoke"),
+        ("St\udcfcrz", "St?rz"),  # typed in a Latin-1 terminal
+        ("x" * (MAX_TEXT + 1), "x" * 199 + "…"),
+    ],
+)
+def test_every_agent_can_read_an_emergency_stop(typed: str, sent: str) -> None:
+    assert said_stop(typed, 700).reason == sent
+
+
+def test_a_tick_that_no_agent_accepts_is_not_passed_on() -> None:
+    assert said_stop("smoke", 700).tick == 700
+    assert said_stop("smoke", MAX_TICK).tick == 0
