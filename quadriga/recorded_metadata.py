@@ -22,5 +22,5 @@ def recorded_patterns(metadata: Mapping[str, str], name: str) -> list[str]:
 def _json(metadata: Mapping[str, str], name: str) -> Any:
     try:
         return json.loads(metadata.get(name, "null"))
-    except ValueError:
+    except (ValueError, RecursionError):  # the latter for what nests too deeply
         return None

@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.gaps import end_of_world, missing_ticks, repeated_ticks
+from quadriga.recorded_metadata import recorded_versions
 from quadriga.table import print_table
 from quadriga.traces import (
     ERRORS,
@@ -76,7 +77,7 @@ def summary_of(traces: Traces) -> dict[str, Any]:
         "estimator": config.estimator.kind,
         "config_sha256": metadata.get("config_sha256", ""),
         "predictor_sha256": metadata.get("predictor_sha256", ""),
-        "versions": json.loads(metadata.get("versions", "{}")),
+        "versions": recorded_versions(metadata),
     }
 
 

@@ -92,7 +92,7 @@ def check_schema(schema: Schema, path: str) -> None:
         return
     try:
         version = json.loads(schema.data)["properties"]["schema"]["const"]
-    except (ValueError, TypeError, LookupError):
+    except (ValueError, TypeError, LookupError, RecursionError):
         return
     if isinstance(version, int) and version > mine:
         raise newer(path, f"messages {schema.name} of schema {version}", f"schema {mine}")

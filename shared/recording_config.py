@@ -20,7 +20,7 @@ def recorded_config(recording: Recording | Salvage) -> Config:
     """
     try:
         sections = json.loads(recording.metadata.get("config_json", ""))
-    except ValueError:
+    except (ValueError, RecursionError):  # the latter for what nests too deeply
         sections = None
     if not isinstance(sections, dict):
         raise RecordingError(
@@ -32,4 +32,9 @@ def recorded_config(recording: Recording | Salvage) -> Config:
         raise RecordingError(
             f"configuration of {recording.path}", f"{error.name} = {error.got}", error.expected,
             "recorded by another version of quadriga: use that one",
+        ) from None  # fmt: skip
+    except RecursionError:  # in the words about a value that nests as deeply as JSON permits
+        raise RecordingError(
+            f"configuration of {recording.path}", "values nested in values", "sections of keys",
+            "recorded by something else than quadriga",
         ) from None  # fmt: skip

@@ -11,14 +11,18 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mcap.records import Schema
 
 from quadriga.cli import main
 from quadriga.recorder import metadata
 from shared import messages as msg
 from shared import recording_seal
 from shared.codec import encode
+from shared.errors import RecordingError
+from shared.mcap_chunk import check_schema
 from shared.messages import State
 from shared.recording import Recording, RecordingWriter
+from shared.recording_config import recorded_config
 from shared.tick_track import periods
 from tests.quadriga.conftest import run_config, write
 
@@ -97,7 +101,13 @@ def test_info_names_gaps_and_reasons_to_stop(tmp_path: Path, say: Say) -> None:
     assert re.search(r"^  r2 stopped +peer-lost:r1$", text, re.MULTILINE)
 
 
-@pytest.mark.parametrize("versions", ["not JSON", "[1]", '{"python": "\x1b[31m3"}'])
+odd_versions = pytest.mark.parametrize(
+    "versions", ["not JSON", "[1]", '{"python": "\x1b[31m3"}', "[" * 100_000],
+    ids=["text", "list", "control", "nested"],
+)  # fmt: skip
+
+
+@odd_versions
 def test_metadata_of_anybody_do_no_harm(tmp_path: Path, say: Say, versions: str) -> None:
     path = tmp_path / "odd.mcap"
     told = metadata(CONFIG, "") | {"versions": versions, "topics": versions}
@@ -107,6 +117,47 @@ def test_metadata_of_anybody_do_no_harm(tmp_path: Path, say: Say, versions: str)
     assert (status, err) == (0, "")
     assert "\x1b" not in "".join(lines)
     assert re.search(r"^  end +\ufffd\[2J end$", "\n".join(lines), re.MULTILINE)
+
+
+@odd_versions
+def test_a_report_shows_metadata_of_anybody(
+    tmp_path: Path, small: Path, say: Say, versions: str
+) -> None:
+    path, source = tmp_path / "odd.mcap", Recording(small)
+    told = dict(source.metadata) | {"versions": versions}
+    with RecordingWriter(path, told, 16, periods=periods(CONFIG)) as writer:
+        for entry in source.entries():
+            writer.write(entry.key, entry.payload, entry.log_time_ns)
+    status, lines, err = say("report", path, "--html", tmp_path / "odd.html")
+    assert (status, err) == (1, "")  # it tells of a fall
+    assert "\x1b" not in "".join(lines)
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "[]", "no JSON"], ids=["nested", "list", "text"])
+def test_a_configuration_that_is_none_is_one_clear_error(
+    tmp_path: Path, say: Say, text: str
+) -> None:
+    path = tmp_path / "odd.mcap"
+    with RecordingWriter(path, metadata(CONFIG, "") | {"config_json": text}) as writer:
+        writer.write("team/r1/state", b"", 0)
+    status, _, err = say("report", path)
+    assert (status, err.count("\n")) == (2, 1)
+    assert "odd.mcap: got metadata without a configuration" in err
+
+
+def test_a_key_that_nests_as_deeply_as_can_be_read_is_one_clear_error(tmp_path: Path) -> None:
+    for depth in range(800, 1000, 5):
+        path = tmp_path / f"{depth}.mcap"
+        told = {"config_json": f'{{"world": {{"seed": {"[" * depth}{"]" * depth}}}}}'}
+        with RecordingWriter(path, metadata(CONFIG, "") | told) as writer:
+            writer.write("team/r1/state", b"", 0)
+        with pytest.raises(RecordingError):
+            recorded_config(Recording(path))
+
+
+def test_a_schema_that_is_no_sensible_json_is_not_obeyed() -> None:
+    for text in (b"[" * 100_000, b"no JSON", b"[]"):
+        check_schema(Schema(data=text, encoding="jsonschema", id=1, name="quadriga.State"), "file")
 
 
 def test_echo_is_one_readable_line_a_message(small: Path, say: Say) -> None:
