@@ -8,7 +8,7 @@ from typing import Final
 
 from shared.barrier import SIM
 from shared.bus import Bus
-from shared.codec import encode
+from shared.codec import encode, sendable
 from shared.config import Config
 from shared.messages import Command, Event, Status
 from shared.topics import EVENT, STATE, STATUS, TRUTH
@@ -41,7 +41,8 @@ class Stage:
         }
         self._put_truth = bus.publisher(TRUTH.key(team), droppable=realtime)
         self._put_status = bus.publisher(STATUS.key(team, SIM), droppable=True)
-        self._put_event = bus.publisher(EVENT.key(team))
+        self._put_event = bus.publisher(EVENT.key(team), droppable=realtime)
+        self._put_stop = bus.publisher(EVENT.key(team))  # all leave by it, no tick waits for it
         self._truth_period = 1 if config.estimator.kind == "truth" else TRUTH_PERIOD_MS
         self._last_tick = round(config.world.seconds * 1000)
         self._malformed = 0
@@ -57,9 +58,9 @@ class Stage:
         world.settle()
 
     def announce(self, kind: str, robot: str, detail: str) -> None:
-        """Publish an event of the present tick."""
+        """Publish an event of the present tick; a detail longer than a message's text is cut."""
         tick = self.world.tick
-        self._send(Event(tick, tick * 1_000_000, kind, robot, detail))
+        self._send(Event(tick, tick * 1_000_000, kind, robot, sendable(detail)))
 
     def tell(self, status: Status) -> None:
         """Publish the world's account of itself."""
@@ -86,6 +87,7 @@ class Stage:
             self.announce("fault", "", f"{count} commands dropped: {self.commands.last_error}")
 
     def _send(self, event: Event) -> None:
-        self._put_event(encode(event))
+        put = self._put_stop if event.kind == "stop" else self._put_event
+        put(encode(event))
         print(f"{event.tick} ms: {event.kind} {event.robot} {event.detail}",
               file=sys.stderr, flush=True)  # fmt: skip

@@ -16,9 +16,10 @@ from shared.clock import monotonic, sleep
 from shared.codec import decode
 from shared.config_text import to_toml
 from shared.errors import ProcessError
-from shared.messages import EStop, Status
+from shared.messages import EStop, Event, Status
+from shared.topics import EVENT
 from tests.runtime.conftest import WAIT, Make, run_alone
-from tests.runtime.frozen import PATIENCE, freeze
+from tests.runtime.frozen import PATIENCE, TEAM, await_tick, freeze
 
 FOREVER = 600.0  # s of world time
 Watcher = Callable[..., Bus]
@@ -48,6 +49,33 @@ def test_who_is_frozen_to_the_end_is_named_and_nobody_else(make_team: Make) -> N
         with pytest.raises(ProcessError, match="process r2: got no end after the walk"):
             running.watch(never)
     assert "stop  fall of" in team.log("sim").splitlines()[-1], "and then nothing, no traceback"
+
+
+def test_in_real_time_the_world_waits_for_no_frozen_listener(
+    make_team: Make, watcher: Watcher
+) -> None:
+    """Its buffers are full some seconds after it froze, and what must not be lost waits 5 s."""
+    pushes = [f"r1:5:90:{second}:0.1" for second in (3, 4, 5, 6)]
+    team = make_team(world__mode="realtime", world__seconds=6.5, world__push=",".join(pushes))
+    echo = (*launch.QUADRIGA, "echo", "**", "--config", str(team.folder / "config.toml"))
+    with team.launch() as running, subprocess.Popen(echo, stdout=subprocess.PIPE) as listener:
+        try:
+            assert listener.stdout is not None
+            listener.stdout.readline()
+            bus = watcher(team)
+            await_tick(bus, 10)
+            listener.send_signal(signal.SIGSTOP)
+            heard, longest, last = 0, 0.0, monotonic()
+            while heard < len(pushes):
+                packet = bus.get(WAIT)
+                assert packet is not None
+                longest, last = max(longest, monotonic() - last), monotonic()
+                if packet[0] == EVENT.key(TEAM):
+                    heard += decode(packet[1], Event).kind == "push"
+        finally:
+            listener.kill()
+        running.watch(never)
+    assert longest < 2.0
 
 
 @pytest.mark.parametrize("name", ["sim", "r2", "operator"])
