@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
 
-from shared.config import Config
+from shared.config import CENTRAL, Config
 from shared.errors import ConfigError
 from shared.payload import carriers
 from shared.presets import PRESETS, preset_keys
@@ -22,6 +22,8 @@ from shared.trace import ROW_END, inlined
 _TEAM_NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
 _PAIRS: Final = ("identification.vx", "identification.vy", "identification.wz",
                  "identification.gain_range")  # fmt: skip
+_ANSWER: Final = 1.0  # s wall, for a robot's step once it has waited for a peer in vain
+_LEAST_PEBBLE: Final = 0.005  # m; the ground holds millions of smaller stones
 
 
 def load(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
@@ -230,11 +232,37 @@ def _check_together(config: Config) -> None:
         raise ConfigError("world.command_damp_ms", str(config.world.command_damp_ms),
                           f"at least world.command_hold_ms = {config.world.command_hold_ms}",
                           "a late command is held first, then damped")  # fmt: skip
-    if config.planner.applied > config.planner.N:
-        raise ConfigError("planner.applied", str(config.planner.applied),
-                          f"at most planner.N = {config.planner.N}")  # fmt: skip
+    if config.world.terrain == "pebbles" and config.world.terrain_height < _LEAST_PEBBLE:
+        raise ConfigError("world.terrain_height", f"{config.world.terrain_height:g}",
+                          f"at least {_LEAST_PEBBLE:g} m for terrain 'pebbles'",
+                          "the height of the largest stones; terrain 'flat' has none"
+                          )  # fmt: skip
+    _check_planner(config)
     for pair in _PAIRS:
         section, _, key = pair.partition(".")
         first, last = getattr(getattr(config, section), key)
         if first > last:
             raise ConfigError(pair, f"[{first}, {last}]", "[least, greatest]")
+
+
+def _check_planner(config: Config) -> None:
+    """Plans reach from one to the next, and who waits for a peer's is waited for."""
+    planner, patience = config.planner, config.world.command_timeout
+    if planner.applied > planner.N:
+        raise ConfigError("planner.applied", str(planner.applied),
+                          f"at most planner.N = {planner.N}")  # fmt: skip
+    if planner.kind == "none":
+        return
+    latency = max(1, planner.latency_ms) if planner.kind in CENTRAL else planner.latency_ms
+    longest = SAMPLE_MS * (planner.N - planner.applied)
+    if latency > longest:
+        raise ConfigError("planner.latency_ms", str(planner.latency_ms),
+                          f"at most {SAMPLE_MS}·(planner.N − planner.applied) = {longest} ms",
+                          "a plan would have run out before the next one takes effect"
+                          )  # fmt: skip
+    least = planner.peer_timeout + _ANSWER
+    if config.world.mode == "lockstep" and patience < least:
+        raise ConfigError("world.command_timeout", f"{patience:g}",
+                          f"at least planner.peer_timeout + {_ANSWER:g} s = {least:g} s",
+                          "else robots that wait for a frozen peer's plan count as frozen too"
+                          )  # fmt: skip

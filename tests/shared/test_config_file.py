@@ -113,6 +113,17 @@ def test_every_key_keeps_its_range_and_has_a_plausible_default(section: str, ite
         ('[world]\npush = "all:9:0:1:1,r7:9:0:1:1"\n', r"world\.push: got a push on 'r7'"),
         ("[world]\ncommand_hold_ms = 300\n", r"world\.command_damp_ms"),
         ("[planner]\nN = 4\napplied = 5\n", r"planner\.applied"),
+        ("[planner]\nlatency_ms = 90\nN = 12\n", r"planner\.latency_ms: got 90, .* = 80 ms"),
+        (
+            '[planner]\nkind = "deepc"\nlatency_ms = 0\nN = 4\n',
+            r"planner\.latency_ms: got 0, .* = 0",
+        ),
+        ("[planner]\npeer_timeout = 9.5\n", r"world\.command_timeout: got 10, .* = 10\.5 s"),
+        (
+            '[world]\nterrain = "pebbles"\nterrain_height = 0.0049\n',
+            r"world\.terrain_height: got 0\.0049, expected at least 0\.005 m for",
+        ),
+        ('[world]\nterrain = "pebbles"\nterrain_height = 0\n', r"world\.terrain_height: got 0, "),
         ("[identification]\nvx = [0.5, -0.5]\n", r"identification\.vx.*\[least, greatest\]"),
         ("[planner]\nR = [0.2, 0.2, -1.0]\n", r"planner\.R\[2\].*≥ 1e-09"),
         ("[world]\nfriction = 9\n", r"world\.friction: got 9, expected a finite number in \[0.05"),
@@ -122,6 +133,22 @@ def test_every_key_keeps_its_range_and_has_a_plausible_default(section: str, ite
 def test_a_mistake_in_the_file_is_named(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         load(write(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[planner]\nlatency_ms = 80\nN = 12\n",
+        "[planner]\nlatency_ms = 0\nN = 4\n",
+        '[planner]\nkind = "none"\nlatency_ms = 90\nN = 12\npeer_timeout = 10.0\n',
+        "[planner]\npeer_timeout = 9.0\n",
+        '[planner]\npeer_timeout = 10.0\n[world]\nmode = "realtime"\n',
+        '[world]\nterrain = "pebbles"\nterrain_height = 0.005\n',
+        "[world]\nterrain_height = 0.0\n",
+    ],
+)
+def test_what_fits_together_is_taken(tmp_path: Path, text: str) -> None:
+    load(write(tmp_path, text))
 
 
 @pytest.mark.parametrize("name", ["", "a/b", "*", "**", "a b", "ä", "x" * 65, "$*", "#"])
