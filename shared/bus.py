@@ -10,7 +10,7 @@ from typing import Any, Final, Self
 
 import zenoh
 
-from shared.bus_settings import member_settings, router_settings
+from shared.bus_settings import at_fault, member_settings, router_settings
 from shared.clock import monotonic, sleep
 from shared.config import BusConfig
 from shared.errors import BusError
@@ -78,7 +78,7 @@ class Bus:
         deadline = monotonic() + (bus.barrier_timeout if stopped else 0.0)
         while True:
             try:
-                return cls(_open(settings, bus.endpoint, name), team, name)
+                return cls(_open(settings, name), team, name)
             except BusError as error:
                 if _NO_LINK not in error.got or monotonic() > deadline:
                     raise
@@ -99,7 +99,7 @@ class Bus:
         if bus.mode == "peer":
             with suppress(BusError):  # somebody listens there, or it is another machine's
                 settings = member_settings(bus, name, hub=True)
-                return cls(_open(settings, bus.endpoint, name), team, name)
+                return cls(_open(settings, name), team, name)
         joined = cls.open(bus, team, name)
         deadline = monotonic() + _LINK_TIMEOUT
         while not joined.linked and monotonic() < deadline:
@@ -119,7 +119,7 @@ class Bus:
         Raises:
             BusError: the endpoint is malformed, cannot be bound, or is already in use.
         """
-        return cls(_open(router_settings(listen), listen, ROUTER), team, ROUTER)
+        return cls(_open(router_settings(listen), ROUTER), team, ROUTER)
 
     @property
     def linked(self) -> bool:
@@ -260,28 +260,27 @@ def _direct(call: Callable[[Any], None]) -> Any:
     return zenoh.handlers.Callback(call, indirect=False)
 
 
-def _open(settings: dict[str, Any], endpoint: str, name: str) -> zenoh.Session:
-    config = zenoh.Config()
+def _open(settings: dict[str, Any], name: str) -> zenoh.Session:
+    config, at = zenoh.Config(), ""
     try:
-        for key, value in settings.items():
-            config.insert_json5(key, json.dumps(value))
+        for at, value in settings.items():
+            config.insert_json5(at, json.dumps(value))
         return zenoh.open(config)
     except zenoh.ZError as error:
-        raise _cannot_open(endpoint, name, error) from None
+        raise _cannot_open(*at_fault(settings, at, str(error)), name, str(error)) from None
 
 
-def _cannot_open(endpoint: str, name: str, error: Exception) -> BusError:
-    text = str(error)
-    if "in use" in text:
+def _cannot_open(key: str, endpoint: str, name: str, error: str) -> BusError:
+    if "in use" in error:
         cause = "another team or program listens there; choose another port"
-    elif _NO_LINK in text:
+    elif _NO_LINK in error:
         cause = "no router there (`quadriga router`), or a name that does not resolve"
-    elif "assign" in text:
+    elif "assign" in error:
         cause = "no interface of this machine has that address"
     else:
         cause = "a name that does not resolve, or not of the form tcp/HOST:PORT"
     where = "sim server" if name == "sim" else name
     return BusError(
-        f"bus.endpoint {endpoint!r} of {where}", text.split(" at /")[0],
+        f"{key} {endpoint!r} of {where}", error.split(" at /")[0],
         "an endpoint that can be opened", cause,
     )  # fmt: skip

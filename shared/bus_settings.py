@@ -51,3 +51,21 @@ def router_settings(listen: str) -> dict[str, Any]:
         "scouting/gossip/enabled": False,
         **_COMMON,
     }
+
+
+def at_fault(settings: dict[str, Any], at: str, error: str) -> tuple[str, str]:
+    """The key of the configuration that Zenoh's error is about, and its value.
+
+    Args:
+        settings: all of Zenoh's.
+        at: the last of them that was set.
+        error: Zenoh's words, which often do not say.
+    """
+    connect, listen = settings["connect/endpoints"], settings["listen/endpoints"]
+    if not (connect and listen):
+        return "bus.endpoint", (connect or listen)[0]
+    # Who listens too connects in the background: only the form and the protocol are checked before.
+    protocol = connect[0].partition("/")[0]
+    if at == "connect/endpoints" or f"not supported for {protocol} protocol" in error:
+        return "bus.endpoint", connect[0]
+    return "bus.listen", listen[0]

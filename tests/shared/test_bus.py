@@ -205,6 +205,30 @@ def test_an_endpoint_that_cannot_be_opened(opened: Open, cause: str) -> None:
         opened("sim")
 
 
+@pytest.mark.parametrize(
+    ("listen", "cause"),
+    [
+        ("tcp/203.0.113.1:0", "no interface of this machine"),
+        ("tcp/127.0.0.1:x", "not of the form tcp/HOST:PORT"),
+        ("tcp/no host:0", "a name that does not resolve"),
+        ("carrier-pigeon/roof:1", "not of the form tcp/HOST:PORT"),
+        ("", "not of the form tcp/HOST:PORT"),
+    ],
+)
+def test_where_a_process_listens_is_not_where_it_connects(
+    endpoint: str, listen: str, cause: str
+) -> None:
+    config = BusConfig(endpoint=endpoint, listen=listen)
+    with pytest.raises(BusError, match=rf"^bus\.listen '{listen}' of r1: .*{cause}"):
+        Bus.open(config, "team", "r1")
+
+
+@pytest.mark.parametrize("endpoint", ["carrier-pigeon/roof:1", "tcp", ""])
+def test_where_a_process_connects_is_not_where_it_listens(endpoint: str) -> None:
+    with pytest.raises(BusError, match=rf"^bus\.endpoint '{endpoint}' of r1: "):
+        Bus.open(BusConfig(endpoint=endpoint), "team", "r1")
+
+
 def test_without_a_router_a_client_cannot_start(opened: Open) -> None:
     with pytest.raises(BusError, match="no router there"):
         opened("r1", mode="client")
