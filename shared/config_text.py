@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import asdict, fields
 from typing import Any
 
 from shared.config import Config
 
 
-def to_toml(config: Config) -> str:
-    """A TOML file that loads as `config`, with every key's meaning, unit and range as comments."""
+def to_toml(config: Config, without: Container[str] = ()) -> str:
+    """A TOML file that loads as `config`, with every key's meaning, unit and range as comments.
+
+    The keys `without`, as `section.key`, are left to their defaults.
+    """
     lines = ["# Configuration of quadriga. Every key may be left out: its default then holds."]
     for section in fields(config):
         values = getattr(config, section.name)
         lines += ["", f"# {_summary(values)}", f"[{section.name}]"]
         for item in fields(values):
+            if f"{section.name}.{item.name}" in without:
+                continue
             doc, unit, limits = item.metadata["doc"], _unit(item.metadata), _limits(item.metadata)
             lines.append(f"# {doc}{f' [{unit}]' if unit else ''}{f'; {limits}' if limits else ''}")
             lines.append(f"{item.name} = {_toml(getattr(values, item.name))}")
