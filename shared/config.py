@@ -76,7 +76,8 @@ class WorldConfig:
         choices=("flat", "boxes", "gravel", "heightfield", "pebbles", "slope"),
     )  # fmt: skip
     terrain_height: float = key(
-        0.05, "m", "greatest height of the terrain; of pebbles: height of the largest",
+        0.05, "m",
+        "greatest height of the terrain; of pebbles: height of the largest, at least 0.005",
         low=0.0, high=0.3,
     )  # fmt: skip
     slope: float = key(8.0, "deg", "terrain slope: grade of the ramps", low=0.5, high=25.0)
@@ -120,7 +121,8 @@ class WorldConfig:
     command_timeout: float = key(
         10.0,
         "s wall",
-        "lockstep: a robot silent longer is put into damping",
+        "lockstep: a robot silent longer is put into damping; with a planner at least 1 s more "
+        "than planner.peer_timeout",
         low=0.05,
         high=60.0,
     )
@@ -319,7 +321,11 @@ class PlannerConfig:
         0.995, "1", "adaptation: what a planning step leaves of older knowledge", low=0.5, high=1.0
     )
     latency_ms: int = key(
-        8, "ms", "a plan made from data at t takes effect at t + this", low=0, high=100
+        8,
+        "ms",
+        "a plan made from data at t takes effect at t + this, at most 10·(N − applied)",
+        low=0,
+        high=100,
     )
     lambda_g: float = key(1e5, "1", "deepc: weight of ‖g‖²", low=1e-9, high=1e12)
     lambda_sigma: float = key(1e5, "1", "deepc: weight of ‖σ‖²", low=1e-9, high=1e15)
