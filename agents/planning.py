@@ -14,8 +14,8 @@ from agents.modes import WALK
 from agents.pilot import NOTHING, Awaited, Heard, PilotState, Planned
 from agents.planner.episode import commanded_outputs, output_base
 from agents.planner.horizon import exchange_ms, step_ms
-from agents.planner.neighbours import Neighbours, PeerMemory
-from agents.planner.planner import PeerTerms, Planner, PlannerInputs, PlanResult
+from agents.planner.neighbours import Neighbours, PeerMemory, patience
+from agents.planner.planner import PEER_LOST, PeerTerms, Planner, PlannerInputs, PlanResult
 from agents.planner.predictor import Predictor
 from agents.planner.qp_solver import SOLVED
 from agents.planner.recursive import Correction
@@ -26,6 +26,7 @@ from shared.robot import Array
 from shared.topics import SAMPLE_MS
 
 FADED: Final = "faded"
+WINDOW_LOST: Final = "window-lost"  # stop: no plan of its own for as long as a peer may be silent
 WINDOW_GAP: Final = "window_gap"  # counted: no plan, for a sample of the robot's own is missing
 REFUSED: Final = "refused_by_planner"  # counted: a peer's message from another time or horizon
 ALONE: Final = "decentralised"
@@ -89,6 +90,8 @@ class LocalPilot:
         if heard.mode.name != WALK:
             return state, Planned(unusual=unusual)
         state, planned = self._planned(state, memory, heard, news)
+        if planned.plan is None and (gone := self._gone(state, memory, heard)):
+            planned = replace(planned, stop_reason=gone)
         return state, replace(planned, unusual=(*planned.unusual, *unusual)) if unusual else planned
 
     def _planned(
@@ -107,6 +110,24 @@ class LocalPilot:
         if news and state.terms_for != step + 1:
             state = self._prepare(state, memory, step + 1, heard.references)
         return state, Planned(present=present(state.flights, tick), unusual=unusual)
+
+    def _gone(self, state: PilotState, memory: PeerMemory, heard: Heard) -> str:
+        """Why to stop although there is no plan of this step that would tell; "" for no reason.
+
+        Asked at every tick: the one of the planning step may itself be missing.
+        """
+        step = heard.tick // self._step_ms
+        first, since = self._first_step, heard.mode.since
+        if since > self._config.gait.stand_ms:
+            # Who begins in the midst of a walk owes and is owed nothing till its window is whole.
+            first = max(first, first_step(self._config, since))
+        age = step - max(state.newest[0], first - 1)
+        if age <= 0:
+            return ""
+        lost = self._neighbours.lost(memory, step - 1, first)
+        if lost:
+            return _peer_lost(lost)
+        return WINDOW_LOST if age > patience(self._config.planner) else ""
 
     def _window_complete(self, state: PilotState, tick: int) -> bool:
         return _gapless(state.own, self._config.planner.T_ini, tick)
@@ -189,7 +210,7 @@ class LocalPilot:
         behind = 0 if serial[1] else 1
         planned = Planned(
             plan,
-            stop_reason=f"peer-lost:{','.join(result.lost)}" if result.lost else "",
+            stop_reason=_peer_lost(result.lost) if result.lost else "",
             planner_ns=took,
             ages_ms={
                 f"plan.{peer}": float(self._step_ms * (behind + age))
@@ -215,15 +236,24 @@ class LocalPilot:
         return replace(planned, present=present(state.flights, tick))
 
 
+def _peer_lost(names: tuple[str, ...]) -> str:
+    return f"{PEER_LOST}:{','.join(names)}"
+
+
 def _gapless(own: tuple[Measurement, ...], count: int, tick: int) -> bool:
     """Whether the last `count` samples up to the tick `tick` are there."""
     return len(own) >= count and own[-count].tick == tick - SAMPLE_MS * (count - 1)
 
 
-def first_step(config: Config) -> int:
-    """The team's first planning step: once it walks and all windows can be complete."""
+def first_step(config: Config, begun: int = 0) -> int:
+    """The team's first planning step: once it walks and all windows can be complete.
+
+    Args:
+        config: the team's configuration.
+        begun: tick of the first sample's beginning.
+    """
     samples = config.planner.T_ini + config.planner.applied
-    ready_ms = max(config.gait.stand_ms, SAMPLE_MS * samples)
+    ready_ms = max(config.gait.stand_ms, begun + SAMPLE_MS * samples)
     return -(-ready_ms // step_ms(config))
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from agents.gait import nominal_forces, scheduled_stance
 from agents.planner.horizon import horizon_stance, sample_starts, step_ms
-from shared.config import Config
+from shared.config import Config, PlannerConfig
 from shared.messages import Measurement, Message, Plan
 from shared.record import record
 from shared.robot import N_FORCES, N_OUTPUTS, Array, robot_names
@@ -123,7 +123,7 @@ class Neighbours:
             if (j != index if peers is None else j in peers)
         }
         self.names = tuple(self._indices)
-        kept_steps = config.planner.max_peer_age + config.planner.hold_steps + 2
+        kept_steps = patience(config.planner) + 2
         self._span_ms = SAMPLE_MS * config.planner.T_ini + step_ms(config) * kept_steps
 
     def initial(self) -> PeerMemory:
@@ -210,6 +210,27 @@ class Neighbours:
         ]
         return Selection(tuple(peers), end)
 
+    def lost(self, memory: PeerMemory, last: int, first_step: int) -> tuple[str, ...]:
+        """Names of the peers given up, those that `select` would call lost."""
+        newest = {
+            name: next((plan for plan in reversed(history.plans) if plan.step <= last), None)
+            for name, history in memory.peers.items()
+        }
+        return tuple(
+            name
+            for name, plan in newest.items()
+            if self._status(_age(plan, last, first_step)) == LOST
+        )
+
+    def _status(self, age: int) -> str:
+        """What becomes of a peer whose plan is `age` steps older than the newest one allowed."""
+        planner = self._config.planner
+        if age > patience(planner):
+            return LOST
+        if age > planner.max_peer_age:
+            return HELD
+        return FRESH if age <= 0 else SHIFTED
+
     def _of(
         self, robot: str, history: PeerHistory, last: int, end: int, first_step: int
     ) -> PeerData:
@@ -217,12 +238,8 @@ class Neighbours:
         config, planner, index = self._config, self._config.planner, self._indices[robot]
         usable = [plan for plan in history.plans if plan.step <= last]
         newest = usable[-1] if usable else None
-        age = last - (newest.step if newest is not None else first_step - 1)
-        if age > planner.max_peer_age:
-            given_up = age > planner.max_peer_age + planner.hold_steps
-            status = LOST if given_up else HELD
-        else:
-            status = FRESH if age <= 0 else SHIFTED
+        age = _age(newest, last, first_step)
+        status = self._status(age)
         known, du_ini, y_ini = self._window(index, history, usable, last, end)
         du = np.zeros((planner.N, N_FORCES))
         skipped = planner.applied * (end - newest.step) if newest is not None else planner.N
@@ -263,6 +280,16 @@ class Neighbours:
             du[places] = np.array([sample.u for sample in samples]) - nominal_forces(stance)
             y[places] = [sample.y for sample in samples]
         return known, du, y
+
+
+def patience(planner: PlannerConfig) -> int:
+    """Planning steps for which a team does without a plan that ought to be there."""
+    return planner.max_peer_age + planner.hold_steps
+
+
+def _age(newest: Plan | None, last: int, first_step: int) -> int:
+    """Steps from a peer's newest plan to `last`; before its first one from the last without any."""
+    return last - (first_step - 1 if newest is None else newest.step)
 
 
 def _by_tick(measurement: Measurement) -> int:

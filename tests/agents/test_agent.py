@@ -167,18 +167,28 @@ def test_excitation_is_added_on_the_stance_feet_while_walking() -> None:
         np.testing.assert_allclose(outputs.measurement.u, nominal_forces(stance) + felt)
 
 
-def test_gaps_in_the_ticks_are_bridged() -> None:
-    """Real time: states get lost now and then; what falls on a lost tick is not sent later."""
+@pytest.mark.parametrize(
+    ("lost_samples", "back", "end"),
+    [(0.03, 1000, ("walk", "")), (0.3, 1100, ("stand", "window-lost"))],
+)
+def test_gaps_in_the_ticks_are_bridged(
+    lost_samples: float, back: int, end: tuple[str, str]
+) -> None:
+    """Real time: states get lost now and then; what falls on a lost tick is not sent later.
+
+    With so many samples lost that no window is whole for long, the robot stops at last.
+    """
     robot, random = Robot(planner=True), np.random.default_rng(0)
-    ticks = [t for t in range(1500) if random.random() > 0.3 or t % 40 == 0]
-    ticks = [t for t in ticks if not 800 < t < 1100]
+    lost = [0.3 if t % 10 else lost_samples for t in range(2000)]
+    ticks = [t for t in range(2000) if random.random() > lost[t] or t % 40 == 0]
+    ticks = [t for t in ticks if not 800 < t < back]
     for tick in ticks:
         robot.tick = tick
         outputs = robot.step()
         assert np.abs(outputs.command.tau).max() <= TORQUE_LIMIT
         assert (outputs.measurement is not None) == (tick % 10 == 0 and tick > 0)
         assert outputs.plan is None or outputs.plan.tick == tick
-    assert outputs.mode == "walk"
+    assert (outputs.mode, outputs.reason) == end
     assert np.abs(outputs.command.tau).max() > 1.0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -168,3 +169,66 @@ def test_the_first_plan_waits_for_the_window_when_the_stand_is_short() -> None:
     flight = Flight(config)
     planned = [tick for tick in range(10, 400, 10) if flight.step(tick).plan is not None]
     assert planned[0] == 160  # (10 + 4 samples) up to the next 40 ms
+
+
+PATIENCE = ALONE.planner.max_peer_age + ALONE.planner.hold_steps
+
+
+def stop_of(flight: Flight, ticks: range, missing: Callable[[int], bool]) -> tuple[int, str]:
+    """Tick and reason of the first stop while some ticks are not there at all; (−1, "") if none."""
+    for tick in ticks:
+        if missing(tick):
+            continue
+        planned = flight.step(tick, ON_COURSE, WALKING if tick >= 300 else Mode(STAND, 0))
+        if planned.stop_reason:
+            return tick, planned.stop_reason
+    return -1, ""
+
+
+def every_ninth_sample(tick: int) -> bool:
+    return tick % 90 == 0
+
+
+def every_planning_step(tick: int) -> bool:
+    return tick >= FIRST and tick % 40 == 0
+
+
+@pytest.mark.parametrize("missing", [every_ninth_sample, every_planning_step])
+def test_without_a_plan_of_its_own_it_walks_only_as_long_as_for_a_silent_peer(
+    missing: Callable[[int], bool],
+) -> None:
+    """Also where the very ticks of the planning steps are those that are lost."""
+    tick, reason = stop_of(Flight(), range(10, 2000, 5), missing)
+    assert reason == "window-lost"
+    assert tick // 40 == FIRST // 40 + PATIENCE
+    flight = Flight()
+    flight.fly(440)
+    tick, reason = stop_of(flight, range(445, 2000, 5), lambda tick: tick % 10 == 0)
+    assert (tick // 40, reason) == (440 // 40 + PATIENCE + 1, "window-lost")
+
+
+@pytest.mark.parametrize("missing", [every_ninth_sample, every_planning_step])
+def test_a_silent_peer_is_given_up_in_time_whatever_its_own_samples_are(
+    missing: Callable[[int], bool],
+) -> None:
+    """Here the agent planned once in between, so that it does not stop for its own sake."""
+    pair = replace(ALONE, team=TeamConfig(robots=2))
+    whole, broken = Flight(pair), Flight(pair)
+    tick, reason = stop_of(whole, range(10, 2000, 5), lambda _: False)
+    assert (tick, reason) == (FIRST + 40 * (PATIENCE + 1), "peer-lost:r2")
+    assert stop_of(broken, range(10, FIRST + 81, 5), lambda _: False) == (-1, "")
+    later, reason = stop_of(broken, range(FIRST + 85, 2000, 5), missing)
+    assert reason == "peer-lost:r2"
+    assert tick <= later <= tick + 5
+
+
+@pytest.mark.parametrize("T_ini", [10, 50])
+def test_who_begins_to_walk_late_has_time_to_fill_its_window(T_ini: int) -> None:
+    flight = Flight(replace(ALONE, planner=replace(ALONE.planner, T_ini=T_ini)))
+    ticks, late = range(5000, 5600, 10), Mode(WALK, 5000)
+    seen = [flight.step(tick, ON_COURSE, late) for tick in ticks]
+    assert {planned.stop_reason for planned in seen} == {""}
+    made = [tick for tick, planned in zip(ticks, seen, strict=True) if planned.plan is not None]
+    assert made[0] == -(-(5000 + 10 * (T_ini - 1)) // 40) * 40
+    lonely = Flight(replace(ALONE, team=TeamConfig(robots=2)))
+    assert {lonely.step(t, ON_COURSE, late).stop_reason for t in range(5000, 5080, 10)} == {""}
