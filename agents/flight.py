@@ -22,7 +22,7 @@ class Flight:
         start: tick from which it is applied.
         plan_tick: tick of its first sample.
         deviation: force deviations from nominal, (N, 12), N.
-        outputs: planned outputs, (N, 6).
+        outputs: outputs to follow, (N, 6): the planned ones, or in part those asked for.
     """
 
     start: int
@@ -37,7 +37,7 @@ class Present:
 
     Attributes:
         deviation: force deviation, (12,), N, yaw frame.
-        outlook: planned vx, vy at the ends of this sample and of those after it, (k, 2), m/s;
+        outlook: vx, vy to follow at the ends of this sample and of those after it, (k, 2), m/s;
             None without a plan.
     """
 

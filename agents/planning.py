@@ -203,7 +203,8 @@ class LocalPilot:
         factor = fading(planner, inputs.y_ini[-1] - inputs.y_des[0])
         plan_tick = inputs.step * self._step_ms
         plan = faded_plan(result, factor, serial, plan_tick)
-        flight = Flight(tick + planner.latency_ms, plan_tick, factor * result.du, plan.y)
+        outputs = _tracked(result, factor, inputs.y_des)
+        flight = Flight(tick + planner.latency_ms, plan_tick, factor * result.du, outputs)
         state = replace(
             state, planner=remembered, flights=launched(state.flights, flight), newest=serial
         )
@@ -265,6 +266,16 @@ def _peers(config: Config, index: int, predictor: Predictor) -> frozenset[int]:
     if predictor.meta.neighbours == "all":
         return others
     return frozenset(j for j in others if predictor.G[:, index, j].any())
+
+
+def _tracked(result: PlanResult, factor: float, y_des: Array) -> Array:
+    """The outputs to follow, (N, 6): where the plan gives way, what is asked for takes over.
+
+    Not what comes of nominal forces alone, which no one wants; that is for the peers to know.
+    """
+    if result.status != SOLVED:
+        return y_des
+    return result.y if factor == 1.0 else y_des + factor * (result.y - y_des)
 
 
 def faded_plan(result: PlanResult, factor: float, serial: tuple[int, int], tick: int) -> Plan:

@@ -164,6 +164,32 @@ def test_the_planned_speeds_are_handed_on_with_the_plan() -> None:
     np.testing.assert_array_equal(planned.present.outlook, planned.plan.y[:, 1:3])
 
 
+@pytest.mark.parametrize(("excess", "share"), [(1.25, 0.75), (1.5, 0.5), (2.0, 0.0), (3.0, 0.0)])
+def test_the_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for(
+    excess: float, share: float
+) -> None:
+    """What is published stays what the forces come to: without any, that is the free response."""
+    y = ON_COURSE + np.array([0.0, excess * ALONE.planner.fade[1], 0.0, 0.0, 0.0, 0.0])
+    wide = replace(ALONE, planner=replace(ALONE.planner, fade=(1e3, 1e3, 1e3, 1e3)))
+    full, faded = Flight(wide).fly(FIRST, y), Flight().fly(FIRST, y)
+    assert full.plan is not None
+    assert faded.plan is not None
+    wish = ON_COURSE[1:3]
+    expected = wish + share * (full.plan.y[:, 1:3] - wish)
+    np.testing.assert_allclose(faded.present.outlook, expected, atol=1e-12)
+    assert np.abs(faded.plan.y[:, 1:3] - expected).max() > 1e-3
+
+
+def test_a_fallback_follows_the_speeds_asked_for() -> None:
+    y = ON_COURSE - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
+    limits = replace(ALONE.planner, force_min=200.0, deviation_max=(20.0, 20.0, 5.0))
+    planned = Flight(replace(ALONE, planner=limits)).fly(FIRST, y)
+    assert planned.plan is not None
+    assert planned.plan.status == "nominal:infeasible"
+    np.testing.assert_array_equal(planned.present.outlook, np.tile(ON_COURSE[1:3], (25, 1)))
+    assert planned.plan.y[0, 1] < 0.25  # nominal forces alone do not mend it at once
+
+
 def test_the_first_plan_waits_for_the_window_when_the_stand_is_short() -> None:
     config = replace(ALONE, gait=replace(ALONE.gait, stand_ms=100))
     flight = Flight(config)
