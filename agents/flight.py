@@ -69,9 +69,12 @@ def present(flights: tuple[Flight, ...], tick: int) -> Present:
 def fading(config: PlannerConfig, error: Array) -> float:
     """Share of a plan to apply: 1 inside the range of the data, falling to 0 at twice that range.
 
+    An error that is no number is out of every range.
+
     Args:
         config: the range.
         error: present outputs less the desired ones, shape (6,).
     """
     ranges = np.array(config.fade)[[0, 1, 1, 2, 2, 3]]
-    return float(np.clip(2.0 - np.max(np.abs(error) / ranges), 0.0, 1.0))
+    share = float(np.clip(2.0 - np.max(np.abs(error) / ranges), 0.0, 1.0))
+    return share if share > 0.0 else 0.0

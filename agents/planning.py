@@ -28,7 +28,7 @@ from shared.topics import SAMPLE_MS
 FADED: Final = "faded"
 WINDOW_LOST: Final = "window-lost"  # stop: no plan of its own for as long as a peer may be silent
 WINDOW_GAP: Final = "window_gap"  # counted: no plan, for a sample of the robot's own is missing
-REFUSED: Final = "refused_by_planner"  # counted: a peer's message from another time or horizon
+REFUSED: Final = "refused_by_planner"  # counted: a peer's message that cannot be meant
 ALONE: Final = "decentralised"
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from agents.gait import NOMINAL_FORCES
 from agents.planner.planner_qp import Problem
+from agents.planner.plausible import OUTPUT_MAX
 from agents.planner.qp_solver import ClosedForm, unconstrained
 from shared.jit import compiled
 from shared.robot import N_FORCES, N_OUTPUTS, Array
@@ -40,8 +41,8 @@ class FreeStep:
         """The plan of `PlannerInputs` and the effect of `PeerTerms`.
 
         Returns:
-            u, du, y and y_nominal of `PlanResult`; None where a bound is active or a number is not
-            finite.
+            u, du, y and y_nominal of `PlanResult`; None where a bound is active or an output is
+            implausible.
         """
         forces, outputs, inside = _free_step(
             u_ini, y_ini, stance_ini, y_base_ini, y_base, y_des, effect, *self._fixed
@@ -56,7 +57,7 @@ def _free_step(
     lower: Array, upper: Array, slope: float, Y_v: Array, columns: NDArray[np.int64],
     nominal: Array, nominal_table: Array,
 ) -> tuple[Array, Array, bool]:  # fmt: skip
-    """Forces u and du, (2, N, 12); outputs y and y_nominal, (2, N, 6); do all bounds hold?"""
+    """Forces u and du, (2, N, 12); outputs y and y_nominal, (2, N, 6); is the plan usable?"""
     T_ini, N = len(u_ini), len(y_des)
     past = np.empty(T_ini * (N_FORCES + N_OUTPUTS))
     for k in range(T_ini):
@@ -76,4 +77,7 @@ def _free_step(
     forces[0] = nominal + forces[1]
     outputs[0] = y_base + (y_free + Y_v @ x).reshape(N, N_OUTPUTS)
     outputs[1] = y_base + y_free.reshape(N, N_OUTPUTS)
+    for output in outputs.flat:
+        if not abs(output) <= OUTPUT_MAX:
+            inside = False
     return forces, outputs, inside

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from agents.gait import nominal_forces, scheduled_stance
 from agents.planner.horizon import horizon_stance, sample_starts, step_ms
+from agents.planner.plausible import plausible
 from shared.config import Config, PlannerConfig
 from shared.messages import Measurement, Message, Plan
 from shared.record import record
@@ -42,7 +43,7 @@ class PeerHistory:
 
 @record
 class PeerMemory:
-    """Recent messages of all peers by name, and how many were refused as foreign."""
+    """Recent messages of all peers by name, and how many were refused."""
 
     peers: Mapping[str, PeerHistory]
     refused: int = 0
@@ -140,14 +141,18 @@ class Neighbours:
         """Add messages that have arrived by world time `tick`; forget what is too old to matter.
 
         The order of arrival does not matter. A second message for the same tick or step, one of
-        a robot that is no peer, one off the time grid or from the future, and a plan of another
-        horizon are refused and counted.
+        a robot that is no peer, one off the time grid or from the future, a plan of another
+        horizon and numbers that no robot can mean (`plausible`) are refused and counted.
         """
         peers, refused = dict(memory.peers), memory.refused
         for robot, measurement in measurements:
             history = peers.get(robot)
             kept = None
-            if history is not None and self._on_grid(measurement.tick, SAMPLE_MS, tick):
+            if (
+                history is not None
+                and self._on_grid(measurement.tick, SAMPLE_MS, tick)
+                and plausible(self._config.planner, measurement.u, measurement.y)
+            ):
                 oldest = tick - self._span_ms
                 kept = _inserted(history.measurements, measurement, oldest, _by_tick)
             if history is None or kept is None:
@@ -162,6 +167,7 @@ class Neighbours:
                 and self._on_grid(plan.tick, step_ms(self._config), tick)
                 and plan.step * step_ms(self._config) == plan.tick
                 and len(plan.u) == self._config.planner.N
+                and plausible(self._config.planner, plan.u, plan.y)
             ):
                 oldest = (tick - self._span_ms) // step_ms(self._config)
                 kept_plans = _inserted(history.plans, plan, (oldest, 0), _by_serial)

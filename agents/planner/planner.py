@@ -15,6 +15,7 @@ from agents.planner.free_step import FreeStep
 from agents.planner.horizon import horizon_stance, phase_of, walking_steps
 from agents.planner.neighbours import Selection
 from agents.planner.planner_qp import Problem, build_problem, unpack
+from agents.planner.plausible import plausible_outputs
 from agents.planner.predictor import Predictor, check_sizes
 from agents.planner.qp_solver import SOLVED, SOLVERS, Residuals, Solver, no_solution
 from shared.config import Config
@@ -22,6 +23,7 @@ from shared.record import record
 from shared.robot import Array
 
 PEER_LOST: Final = "peer-lost"
+IMPLAUSIBLE: Final = "implausible"
 
 
 @record
@@ -88,14 +90,14 @@ class PlannerState:
 
 @record
 class PlanResult:
-    """A plan of N samples from t_k on, always usable.
+    """A plan of N samples from t_k on, always finite and usable.
 
     Attributes:
-        status: "solved", or "nominal:<reason>": nominal forces because the QP has no solution
-            or a peer is lost.
+        status: "solved", or "nominal:<reason>": nominal forces because the QP has no solution,
+            a peer is lost or the outputs predicted are none that a robot can reach.
         u: forces, swing legs exactly zero, (N, 12), N.
         du: their deviation from nominal, (N, 12), N.
-        y: predicted outputs under u, (N, 6).
+        y: predicted outputs under u, (N, 6); the desired ones where the prediction is implausible.
         y_nominal: predicted outputs under nominal forces, for a plan that is faded, (N, 6).
         used: for each peer the step of the plan consumed.
         lost: peers given up; not empty means: stop.
@@ -198,6 +200,14 @@ class Planner:
             found = _unbounded(setup.free, inputs, peers)
             if found is not None:
                 return PlannerState(inputs.step, found.du, state.solves + 1), found
+        # Whatever was measured: a number that overflows is told by the result, not on the way.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._solved(setup, state, inputs, peers)
+
+    def _solved(
+        self, setup: _Setup, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
+    ) -> tuple[PlannerState, PlanResult]:
+        """The same where bounds are active, or there is no plan."""
         problem = setup.problem
         past, y_des = inputs.past(), (inputs.y_des - inputs.y_base).ravel()
         y_free = problem.condensed.Y_past @ past + peers.effect
@@ -210,13 +220,19 @@ class Planner:
         x = solution.x
         if self._config.planner.damping and solution.status == SOLVED:
             x = self._damped(problem, x, state, inputs.step)
+        status = solution.status
         du, dy = unpack(problem, x, y_free)
+        y, y_nominal = inputs.y_base + dy, inputs.y_base + y_free.reshape(dy.shape)
+        if not (plausible_outputs(y) and plausible_outputs(y_nominal)):
+            # What cannot be foretold is taken to go as asked: the next best that can be told.
+            du, y, y_nominal = np.zeros_like(du), inputs.y_des, inputs.y_des
+            status = IMPLAUSIBLE if status == SOLVED else status
         result = PlanResult(
-            status=SOLVED if solution.status == SOLVED else f"nominal:{solution.status}",
+            status=SOLVED if status == SOLVED else f"nominal:{status}",
             u=setup.nominal + du,
             du=du,
-            y=inputs.y_base + dy,
-            y_nominal=inputs.y_base + y_free.reshape(dy.shape),
+            y=y,
+            y_nominal=y_nominal,
             used=peers.used,
             lost=peers.lost,
             residuals=solution.residuals,

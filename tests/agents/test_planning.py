@@ -13,10 +13,11 @@ from agents.gait import nominal_forces, scheduled_stance
 from agents.modes import STAND, STOPPING, WALK, Mode
 from agents.pilot import Heard, PilotState, Planned
 from agents.planner.planner import PlanResult
+from agents.planner.predictor import Predictor
 from agents.planner.qp_solver import Residuals
 from agents.planning import LocalPilot, faded_plan
 from shared.config import Config, PlannerConfig, TeamConfig
-from shared.messages import Measurement
+from shared.messages import Measurement, Plan
 from shared.robot import Array
 from tests.agents.duet import asked, simple_predictor
 
@@ -29,24 +30,40 @@ FIRST = 320
 
 @cache
 def pilot_of(config: Config) -> LocalPilot:
-    return LocalPilot(config, 0, simple_predictor(config), lambda: 0)
+    return pilot_with(config, simple_predictor(config))
+
+
+def pilot_with(config: Config, predictor: Predictor) -> LocalPilot:
+    return LocalPilot(config, 0, predictor, lambda: 0)
+
+
+@cache
+def coupled(config: Config) -> Predictor:
+    """What a peer does moves the other as well."""
+    alone = simple_predictor(config)
+    G = alone.G.copy()
+    G[:, 0, 1] = 0.3 * G[:, 1, 1]
+    return Predictor(alone.meta, G)
 
 
 class Flight:
     """One robot's pilot with samples of our own making."""
 
-    def __init__(self, config: Config = ALONE) -> None:
+    def __init__(self, config: Config = ALONE, predictor: Predictor | None = None) -> None:
         self.config = config
-        self.pilot = pilot_of(config)
+        self.pilot = pilot_of(config) if predictor is None else pilot_with(config, predictor)
         self.state = PilotState()
 
-    def step(self, tick: int, y: Array = ON_COURSE, mode: Mode = WALKING) -> Planned:
+    def step(
+        self, tick: int, y: Array = ON_COURSE, mode: Mode = WALKING,
+        plans: tuple[tuple[str, Plan], ...] = (),
+    ) -> Planned:  # fmt: skip
         measurement = None
         if tick % 10 == 0:
             stance = scheduled_stance(self.config, 0, np.array([tick - 10]))[0]
             u = nominal_forces(stance)
             measurement = Measurement(tick, tick * 1_000_000, u, y, stance.astype(float))
-        heard = Heard(tick, mode, (REFERENCE,), measurement)
+        heard = Heard(tick, mode, (REFERENCE,), measurement, plans=plans)
         self.state, planned = self.pilot.step(self.state, heard)
         return planned
 
@@ -174,6 +191,7 @@ def test_the_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for(
     full, faded = Flight(wide).fly(FIRST, y), Flight().fly(FIRST, y)
     assert full.plan is not None
     assert faded.plan is not None
+    assert faded.present.outlook is not None
     wish = ON_COURSE[1:3]
     expected = wish + share * (full.plan.y[:, 1:3] - wish)
     np.testing.assert_allclose(faded.present.outlook, expected, atol=1e-12)
@@ -188,6 +206,47 @@ def test_a_fallback_follows_the_speeds_asked_for() -> None:
     assert planned.plan.status == "nominal:infeasible"
     np.testing.assert_array_equal(planned.present.outlook, np.tile(ON_COURSE[1:3], (25, 1)))
     assert planned.plan.y[0, 1] < 0.25  # nominal forces alone do not mend it at once
+
+
+@pytest.mark.parametrize(
+    ("absurd", "back"),
+    [(np.nan, 0), (np.inf, 0), (1e170, 0), (1e6, 0), (np.nan, 30), (np.inf, 30)],
+)
+def test_a_plan_of_absurd_samples_is_nominal_by_name_and_follows_what_is_asked_for(
+    absurd: float, back: int
+) -> None:
+    """The newest sample tells of the fading too."""
+    flight, broken = Flight(), ON_COURSE.copy()
+    broken[1] = absurd
+    for tick in range(10, FIRST + 1, 10):
+        mode = WALKING if tick >= 300 else Mode(STAND, 0)
+        planned = flight.step(tick, broken if tick == FIRST - back else ON_COURSE, mode)
+    assert planned.plan is not None
+    assert planned.plan.status.startswith("nominal:")
+    nominal = nominal_forces(scheduled_stance(ALONE, 0, FIRST + 10 * np.arange(25)))
+    np.testing.assert_array_equal(planned.plan.u, nominal)
+    np.testing.assert_array_equal(planned.plan.y, np.tile(ON_COURSE, (25, 1)))
+    assert not planned.present.deviation.any()
+    np.testing.assert_array_equal(planned.present.outlook, np.tile(ON_COURSE[1:3], (25, 1)))
+
+
+@pytest.mark.parametrize("absurd", [1e39, 1e300, np.nan])
+@pytest.mark.parametrize("name", ["u", "y"])
+def test_absurd_numbers_of_a_peer_do_not_enter_a_plan(absurd: float, name: str) -> None:
+    pair = replace(ALONE, team=TeamConfig(robots=2))
+    flight = Flight(pair, coupled(pair))
+    expected = Flight(pair, coupled(pair)).fly(FIRST).plan
+    assert expected is not None
+    for tick in range(10, FIRST + 1, 10):
+        plans: tuple[tuple[str, Plan], ...] = ()
+        if tick == FIRST - 10:  # made of one's own, which any could be
+            claim = replace(expected, tick=FIRST - 40, step=FIRST // 40 - 1)
+            plans = (("r2", replace(claim, **{name: np.full_like(getattr(claim, name), absurd)})),)
+        planned = flight.step(tick, ON_COURSE, WALKING if tick >= 300 else Mode(STAND, 0), plans)
+        assert planned.unusual.count("refused_by_planner") == len(plans)
+    assert planned.plan is not None
+    np.testing.assert_array_equal(planned.plan.u, expected.u)
+    np.testing.assert_array_equal(planned.plan.y, expected.y)
 
 
 def test_the_first_plan_waits_for_the_window_when_the_stand_is_short() -> None:

@@ -90,3 +90,14 @@ def test_a_number_that_is_not_finite_is_left_to_the_solver(free: FreeStep) -> No
             inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini, inputs.y_base,
             inputs.y_des, effect,
         ) is None  # fmt: skip
+
+
+def test_outputs_that_no_robot_reaches_are_no_plan(free: FreeStep) -> None:
+    """Even where no force is asked for: the error is zero."""
+    zero = np.zeros((N, 6))
+    for height, is_plan in ((99.0, True), (101.0, False), (np.nan, False)):
+        plan = free.plan(
+            nominal_forces(STANCE[:T_INI]), zero[:T_INI], STANCE[:T_INI], zero[:T_INI],
+            zero + height, zero + height, np.zeros(6 * N),
+        )  # fmt: skip
+        assert (plan is not None) == is_plan

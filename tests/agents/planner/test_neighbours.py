@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +29,12 @@ INDEX = {"r2": 1, "r3": 2}
 
 def mark(robot: str, tick: int) -> float:
     """A deviation that tells whose sample it is and when."""
-    return 1e-3 * tick + 100.0 * INDEX[robot]
+    return 1e-4 * tick + 10.0 * INDEX[robot]
+
+
+def told(step: int, k: Any) -> Any:
+    """The deviation that a plan of step `step` tells of its sample k."""
+    return 0.1 * step + 1e-3 * k
 
 
 def measurement(robot: str, tick: int) -> Measurement:
@@ -39,12 +45,12 @@ def measurement(robot: str, tick: int) -> Measurement:
 
 
 def plan(robot: str, step: int, exchange: int = 0) -> Plan:
-    """Sample k of the plan of step s deviates by 1000 s + k."""
+    """The plan of a step, its samples as `told`."""
     nominal = nominal_forces(horizon_stance(CONFIG, INDEX[robot], step))
     k = np.arange(PLANNER.N)[:, None]
     return Plan(
-        40 * step, 0, step=step, u=nominal + 1000.0 * step + k,
-        y=np.tile(1000.0 * step + k, (1, 6)), status="solved", used={},
+        40 * step, 0, step=step, u=nominal + told(step, k),
+        y=np.tile(told(step, k), (1, 6)), status="solved", used={},
         exchange=exchange,
     )  # fmt: skip
 
@@ -69,7 +75,7 @@ def window_ticks(step: int) -> list[int]:
 
 def expected_du(step: int, age: int) -> Array:
     """The plan of step − 1 − age, shifted: its first 4 samples per step of age are gone."""
-    deviation = 1000.0 * (step - 1 - age) + np.arange(PLANNER.N)
+    deviation = told(step - 1 - age, np.arange(PLANNER.N))
     shifted = np.zeros(PLANNER.N)
     shifted[: PLANNER.N - 4 * age] = deviation[4 * age :]
     return np.tile(shifted[:, None], (1, 12))
@@ -130,7 +136,8 @@ def test_lost_samples_are_taken_from_the_peers_own_prediction() -> None:
     peer = of(remember(20, [17, 18], ticks[:1] + ticks[2:3]), 20)
     assert peer.known.all()
     # Window ends at 760; plan 17 covers samples that end at 690 … 840, plan 18 from 730.
-    expected = [mark("r2", 710), 17003.0, mark("r2", 730), 18001.0, 18002.0, 18003.0]
+    later = [told(18, k) for k in (1, 2, 3)]
+    expected = [mark("r2", 710), told(17, 3), mark("r2", 730), *later]
     np.testing.assert_allclose(peer.y_ini[:, 0], expected)
     np.testing.assert_allclose(peer.du_ini[:, 0], expected, atol=1e-9)
 
@@ -160,6 +167,32 @@ def test_foreign_messages_are_refused_and_counted() -> None:
     memory = NEIGHBOURS.remember(NEIGHBOURS.initial(), now, bad_samples, bad_plans)
     assert memory.refused == len(bad_plans) + len(bad_samples)
     assert memory.peers == NEIGHBOURS.initial().peers
+
+
+@pytest.mark.parametrize("absurd", [1e39, -1e39, 1e4, np.inf, np.nan])
+def test_numbers_that_no_robot_can_mean_are_refused_and_counted(absurd: float) -> None:
+    now, good, sample = 40 * 20, plan("r2", 20), measurement("r2", 40 * 20)
+    bad_plans, bad_samples = [], []
+    for name in ("u", "y"):
+        one = getattr(good, name).copy()
+        one[-1, -1] = absurd
+        bad_plans.append(("r2", replace(good, **{name: one})))
+        other = getattr(sample, name).copy()
+        other[-1] = absurd
+        bad_samples.append(("r2", replace(sample, **{name: other})))
+    memory = NEIGHBOURS.remember(NEIGHBOURS.initial(), now, bad_samples, bad_plans)
+    assert memory.refused == 4
+    assert memory.peers == NEIGHBOURS.initial().peers
+
+
+def test_the_largest_forces_that_may_be_planned_are_taken() -> None:
+    strong = replace(CONFIG, planner=replace(PLANNER, deviation_max=(20.0, 20.0, 5e3)))
+    good = plan("r2", 20)
+    pushing = replace(good, u=good.u + np.tile([20.0, 20.0, 5e3], 4))
+    for config, refused in ((strong, 0), (CONFIG, 1)):
+        neighbours = Neighbours(config, 0)
+        memory = neighbours.remember(neighbours.initial(), 800, [], [("r2", pushing)])
+        assert memory.refused == refused
 
 
 def test_memory_stays_small() -> None:
@@ -214,7 +247,7 @@ def test_loss_repetition_and_reordering(
         if tick in ticks:
             expected = mark("r2", tick)
         elif planned:
-            expected = 1000.0 * max(planned) + (tick - 40 * max(planned)) // 10 - 1
+            expected = told(max(planned), (tick - 40 * max(planned)) // 10 - 1)
         else:
             assert not peer.known[place]
             continue
@@ -229,11 +262,11 @@ def test_brought_forward_the_window_ends_now_and_its_end_is_what_the_peer_planne
     peer = selection.peers[0]
     assert (peer.status, peer.step, peer.age, selection.window_step) == (FRESH, 19, 0, 20)
     # Samples after the step that may be looked at come from its plan, measured or not.
-    expected = [mark("r2", 750), mark("r2", 760), 19000.0, 19001.0, 19002.0, 19003.0]
+    expected = [mark("r2", 750), mark("r2", 760), *(told(19, k) for k in range(4))]
     np.testing.assert_allclose(peer.y_ini[:, 0], expected)
     np.testing.assert_allclose(peer.du_ini[:, 0], expected, atol=1e-9)
     ahead = np.zeros(PLANNER.N)
-    ahead[: PLANNER.N - 4] = 19000.0 + np.arange(4, PLANNER.N)
+    ahead[: PLANNER.N - 4] = told(19, np.arange(4, PLANNER.N))
     np.testing.assert_allclose(peer.du[:, 0], ahead, atol=1e-9)
 
 

@@ -187,6 +187,24 @@ def test_a_broken_measurement_gives_nominal_forces(small: Config, predictor: Pre
     np.testing.assert_array_equal(result.u, nominal_forces(horizon_stance(small, 0, STEP)))
 
 
+@pytest.mark.parametrize(
+    ("absurd", "status"),
+    [(np.nan, "not-finite"), (np.inf, "not-finite"), (1e170, "not-finite"), (1e6, "implausible")],
+)
+def test_a_plan_is_finite_and_within_reach_whatever_was_measured(
+    small: Config, predictor: Predictor, absurd: float, status: str
+) -> None:
+    broken = np.tile(BASE, (4, 1))
+    broken[2, 1] = absurd
+    wish = np.tile(BASE + 0.01, (8, 1))
+    result = plan(small, predictor, inputs_of(small, y_ini=broken, y_des=wish))
+    assert result.status == f"nominal:{status}"
+    np.testing.assert_array_equal(result.u, nominal_forces(horizon_stance(small, 0, STEP)))
+    assert not result.du.any()
+    for outputs in (result.y, result.y_nominal):
+        np.testing.assert_array_equal(outputs, wish)
+
+
 def test_equal_inputs_give_equal_bits_whatever_came_before(
     small: Config, predictor: Predictor
 ) -> None:
