@@ -6,6 +6,7 @@ import numpy as np
 
 from agents.gait import nominal_forces
 from agents.planner.horizon import gait_phase
+from agents.planner.plausible import plausible
 from agents.planner.predictor import Predictor
 from agents.planner.recursive import Correction, Forgetting, begin, block_correction, take_in
 from shared.config import Config
@@ -35,7 +36,7 @@ class Adapter:
     def learn(
         self, learned: Correction | None, own: tuple[Measurement, ...], y_base: Array
     ) -> Correction:
-        """Take in the newest window.
+        """Take in the newest window, unless it says what no robot can mean.
 
         Args:
             learned: so far; None before the first window.
@@ -46,8 +47,10 @@ class Adapter:
             learned = begin(self._predictor.meta, self._index, (self._index,), self._how)
         T_ini, gait = self._config.planner.T_ini, self._config.gait
         stance = np.array([sample.stance for sample in own]) > 0.5
-        du = np.array([sample.u for sample in own]) - nominal_forces(stance)
-        dy = np.array([sample.y for sample in own]) - y_base
+        u, y = np.array([sample.u for sample in own]), np.array([sample.y for sample in own])
+        if not plausible(self._config.planner, u, y):
+            return learned.refuse()
+        du, dy = u - nominal_forces(stance), y - y_base
         z = np.zeros((self._predictor.meta.robots, self._predictor.meta.width))
         z[self._index] = np.concatenate(
             [du[:T_ini].ravel(), dy[:T_ini].ravel(), du[T_ini:].ravel()]

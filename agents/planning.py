@@ -29,6 +29,7 @@ FADED: Final = "faded"
 WINDOW_LOST: Final = "window-lost"  # stop: no plan of its own for as long as a peer may be silent
 WINDOW_GAP: Final = "window_gap"  # counted: no plan, for a sample of the robot's own is missing
 REFUSED: Final = "refused_by_planner"  # counted: a peer's message that cannot be meant
+UNLEARNT: Final = "window_not_learnt"  # counted: a window that an agent that adapts refused
 ALONE: Final = "decentralised"
 
 
@@ -160,8 +161,10 @@ class LocalPilot:
             terms = self._terms(state, memory, step, heard.references)
         inputs = self._planner_inputs(state, step, heard)
         learned = self._learn(state, heard)
+        unlearnt = _refused(learned) > _refused(state.learned)
         state = replace(state, terms=terms, terms_for=step, inputs=inputs, learned=learned)
-        return self._solve(state, inputs, terms, (step, 0), heard)
+        state, planned = self._solve(state, inputs, terms, (step, 0), heard)
+        return state, replace(planned, unusual=(UNLEARNT,)) if unlearnt else planned
 
     def _learn(self, state: PilotState, heard: Heard) -> Correction | None:
         """What the newest window tells of the plant, if the agent adapts and it is whole."""
@@ -172,10 +175,11 @@ class LocalPilot:
         return adapter.learn(state.learned, state.own, y_base)
 
     def _own_block(self, learned: Correction | None, step: int) -> Array | None:
-        """The corrected G_ii; None where there is nothing to correct."""
+        """The corrected G_ii; None where there is nothing to correct, or the result no number."""
         if self._adapter is None or learned is None:
             return None
-        return self._adapter.block(learned, self._planner.phase(step))
+        G_ii = self._adapter.block(learned, self._planner.phase(step))
+        return G_ii if np.isfinite(G_ii).all() else None
 
     def _answer(
         self, state: PilotState, memory: PeerMemory, serial: tuple[int, int], heard: Heard
@@ -239,6 +243,10 @@ class LocalPilot:
 
 def _peer_lost(names: tuple[str, ...]) -> str:
     return f"{PEER_LOST}:{','.join(names)}"
+
+
+def _refused(learned: Correction | None) -> int:
+    return 0 if learned is None else learned.refused
 
 
 def _gapless(own: tuple[Measurement, ...], count: int, tick: int) -> bool:

@@ -11,6 +11,7 @@ The same correction serves every phase. All in scaled deviations, so that one pr
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -21,6 +22,7 @@ from agents.planner.regression import scales
 from shared.errors import PredictorError
 from shared.robot import N_OUTPUTS, Array
 
+_LARGEST = 100.0  # of an entry of D; the largest ones of a predictor, as scaled, are about 1
 _NOTHING = 1e-12  # zᵀPz of a regressor that says nothing about anything not known
 
 
@@ -58,6 +60,7 @@ class Correction:
         P: covariance over the noise variance, shape (k, k), exactly symmetric.
         updates: windows that were taken in.
         skipped: windows that told nothing new.
+        refused: windows that were implausible themselves, or would have made D so.
     """
 
     robot: int
@@ -66,6 +69,11 @@ class Correction:
     P: Array
     updates: int = 0
     skipped: int = 0
+    refused: int = 0
+
+    def refuse(self) -> Correction:
+        """The same after one more window that was not taken in."""
+        return replace(self, refused=self.refused + 1)
 
 
 def begin(meta: PredictorMeta, robot: int, sources: Sequence[int], how: Forgetting) -> Correction:
@@ -120,6 +128,9 @@ def update(state: Correction, z: Array, left: Array, how: Forgetting) -> Correct
     min Σ ‖left − D z‖² + ‖D‖² / prior; with one direction alone, exponentially weighted. Under a
     constant z the variance along it settles at (1 − λ) / λ and no other direction is touched.
 
+    A window after which an entry of D would be no number, or far from all a plant can be, is
+    refused: from then on everything that is planned would be.
+
     Args:
         state: so far.
         z: scaled regressor, shape (k,).
@@ -130,10 +141,12 @@ def update(state: Correction, z: Array, left: Array, how: Forgetting) -> Correct
     s = float(z @ Pz)
     if s <= _NOTHING:
         return replace(state, skipped=state.skipped + 1)
-    lost = (how.factor * s - 1.0 + how.factor) / (how.factor * s * (1.0 + s))
-    if state.P.trace() - lost * float(Pz @ Pz) > how.bound * len(Pz):
+    lost, size = (how.factor * s - 1.0 + how.factor) / (how.factor * s * (1.0 + s)), float(Pz @ Pz)
+    if state.P.trace() - lost * size > how.bound * len(Pz):
         lost = 1.0 / (1.0 + s)
     D = state.D + np.outer(left - state.D @ z, Pz / (1.0 + s))
+    if not (np.abs(D).max() <= _LARGEST and math.isfinite(lost * size)):
+        return state.refuse()
     P = state.P - lost * np.outer(Pz, Pz)
     return replace(state, D=D, P=P, updates=state.updates + 1)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from agents.adaptation import Adapter
 from agents.gait import nominal_forces, scheduled_stance
@@ -117,3 +118,36 @@ def test_a_gap_in_the_samples_teaches_nothing_until_it_has_passed() -> None:
     later = [s.tick for s in samples[61 + 34 :] if s.tick % 40 == 0]
     assert state.learned is not None
     assert state.learned.updates == len(whole) + len(later)
+
+
+@pytest.mark.parametrize("absurd", [1e4, 1e170, np.nan])
+@pytest.mark.parametrize("name", ["u", "y"])
+def test_a_sample_that_no_robot_can_mean_is_not_learnt_from(absurd: float, name: str) -> None:
+    samples, base = walk(35, 0.6), np.tile(COURSE, (35, 1))
+    adapter, known = learnt(0.6, 10)
+    broken = getattr(samples[7], name).copy()
+    broken[3] = absurd
+    wrong = replace(samples[7], **{name: broken})
+    for before in (None, known):
+        after = adapter.learn(before, (*samples[:7], wrong, *samples[8:]), base)
+        assert (after.updates, after.refused) == (0 if before is None else 10, 1)
+        np.testing.assert_array_equal(after.D, 0.0 if before is None else known.D)
+
+
+def test_without_a_finite_correction_the_predictors_own_part_counts() -> None:
+    """And windows with an absurd sample are counted as long as it is among the last 35."""
+    samples = walk(75, 0.6)
+    state, _ = fly(ADAPTING, samples[:62])
+    assert state.learned is not None
+    spoilt = replace(state, learned=replace(state.learned, D=np.full_like(state.learned.D, np.inf)))
+    wrong = replace(samples[62], u=np.full(12, 1e6))
+    plans = []
+    for config, start in ((ADAPTING, spoilt), (ALONE, state)):
+        pilot = LocalPilot(config, 0, PREDICTOR, lambda: 0)
+        for sample in (wrong, *samples[63:66]):
+            heard = Heard(sample.tick, Mode(WALK, 300), (asked(0.3),), sample)
+            start, planned = pilot.step(start, heard)
+        assert planned.plan is not None
+        assert planned.unusual == (("window_not_learnt",) if config is ADAPTING else ())
+        plans.append(planned.plan)
+    np.testing.assert_array_equal(plans[0].u, plans[1].u)

@@ -102,20 +102,31 @@ def test_a_few_failures_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not outputs.command.kd.any()
 
 
+@pytest.mark.parametrize("planner", ["", "none", "recursive"], ids=["bare", "plans", "adapts"])
 @pytest.mark.parametrize(
     "absurd",
     [
         replace(standing(400), v_joint=np.full(12, 1e200)),
         replace(standing(400), imu_accel=np.full(3, 1e300)),
+        replace(standing(400), imu_accel=np.full(3, 1e170)),
         replace(standing(400), imu_gyro=np.full(3, 1e160)),
     ],
-    ids=["rates", "acceleration", "turning"],
+    ids=["rates", "acceleration", "less acceleration", "turning"],
 )
-def test_finite_but_absurd_sensors_end_in_damping_and_not_in_a_crash(absurd: State) -> None:
-    robot = Robot()
+def test_finite_but_absurd_sensors_end_in_damping_and_not_in_a_crash(
+    absurd: State, planner: str
+) -> None:
+    config = replace(ALONE, planner=replace(ALONE.planner, adaptation=planner or "none"))
+    robot = Robot(config, planner=bool(planner))
     last = robot.run(400).command.tau
     outputs = robot.step(over_the_bus(absurd))
     np.testing.assert_array_equal(outputs.command.tau, last)
+    if planner:
+        assert outputs.plan is not None
+        assert outputs.plan.status.startswith("nominal:")
+        assert np.isfinite(outputs.plan.u).all()
+        assert np.abs(outputs.plan.y).max() < 1.0
+        assert outputs.counters.get("window_not_learnt", 0) == (planner == "recursive")
     for _ in range(ALONE.controller.max_failures):
         outputs = robot.step()
         assert np.isfinite(outputs.command.tau).all()

@@ -168,6 +168,21 @@ def test_the_covariance_stays_bounded_symmetric_and_positive_whatever_is_excited
     np.testing.assert_array_equal(silent.P, state.P)
 
 
+@pytest.mark.parametrize("absurd", [1e4, 1e160, np.inf, np.nan])
+def test_a_window_that_would_spoil_the_correction_is_refused_and_counted(absurd: float) -> None:
+    how = Forgetting(prior=1.0, bound=2.0)
+    z, y = random_windows(5, 3, 20, 0)
+    state = state_of(5, 3, how)
+    for row, target in zip(z, y, strict=True):
+        state = update(state, row, target, how)
+    spoilt = update(state, z[0], np.full(3, absurd), how)
+    assert (spoilt.updates, spoilt.refused) == (20, 1)
+    np.testing.assert_array_equal(spoilt.D, state.D)
+    np.testing.assert_array_equal(spoilt.P, state.P)
+    again = update(spoilt, z[0], y[0], how)
+    np.testing.assert_array_equal(again.D, update(state, z[0], y[0], how).D)
+
+
 def test_windows_that_do_not_fit_are_refused_by_name(predictor: Predictor) -> None:
     meta, how = predictor.meta, Forgetting()
     state = begin(meta, 0, (0,), how)
