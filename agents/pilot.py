@@ -9,7 +9,8 @@ from typing import Final, Protocol
 from agents.flight import Flight, Present
 from agents.modes import Mode
 from agents.planner.neighbours import PeerMemory
-from agents.planner.planner import PeerTerms, PlannerInputs, PlannerState
+from agents.planner.peer_terms import PeerTerms
+from agents.planner.planner import PlannerInputs, PlannerState
 from agents.planner.recursive import Correction
 from shared.messages import Measurement, Plan, Reference
 from shared.record import record

@@ -13,9 +13,10 @@ from agents.flight import Flight, fading, launched, present
 from agents.modes import WALK
 from agents.pilot import NOTHING, Awaited, Heard, PilotState, Planned
 from agents.planner.episode import commanded_outputs, output_base
-from agents.planner.horizon import exchange_ms, step_ms
-from agents.planner.neighbours import Neighbours, PeerMemory, patience
-from agents.planner.planner import PEER_LOST, PeerTerms, Planner, PlannerInputs, PlanResult
+from agents.planner.horizon import exchange_ms, patience, step_ms
+from agents.planner.neighbours import Neighbours, PeerMemory
+from agents.planner.peer_terms import PeerTerms
+from agents.planner.planner import PEER_LOST, Planner, PlannerInputs, PlanResult
 from agents.planner.predictor import Predictor
 from agents.planner.qp_solver import SOLVED
 from agents.planner.recursive import Correction
@@ -128,7 +129,7 @@ class LocalPilot:
         lost = self._neighbours.lost(memory, step - 1, first)
         if lost:
             return _peer_lost(lost)
-        return WINDOW_LOST if age > patience(self._config.planner) else ""
+        return WINDOW_LOST if age > patience(self._config) else ""
 
     def _window_complete(self, state: PilotState, tick: int) -> bool:
         return _gapless(state.own, self._config.planner.T_ini, tick)

@@ -13,7 +13,8 @@ from agents.planner.as_written import DeepcQp, PaperQp
 from agents.planner.central import TeamPlanner, centralised
 from agents.planner.deepc import build_model, reduce, select
 from agents.planner.episode import Episode
-from agents.planner.planner import PeerTerms, Planner
+from agents.planner.peer_terms import PeerTerms
+from agents.planner.planner import Planner
 from agents.planner.planner_qp import Problem, build_problem, constrain, stance_columns, unpack
 from agents.planner.predictor import Predictor
 from agents.planner.qp_solver import SOLVERS, Solver

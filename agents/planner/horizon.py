@@ -43,6 +43,16 @@ def walking_steps(config: Config) -> range:
     return range(first, first + lcm(2 * config.gait.stance_ms, step_ms(config)) // step_ms(config))
 
 
+def place_in(cycle: range, step: int) -> int:
+    """The step of the first cycle (`walking_steps`) that does the same as `step`."""
+    return cycle.start + (step - cycle.start) % len(cycle) if step >= cycle.start else step
+
+
+def patience(config: Config) -> int:
+    """Planning steps for which a team does without a plan that ought to be there."""
+    return config.planner.max_peer_age + config.planner.hold_steps
+
+
 def gait_phase(tick: int, stand_ms: int, stance_ms: int, phases: int) -> int:
     """Which of `phases` equal parts of the gait's period (two stance times) a tick lies in."""
     period = 2 * stance_ms

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.gait import nominal_forces, scheduled_stance
-from agents.planner.horizon import horizon_stance, sample_starts, step_ms
+from agents.planner.horizon import horizon_stance, patience, sample_starts, step_ms
 from agents.planner.plausible import plausible
-from shared.config import Config, PlannerConfig
+from shared.config import Config
 from shared.messages import Measurement, Message, Plan
 from shared.record import record
 from shared.robot import N_FORCES, N_OUTPUTS, Array, robot_names
@@ -29,7 +29,7 @@ K = TypeVar("K", int, tuple[int, int])
 
 FRESH: Final = "fresh"  # the newest plan that may be used: that of step k−1
 SHIFTED: Final = "shifted"  # an older one, shifted by its age
-HELD: Final = "held"  # too old: the peer's last terms stay in force
+HELD: Final = "held"  # too old: the effect of the peer's last terms stays in force
 LOST: Final = "lost"  # held long enough: the team stops
 
 
@@ -124,7 +124,7 @@ class Neighbours:
             if (j != index if peers is None else j in peers)
         }
         self.names = tuple(self._indices)
-        kept_steps = patience(config.planner) + 2
+        kept_steps = patience(config) + 2
         self._span_ms = SAMPLE_MS * config.planner.T_ini + step_ms(config) * kept_steps
 
     def initial(self) -> PeerMemory:
@@ -230,10 +230,9 @@ class Neighbours:
 
     def _status(self, age: int) -> str:
         """What becomes of a peer whose plan is `age` steps older than the newest one allowed."""
-        planner = self._config.planner
-        if age > patience(planner):
+        if age > patience(self._config):
             return LOST
-        if age > planner.max_peer_age:
+        if age > self._config.planner.max_peer_age:
             return HELD
         return FRESH if age <= 0 else SHIFTED
 
@@ -286,11 +285,6 @@ class Neighbours:
             du[places] = np.array([sample.u for sample in samples]) - nominal_forces(stance)
             y[places] = [sample.y for sample in samples]
         return known, du, y
-
-
-def patience(planner: PlannerConfig) -> int:
-    """Planning steps for which a team does without a plan that ought to be there."""
-    return planner.max_peer_age + planner.hold_steps
 
 
 def _age(newest: Plan | None, last: int, first_step: int) -> int:

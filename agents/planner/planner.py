@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agents.gait import nominal_forces
-from agents.planner.coupling import Coupling, fill_deviations
 from agents.planner.free_step import FreeStep
-from agents.planner.horizon import horizon_stance, phase_of, walking_steps
+from agents.planner.horizon import horizon_stance, phase_of, place_in, walking_steps
 from agents.planner.neighbours import Selection
+from agents.planner.peer_terms import Peers, PeerTerms
 from agents.planner.planner_qp import Problem, build_problem, unpack
 from agents.planner.plausible import plausible_outputs
 from agents.planner.predictor import Predictor, check_sizes
@@ -24,25 +23,6 @@ from shared.robot import Array
 
 PEER_LOST: Final = "peer-lost"
 IMPLAUSIBLE: Final = "implausible"
-
-
-@record
-class PeerTerms:
-    """What the peers will do to an agent's outputs at one planning step (eq. 11).
-
-    Attributes:
-        effect: Σ G_ij [u_ini; y_ini; u] over the peers, (6 N,).
-        deviations: each peer's [u_ini; y_ini; u], held while it is silent, (18 T_ini + 12 N,).
-        used: for each peer the step of the plan consumed.
-        lost: peers given up; not empty means: stop.
-        ages: how many steps older than allowed each peer's plan is.
-    """
-
-    effect: Array | float = 0.0
-    deviations: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
-    used: Mapping[str, int] = field(default_factory=dict)
-    lost: tuple[str, ...] = ()
-    ages: Mapping[str, int] = field(default_factory=dict)
 
 
 @record
@@ -141,16 +121,11 @@ class Planner:
     def __init__(self, config: Config, index: int, predictor: Predictor) -> None:
         check_sizes(config, predictor)
         self._config, self._index, self._predictor = config, index, predictor
-        self._silent = np.zeros(predictor.meta.width, dtype=np.float32)
-        self._cycle = walking_steps(config)
-        self._others = [j for j in range(config.team.robots) if j != index]
-        # What is set up once for each step of the gait's cycle: memos, they change no result.
+        self._cycle, self._peers = walking_steps(config), Peers(config, index, predictor)
+        # What is set up once for each step of the gait's cycle: a memo, it changes no result.
         self._setups: dict[int, _Setup] = {}
-        self._couplings: dict[tuple[int, int], Coupling] = {}
-        behind = 0 if config.planner.compensation else 1
         for step in self._cycle:
             self._setup(step)
-            self._coupling(step, step - behind)
 
     def initial(self) -> PlannerState:
         """No plan made yet."""
@@ -159,29 +134,8 @@ class Planner:
     def peer_terms(
         self, before: PeerTerms, selection: Selection, step: int, y_base: Array
     ) -> PeerTerms:
-        """The peers' terms of eq. 11 for planning step `step`; what was last known of the silent.
-
-        Args:
-            before: terms of the step before.
-            selection: the peers' windows and plans.
-            step: k, whose contact phase chooses the transition matrix.
-            y_base: base of the outputs at the ends of the windows' samples, (T_ini, 6).
-        """
-        if not selection.peers:
-            return PeerTerms()
-        width = len(self._silent)
-        z = np.zeros(len(self._others) * width, dtype=np.float32)
-        deviations = {}
-        for peer in selection.peers:
-            place = width * (peer.index - (peer.index > self._index))
-            part = deviations[peer.robot] = z[place : place + width]
-            if peer.usable:
-                fill_deviations(part, peer.du_ini, peer.y_ini, y_base, peer.known, peer.du)
-            else:
-                part[:] = before.deviations.get(peer.robot, self._silent)
-        effect = self._coupling(step, selection.window_step).effect(z)
-        ages = {peer.robot: peer.age for peer in selection.peers}
-        return PeerTerms(effect, deviations, selection.used, selection.lost, ages)
+        """See `Peers.terms`."""
+        return self._peers.terms(before, selection, step, y_base)
 
     def step(
         self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms,
@@ -258,23 +212,8 @@ class Planner:
         """The contact phase of a planning step, which chooses the transition matrix."""
         return phase_of(self._config, step, self._predictor.phases)
 
-    def _place(self, step: int) -> int:
-        """The step of the first cycle that does the same as `step`."""
-        begin = self._cycle.start
-        return begin + (step - begin) % len(self._cycle) if step >= begin else step
-
-    def _coupling(self, step: int, window_step: int) -> Coupling:
-        """What the peers do from planning step `step` on, told of by plans from another one on."""
-        place = self._place(step), self._place(window_step)
-        found = self._couplings.get(place)
-        if found is None:
-            G = self._predictor.G[self.phase(step)][self._index, self._others]
-            stance = [horizon_stance(self._config, j, window_step) for j in self._others]
-            found = self._couplings[place] = Coupling(G, stance)
-        return found
-
     def _setup(self, step: int) -> _Setup:
-        place = self._place(step)
+        place = place_in(self._cycle, step)
         found = self._setups.get(place)
         if found is None:
             G_ii = self._predictor.block(self._index, self._index, self.phase(place))

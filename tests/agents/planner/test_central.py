@@ -14,7 +14,8 @@ from agents.gait import nominal_forces
 from agents.planner.central import centralised
 from agents.planner.fits import fit_ridge
 from agents.planner.horizon import horizon_stance
-from agents.planner.planner import PeerTerms, Planner, PlannerInputs
+from agents.planner.peer_terms import PeerTerms
+from agents.planner.planner import Planner, PlannerInputs
 from agents.planner.predictor import Predictor, PredictorMeta
 from shared.config import Config
 from shared.errors import PredictorError

@@ -11,9 +11,10 @@ import pytest
 
 from agents.gait import nominal_forces
 from agents.planner.fits import fit_ridge
-from agents.planner.horizon import horizon_stance
+from agents.planner.horizon import horizon_stance, walking_steps
 from agents.planner.neighbours import HELD, LOST, PeerData, Selection
-from agents.planner.planner import PeerTerms, Planner, PlannerInputs, PlannerState, PlanResult
+from agents.planner.peer_terms import PeerTerms
+from agents.planner.planner import Planner, PlannerInputs, PlannerState, PlanResult
 from agents.planner.predictor import Predictor, PredictorMeta
 from shared.config import Config
 from shared.errors import PredictorError
@@ -165,6 +166,57 @@ def test_a_silent_peers_terms_are_held_then_it_is_lost(small: Config, predictor:
     assert after.lost == ("r2",)
     np.testing.assert_array_equal(after.u, nominal_forces(horizon_stance(small, 0, STEP)))
     assert state.solves == 2
+
+
+def test_a_silent_peers_effect_is_held_while_the_legs_change(
+    small: Config, predictor: Predictor, linear_team: Team
+) -> None:
+    """Whichever legs its schedule has standing later; what another does adds to it."""
+    three = replace(small, team=replace(small.team, robots=3))
+    meta = replace(PredictorMeta.of(three), ridge=1e-10, block_weight=1.0)
+    planner = Planner(three, 0, fit_ridge([linear_team(3).episode(2500, 1)], meta))
+    base = np.tile(BASE, (small.planner.T_ini, 1))
+    stance = np.repeat(horizon_stance(three, 1, STEP - 1), 3, axis=1)
+    talking = peer(three, du=np.where(stance, np.tile([20.0, 5.0, 0.0], (8, 4)), 0.0))
+    third = peer(three, robot="r3", index=2)
+
+    def terms(step: int, before: PeerTerms, *peers: PeerData) -> PeerTerms:
+        return planner.peer_terms(before, Selection(peers, step - 1), step, base)
+
+    heard = terms(STEP, NOTHING, talking, third)
+    now = heard
+    assert np.abs(heard.effect).max() > 1e-3
+    for step in range(STEP + 1, STEP + 9):
+        silent = peer(three, status=HELD, step=STEP - 1, age=step - STEP)
+        now = terms(step, now, silent, third)
+        np.testing.assert_allclose(now.effect, heard.effect, atol=1e-7)
+    pushing = replace(third, y_ini=third.y_ini + 0.01)
+    alone = terms(STEP + 9, NOTHING, peer(three), pushing)
+    both = terms(STEP + 9, now, silent, pushing)
+    np.testing.assert_allclose(both.effect, heard.effect + alone.effect, atol=1e-7)
+    again = terms(STEP + 10, now, peer(three), third)
+    np.testing.assert_allclose(again.effect, 0.0, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("changes", "behind"),
+    [({}, (1,)), ({"compensation": True}, (0,)), ({"exchanges": 2}, (1, 0))],
+    ids=["plain", "compensated", "exchanging"],
+)
+def test_on_the_way_nothing_is_set_up_any_more(
+    small: Config, predictor: Predictor, monkeypatch: pytest.MonkeyPatch,
+    changes: dict[str, Any], behind: tuple[int, ...],
+) -> None:  # fmt: skip
+    config = replace(small, planner=replace(small.planner, **changes))
+    planner = Planner(config, 0, predictor)
+    monkeypatch.setattr("agents.planner.peer_terms.Coupling", None)
+    monkeypatch.setattr("agents.planner.planner.build_problem", None)
+    base, state, terms = np.tile(BASE, (4, 1)), planner.initial(), NOTHING
+    first = walking_steps(config).start
+    for step in range(first, first + 3 * len(walking_steps(config))):
+        for steps in behind:
+            terms = planner.peer_terms(terms, Selection((peer(config),), step - steps), step, base)
+            state, _ = planner.step(state, inputs_of(config, step), terms)
 
 
 def test_without_a_solution_the_plan_is_nominal(small: Config, predictor: Predictor) -> None:

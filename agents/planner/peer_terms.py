@@ -1,0 +1,123 @@
+"""The peers' terms of eq. 11: made of what is known of each, held while one is silent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.planner.coupling import Coupling, fill_deviations
+from agents.planner.horizon import horizon_stance, phase_of, place_in, walking_steps
+from agents.planner.neighbours import PeerData, Selection
+from agents.planner.predictor import Predictor
+from shared.config import Config
+from shared.record import record
+from shared.robot import Array
+
+
+@record
+class PeerTerms:
+    """What the peers will do to an agent's outputs at one planning step (eq. 11).
+
+    Attributes:
+        effect: Σ G_ij [u_ini; y_ini; u] over the peers, (6 N,).
+        deviations: [u_ini; y_ini; u] of each peer heard from, (18 T_ini + 12 N,).
+        held: share of the effect of each one that is silent, as it was at last, (6 N,).
+        steps: planning step, and step at which the peers' windows end.
+        used: for each peer the step of the plan consumed.
+        lost: peers given up; not empty means: stop.
+        ages: how many steps older than allowed each peer's plan is.
+    """
+
+    effect: Array | float = 0.0
+    deviations: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
+    held: Mapping[str, Array] = field(default_factory=dict)
+    steps: tuple[int, int] = (0, 0)
+    used: Mapping[str, int] = field(default_factory=dict)
+    lost: tuple[str, ...] = ()
+    ages: Mapping[str, int] = field(default_factory=dict)
+
+
+class Peers:
+    """Fixed data of one agent's coupling to its peers; its functions depend on arguments alone.
+
+    Args:
+        config: the team's configuration.
+        index: this agent's place in the team, 0-based.
+        predictor: fitted for this team.
+    """
+
+    def __init__(self, config: Config, index: int, predictor: Predictor) -> None:
+        self._config, self._index, self._predictor = config, index, predictor
+        self._others = [j for j in range(config.team.robots) if j != index]
+        # What is set up once for each step of the gait's cycle: a memo, it changes no result.
+        self._couplings: dict[tuple[int, int], Coupling] = {}
+        self._cycle = walking_steps(config)
+        behind = {0 if config.planner.compensation else 1}
+        if config.planner.exchanges:
+            behind.add(0)
+        # The first step comes again behind one that is of the walk as well.
+        for step in (*self._cycle, self._cycle.stop):
+            for steps in behind:
+                self._coupling(step, step - steps)
+
+    def terms(self, before: PeerTerms, selection: Selection, step: int, y_base: Array) -> PeerTerms:
+        """The peers' terms of eq. 11 for planning step `step`; what was last known of the silent.
+
+        Args:
+            before: terms of the step before.
+            selection: the peers' windows and plans.
+            step: k, whose contact phase chooses the transition matrix.
+            y_base: base of the outputs at the ends of the windows' samples, (T_ini, 6).
+        """
+        if not selection.peers:
+            return PeerTerms()
+        z, deviations = self._nothing(), {}
+        held: dict[str, Array] = {}
+        for peer in selection.peers:
+            if peer.usable:
+                part = deviations[peer.robot] = self._part(z, peer.index)
+                fill_deviations(part, peer.du_ini, peer.y_ini, y_base, peer.known, peer.du)
+            elif (share := self._held(before, peer)) is not None:
+                held[peer.robot] = share
+        effect = self._coupling(step, selection.window_step).effect(z)
+        for share in held.values():
+            effect += share
+        ages = {peer.robot: peer.age for peer in selection.peers}
+        steps = step, selection.window_step
+        return PeerTerms(effect, deviations, held, steps, selection.used, selection.lost, ages)
+
+    def _held(self, before: PeerTerms, peer: PeerData) -> Array | None:
+        """A silent peer's last share of the effect, (6 N,); None if it was never heard of.
+
+        Not made anew of its last deviations: those are of legs that stood then and swing now.
+        """
+        part = before.deviations.get(peer.robot)
+        if part is None:
+            return before.held.get(peer.robot)
+        z = self._nothing()
+        self._part(z, peer.index)[:] = part
+        return self._coupling(*before.steps).effect(z)
+
+    def _nothing(self) -> NDArray[np.float32]:
+        """No deviation of any peer."""
+        return np.zeros(len(self._others) * self._predictor.meta.width, dtype=np.float32)
+
+    def _part(self, z: NDArray[np.float32], index: int) -> NDArray[np.float32]:
+        """Where a peer's deviations are in those of all."""
+        width = self._predictor.meta.width
+        place = width * (index - (index > self._index))
+        return z[place : place + width]
+
+    def _coupling(self, step: int, window_step: int) -> Coupling:
+        """What the peers do from planning step `step` on, told of by plans from another one on."""
+        place = place_in(self._cycle, step), place_in(self._cycle, window_step)
+        found = self._couplings.get(place)
+        if found is None:
+            phase = phase_of(self._config, step, self._predictor.phases)
+            G = self._predictor.G[phase][self._index, self._others]
+            stance = [horizon_stance(self._config, j, window_step) for j in self._others]
+            found = self._couplings[place] = Coupling(G, stance)
+        return found
