@@ -21,6 +21,7 @@ WORLD: Final = "sim"
 Source = tuple[str, str]  # name of a topic, name of who sends it
 Order = tuple[int, int]  # a tick, or the step and exchange of a plan
 Wanted = tuple[Source, Order]  # a message of a source, and all before it
+UNREADABLE: Final = "unreadable"  # reason of a stop whose message does not decode
 _NEVER: Final = (-1, 0)
 _HELD: Final = 256  # messages of one source beyond those of the stand; more can only be a flood
 _UPRIGHT: Final = (0.5, 2.0)  # |q|² of an orientation; far from 1 it is none
@@ -86,11 +87,7 @@ class Arrivals:
             self.counters["dropped_foreign"] += 1
             return
         topic, sender = row
-        message: Message | None
-        try:
-            message = decode(payload, topic.type)
-        except MessageError:
-            message = None
+        message = read(topic, payload)
         if message is None or not _believable(message):
             self.counters[f"dropped_{topic.name}"] += 1
             return
@@ -165,6 +162,14 @@ class Arrivals:
         self._held[topic.name] = later
         self._count.subtract((topic.name, sender) for sender, _ in due)
         return sorted(due, key=lambda item: (item[0], order_of(item[1])))
+
+
+def read(topic: Topic, payload: bytes) -> Message | None:
+    """The message in a packet; None if it is none. Whatever comes as an emergency stop is one."""
+    try:
+        return decode(payload, topic.type)
+    except MessageError:
+        return EStop(0, 0, UNREADABLE) if topic is ESTOP else None
 
 
 def _believable(message: Message) -> bool:

@@ -16,6 +16,7 @@ STOPPING: Final = "stopping"
 DAMPING: Final = "damping"
 ESTOP: Final = "estop"
 
+REASON_MOST: Final = 200  # characters of a reason; beyond 4096 no status could be read
 SLOW_DOWN_MS: Final = 500  # of a safe stop: speed goes to zero while the trot goes on
 
 
@@ -60,7 +61,10 @@ def stop_safely(mode: Mode, tick: int, reason: str) -> Mode:
 
 
 def go_limp(mode: Mode, tick: int, name: str, reason: str) -> Mode:
-    """Damp the joints for good; an emergency stop outranks a fault, the first reason stays."""
+    """Damp the joints for good; an emergency stop outranks a fault, the first reason stays.
+
+    Of a long reason, which anyone may send, the first `REASON_MOST` characters are kept.
+    """
     if mode.name == ESTOP or (mode.limp and name == DAMPING):
         return mode
-    return Mode(name, tick, reason)
+    return Mode(name, tick, reason[:REASON_MOST])

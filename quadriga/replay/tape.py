@@ -8,12 +8,11 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from agents.agent import Agent
-from agents.arrivals import Arrivals, Order, Source, order_of
+from agents.arrivals import Arrivals, Order, Source, order_of, read
 from agents.intake import ANYONE
-from shared.codec import decode
 from shared.config import CENTRAL, Config
-from shared.errors import MessageError, RecordingError
-from shared.messages import Consumed, Message
+from shared.errors import RecordingError
+from shared.messages import Consumed
 from shared.recording import Entry, Recording
 from shared.topics import (
     COMMAND,
@@ -73,8 +72,9 @@ def read_tape(
     """
     tape = Tape()
     takers = _takers(tape, config, agent, arrivals)
+    stop_key = ESTOP.key(config.team.name)  # obeyed even where its tick cannot be read
     for count, entry in enumerate(recording.entries(keys=takers)):
-        if entry.tick >= 0:
+        if entry.tick >= 0 or entry.key == stop_key:
             takers[entry.key](entry)
         if count % _REPORT_AFTER == 0:
             progress(entry.tick)
@@ -98,7 +98,7 @@ def _takers(
         tape.last = max(tape.last, entry.tick)
 
     def record(entry: Entry) -> None:
-        found = _valid(entry, INPUTS)
+        found = read(INPUTS, entry.payload)
         if isinstance(found, Consumed):
             tape.records[found.tick] = found
             tape.last = max(tape.last, found.tick)
@@ -122,7 +122,7 @@ def _listener(tape: Tape, topic: Topic, sender: str) -> Callable[[Entry], None]:
     by_order = tape.heard[topic.name, sender]
 
     def listen(entry: Entry) -> None:
-        message = _valid(entry, topic)
+        message = read(topic, entry.payload)
         if message is not None:  # what is not valid, the agent dropped
             by_order[order_of(message)].append((entry.key, entry.payload))
 
@@ -131,7 +131,7 @@ def _listener(tape: Tape, topic: Topic, sender: str) -> Callable[[Entry], None]:
 
 def _speaker(tape: Tape, topic: Topic) -> Callable[[Entry], None]:
     def speak(entry: Entry) -> None:
-        message = _valid(entry, topic)
+        message = read(topic, entry.payload)
         order = (entry.tick, 0) if message is None else order_of(message)
         tape.said[topic.name, *order].append(entry.payload)
 
@@ -144,13 +144,6 @@ def _watcher(ticks: set[int]) -> Callable[[Entry], None]:
             ticks.add(entry.tick)
 
     return watch
-
-
-def _valid(entry: Entry, topic: Topic) -> Message | None:
-    try:
-        return decode(entry.payload, topic.type)
-    except MessageError:
-        return None
 
 
 def _check(tape: Tape, recording: Recording, config: Config, robot: str) -> None:

@@ -11,7 +11,9 @@ import pytest
 from agents.controller import controller, whole_body_qp
 from agents.controller.whole_body_qp import Problem
 from agents.rehearsal import standing
-from shared.messages import EStop, State
+from agents.telemetry import Telemetry
+from shared.codec import decode, encode
+from shared.messages import EStop, State, Status
 from shared.robot import Array
 from tests.agents.duet import CONFIG, FIRST_PLAN, over_the_bus
 from tests.agents.lone_robot import ALONE, Robot, is_damping, tilted
@@ -26,6 +28,15 @@ def test_an_emergency_stop_damps_the_joints_for_good(at: int) -> None:
         assert is_damping(outputs)
         assert (outputs.mode, outputs.reason) == ("estop", "estop:operator: key")
         outputs = robot.step(estop=EStop(at, at, "another"))
+
+
+def test_a_status_can_be_read_whatever_the_reason_of_a_stop() -> None:
+    robot = Robot()
+    outputs = robot.step(estop=EStop(0, 0, 4096 * "x"))
+    assert outputs.reason == "estop:" + 194 * "x"
+    status = Telemetry("kalman").status(0, outputs, {})
+    assert status is not None
+    assert decode(encode(status), Status).reason == outputs.reason
 
 
 def test_an_emergency_stop_outranks_a_fall() -> None:

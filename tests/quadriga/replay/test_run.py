@@ -7,7 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
+from agents.agent import Agent
+from agents.arrivals import Arrivals
+from agents.intake import Intake
 from agents.planner.gates import GateReport
 from agents.planner.predictor import Predictor, PredictorMeta
 from agents.planner.store import Provenance, predictor_sha256, save
@@ -15,6 +19,7 @@ from agents.rehearsal import standing
 from quadriga.cli import main
 from quadriga.recorder import metadata
 from quadriga.replay.recorded_predictor import PREDICTOR, keep, recorded_predictor
+from quadriga.replay.run import replay
 from quadriga.replay.saved_qp import SavedQp
 from quadriga.replay.saved_qp import load as load_qp
 from quadriga.replay.saved_qp import save as save_qp
@@ -113,6 +118,32 @@ def test_recordings_that_lack_what_a_replay_needs(
     assert main(["replay", str(late), "--all"]) == 1
     said = capsys.readouterr().out
     assert "input missing from the recording: reference:operator:0 (tick 0); state of r1" in said
+
+
+def test_a_stop_that_could_not_be_read_is_handed_over_where_it_was_taken_in(tmp_path: Path) -> None:
+    run, config = tmp_path / "run.mcap", configured()
+    agent = Agent(config, "r1", None)
+    arrivals = Arrivals(config, "r1", agent.peers)
+    memory, intake = agent.initial(), Intake(config, arrivals)
+    with RecordingWriter(run, metadata(config, "")) as to:
+        for tick in range(5):
+            reference = encode(Reference(0, 0, 0.0, 0.0, 0.0, 0.26))
+            if tick == 0:
+                arrivals.take("team/reference", reference)
+                to.write("team/reference", reference, 0)
+            if tick == 3:
+                arrivals.take("team/estop", b"stop!")
+                to.write("team/estop", b"stop!", 3)
+            inputs = arrivals.inputs(standing(tick), awaited := agent.awaited(tick))
+            if record := intake.record(tick - 1, inputs, awaited):
+                to.write("team/r1/inputs", encode(record), tick)
+            memory, outputs = agent.step(memory, inputs)
+            to.write("team/r1/state", encode(standing(tick)), tick)
+            to.write("team/r1/command", encode(outputs.command), tick)
+    assert outputs.reason == "estop:unreadable"
+    (outcome,) = replay(run, (), {}, None, None, Console())
+    assert outcome.verdict.exact
+    assert outcome.verdict.equal["command"] == 5
 
 
 def test_a_cut_recording_is_replayed_up_to_the_cut_and_said_to_be_cut(
