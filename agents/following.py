@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from agents.flight import Flight, fading, launched, present
 from agents.gait import nominal_forces
 from agents.modes import WALK
@@ -15,9 +17,15 @@ from agents.planning import FADED, REFUSED, first_step
 from agents.references import in_force
 from shared.config import Config
 from shared.messages import Plan
+from shared.robot import N_LEGS, Array
 from shared.topics import SAMPLE_MS
 
 LOST: Final = "planner-lost"
+# A planner's own plans keep to deviation_max: the share and N on top are for its solver.
+# With forces far beyond it a single message would drive all joints to their limits.
+_SHARE: Final = 1.5
+_MARGIN: Final = 1.0  # N
+_FARTHEST: Final = 10.0  # m, m/s, rad, rad/s: no trunk gets there, whatever is predicted
 
 
 class Follower:
@@ -32,6 +40,7 @@ class Follower:
         self._config, self._index = config, index
         self._step_ms, self._latency = step_ms(config), central_latency(config)
         self._first_step = first_step(config)
+        self._most = _SHARE * np.tile(config.planner.deviation_max, N_LEGS) + _MARGIN  # (12,), N
 
     @property
     def peers(self) -> tuple[str, ...]:
@@ -73,7 +82,18 @@ class Follower:
         """Whether a plan is one of this team's at this time: else it is foreign, or forged."""
         samples = self._config.planner.N
         begun = plan.tick == plan.step * self._step_ms
-        return begun and 0 <= tick - plan.tick < SAMPLE_MS * samples and len(plan.u) == samples
+        timely = begun and 0 <= tick - plan.tick < SAMPLE_MS * samples
+        return timely and len(plan.u) == samples and self._plausible(plan)
+
+    def _plausible(self, plan: Plan) -> bool:
+        """Whether forces and outputs are such as a planner of this configuration may plan."""
+        possible = np.abs(self._deviation(plan)) <= self._most
+        return bool(possible.all() and (np.abs(plan.y) <= _FARTHEST).all())
+
+    def _deviation(self, plan: Plan) -> Array:
+        """What a plan adds to the nominal forces. Shape (N, 12), N."""
+        du: Array = plan.u - nominal_forces(horizon_stance(self._config, self._index, plan.step))
+        return du
 
     def _take(self, state: PilotState, plan: Plan, heard: Heard) -> tuple[PilotState, float]:
         """Take a plan into force; with the share of it that is applied."""
@@ -85,8 +105,7 @@ class Follower:
             # What the outputs come to without the plan's forces is not in the plan: the speeds of
             # one that fades out give way to those asked for.
             outputs = asked + factor * (plan.y - asked)
-        du = plan.u - nominal_forces(horizon_stance(self._config, self._index, plan.step))
-        flight = Flight(heard.tick, plan.tick, factor * du, outputs)
+        flight = Flight(heard.tick, plan.tick, factor * self._deviation(plan), outputs)
         state = replace(state, flights=launched(state.flights, flight), newest=plan.serial)
         return state, factor
 

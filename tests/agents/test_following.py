@@ -88,6 +88,33 @@ def test_a_plan_from_another_time_is_not_used_and_blocks_none(change: dict[str, 
     assert planned.unusual == ()
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize("name", ["u", "y"])
+@pytest.mark.parametrize("size", [120.0, 1e4, 1e308])
+def test_a_plan_that_no_planner_makes_is_not_used_and_blocks_none(
+    name: str, size: float, sign: float
+) -> None:
+    follower, wild = Follower(CONFIG, 1), plan_of(9)
+    values = getattr(wild, name).copy()
+    values[3, 5] += sign * size
+    state, planned = follow(follower, PilotState(), 365, replace(wild, **{name: values}))
+    assert not planned.present.deviation.any()
+    assert planned.unusual == ("refused_by_planner",)
+    _, planned = follow(follower, state, 366, plan_of(9))
+    assert planned.present.deviation.max() == pytest.approx(9.0)
+
+
+@pytest.mark.parametrize("largest", [(20.0, 20.0, 60.0), (0.0, 0.0, 0.0)])
+def test_a_plan_at_the_bounds_of_its_planner_is_used(largest: tuple[float, ...]) -> None:
+    config = replace(CONFIG, planner=replace(CONFIG.planner, deviation_max=largest))
+    stance = horizon_stance(config, 1, 9)
+    du = np.repeat(stance, 3, axis=1) * np.tile(largest, 4)
+    full = replace(plan_of(9), u=nominal_forces(stance) - (1.0 + 1e-6) * du)
+    state, planned = follow(Follower(config, 1), PilotState(), 365, full)
+    assert planned.unusual == ()
+    assert state.newest == (9, 0)
+
+
 def test_the_age_of_the_plan_in_use_is_told_at_every_tick() -> None:
     follower = Follower(CONFIG, 1)
     state, _ = follow(follower, PilotState(), 321, plan_of(8))
