@@ -13,7 +13,8 @@ from shared.barrier import PLANNER
 from shared.codec import decode
 from shared.config import CENTRAL, Config
 from shared.errors import MessageError
-from shared.messages import EStop, Event, Message, Plan, Reference, State
+from shared.messages import EStop, Event, Message, Plan, Reference, State, Truth
+from shared.robot import Array
 from shared.topics import ESTOP, EVENT, MEASUREMENT, PLAN, REFERENCE, SAMPLE_MS, STATE, TRUTH, Topic
 
 OPERATOR: Final = "operator"
@@ -24,7 +25,7 @@ Wanted = tuple[Source, Order]  # a message of a source, and all before it
 UNREADABLE: Final = "unreadable"  # reason of a stop whose message does not decode
 _NEVER: Final = (-1, 0)
 _HELD: Final = 256  # messages of one source beyond those of the stand; more can only be a flood
-_UPRIGHT: Final = (0.5, 2.0)  # |q|² of an orientation; far from 1 it is none
+_NORM: Final = (0.5, 2.0)  # |q|² of an orientation; far from 1 it is none
 
 
 class Arrivals:
@@ -49,6 +50,7 @@ class Arrivals:
 
     def __init__(self, config: Config, robot: str, peers: Sequence[str]) -> None:
         team, central = config.team.name, config.planner.kind in CENTRAL
+        self._robot = robot
         self._lockstep = config.world.mode == "lockstep"
         self._peers, self._planners = tuple(peers), (PLANNER,) if central else tuple(peers)
         self.topics: dict[str, tuple[Topic, str]] = {
@@ -88,7 +90,7 @@ class Arrivals:
             return
         topic, sender = row
         message = read(topic, payload)
-        if message is None or not _believable(message):
+        if message is None or not _believable(message, self._robot):
             self.counters[f"dropped_{topic.name}"] += 1
             return
         self.heard[topic.name, sender] += 1
@@ -172,12 +174,23 @@ def read(topic: Topic, payload: bytes) -> Message | None:
         return EStop(0, 0, UNREADABLE) if topic is ESTOP else None
 
 
-def _believable(message: Message) -> bool:
-    """Whether numbers that are finite can be meant: an orientation, a reference within limits."""
+def _believable(message: Message, robot: str) -> bool:
+    """Whether numbers that are finite can be meant, and for this robot.
+
+    An orientation must be one, a reference be within limits, the world's word speak of the robot.
+    """
     if isinstance(message, State):
-        quat = message.imu_quat_wxyz
-        return _UPRIGHT[0] < float(quat @ quat) < _UPRIGHT[1]
+        return _orientation(message.imu_quat_wxyz)
+    if isinstance(message, Truth):
+        names, quats = message.robots, message.base_quat_wxyz
+        return (
+            len(names) == len(quats) and robot in names and _orientation(quats[names.index(robot)])
+        )
     return not isinstance(message, Reference) or allowed(message)
+
+
+def _orientation(quat_wxyz: Array) -> bool:
+    return _NORM[0] < float(quat_wxyz @ quat_wxyz) < _NORM[1]
 
 
 def order_of(message: Message) -> Order:

@@ -162,8 +162,15 @@ def filter_step(
     return mean, 0.5 * (covariance + covariance.T), frame
 
 
-def trunk_from_truth(truth: Truth, index: int, state: State) -> Estimate:
-    """The estimate the simulator's truth gives, for comparison with the filter's."""
+def trunk_from_truth(truth: Truth, robot: str, state: State) -> Estimate:
+    """The estimate the simulator's truth gives, for comparison with the filter's.
+
+    Args:
+        truth: of a world in which the robot is.
+        robot: its name.
+        state: what it measures.
+    """
+    index = truth.robots.index(robot)
     R = rotation_matrix(truth.base_quat_wxyz[index])
     position, velocity = truth.base_pos[index], truth.base_vel[index]
     p_leg, _, _ = leg_kinematics(state.q_joint, state.v_joint)

@@ -35,8 +35,10 @@ def roll_pitch_yaw(R: Array) -> Array:
 
 @compiled
 def heading(R: Array) -> tuple[float, float]:
-    """Cosine and sine of the yaw of R."""
+    """Cosine and sine of the yaw of R; of a trunk that points straight up or down, yaw is 0."""
     norm = np.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2)
+    if norm == 0.0:
+        return 1.0, 0.0
     return R[0, 0] / norm, R[1, 0] / norm
 
 

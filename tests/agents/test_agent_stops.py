@@ -61,6 +61,16 @@ def test_a_tilt_beyond_the_limit_is_a_fall(sign: float) -> None:
         outputs = robot.step()
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_robot_that_points_straight_up_or_down_has_fallen(sign: float) -> None:
+    robot = Robot()
+    robot.run(400)
+    quat = np.array([0.5, -0.5 * sign, 0.5 * sign, 0.5])
+    outputs = robot.step(over_the_bus(replace(standing(400), imu_quat_wxyz=quat)))
+    assert is_damping(outputs)
+    assert (outputs.mode, outputs.reason) == ("damping", "fall")
+
+
 def test_an_orientation_that_is_no_number_damps_the_joints_at_once() -> None:
     robot = Robot()
     robot.run(400)

@@ -14,7 +14,7 @@ from agents.pilot import Awaited
 from agents.rehearsal import standing
 from shared.codec import encode
 from shared.config_file import load
-from shared.messages import EStop, Event, Measurement, Message, Plan, Reference
+from shared.messages import EStop, Event, Measurement, Message, Plan, Reference, Truth
 from shared.robot import Array
 from shared.topics import ESTOP, TABLE, Topic
 
@@ -191,6 +191,28 @@ def test_a_reference_that_nobody_may_configure_is_dropped(change: dict[str, Any]
     feed(box, ("reference", replace(reference(0), vx=1.2, vy=0.5, wz=-1.0, height=0.32)))
     assert box.counters["dropped_reference"] == 1
     assert len(box.inputs(standing(0), Awaited(reference_tick=0)).references) == 1
+
+
+def truth(robots: tuple[str, ...], rows: int, quat: float = 0.5) -> Truth:
+    zero = np.zeros((rows, 3))
+    return Truth(0, 0, robots, zero, np.full((rows, 4), quat), zero, zero,
+                 np.zeros((rows, 4, 3)), np.zeros(0), np.zeros(0))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        truth(("r1",), 1), truth(("r1", "r2", "r3"), 1), truth((), 3), truth(("r1", "r3", "r4"), 3),
+        truth(("r1", "r2", "r3"), 3, 0.0), truth(("r1", "r2", "r3"), 3, 1e3),
+    ],
+)  # fmt: skip
+def test_a_truth_that_says_nothing_of_the_robot_is_dropped(wrong: Truth) -> None:
+    box, awaited = arrivals(estimator="truth"), Awaited(truth=True)
+    feed(box, ("sim/truth", wrong))
+    assert box.counters["dropped_sim/truth"] == 1
+    assert box.inputs(standing(0), awaited).truth is None
+    feed(box, ("sim/truth", truth(("r1", "r2", "r3"), 3)))
+    assert box.inputs(standing(0), awaited).truth is not None
 
 
 @pytest.mark.parametrize("quat", [np.zeros(4), np.full(4, 1e-3), np.full(4, 10.0)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -210,9 +210,20 @@ def moving(seed: int) -> tuple[Truth, State, Estimate]:
 @pytest.mark.parametrize("seed", range(3))
 def test_the_truth_is_taken_over_as_it_is(seed: int) -> None:
     truth, state, expected = moving(seed)
-    estimate = trunk_from_truth(truth, 1, state)
+    estimate = trunk_from_truth(truth, "r2", state)
     for name in ("position", "velocity", "R", "omega", "p_foot", "q_joint", "v_joint"):
         np.testing.assert_allclose(getattr(estimate, name), getattr(expected, name), atol=1e-12)
+
+
+def test_a_robot_is_found_in_the_truth_by_its_name() -> None:
+    truth, state, expected = moving(3)
+    rows = ("base_pos", "base_quat_wxyz", "base_vel", "base_omega")
+    turned = replace(
+        truth, robots=("r2", "r1"), **{name: getattr(truth, name)[::-1] for name in rows}
+    )
+    estimate = trunk_from_truth(turned, "r2", state)
+    np.testing.assert_allclose(estimate.position, expected.position, atol=1e-12)
+    np.testing.assert_allclose(estimate.omega, expected.omega, atol=1e-12)
 
 
 def test_the_filter_goes_on_from_a_known_state() -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from agents.controller.rotation import cross, roll_pitch_yaw, rotation_matrix, wrap_angle
+from agents.controller.rotation import cross, heading, roll_pitch_yaw, rotation_matrix, wrap_angle
 from shared.robot import Array
 
 QUATERNIONS = arrays(np.float64, 4, elements=st.floats(-1.0, 1.0)).filter(
@@ -54,6 +55,13 @@ def test_the_conjugate_turns_back(quat: Array) -> None:
 def test_roll_pitch_yaw_undoes_the_three_turns(roll: float, pitch: float, yaw: float) -> None:
     R = pin.utils.rotate("z", yaw) @ pin.utils.rotate("y", pitch) @ pin.utils.rotate("x", roll)
     np.testing.assert_allclose(roll_pitch_yaw(R), [roll, pitch, yaw], atol=1e-9)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_trunk_that_points_straight_up_or_down_has_a_heading(sign: float) -> None:
+    R = rotation_matrix(np.array([0.5, -0.5 * sign, 0.5 * sign, 0.5]))
+    assert R[0, 0] == R[1, 0] == 0.0
+    assert heading(R) == (1.0, 0.0)
 
 
 def test_pitch_stays_a_number_where_rounding_leaves_the_sine_beyond_one() -> None:
