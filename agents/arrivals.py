@@ -8,7 +8,8 @@ from typing import Any, Final
 
 from agents.agent import Inputs
 from agents.pilot import NOTHING, Awaited
-from agents.references import allowed
+from agents.planner.horizon import step_ms
+from agents.references import AHEAD_MS, allowed
 from shared.barrier import PLANNER
 from shared.codec import decode
 from shared.config import CENTRAL, Config
@@ -25,6 +26,7 @@ Wanted = tuple[Source, Order]  # a message of a source, and all before it
 UNREADABLE: Final = "unreadable"  # reason of a stop whose message does not decode
 _NEVER: Final = (-1, 0)
 _HELD: Final = 256  # messages of one source beyond those of the stand; more can only be a flood
+_JUMP_MS: Final = 5000  # from one state to the next; longer than any silence the team survives
 _NORM: Final = (0.5, 2.0)  # |q|² of an orientation; far from 1 it is none
 
 
@@ -44,7 +46,9 @@ class Arrivals:
         topics: row of the table and sender of every key that it subscribes to.
         counters: refused messages, states passed over and waits given up, by name.
         heard: valid messages by topic and sender.
-        flooded: whether a valid message was refused because too many were held.
+        refused: whether a valid message but a state was refused: too many were held, or it is of
+            a time too far ahead.
+        misfits: states since the newest one that were not newer, or too far ahead.
         ended: whether the world has said that the walk is over.
     """
 
@@ -68,12 +72,15 @@ class Arrivals:
             self.topics[MEASUREMENT.key(team, peer)] = (MEASUREMENT, peer)
         self.counters: Counter[str] = Counter()
         self.heard: Counter[Source] = Counter()
-        self.flooded = self.ended = False
+        self.refused = self.ended = False
+        self.misfits = 0
         self._newest: dict[Source, Order] = {}
         self._held: dict[str, list[tuple[str, Any]]] = {}  # sender and message by topic
         self._count: Counter[Source] = Counter()  # of these
         # In lock-step nobody asks for what peers measure while they stand until they walk.
         self._most = _HELD + config.gait.stand_ms // SAMPLE_MS
+        self._step_ms = step_ms(config)
+        self._now = -1  # tick of the newest state
         self._state: State | None = None
         self._estop: EStop | None = None
 
@@ -93,14 +100,28 @@ class Arrivals:
         if message is None or not _believable(message, self._robot):
             self.counters[f"dropped_{topic.name}"] += 1
             return
+        if topic not in (ESTOP, EVENT) and self._ahead(message):
+            self.counters[f"ahead_{topic.name}"] += 1
+            self.misfits += topic is STATE
+            self.refused |= topic is not STATE
+            return
         self.heard[topic.name, sender] += 1
         self._keep(topic, sender, message)
 
+    def _ahead(self, message: Message) -> bool:
+        """Whether a message is of a time that nobody in the team can have come to.
+
+        One such would be held for as long, and what is real would be late behind it. The first
+        state is believed: it says what time it is.
+        """
+        if isinstance(message, State):
+            return 0 <= self._now < message.tick - _JUMP_MS
+        tick = message.step * self._step_ms if isinstance(message, Plan) else message.tick
+        return tick > max(self._now, 0) + AHEAD_MS
+
     def _keep(self, topic: Topic, sender: str, message: Message) -> None:
         if isinstance(message, State):
-            if self._state is not None:
-                self.counters["states_passed_over"] += 1
-            self._state = message
+            self._keep_newest(message)
         elif isinstance(message, EStop):
             self._estop = message
         elif isinstance(message, Event):
@@ -109,14 +130,23 @@ class Arrivals:
             source = (topic.name, sender)
             if self._count[source] >= self._most:
                 self.counters[f"flooded_{topic.name}"] += 1
-                self.flooded = True
+                self.refused = True
                 return
             self._held.setdefault(topic.name, []).append((sender, message))
             self._count[source] += 1
             self._newest[source] = max(self._newest.get(source, _NEVER), order_of(message))
 
+    def _keep_newest(self, state: State) -> None:
+        older = state.tick <= self._now
+        if older or self._state is not None:
+            self.counters["states_passed_over"] += 1
+        if older:
+            self.misfits += 1
+        else:
+            self._state, self._now, self.misfits = state, state.tick, 0
+
     def state(self) -> State | None:
-        """The newest state, once."""
+        """The newest state, once; ticks only rise."""
         state, self._state = self._state, None
         return state
 

@@ -22,7 +22,8 @@ class Intake:
     In real time what an agent knew depends on who was faster: due is one at every step that took
     in more than the state after the last one. In lock-step `Arrivals` and `Agent.awaited` say what
     is taken in at each tick: due is one when a message was owed, or came too late for the step that
-    awaited it, when a state was passed over, after a flood, and of what no rule expects.
+    awaited it, when a state was passed over, once a valid message was refused, and of what no rule
+    expects.
 
     Args:
         config: the team's configuration.
@@ -49,8 +50,7 @@ class Intake:
         taken, owed = taken_in(inputs), frozenset[Source]()
         unusual = bool(taken)
         if self._lockstep:
-            if unusual:
-                unusual = self._arrivals.flooded or not self._by_rule(taken)
+            unusual = self._arrivals.refused or not self._by_rule(taken)
             if awaited != NOTHING:
                 owed = self._arrivals.owing(tick, awaited)
                 self._handed_over.update(self._arrivals.wanted(tick, awaited))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
+from typing import Final
 
 from agents.agent import Agent, AgentState, Inputs, Outputs
 from agents.arrivals import Arrivals, Source
@@ -18,10 +19,11 @@ from shared.bus import HERE, POLL, READY, Bus
 from shared.clock import monotonic, monotonic_ns
 from shared.codec import encode
 from shared.config import Config
+from shared.errors import BusError
 from shared.messages import State
 from shared.scheduling import take_priority
 from shared.signals import stop_on_signals
-from shared.topics import COMMAND, INPUTS, MEASUREMENT, PLAN, STATUS
+from shared.topics import COMMAND, INPUTS, MEASUREMENT, PLAN, STATE, STATUS
 
 
 def run(
@@ -39,7 +41,8 @@ def run(
         stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
 
     Raises:
-        BusError: the bus cannot be opened, or the team is not complete in time.
+        BusError: the bus cannot be opened, or the team is not complete in time; or for 3 s no
+            state has come that is newer than those before.
     """
     stopped = stopped or stop_on_signals()
     one_blas_thread()
@@ -60,6 +63,9 @@ def run(
         shell.walk(stopped)
 
 
+_PATIENCE: Final = 3.0  # s without a state that fits; no answer goes out meanwhile
+
+
 class _Shell:
     """The loop around `Agent.step`."""
 
@@ -73,6 +79,8 @@ class _Shell:
         }
         self._telemetry = Telemetry(config.estimator.kind, paced=realtime)
         self._intake = Intake(config, arrivals)
+        # Since the last answer: how many there were when they were first noticed, and when.
+        self._misfits: tuple[int, float] | None = None
         self._given_up: dict[Source, int] = {}  # what had been heard of whom when given up
 
     def walk(self, stopped: Callable[[], bool]) -> None:
@@ -81,11 +89,28 @@ class _Shell:
         while not (stopped() or self._arrivals.ended):
             self._receive(POLL)
             state = self._arrivals.state()
-            if state is None:
-                if SIM not in self._bus.present(HERE):
-                    return
-            elif state.tick > memory.tick:
+            if state is not None:
                 memory = self._answer(memory, state)
+                self._misfits = None
+            elif SIM not in self._bus.present(HERE):
+                return
+            else:
+                self._check_clock(memory.tick)
+
+    def _check_clock(self, tick: int) -> None:
+        """End where states go on coming but none is newer than `tick`: all would be ignored."""
+        count, now = self._arrivals.misfits, monotonic()
+        if self._misfits is None:
+            self._misfits = (count, now) if count else None
+            return
+        before, since = self._misfits
+        if count > before and now - since > _PATIENCE:
+            raise BusError(
+                STATE.key(self._config.team.name, self._agent.robot),
+                f"{count} states within {now - since:.0f} s whose ticks do not go on",
+                f"ticks that rise from {tick} on",
+                "has the world's clock been set, or does someone else send states?",
+            )
 
     def _receive(self, timeout: float) -> bool:
         """Take in all that has come; False if nothing came within `timeout` seconds."""

@@ -19,6 +19,7 @@ _LIMITS: Final = {
     for name, key in ReferenceConfig.__dataclass_fields__.items()
     if name in ("vx", "vy", "wz", "height")
 }
+AHEAD_MS: Final = 1000  # of the present: whoever speaks of later must be there to say it then
 _KEPT_MS = 2000  # long enough for the windows of the oldest plan that may still be used
 
 

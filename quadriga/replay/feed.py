@@ -68,6 +68,7 @@ class Feed:
     def _step(self, tick: int) -> Fed:
         record = self._tape.records.get(tick)
         missing = list(self._lost.get(tick, ()))
+        state = self._state(tick)  # first: it says what time it is, see `Arrivals`
         awaited = self._agent.awaited(tick) if self._lockstep else NOTHING
         wanted = [] if awaited == NOTHING else self._arrivals.wanted(tick, awaited)
         if record is not None:
@@ -76,7 +77,6 @@ class Feed:
         else:
             for source, due in wanted:
                 missing += self._take_up_to(source, due)
-        state = self._state(tick)
         if state is None:
             missing.append(f"state of {self._agent.robot} at tick {tick}")
             return Fed(tick, None, tuple(missing))

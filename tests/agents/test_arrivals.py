@@ -90,6 +90,62 @@ def test_the_newest_state_counts_and_the_others_are_counted() -> None:
     assert box.state() is None
 
 
+def test_of_states_in_any_order_the_newest_counts_and_none_before_it() -> None:
+    for order in permutations((4, 5, 6)):
+        box = arrivals()
+        feed(box, *(("r2/state", standing(tick)) for tick in order))
+        state = box.state()
+        assert state is not None
+        assert state.tick == 6
+        assert box.counters["states_passed_over"] == 2
+        feed(box, ("r2/state", standing(5)), ("r2/state", standing(6)))
+        assert box.state() is None
+        assert box.misfits == 2 + (order[-1] != 6) + (order[0] == 6)
+
+
+def test_a_state_of_years_ahead_does_not_make_the_real_ones_late() -> None:
+    box = arrivals()
+    for tick, wrong in ((7, 1 << 41), (8, 8 + 5001)):
+        feed(box, ("r2/state", standing(tick)), ("r2/state", standing(wrong)))
+        state = box.state()
+        assert state is not None
+        assert state.tick == tick
+        assert box.misfits == 1
+    assert box.counters["ahead_state"] == 2
+    feed(box, ("r2/state", standing(8 + 5000)))
+    assert box.state() is not None, "a process may have been stopped for so long"
+    assert box.misfits == 0
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+@pytest.mark.parametrize("lead", [1001, 10_000, (1 << 42) - 3000])
+def test_what_is_of_a_time_far_ahead_is_refused_and_nobody_is_taken_to_have_spoken(
+    mode: str, lead: int
+) -> None:
+    box, step = arrivals(mode, estimator="truth"), -(-(2000 + lead) // 40)
+    feed(box, ("r2/state", standing(2000)))
+    early: list[tuple[str, Message]] = [
+        ("r1/plan", plan(step)), ("r1/plan", replace(plan(step), tick=2000)),
+        ("r3/measurement", measurement(2000 + lead)), ("reference", reference(2000 + lead)),
+        ("sim/truth", replace(truth(("r1", "r2", "r3"), 3), tick=2000 + lead)),
+    ]  # fmt: skip
+    for _ in range(400):
+        feed(box, *early)
+    named = {"plan": 800, "measurement": 400, "reference": 400, "sim/truth": 400}
+    assert box.counters == {f"ahead_{name}": count for name, count in named.items()}
+    assert box.refused
+    assert not box.heard["plan", "r1"]
+    awaited = Awaited((50, 0), 2000, 2000, True)
+    assert len(box.owing(2000, awaited)) == 6
+    feed(box, ("r1/plan", plan(50)), ("r3/measurement", measurement(2000)),
+         ("reference", reference(2000)), ("reference", reference(3000)))  # fmt: skip
+    inputs = box.inputs(standing(2000), awaited)
+    assert [found.step for _, found in inputs.plans] == [50]
+    assert [sample.tick for _, sample in inputs.measurements] == [2000]
+    due = [2000] if mode == "lockstep" else [2000, 3000]
+    assert [found.tick for found in inputs.references] == due
+
+
 def test_the_order_of_arrival_does_not_matter() -> None:
     messages: list[tuple[str, Message]] = [
         ("r1/measurement", measurement(10)), ("r3/measurement", measurement(10)),
@@ -157,6 +213,7 @@ def test_an_emergency_stop_and_the_end_are_never_held_back() -> None:
 
 def test_a_flood_is_bounded_and_counted() -> None:
     box = arrivals()
+    feed(box, ("r2/state", standing(20_000)))
     feed(box, *(("r1/measurement", measurement(10 * k)) for k in range(1000)))
     most = 256 + 300 // 10  # what is measured while the team stands belongs to no flood
     assert box.counters["flooded_measurement"] == 1000 - most
@@ -175,9 +232,10 @@ def test_nothing_that_is_measured_during_the_stand_is_refused(robots: int, stand
     config = load(None, {"team.robots": robots, "gait.stand_ms": stand_ms})
     peers = [f"r{k}" for k in range(2, robots + 1)]
     box, last = Arrivals(config, "r1", peers), stand_ms + 10
+    feed(box, ("r1/state", standing(last)))
     for peer in peers:
         feed(box, *((f"{peer}/measurement", measurement(t)) for t in range(10, last + 1, 10)))
-    assert not box.flooded
+    assert not box.refused
     assert not box.owing(last, Awaited(measurement_tick=last))
 
 

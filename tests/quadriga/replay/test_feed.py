@@ -55,9 +55,21 @@ def sent(config: Config) -> list[tuple[int, str, Source, Message]]:
     return found
 
 
+def forged(of: int) -> list[tuple[str, Source, Message]]:
+    """Key, source, message of what nobody sends by rule, of a time."""
+    sample = Measurement(of, of, np.zeros(12), np.zeros(6), np.zeros(4))
+    horizon = np.zeros((25, 12)), np.zeros((25, 6))
+    return [
+        ("team/reference", ("reference", "operator"), Reference(of, of, 0.2, 0.0, 0.0, 0.26)),
+        ("team/r1/measurement", ("measurement", "r1"), sample),
+        ("team/r3/plan", ("plan", "r3"), Plan(of, of, of // STEP_MS, *horizon, "", {}, 1)),
+    ]  # fmt: skip
+
+
 def lived(
-    mode: str, seed: int, late: float, skipped: float, second: Sequence[tuple[int, int]] = ()
-) -> tuple[Tape, Taken]:
+    mode: str, seed: int, late: float, skipped: float, second: Sequence[tuple[int, int]] = (),
+    early: Sequence[tuple[int, int]] = (),
+) -> tuple[Tape, Taken]:  # fmt: skip
     """A walk in which messages come late or never and states are passed over; its recording.
 
     Args:
@@ -66,6 +78,7 @@ def lived(
         late: share of messages that come late or never.
         skipped: share of states passed over.
         second: tick and delay of references that a second operator sends beside the first.
+        early: when somebody sends messages of all kinds, and how far ahead of it, ms.
     """
     rng = np.random.default_rng(seed)
     config, agent = AGENTS[mode]
@@ -85,6 +98,10 @@ def lived(
         source, message = ("reference", "operator"), Reference(tick, tick, 0.2, 0.0, 0.0, 0.26)
         pending.append((tick + after, "team/reference", source, message))
         tape.heard[source][order_of(message)].append(("team/reference", encode(message)))
+    for comes_at, lead in early:
+        for key, source, message in forged(comes_at + lead):
+            pending.append((comes_at, key, source, message))
+            tape.heard[source][order_of(message)].append((key, encode(message)))
     taken: Taken = []
     last = -1
     for tick in range(TICKS):
@@ -92,6 +109,7 @@ def lived(
         if rng.random() < skipped:
             continue
         awaited = agent.awaited(tick)
+        arrivals.take("team/r2/state", tape.states[tick][0])
 
         def take(until: int, of: frozenset[Source] | None = None) -> None:
             for item in sorted(pending, key=lambda item: item[0]):
@@ -102,7 +120,6 @@ def lived(
         take(tick)
         if mode == "lockstep":
             take(tick + PATIENCE, arrivals.owing(tick, awaited))
-        arrivals.take("team/r2/state", tape.states[tick][0])
         state = arrivals.state()
         assert state is not None
         inputs = arrivals.inputs(state, awaited)
@@ -131,6 +148,10 @@ def fed(mode: str, tape: Tape) -> list[Fed]:
         st.tuples(st.sampled_from([55, 145, 235, 325]), st.integers(1, 300)), max_size=4,
         unique_by=lambda sent: sent[0],
     ),
+    early=st.lists(
+        st.tuples(st.sampled_from([5, 55, 155, 205, 265]), st.sampled_from([90, 100, 120, 10**6])),
+        max_size=4, unique_by=sum,
+    ),
 )  # fmt: skip
 def test_a_replay_takes_in_what_the_agent_took_in(
     mode: str,
@@ -139,11 +160,15 @@ def test_a_replay_takes_in_what_the_agent_took_in(
     skipped: float,
     held: int,
     second: list[tuple[int, int]],
+    early: list[tuple[int, int]],
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("agents.arrivals._HELD", held)
-        tape, taken = lived(mode, seed, late, skipped, second)
-    steps = fed(mode, tape)
+        patch.setattr("agents.arrivals.AHEAD_MS", 100)
+        tape, taken = lived(mode, seed, late, skipped, second, early)
+        patch.undo()
+        patch.setattr("agents.arrivals.AHEAD_MS", 100)
+        steps = fed(mode, tape)
     assert not [step.missing for step in steps if step.missing]
     again = [(step.tick, taken_in(step.inputs)) for step in steps if step.inputs is not None]
     assert again == taken
