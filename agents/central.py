@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Final
 
 import numpy as np
 
@@ -12,13 +13,14 @@ from agents.planner.episode import commanded_outputs, output_base
 from agents.planner.horizon import step_ms
 from agents.planner.planner import PlannerInputs
 from agents.planning import first_step
-from agents.references import base_of_window, in_force, remember_references
+from agents.references import AHEAD_MS, base_of_window, in_force, remember_references
 from shared.config import Config
 from shared.messages import Measurement, Plan, Reference
 from shared.robot import robot_names
-from shared.topics import SAMPLE_MS
+from shared.topics import MEASUREMENT, SAMPLE_MS
 
 Windows = Mapping[str, tuple[Measurement, ...]]
+_AHEAD_MS: Final = MEASUREMENT.max_age_ms  # of the team's time, of a sample that is believed
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,11 +30,15 @@ class CentralState:
     Attributes:
         windows: each robot's last samples, ascending, at most T_ini + those of one step.
         references: what the operator asked for lately.
+        claimed: by robot, tick of a sample that was not believed, until one is.
+        refused: messages of a time too far ahead so far.
         step: the last step planned; −1 before the first.
     """
 
     windows: Windows = field(default_factory=dict)
     references: tuple[Reference, ...] = ()
+    claimed: Mapping[str, int] = field(default_factory=dict)
+    refused: int = 0
     step: int = -1
 
 
@@ -61,30 +67,61 @@ class Central:
         self._kept = config.planner.T_ini + config.planner.applied
 
     def due(self, state: CentralState) -> int | None:
-        """The newest planning step that all robots' windows allow and that is not planned yet."""
+        """The newest planning step that all robots' windows allow and that is not planned yet.
+
+        None once a robot stands where it should walk: it has stopped or is damped, and without
+        plans the others stop too.
+        """
         T_ini = self._config.planner.T_ini
         newest = min((self._newest(state.windows, name) for name in self._names), default=-1)
         step = newest // self._step_ms
         if step <= state.step or step < first_step(self._config):
             return None
         end = step * self._step_ms
-        whole = all(len(_window(state.windows[name], end, T_ini)) == T_ini for name in self._names)
-        return step if whole else None
+        windows = [_window(state.windows[name], end, T_ini) for name in self._names]
+        whole = all(len(window) == T_ini for window in windows)
+        return step if whole and not any(map(self._stands, windows)) else None
+
+    def _stands(self, window: tuple[Measurement, ...]) -> bool:
+        """Whether at the end of a window all four feet stand: in a trot two of them swing."""
+        last = window[-1]
+        begun = last.tick - SAMPLE_MS >= self._config.gait.stand_ms
+        return begun and bool((last.stance > 0.5).all())
 
     def remember(
         self, state: CentralState, measurements: Iterable[tuple[str, Measurement]],
         references: Iterable[Reference],
     ) -> CentralState:  # fmt: skip
-        """Add what has arrived; what is repeated, late or of no robot here is passed over."""
-        windows = dict(state.windows)
+        """Add what has arrived; what is repeated, late or of no robot here is passed over.
+
+        Refused and counted is what is far ahead of the team's time, which is the median of its
+        robots' newest samples: behind it all that is real would be late. After a silence of all
+        the team's time goes on when most have spoken again.
+        """
+        windows, claimed, refused = dict(state.windows), dict(state.claimed), state.refused
         for name, sample in measurements:
-            held = windows.get(name, ())
-            newer = not held or sample.tick > held[-1].tick
-            if name in self._names and newer and sample.tick % SAMPLE_MS == 0:
-                windows[name] = (*held, sample)[-self._kept :]
+            newer = sample.tick > self._newest(windows, name)
+            if name not in self._names or not newer or sample.tick % SAMPLE_MS:
+                continue
+            if sample.tick > self._team_time(windows, claimed) + _AHEAD_MS:
+                claimed[name] = sample.tick
+                refused += 1
+                continue
+            claimed.pop(name, None)
+            windows[name] = (*windows.get(name, ()), sample)[-self._kept :]
         now = max((self._newest(windows, name) for name in windows), default=0)
-        known = remember_references(state.references, references, now)
-        return replace(state, windows=windows, references=known)
+        heard = tuple(references)
+        timely = tuple(item for item in heard if item.tick <= now + AHEAD_MS)
+        known = remember_references(state.references, timely, now)
+        return replace(
+            state, windows=windows, references=known, claimed=claimed,
+            refused=refused + len(heard) - len(timely),
+        )  # fmt: skip
+
+    def _team_time(self, windows: Windows, claimed: Mapping[str, int]) -> int:
+        """The (lower) median of the robots' newest samples, those not believed among them, ms."""
+        newest = [claimed.get(name, self._newest(windows, name)) for name in self._names]
+        return sorted(newest)[(len(newest) - 1) // 2]
 
     def step(self, state: CentralState) -> tuple[CentralState, CentralOutputs]:
         """Plan the step that is due, if one is."""

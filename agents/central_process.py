@@ -12,6 +12,7 @@ import numpy as np
 from agents.central import Central, CentralOutputs, CentralState
 from agents.planner.central import TeamPlanner
 from agents.planner.horizon import step_ms
+from agents.planning import REFUSED
 from agents.references import allowed
 from agents.rehearsal import rehearse_central
 from shared.barrier import PLANNER, SIM, meet
@@ -76,7 +77,6 @@ class _Shell:
         self._tell = bus.publisher(STATUS.key(team, PLANNER), droppable=realtime)
         self._lockstep = not realtime
         self._references: list[Reference] = []
-        self._newest_reference = -1
         self._measurements: list[tuple[str, Measurement]] = []
         self._counters: Counter[str] = Counter()
         self._ended = False
@@ -95,18 +95,19 @@ class _Shell:
             due = self._central.due(state)
             if due is None:
                 since = monotonic()
-            elif self._reference_known(due) or monotonic() - since > self._patience:
+            elif self._reference_known(state, due) or monotonic() - since > self._patience:
                 state, outputs = self._central.step(state)
-                self._publish(outputs)
+                self._publish(state, outputs)
 
     @property
     def _patience(self) -> float:
         return self._config.planner.peer_timeout if self._lockstep else 0.0
 
-    def _reference_known(self, step: int) -> bool:
+    def _reference_known(self, state: CentralState, step: int) -> bool:
         """Whether the operator's word for the time of `step` is there."""
         tick = step * step_ms(self._config)
-        return self._newest_reference >= tick - tick % EPOCH_MS
+        known = state.references
+        return bool(known) and known[-1].tick >= tick - tick % EPOCH_MS
 
     def _take(self, key: str, payload: bytes) -> None:
         robot = self._robots.get(key)
@@ -121,11 +122,10 @@ class _Shell:
                     self._counters[f"dropped_{REFERENCE.name}"] += 1
                     return
                 self._references.append(reference)
-                self._newest_reference = max(self._newest_reference, reference.tick)
         except MessageError:
             self._counters[f"dropped_{key.rpartition('/')[2]}"] += 1
 
-    def _publish(self, outputs: CentralOutputs) -> None:
+    def _publish(self, state: CentralState, outputs: CentralOutputs) -> None:
         for name, plan in outputs.plans:
             self._put[name](encode(plan))
         if not outputs.plans or outputs.planner_ns is None:
@@ -133,6 +133,8 @@ class _Shell:
         plan = outputs.plans[0][1]
         if plan.status != "solved":
             self._counters[f"plan_{plan.status.partition(':')[0]}"] += 1
+        if state.refused:
+            self._counters[REFUSED] = state.refused
         took = np.array([1e-6 * outputs.planner_ns])
         self._tell(encode(Status(
             plan.tick, plan.stamp_ns, _WORKING, "", "", {}, dict(self._counters), took,

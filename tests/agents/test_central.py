@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
+import pytest
 
 from agents.central import Central, CentralOutputs, CentralState
 from agents.gait import nominal_forces, scheduled_stance
@@ -13,7 +14,7 @@ from agents.planner.central import centralised
 from agents.rehearsal import rehearse_central
 from shared.config import Config, PlannerConfig, TeamConfig
 from shared.messages import Measurement
-from tests.agents.duet import asked, simple_predictor
+from tests.agents.duet import asked, fingerprint, simple_predictor
 
 CONFIG = Config(team=TeamConfig(robots=2), planner=PlannerConfig(kind="centralised"))
 CENTRAL = Central(CONFIG, centralised(CONFIG, simple_predictor(CONFIG)))
@@ -27,10 +28,17 @@ def sample(name: str, tick: int, vx: float = 0.3) -> tuple[str, Measurement]:
     return name, Measurement(tick, 0, nominal_forces(stance), y, stance.astype(float))
 
 
-def heard(until: int, vx: float = 0.3) -> CentralState:
-    """All samples of both robots up to a tick."""
-    state = CentralState()
-    for tick in range(10, until + 1, 10):
+def standing(name: str, tick: int) -> tuple[str, Measurement]:
+    """What a robot measures that has stopped, or is damped."""
+    return name, replace(sample(name, tick)[1], stance=np.ones(4))
+
+
+def heard(until: int, vx: float = 0.3, start: CentralState | None = None) -> CentralState:
+    """All samples of both robots up to a tick, after those in `start`."""
+    state, first = start or CentralState(), 10
+    if state.windows:
+        first = 10 + max(held[-1].tick for held in state.windows.values())
+    for tick in range(first, until + 1, 10):
         pair = [sample("r1", tick, vx), sample("r2", tick)]
         state = CENTRAL.remember(state, pair, [asked(0.3)])
     return state
@@ -99,3 +107,66 @@ def test_a_rehearsal_plans_two_steps_of_standing() -> None:
 
     rehearse_central(CONFIG, Watched(CONFIG, centralised(CONFIG, simple_predictor(CONFIG))))
     assert planned == [8, 8, 9, 9]
+
+
+@pytest.mark.parametrize("name", ["r1", "r2"])
+@pytest.mark.parametrize("ahead", [210, 1000, 10**12])
+def test_a_sample_of_a_time_far_ahead_is_refused_and_makes_none_late(name: str, ahead: int) -> None:
+    _, forged = sample(name, 0)
+    state = CENTRAL.remember(heard(350), [(name, replace(forged, tick=350 + ahead))], ())
+    assert state.refused == 1
+    state = heard(360, start=state)
+    assert CENTRAL.due(state) == 9
+    made, usual = (CENTRAL.step(which)[1] for which in (state, heard(360)))
+    assert fingerprint(made) == fingerprint(usual)
+    assert heard(370, start=state).refused == 1
+
+
+@pytest.mark.parametrize("robots", [1, 2, 3, 4])
+def test_after_a_silence_of_all_the_team_plans_again(robots: int) -> None:
+    config = replace(CONFIG, team=TeamConfig(robots=robots))
+    central = Central(config, centralised(config, simple_predictor(config)))
+    state, names = CentralState(), [f"r{k + 1}" for k in range(robots)]
+    for tick in (*range(10, 350, 10), *range(5000, 5400, 10)):
+        state = central.remember(state, [sample(name, tick) for name in names], ())
+    assert 0 < state.refused < 2 * robots
+    assert central.due(state) == 5390 // 40
+
+
+def test_a_third_robot_that_claims_another_time_stops_nobody_else() -> None:
+    config = replace(CONFIG, team=TeamConfig(robots=3))
+    central, state = Central(config, centralised(config, simple_predictor(config))), CentralState()
+    for tick in range(10, 600, 10):
+        both = [sample("r1", tick), sample("r2", tick)]
+        wrong = sample("r3", 10**6 + tick if tick > 300 else tick)
+        state = central.remember(state, [wrong, *both], ())
+    assert [held[-1].tick for _, held in sorted(state.windows.items())] == [590, 590, 300]
+
+
+def test_references_of_a_time_far_ahead_are_refused() -> None:
+    ahead = [replace(asked(), tick=tick) for tick in (400, 1350, 1351, 1 << 41)]
+    state = CENTRAL.remember(heard(350), (), ahead)
+    assert [reference.tick for reference in state.references] == [0, 400, 1350]
+    assert state.refused == 2
+
+
+@pytest.mark.parametrize("name", ["r1", "r2"])
+def test_nobody_is_planned_for_once_a_robot_stands_where_it_should_walk(name: str) -> None:
+    other = "r2" if name == "r1" else "r1"
+    state = heard(350)
+    assert CENTRAL.due(state) == 8
+    for tick in range(360, 700, 10):
+        state = CENTRAL.remember(state, [standing(name, tick), sample(other, tick)], ())
+        if tick % 40 == 0:
+            assert CENTRAL.due(state) is None
+            assert CENTRAL.step(state)[1] == CentralOutputs()
+
+
+def test_the_stand_before_the_first_step_is_none() -> None:
+    config = replace(CONFIG, gait=replace(CONFIG.gait, stand_ms=320))
+    central = Central(config, centralised(config, simple_predictor(config)))
+    state = CentralState()
+    for tick in range(10, 330, 10):
+        pair = [standing("r1", tick), standing("r2", tick)]
+        state = central.remember(state, pair, ())
+    assert central.due(state) == 8
