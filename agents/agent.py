@@ -168,7 +168,7 @@ class Agent:
             mode = go_limp(mode, tick, DAMPING, NO_ESTIMATE if math.isnan(seen.upright) else "fall")
 
         measurement = None
-        if tick % SAMPLE_MS == 0 and tick > 0:
+        if tick % SAMPLE_MS == 0 and 0 <= tick - SAMPLE_MS <= state.tick:
             stance = self._schedule(tick - SAMPLE_MS, state.mode).stance  # during the sample
             measurement = measured(tick, seen.memory.mean_force, seen.outputs, stance)
         pilot, planned = state.pilot, NOTHING_PLANNED
@@ -179,7 +179,8 @@ class Agent:
                 mode = stop_safely(mode, tick, planned.stop_reason)
 
         task = self._task(tick, mode, reference, planned, inputs.excitation, schedule.progress)
-        acted = self._controller.act(seen, schedule, task, dt, new_sample=measurement is not None)
+        new_sample = tick // SAMPLE_MS != state.tick // SAMPLE_MS
+        acted = self._controller.act(seen, schedule, task, dt, new_sample=new_sample)
         solution = acted.solution
         failures, mode = self._failures(state.failures, solution, mode, tick)
         counters = _counted(state.counters, planned, solution)

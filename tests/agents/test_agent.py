@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -190,6 +191,31 @@ def test_gaps_in_the_ticks_are_bridged(
         assert outputs.plan is None or outputs.plan.tick == tick
     assert (outputs.mode, outputs.reason) == end
     assert np.abs(outputs.command.tau).max() > 1.0
+
+
+@pytest.mark.parametrize(
+    "passed", [[400], [410], range(398, 405), range(401, 410), range(395, 410), [403, 407, 408]]
+)
+def test_a_sample_is_of_its_own_ticks_whatever_was_passed_over(passed: Sequence[int]) -> None:
+    """Deviation k N at the tick 400 + k."""
+    robot = Robot()
+    robot.run(390)
+    samples = {}
+    for tick in range(390, 431):
+        if tick not in passed:
+            robot.tick = tick
+            excitation = np.tile([float(tick - 400), 0.0, 0.0], 4)
+            samples[tick] = robot.step(excitation=excitation).measurement
+    sample, counted = samples.get(410), [tick for tick in range(400, 410) if tick not in passed]
+    if 410 in passed or not counted:
+        assert sample is None
+    else:
+        assert sample is not None
+        assert sample.u[::3].max() == pytest.approx(np.mean(counted) - 400)
+    after = samples[420]
+    assert after is not None
+    first = 411 if 410 in passed else 410
+    assert after.u[::3].max() == pytest.approx(np.mean(range(first, 420)) - 400)
 
 
 # ---- estimators
