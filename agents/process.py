@@ -25,6 +25,8 @@ from shared.scheduling import take_priority
 from shared.signals import stop_on_signals
 from shared.topics import COMMAND, INPUTS, MEASUREMENT, PLAN, STATE, STATUS
 
+_PATIENCE: Final = 3.0  # s of states none of which is newer; long before, the joints are damped
+
 
 def run(
     config: Config,
@@ -61,9 +63,6 @@ def run(
         take_priority(config)
         bus.declare(READY)
         shell.walk(stopped)
-
-
-_PATIENCE: Final = 3.0  # s without a state that fits; no answer goes out meanwhile
 
 
 class _Shell:
