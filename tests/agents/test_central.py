@@ -10,11 +10,13 @@ import pytest
 
 from agents.central import Central, CentralOutputs, CentralState
 from agents.gait import nominal_forces, scheduled_stance
+from agents.modes import DAMPING, STOPPING, Mode
 from agents.planner.central import centralised
 from agents.rehearsal import rehearse_central
+from quadriga.rollout import Rollout
 from shared.config import Config, PlannerConfig, TeamConfig
 from shared.messages import Measurement
-from tests.agents.duet import asked, fingerprint, simple_predictor
+from tests.agents.duet import asked, every_100_ms, fingerprint, simple_predictor
 
 CONFIG = Config(team=TeamConfig(robots=2), planner=PlannerConfig(kind="centralised"))
 CENTRAL = Central(CONFIG, centralised(CONFIG, simple_predictor(CONFIG)))
@@ -170,3 +172,19 @@ def test_the_stand_before_the_first_step_is_none() -> None:
         pair = [standing("r1", tick), standing("r2", tick)]
         state = central.remember(state, pair, ())
     assert central.due(state) == 8
+
+
+@pytest.mark.parametrize("mode", [Mode(DAMPING, 400, "fall"), Mode(STOPPING, 400, "peer")])
+def test_when_one_robot_has_stopped_the_other_does_not_go_on(mode: Mode) -> None:
+    config = replace(CONFIG, planner=replace(CONFIG.planner, latency_ms=0))
+    planner = centralised(config, simple_predictor(config))
+    rollout = Rollout(config, None, every_100_ms, planner=planner)
+    for _ in range(400):
+        before = rollout.step().outputs["r2"]
+    assert before.mode == "walk"
+    rollout.states["r1"] = replace(rollout.states["r1"], mode=mode)
+    for _ in range(1400):
+        outputs = rollout.step().outputs["r2"]
+        if outputs.mode != "walk":
+            break
+    assert (outputs.mode, outputs.reason) == ("stopping", "planner-lost")
