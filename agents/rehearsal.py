@@ -12,6 +12,7 @@ from agents.central import Central, CentralState
 from agents.gait import nominal_forces, scheduled_stance
 from agents.planner.horizon import step_ms
 from agents.planning import first_step
+from shared.codec import decode, encode
 from shared.config import Config
 from shared.messages import Measurement, Reference, State
 from shared.robot import (
@@ -31,13 +32,17 @@ _LEAN = 0.8  # of the tilt that is a fall
 def rehearse(config: Config, agent: Agent) -> AgentState:
     """Step `agent` through standing, the first walking ticks and some planning steps.
 
+    What it takes in and what it commands goes over the wire's bytes.
+
     For the last two of them it leans, so far that limits of both its QPs are active.
     """
     memory, lean = agent.initial(), _LEAN * config.controller.fall_tilt
     upright = config.gait.stand_ms + SAMPLE_MS * config.planner.T_ini + 2 * step_ms(config)
     for tick in range(upright + 2 * step_ms(config) + 1):
-        state = standing(tick, lean if tick > upright else 0.0)
-        memory, _ = agent.step(memory, Inputs(state, references=(_stay(config, tick),)))
+        sent = encode(standing(tick, lean if tick > upright else 0.0))
+        inputs = Inputs(decode(sent, State), references=(_stay(config, tick),))
+        memory, outputs = agent.step(memory, inputs)
+        encode(outputs.command)
     return memory
 
 

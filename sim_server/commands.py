@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
-from shared.codec import decode
+import numpy as np
+
+from shared.codec import decode, encode
 from shared.errors import MessageError
 from shared.messages import Command
+from shared.robot import N_JOINTS
 from shared.topics import COMMAND
 
 
@@ -25,6 +28,8 @@ class CommandBox:
         self.latest: dict[str, Command] = {}
         self.refused: Counter[str] = Counter()
         self.last_error = ""
+        # The first one read compiles or loads the reader, which is not for the first tick.
+        decode(encode(Command(0, 0, *np.zeros((5, N_JOINTS)))), Command)
 
     @property
     def malformed(self) -> int:

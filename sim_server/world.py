@@ -67,6 +67,8 @@ class World:
         self._strength = np.ones((n, N_JOINTS))
         self._fallen = [False] * n
         self._surely_up = _FALL_HEIGHT + self.team.terrain.top
+        # What is compiled is compiled, or loaded, now and not in the first tick.
+        drive(self._commanded, self._q, self._v, self._strength, np.empty_like(self._tau))
         self._sensors = Sensors(config.sensors, config.world.seed, self.names)
 
         self.physics.qpos[:] = self.team.q_spawn

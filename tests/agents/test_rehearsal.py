@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,6 +17,20 @@ from shared.config import Config, TeamConfig
 from tests.agents.duet import simple_predictor
 
 ALONE = Config(team=TeamConfig(robots=1))
+
+FIRST_CALLS = """
+from agents.agent import Agent
+from agents.rehearsal import rehearse
+from shared import flat_layout
+from shared.config import Config, TeamConfig
+from sim_server import motors
+from sim_server.commands import CommandBox
+from sim_server.world import World
+config = Config(team=TeamConfig(robots=1))
+WHAT
+first = flat_layout._read.signatures + motors.drive.signatures
+print(len(first))
+"""
 
 
 def test_limits_of_both_qps_are_met(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -31,3 +48,17 @@ def test_limits_of_both_qps_are_met(monkeypatch: pytest.MonkeyPatch) -> None:
     assert state.mode.name == WALK
     assert state.counters["qp_constrained"] > 0
     assert max(judged) > 0
+
+
+@pytest.mark.parametrize(
+    "what",
+    ['rehearse(config, Agent(config, "r1", None))', 'CommandBox("team", ["r1"])', "World(config)"],
+    ids=["agent", "commands", "world"],
+)
+def test_nothing_of_the_first_tick_is_left_to_compile(what: str) -> None:
+    """On a machine that has compiled nothing yet it takes seconds, of a walk in real time."""
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST_CALLS.replace("WHAT", what)], capture_output=True, text=True,
+        timeout=300.0, check=True, cwd=Path(__file__).parents[2],
+    )  # fmt: skip
+    assert done.stdout == "1\n"
