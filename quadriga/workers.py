@@ -5,9 +5,10 @@ from __future__ import annotations
 import multiprocessing
 import os
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import resource_tracker
+from queue import SimpleQueue
 from typing import TypeVar
 
 from shared.errors import ProcessError
@@ -35,9 +36,15 @@ def each_done(
     resource_tracker.ensure_running()  # before signals are held: its start lets them through
     with ProcessPoolExecutor(jobs, context, die_with_parent, (os.getpid(),)) as pool:
         try:
+            # Not `as_completed`: interrupted while it holds every future's lock, it leaves them
+            # locked, and the pool waits for them for ever.
+            done: SimpleQueue[Future[B]] = SimpleQueue()
             with interrupts_held():
                 futures = {pool.submit(call, argument): argument for argument in arguments}
-            for future in as_completed(futures):
+                for future in futures:
+                    future.add_done_callback(done.put)
+            for _ in arguments:
+                future = done.get()
                 yield futures[future], future.result()
         except BrokenProcessPool:
             raise ProcessError("a worker process", "its death", "an answer",
