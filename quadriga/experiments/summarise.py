@@ -34,6 +34,7 @@ def summarise(experiment: Experiment, campaigns: Sequence[Walked]) -> Results:
         mine = groups.get(tuple(sweep.name for sweep in manifest.sweeps), set())
         rows += [row for row in found
                  if row.group in mine and row.variant in same and row.seed in seeds]  # fmt: skip
+    rows.sort(key=lambda row: (row.group, row.seed))  # in whichever order they were walked
     wanted = len(seeds)
     base = [row for row in rows if row.variant == experiment.baseline]
     beside = {name: None if name == experiment.baseline else base for name in keys}

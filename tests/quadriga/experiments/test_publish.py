@@ -265,9 +265,12 @@ def test_published_trials_are_taken_up_and_gone_on_with(
 
 
 def test_the_order_of_walking_does_not_show_in_what_is_published(tmp_path: Path) -> None:
-    experiment = experiment_of("ice")
+    experiment = experiment_of("ice", "steps")
     for name, seeds in (("one", range(6)), ("other", range(5, -1, -1))):
-        write_runs(experiment, tmp_path / name, seeds, fate)
+        write_runs(experiment, tmp_path / name, seeds, lambda group, seed: {
+            **fate(group, seed), "wall_s": 0.1 + 1e6 * (seed == 0),
+            "plans": "solved=3, faded=1" if seed % 2 else "faded=2",
+        })  # fmt: skip
         publish_all([experiment], tmp_path / name, checkout(tmp_path / f"of-{name}"))
     assert files(tmp_path / "of-one") == files(tmp_path / "of-other")
 
