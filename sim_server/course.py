@@ -110,6 +110,7 @@ def _begins_backward(config: Config, way: Array) -> bool:
     """Whether the team leaves the flat place backward: with a trace, in its first metre."""
     if not config.reference.trace:
         return config.reference.vx < 0.0
+    # By then it comes to the end of the flat place.
     left = np.linalg.norm(way, axis=1) >= _FLAT_AHEAD
     return bool(way[left.argmax() if left.any() else -1, 0] < 0.0)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import cast
+from typing import Any, cast
 
 import msgpack
 import pytest
@@ -32,8 +32,8 @@ class Heard:
         ]
 
 
-def staged(**world: object) -> tuple[Stage, Heard]:
-    config, heard = configured(**world), Heard()  # type: ignore[arg-type]
+def staged(**world: Any) -> tuple[Stage, Heard]:
+    config, heard = configured(**world), Heard()
     return Stage(config, World(config), cast("Bus", heard)), heard
 
 

@@ -93,3 +93,11 @@ def publish_all(experiments: Iterable[Experiment], runs: Path, into: Path) -> li
     """Publish experiments, the runs of each if it has any."""
     every = list(experiments)
     return publish(every, runs, into, [one.name for one in every], print)
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """What a folder holds, by path."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.rglob("*") if path.is_file()
+    }  # fmt: skip
