@@ -11,6 +11,8 @@ from scipy import linalg
 
 from agents.gait import nominal_forces, scheduled_stance
 from agents.planner.episode import Episode
+from agents.planner.fits import fit_ridge
+from agents.planner.predictor import Predictor, PredictorMeta
 from shared.config import Config
 from shared.robot import TOTAL_MASS, Array
 
@@ -98,3 +100,10 @@ def linear_team() -> Callable[..., LinearTeam]:
 def small() -> Config:
     """Two robots with short horizons, so that reference solutions stay cheap."""
     return SMALL
+
+
+@pytest.fixture(scope="module")
+def predictor(small: Config) -> Predictor:
+    """Of a team of two, as good as exact."""
+    meta = replace(PredictorMeta.of(small), ridge=1e-10, block_weight=1.0)
+    return fit_ridge([LinearTeam(2).episode(1500, 1)], meta)

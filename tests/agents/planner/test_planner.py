@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,72 +9,13 @@ import numpy as np
 import pytest
 
 from agents.gait import nominal_forces
-from agents.planner.fits import fit_ridge
-from agents.planner.horizon import horizon_stance, walking_steps
-from agents.planner.neighbours import HELD, LOST, PeerData, Selection
-from agents.planner.peer_terms import PeerTerms
-from agents.planner.planner import Planner, PlannerInputs, PlannerState, PlanResult
-from agents.planner.predictor import Predictor, PredictorMeta
+from agents.planner.horizon import horizon_stance
+from agents.planner.planner import Planner, PlannerState
+from agents.planner.predictor import Predictor
 from shared.config import Config
 from shared.errors import PredictorError
 from shared.robot import Array
-
-Team = Callable[..., Any]
-BASE = np.array([0.26, 0.4, 0.0, 0.0, 0.0, 0.1])
-STEP = 20
-NOTHING = PeerTerms()
-
-
-@pytest.fixture(scope="module")
-def predictor(small: Config, linear_team: Team) -> Predictor:
-    meta = replace(PredictorMeta.of(small), ridge=1e-10, block_weight=1.0)
-    return fit_ridge([linear_team(2).episode(1500, 1)], meta)
-
-
-def peer(config: Config, **changes: Any) -> PeerData:
-    """A peer that did and plans nothing, with changes."""
-    quiet = PeerData(
-        robot="r2", index=1, status="fresh", step=STEP - 1, age=0,
-        known=np.ones(config.planner.T_ini, dtype=np.bool_),
-        du_ini=np.zeros((config.planner.T_ini, 12)),
-        y_ini=np.tile(BASE, (config.planner.T_ini, 1)),
-        du=np.zeros((config.planner.N, 12)),
-    )  # fmt: skip
-    return replace(quiet, **changes)
-
-
-def inputs_of(config: Config, step: int = STEP, **changes: Any) -> PlannerInputs:
-    """A robot that walks exactly as commanded, with changes."""
-    planner = config.planner
-    stance = np.ones((planner.T_ini, 4), dtype=np.bool_)
-    calm = PlannerInputs(
-        step=step,
-        u_ini=nominal_forces(stance),
-        y_ini=np.tile(BASE, (planner.T_ini, 1)),
-        stance_ini=stance,
-        y_base_ini=np.tile(BASE, (planner.T_ini, 1)),
-        y_base=np.tile(BASE, (planner.N, 1)),
-        y_des=np.tile(BASE, (planner.N, 1)),
-    )
-    return replace(calm, **changes)
-
-
-def terms_of(
-    config: Config, planner: Planner, *peers: PeerData, before: PeerTerms = NOTHING,
-    base: Array | None = None,
-) -> PeerTerms:  # fmt: skip
-    """Terms of the peers given, by default of one that did and plans nothing."""
-    y_base = np.tile(BASE, (config.planner.T_ini, 1)) if base is None else base
-    return planner.peer_terms(before, Selection(peers or (peer(config),)), STEP, y_base)
-
-
-def plan(
-    config: Config, predictor: Predictor, inputs: PlannerInputs, *peers: PeerData,
-    base: Array | None = None,
-) -> PlanResult:  # fmt: skip
-    planner = Planner(config, 0, predictor)
-    terms = terms_of(config, planner, *peers, base=base)
-    return planner.step(planner.initial(), inputs, terms)[1]
+from tests.agents.planner.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, plan, terms_of
 
 
 def test_at_rest_on_the_command_the_plan_is_nominal(small: Config, predictor: Predictor) -> None:
@@ -129,94 +69,6 @@ def test_swing_legs_carry_exactly_nothing(small: Config, predictor: Predictor) -
         result = plan(small, predictor, inputs_of(small, step=step, y_des=wish))
         swing = ~horizon_stance(small, 0, step)
         assert (result.u.reshape(8, 4, 3)[swing] == 0.0).all()
-
-
-def test_the_peers_base_is_that_of_its_own_window(small: Config, predictor: Predictor) -> None:
-    """The peer's window ends one step earlier, so its deviations count from earlier commands."""
-    T_ini, lag = small.planner.T_ini, small.planner.applied
-    rising = BASE + np.linspace(0.0, 0.1, T_ini + lag)[:, None] * [0, 1, 0, 0, 0, 0]
-    exact = inputs_of(small, y_base_ini=rising[lag:], y_ini=rising[lag:])
-    earlier = rising[:T_ini]
-    result = plan(small, predictor, exact, peer(small, y_ini=earlier), base=earlier)
-    np.testing.assert_allclose(result.du, 0.0, atol=1e-9)
-
-
-def test_unknown_samples_of_a_peer_count_as_no_deviation(
-    small: Config, predictor: Predictor
-) -> None:
-    unknown = peer(small, known=np.zeros(4, dtype=np.bool_), y_ini=np.full((4, 6), 1e3))
-    result = plan(small, predictor, inputs_of(small), unknown)
-    np.testing.assert_allclose(result.du, 0.0, atol=1e-9)
-
-
-def test_a_silent_peers_terms_are_held_then_it_is_lost(small: Config, predictor: Predictor) -> None:
-    planner, inputs = Planner(small, 0, predictor), inputs_of(small)
-    push = np.tile([20.0, 0.0, 0.0], (8, 4))
-    heard = terms_of(small, planner, peer(small, du=push))
-    state, before = planner.step(planner.initial(), inputs, heard)
-    assert np.abs(before.du).max() > 0.01
-    silent = peer(small, status=HELD, step=STEP - 5, age=4)
-    held = terms_of(small, planner, silent, before=heard)
-    state, during = planner.step(state, inputs, held)
-    np.testing.assert_array_equal(during.u, before.u)
-    assert during.used == {"r2": STEP - 5}
-    gone = peer(small, status=LOST, step=STEP - 9, age=8)
-    state, after = planner.step(state, inputs, terms_of(small, planner, gone, before=held))
-    assert after.status == "nominal:peer-lost"
-    assert after.lost == ("r2",)
-    np.testing.assert_array_equal(after.u, nominal_forces(horizon_stance(small, 0, STEP)))
-    assert state.solves == 2
-
-
-def test_a_silent_peers_effect_is_held_while_the_legs_change(
-    small: Config, predictor: Predictor, linear_team: Team
-) -> None:
-    """Whichever legs its schedule has standing later; what another does adds to it."""
-    three = replace(small, team=replace(small.team, robots=3))
-    meta = replace(PredictorMeta.of(three), ridge=1e-10, block_weight=1.0)
-    planner = Planner(three, 0, fit_ridge([linear_team(3).episode(2500, 1)], meta))
-    base = np.tile(BASE, (small.planner.T_ini, 1))
-    stance = np.repeat(horizon_stance(three, 1, STEP - 1), 3, axis=1)
-    talking = peer(three, du=np.where(stance, np.tile([20.0, 5.0, 0.0], (8, 4)), 0.0))
-    third = peer(three, robot="r3", index=2)
-
-    def terms(step: int, before: PeerTerms, *peers: PeerData) -> PeerTerms:
-        return planner.peer_terms(before, Selection(peers, step - 1), step, base)
-
-    heard = terms(STEP, NOTHING, talking, third)
-    now = heard
-    assert np.abs(heard.effect).max() > 1e-3
-    for step in range(STEP + 1, STEP + 9):
-        silent = peer(three, status=HELD, step=STEP - 1, age=step - STEP)
-        now = terms(step, now, silent, third)
-        np.testing.assert_allclose(now.effect, heard.effect, atol=1e-7)
-    pushing = replace(third, y_ini=third.y_ini + 0.01)
-    alone = terms(STEP + 9, NOTHING, peer(three), pushing)
-    both = terms(STEP + 9, now, silent, pushing)
-    np.testing.assert_allclose(both.effect, heard.effect + alone.effect, atol=1e-7)
-    again = terms(STEP + 10, now, peer(three), third)
-    np.testing.assert_allclose(again.effect, 0.0, atol=1e-7)
-
-
-@pytest.mark.parametrize(
-    ("changes", "behind"),
-    [({}, (1,)), ({"compensation": True}, (0,)), ({"exchanges": 2}, (1, 0))],
-    ids=["plain", "compensated", "exchanging"],
-)
-def test_on_the_way_nothing_is_set_up_any_more(
-    small: Config, predictor: Predictor, monkeypatch: pytest.MonkeyPatch,
-    changes: dict[str, Any], behind: tuple[int, ...],
-) -> None:  # fmt: skip
-    config = replace(small, planner=replace(small.planner, **changes))
-    planner = Planner(config, 0, predictor)
-    monkeypatch.setattr("agents.planner.peer_terms.Coupling", None)
-    monkeypatch.setattr("agents.planner.planner.build_problem", None)
-    base, state, terms = np.tile(BASE, (4, 1)), planner.initial(), NOTHING
-    first = walking_steps(config).start
-    for step in range(first, first + 3 * len(walking_steps(config))):
-        for steps in behind:
-            terms = planner.peer_terms(terms, Selection((peer(config),), step - steps), step, base)
-            state, _ = planner.step(state, inputs_of(config, step), terms)
 
 
 def test_without_a_solution_the_plan_is_nominal(small: Config, predictor: Predictor) -> None:
