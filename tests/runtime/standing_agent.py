@@ -18,6 +18,7 @@ from shared.config_file import load
 from shared.errors import MessageError
 from shared.messages import Command, Event, State
 from shared.robot import N_JOINTS, q_stand
+from shared.scheduling import take_priority
 from shared.signals import die_with_parent, stop_on_signals
 from shared.topics import COMMAND, EVENT, STATE
 
@@ -32,6 +33,8 @@ def run(config: Config, robot: str) -> None:
         bus.subscribe(EVENT.key(team))
         put = bus.publisher(COMMAND.key(team, robot))
         meet(bus, config, stopped)
+        if config.world.mode == "realtime":  # or it lies down on a busy machine
+            take_priority(config)
         bus.declare(READY)
         while not (stopped() or ended):
             packet = bus.get(POLL)
