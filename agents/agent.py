@@ -168,7 +168,9 @@ class Agent:
             mode = go_limp(mode, tick, DAMPING, NO_ESTIMATE if math.isnan(seen.upright) else "fall")
 
         measurement = None
-        # None of a sample that was passed over as a whole: nobody knows what was applied in it.
+        # Where states were passed over, the mean is over those of its ticks at which the agent
+        # stepped: a window without the sample would be of no use. None if its end was passed
+        # over, or all of it: nobody knows what was applied in it.
         if tick % SAMPLE_MS == 0 and 0 <= tick - SAMPLE_MS <= state.tick:
             stance = self._schedule(tick - SAMPLE_MS, state.mode).stance  # during the sample
             measurement = measured(tick, seen.memory.mean_force, seen.outputs, stance)

@@ -7,10 +7,12 @@ from shared.robot import Array
 
 
 def measured(tick: int, force: Array, outputs: Array, stance: Array) -> Measurement:
-    """The sample that ends at `tick`, with the mean force over it.
+    """The sample that ends at `tick`.
 
-    Where states were passed over, the mean is over those of its ticks at which the agent stepped:
-    the forces changed little between them, while a window without the sample would be of no use.
-    There is none if its end was passed over, or all of it.
+    Args:
+        tick: its last tick, ms.
+        force: planned forces, their mean over the sample, yaw frame, shape (12,), N.
+        outputs: y at its last tick, yaw frame, shape (6,).
+        stance: which feet were to stand in it, shape (4,).
     """
     return Measurement(tick, tick * 1_000_000, force, outputs, stance)

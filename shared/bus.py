@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -25,7 +26,6 @@ _ACK: Final = "received"  # key of the question whether everything before it has
 _ACK_TIMEOUT: Final = 2.0  # s
 _LINK_TIMEOUT: Final = 5.0  # s
 _NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
-_left_open: list[zenoh.Session] = []
 
 
 class Bus:
@@ -214,7 +214,8 @@ class Bus:
         """Leave the network once the others have received what this process published.
 
         Zenoh takes ten seconds to close a session from which a frozen process has yet to read, and
-        then fails. Such a session hears nothing any more, and ends with the process.
+        then fails. Such a session hears nothing any more, and ends with the process: it closes one
+        that nobody refers to, even when the interpreter ends, so a reference is left for good.
         """
         if self._closed:
             return
@@ -225,7 +226,7 @@ class Bus:
             return
         for declared in self._kept:
             declared.undeclare()
-        _left_open.append(self._session)  # Zenoh closes one that nobody refers to
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._session))
 
     def __enter__(self) -> Self:
         return self

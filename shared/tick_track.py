@@ -89,12 +89,13 @@ class TickTrack:
             return
         if self.first < 0:
             self.first = tick
-        if self.last >= 0 and self._period > 0 and not 0 <= tick - self.last < _LONG:
-            if not 0 < tick - self._odd <= self._period or self._odd < 0:
-                self._odd = tick
-                return
+        if self.last < 0 or self._period == 0 or 0 <= tick - self.last < _LONG:
+            self._go_on(tick)
+        elif self._odd >= 0 and 0 < tick - self._odd <= self._period:
             self._go_on(self._odd)
-        self._go_on(tick)
+            self._go_on(tick)
+        else:
+            self._odd = tick
 
     def _go_on(self, tick: int) -> None:
         step = tick - self.last

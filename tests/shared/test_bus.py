@@ -111,22 +111,41 @@ with Bus.open(BusConfig(endpoint=sys.argv[1]), "team", "r1") as bus:
 """
 
 
+LEAVES = """
+import sys
+from shared.bus import HERE, Bus
+from shared.config import BusConfig
+with Bus.open(BusConfig(endpoint=sys.argv[1]), "team", "sim") as bus:
+    bus.declare(HERE)
+    bus.wait_for(HERE, {"r1", "r2"}, 10.0, lambda: False)
+    print(flush=True)
+    input()
+    put = bus.publisher("team/sim/x")
+    for k in range(2000):
+        put(b"%500d" % k)
+"""
+
+
 def test_who_is_frozen_keeps_nobody_from_leaving(opened: Open, endpoint: str) -> None:
     """Zenoh fails to close a session from which a frozen process has yet to read this much."""
-    sim, r2 = opened("sim"), opened("r2")
+    r2 = opened("r2")
     r2.subscribe("team/**")
-    meet(sim, r2)
-    with subprocess.Popen([sys.executable, "-c", FROZEN, endpoint]) as r1:
+    r2.declare(HERE)
+    pipe, python = subprocess.PIPE, (sys.executable, "-c")
+    with (
+        subprocess.Popen([*python, LEAVES, endpoint], stdin=pipe, stdout=pipe, stderr=pipe) as sim,
+        subprocess.Popen([*python, FROZEN, endpoint]) as r1,
+    ):
         try:
-            assert sim.wait_for(HERE, {"r1"}, WAIT, never)
+            assert sim.stdout is not None
+            assert sim.stdout.readline() == b"\n"
             r1.send_signal(signal.SIGSTOP)
-            put = sim.publisher("team/sim/x")
-            for k in range(2000):
-                put(b"%500d" % k)
-            sim.close()
-            assert numbers(r2, 2000) == list(range(2000))
+            said = sim.communicate(b"\n", WAIT)
         finally:
             r1.kill()
+            sim.kill()
+    assert (sim.returncode, *said) == (0, b"", b"")
+    assert numbers(r2, 2000) == list(range(2000))
 
 
 def test_presence_comes_and_goes_by_stage(opened: Open) -> None:
