@@ -66,7 +66,7 @@ def test_in_real_time_the_world_waits_for_no_frozen_listener(
             await_tick(bus, 10)
             listener.send_signal(signal.SIGSTOP)
             heard, longest, last = 0, 0.0, monotonic()
-            while heard < 5:
+            while heard < 5:  # one push a second
                 packet = bus.get(WAIT)
                 assert packet is not None
                 longest, last = max(longest, monotonic() - last), monotonic()
