@@ -62,12 +62,11 @@ def _ratios(experiment: Experiment, results: Results) -> Figure | None:
 def _swept(experiment: Experiment, results: Results) -> Figure | None:
     """A panel for each scenario: success of every variant against what is swept in it."""
     parts = [part for part in experiment.parts if part.sweep is not None]
-    names = [variant.name for variant in experiment.variants]
     figure = Figure(figsize=(_WIDTH, 3.3), layout="constrained")
     axes = figure.subplots(1, max(len(parts), 1), squeeze=False, sharey=True)[0]
     drawn = False
     for part, panel in zip(parts, axes, strict=False):
-        for colour, name in zip(_cycle(names), names, strict=True):
+        for name, colour in _colours(experiment).items():
             points = []
             for world in part.worlds():
                 line = results.find(world, name)
@@ -103,9 +102,10 @@ def _panels(
 ) -> dict[tuple[str, ...], list[Point]]:
     """Of each world what there is to draw; rows are variants, or measures if there are several."""
     found: dict[tuple[str, ...], list[Point]] = {}
+    colours = _colours(experiment)
     for world in (*experiment.worlds(), POOLED):
         for measure in measures:
-            for colour, name in zip(_cycle(names), names, strict=True):
+            for name in names:
                 line = results.find(world, name)
                 estimate = None if line is None else MEASURES[measure].of(line)
                 if estimate is None:
@@ -115,7 +115,7 @@ def _panels(
                     row = row if len(names) == 1 else f"{row}  {name}"
                 else:
                     row = name
-                found.setdefault(world, []).append((row, colour, name, measure, estimate))
+                found.setdefault(world, []).append((row, colours[name], name, measure, estimate))
     return found
 
 
@@ -169,8 +169,10 @@ def _reach(found: Estimate) -> tuple[float, float]:
     return max(0.0, found.value - low), max(0.0, high - found.value)
 
 
-def _cycle(names: Sequence[str]) -> list[str]:
-    return [_COLOURS[k % len(_COLOURS)] for k in range(len(names))]
+def _colours(experiment: Experiment) -> dict[str, str]:
+    """Of each variant the colour that it has in every figure of the experiment."""
+    names = (variant.name for variant in experiment.variants)
+    return {name: _COLOURS[k % len(_COLOURS)] for k, name in enumerate(names)}
 
 
 def _length(handles: tuple[Sequence[object], Sequence[str]]) -> int:
