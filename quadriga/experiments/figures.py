@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from quadriga.campaign.analysis import COST
 from quadriga.campaign.sheets import number
-from quadriga.experiments.experiment import Experiment
+from quadriga.experiments.experiment import Experiment, Part
 from quadriga.experiments.measures import MEASURES, Estimate, ratio
 from quadriga.experiments.results import Results
 from quadriga.experiments.summarise import POOLED
@@ -64,15 +64,16 @@ def _swept(experiment: Experiment, results: Results) -> Figure | None:
     parts = [part for part in experiment.parts if part.sweep is not None]
     figure = Figure(figsize=(_WIDTH, 3.3), layout="constrained")
     axes = figure.subplots(1, max(len(parts), 1), squeeze=False, sharey=True)[0]
+    colours = _colours(experiment).items()
     drawn = False
     for part, panel in zip(parts, axes, strict=False):
-        for name, colour in _colours(experiment).items():
+        for aside, (name, colour) in zip(_asides(part, experiment), colours, strict=True):
             points = []
             for world in part.worlds():
                 line = results.find(world, name)
                 found = None if line is None else MEASURES["success"].of(line)
                 if found is not None:
-                    points.append((number(world[1]), found))
+                    points.append((number(world[1]) + aside, found))
             if points:
                 drawn = True
                 panel.errorbar(
@@ -95,6 +96,14 @@ def _swept(experiment: Experiment, results: Results) -> Figure | None:
 FIGURES: Final[Mapping[str, Callable[[Experiment, Results], Figure | None]]] = {
     "success": _success, "falls": _falls, "ratios": _ratios, "sweep": _swept,
 }  # fmt: skip
+
+
+def _asides(part: Part, experiment: Experiment) -> list[float]:
+    """How far each variant is drawn beside the swept value, so that none hides another."""
+    values = [number(world[1]) for world in part.worlds()]
+    step = 0.012 * (max(values) - min(values))
+    count = len(experiment.variants)
+    return [step * (k - (count - 1) / 2) for k in range(count)]
 
 
 def _panels(
