@@ -13,6 +13,10 @@ _COMMON: Final = {
     # Messages that may wait for a link in real time before they are dropped. With Zenoh's 2 a
     # recorder on a busy machine loses one in a thousand.
     "transport/link/tx/queue/size/data": 16,
+    # ms, of a handshake with someone who says nothing, frozen or just leaving. Nobody can leave
+    # before it is over, and Zenoh's 10 s are longer than a process is given.
+    "transport/unicast/open_timeout": 1000,
+    "transport/unicast/accept_timeout": 1000,
 }
 
 

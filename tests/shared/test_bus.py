@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -17,6 +18,7 @@ from shared.config import BusConfig
 from shared.errors import BusError
 
 WAIT = 10.0  # s, far more than anything here takes
+GRACE = 5.0  # s, that the launcher gives a process to leave
 Open = Callable[..., Bus]
 
 
@@ -146,6 +148,29 @@ def test_who_is_frozen_keeps_nobody_from_leaving(opened: Open, endpoint: str) ->
             sim.kill()
     assert (sim.returncode, *said) == (0, b"", b"")
     assert numbers(r2, 2000) == list(range(2000))
+
+
+def leaves_in_time(bus: Bus) -> bool:
+    """Whether closing a bus takes less than a process has once it is told to leave."""
+    begun = monotonic()
+    bus.close()
+    return monotonic() - begun < GRACE
+
+
+def test_who_accepts_and_says_nothing_keeps_nobody_from_leaving() -> None:
+    """Zenoh tries to shake hands for ten seconds, and until then closes no session."""
+    with socket.create_server(("127.0.0.1", 0)) as mute:
+        config = BusConfig(endpoint=f"tcp/127.0.0.1:{mute.getsockname()[1]}")
+        r1 = Bus.open(config, "team", "r1")
+        with mute.accept()[0]:
+            assert leaves_in_time(r1)
+
+
+def test_who_calls_and_says_nothing_keeps_nobody_from_leaving(opened: Open, endpoint: str) -> None:
+    sim, address = opened("sim"), endpoint.removeprefix("tcp/").split(":")
+    with socket.create_connection((address[0], int(address[1]))):
+        meet(sim, opened("r1"))  # who calls later is heard later
+        assert leaves_in_time(sim)
 
 
 def test_presence_comes_and_goes_by_stage(opened: Open) -> None:
