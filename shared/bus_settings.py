@@ -15,8 +15,8 @@ _COMMON: Final = {
     "transport/link/tx/queue/size/data": 16,
     # ms, of a handshake with someone who says nothing, frozen or just leaving. Nobody can leave
     # before it is over, and Zenoh's 10 s are longer than a process is given.
-    "transport/unicast/open_timeout": 1000,
-    "transport/unicast/accept_timeout": 1000,
+    "transport/unicast/open_timeout": 2000,
+    "transport/unicast/accept_timeout": 2000,
 }
 
 

@@ -13,7 +13,7 @@ from shared.errors import ConfigError
 CHECKOUT: Final = Path(__file__).parents[2]
 FOLDER: Final = CHECKOUT / "deploy" / "experiments"
 # In this order on the page: what was promised, then what explains it, then how far it goes.
-_ORDER: Final = ("paper", "hard", "low-level", "ideas", "central", "ten", "sweeps")
+_ORDER: Final = ("paper", "hard", "low-level", "ideas", "central", "beyond", "ten", "sweeps")
 _SUFFIX: Final = ".toml"
 
 

@@ -153,7 +153,7 @@ def test_every_experiment_of_the_project_can_be_walked(name: str) -> None:
 
 
 def test_all_that_are_promised_are_there_in_order() -> None:
-    assert names() == ("paper", "hard", "low-level", "ideas", "central", "ten", "sweeps")
+    assert names() == ("paper", "hard", "low-level", "ideas", "central", "beyond", "ten", "sweeps")
 
 
 def test_a_name_that_is_none_lists_those_there_are(tmp_path: Path) -> None:
