@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -21,6 +22,7 @@ _COLOURS: Final = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17be
                    "#e377c2", "#7f7f7f", "#bcbd22", "#000000")  # fmt: skip
 _WIDTH: Final = 10.0  # inch
 _DPI: Final = 90
+_ABREAST: Final = 6  # panels whose titles have room beside each other
 
 Point = tuple[str, str, str, str, Estimate]  # row, colour, variant, measure, what is drawn
 
@@ -132,15 +134,21 @@ def _rows(
     panels: Mapping[tuple[str, ...], Sequence[Point]], across: str, experiment: Experiment,
     at: float | None = None,
 ) -> Figure | None:  # fmt: skip
-    """Panels side by side that share their rows; a line at `at`, a dotted one at each limit."""
+    """Panels that share their rows; a line at `at`, a dotted one at each limit."""
     if not panels:
         return None
     rows = list(dict.fromkeys(row for points in panels.values() for row, *_ in points))
-    height = 1.0 + 0.24 * max(len(rows), 2)
+    lines = math.ceil(len(panels) / _ABREAST)
+    height = 0.4 + lines * (0.6 + 0.24 * max(len(rows), 2))
     figure = Figure(figsize=(_WIDTH, height), layout="constrained")
-    axes = figure.subplots(1, len(panels), squeeze=False, sharey=True, sharex=True)[0]
+    grid = figure.subplots(
+        lines, math.ceil(len(panels) / lines), squeeze=False, sharey=True, sharex=True
+    )
+    axes = list(grid.flat)
+    for empty in axes[len(panels) :]:
+        empty.remove()
     required = False
-    for (world, points), panel in zip(panels.items(), axes, strict=True):
+    for (world, points), panel in zip(panels.items(), axes, strict=False):
         if at is not None:
             panel.axvline(at, color="0.6", linewidth=0.8)
         for row, colour, variant, measure, estimate in points:
