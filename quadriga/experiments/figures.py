@@ -141,14 +141,15 @@ def _rows(
     lines = math.ceil(len(panels) / _ABREAST)
     height = 0.4 + lines * (0.6 + 0.24 * max(len(rows), 2))
     figure = Figure(figsize=(_WIDTH, height), layout="constrained")
-    grid = figure.subplots(
-        lines, math.ceil(len(panels) / lines), squeeze=False, sharey=True, sharex=True
-    )
-    axes = list(grid.flat)
-    for empty in axes[len(panels) :]:
-        empty.remove()
+    columns = math.ceil(len(panels) / lines)
+    grid = list(figure.subplots(lines, columns, squeeze=False, sharey=True, sharex=True).flat)
+    axes, empty = grid[: len(panels)], grid[len(panels) :]
+    for panel in empty:
+        panel.remove()
+    for panel in axes[-columns:]:
+        panel.tick_params(labelbottom=True)  # also above an empty place
     required = False
-    for (world, points), panel in zip(panels.items(), axes, strict=False):
+    for (world, points), panel in zip(panels.items(), axes, strict=True):
         if at is not None:
             panel.axvline(at, color="0.6", linewidth=0.8)
         for row, colour, variant, measure, estimate in points:
