@@ -61,18 +61,18 @@ clip: $(STAMP)
 
 # Every scenario the project promises, on three seeds; about an hour.
 acceptance: $(STAMP)
-	$(BIN)/python benchmarks/acceptance.py $(ARGS)
+	$(BIN)/python -m benchmarks.acceptance $(ARGS)
 
 # What everything costs, on one page, in runs/bench.json and runs/bench.png; some three minutes, and
 # as many more for each team that has not walked here before (ten robots: much more).
 bench: $(STAMP)
-	$(BIN)/python benchmarks/bench.py $(ARGS)
+	$(BIN)/python -m benchmarks.bench $(ARGS)
 
 # What a plan costs, as the paper writes it and as it is solved here; about ten minutes, and five
 # more for a team of five that has not walked here before.
 bench-planner: $(STAMP)
-	$(BIN)/python benchmarks/planner.py $(ARGS)
+	$(BIN)/python -m benchmarks.planner $(ARGS)
 
 # Whether the recorder keeps up with 20,000 messages a second; some ten seconds.
 bench-recorder: $(STAMP)
-	$(BIN)/python benchmarks/recorder.py $(ARGS)
+	$(BIN)/python -m benchmarks.recorder $(ARGS)

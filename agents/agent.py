@@ -8,14 +8,13 @@ from dataclasses import field, replace
 
 import numpy as np
 
-from agents.controller.controller import Controller, Schedule, Task
-from agents.controller.estimator import trunk_from_truth
-from agents.controller.memory import Memory
-from agents.controller.sensing import Seen
-from agents.controller.whole_body_qp import UNCONSTRAINED, Solution
-from agents.following import Follower
-from agents.gait import stance_of_half, stance_progress
-from agents.modes import (
+from quadriga.agents.controller.controller import Controller, Schedule, Task
+from quadriga.agents.controller.estimator import trunk_from_truth
+from quadriga.agents.controller.memory import Memory
+from quadriga.agents.controller.sensing import Sensed
+from quadriga.agents.controller.whole_body_qp import UNCONSTRAINED, WholeBodySolution
+from quadriga.agents.gait import stance_of_half, stance_progress
+from quadriga.agents.modes import (
     DAMPING,
     ESTOP,
     STAND,
@@ -26,17 +25,26 @@ from agents.modes import (
     step_mode,
     stop_safely,
 )
-from agents.pilot import NOTHING, NOTHING_PLANNED, Awaited, Heard, Pilot, PilotState, Planned
-from agents.planner.predictor import Predictor
-from agents.planner.qp_solver import SOLVED
-from agents.planning import LocalPilot
-from agents.references import in_force, remember_references
-from agents.sampling import measured
-from shared.config import CENTRAL, Config
-from shared.messages import Command, EStop, Measurement, Plan, Reference, State, Truth
-from shared.record import record
-from shared.robot import Array, robot_names
-from shared.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
+from quadriga.agents.planner.qp_solver import SOLVED
+from quadriga.agents.planning.interface import (
+    NO_OUTPUTS,
+    NOTHING,
+    Expected,
+    PlanningInputs,
+    PlanningInterface,
+    PlanningOutputs,
+    PlanningState,
+)
+from quadriga.agents.planning.local import LocalPlanning
+from quadriga.agents.planning.operator_references import in_force, remember_references
+from quadriga.agents.planning.remote import RemotePlanning
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.sampling import measured
+from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.robot.a1 import Array, robot_names
+from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.messages import Command, EStop, Measurement, Plan, Reference, State, Truth
+from quadriga.shared.wire.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
 
 _ZERO = np.zeros(12)
 _STANDING = Schedule(stance_of_half(-1).astype(float), 0.5, -1)
@@ -99,7 +107,7 @@ class AgentState:
     mode: Mode
     low_level: Memory | None = None
     references: tuple[Reference, ...] = ()
-    pilot: PilotState = field(default_factory=PilotState)
+    pilot: PlanningState = field(default_factory=PlanningState)
     last_tau: Array = field(default_factory=lambda: np.zeros(12))
     failures: int = 0
     counters: Mapping[str, int] = field(default_factory=dict)
@@ -117,9 +125,12 @@ class Agent:
     """
 
     def __init__(
-        self, config: Config, robot: str, predictor: Predictor | None,
+        self,
+        config: Config,
+        robot: str,
+        predictor: Predictor | None,
         clock_ns: Callable[[], int] = lambda: 0,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.config = config
         self.robot = robot
         self.index = robot_names(config.team.robots).index(robot)
@@ -128,11 +139,11 @@ class Agent:
         self._stand_ms, self._stance_ms = config.gait.stand_ms, config.gait.stance_ms
         self._height = config.reference.height
         self._schedules = _schedules(config, self.index)
-        self._pilot: Pilot | None = None
+        self._pilot: PlanningInterface | None = None
         if config.planner.kind in CENTRAL:
-            self._pilot = Follower(config, self.index)
+            self._pilot = RemotePlanning(config, self.index)
         elif predictor is not None:
-            self._pilot = LocalPilot(config, self.index, predictor, clock_ns)
+            self._pilot = LocalPlanning(config, self.index, predictor, clock_ns)
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
         self._damping = config.controller.damping
         self._feedforward = config.planner.interface == "feedforward"
@@ -147,7 +158,7 @@ class Agent:
         """The state before the first tick."""
         return AgentState(-1, Mode(STAND, 0))
 
-    def awaited(self, tick: int) -> Awaited:
+    def awaited(self, tick: int) -> Expected:
         """What lock-step waits for before the step of `tick`."""
         awaited = NOTHING if self._pilot is None else self._pilot.awaited(tick)
         reference = tick if tick % REFERENCE_EPOCH_MS == 0 else None
@@ -174,9 +185,11 @@ class Agent:
         if tick % SAMPLE_MS == 0 and 0 <= tick - SAMPLE_MS <= state.tick:
             stance = self._schedule(tick - SAMPLE_MS, state.mode).stance  # during the sample
             measurement = measured(tick, seen.memory.mean_force, seen.outputs, stance)
-        pilot, planned = state.pilot, NOTHING_PLANNED
+        pilot, planned = state.pilot, NO_OUTPUTS
         if self._pilot is not None:
-            heard = Heard(tick, mode, references, measurement, inputs.measurements, inputs.plans)
+            heard = PlanningInputs(
+                tick, mode, references, measurement, inputs.measurements, inputs.plans
+            )
             pilot, planned = self._pilot.step(state.pilot, heard)
             if planned.stop_reason:
                 mode = stop_safely(mode, tick, planned.stop_reason)
@@ -189,13 +202,25 @@ class Agent:
         counters = _counted(state.counters, planned, solution)
         command = self._command(tick, solution, state.last_tau, mode)
         new = AgentState(
-            tick, mode, acted.memory, references, pilot,
-            command.tau if solution.solved else state.last_tau, failures, counters,
-        )  # fmt: skip
+            tick,
+            mode,
+            acted.memory,
+            references,
+            pilot,
+            command.tau if solution.solved else state.last_tau,
+            failures,
+            counters,
+        )
         return new, Outputs(
-            command, measurement, planned.plan, mode.name, mode.reason, counters,
-            {"reference": float(reference_age), **planned.ages_ms}, planned.planner_ns,
-        )  # fmt: skip
+            command,
+            measurement,
+            planned.plan,
+            mode.name,
+            mode.reason,
+            counters,
+            {"reference": float(reference_age), **planned.ages_ms},
+            planned.planner_ns,
+        )
 
     def _mode(self, state: AgentState, inputs: Inputs, reference_age: int) -> Mode:
         """What the robot does from now on, as far as it is known before the tick."""
@@ -216,11 +241,16 @@ class Agent:
         return self._schedules[(tick - self._stand_ms) % len(self._schedules)]
 
     def _task(
-        self, tick: int, mode: Mode, reference: Reference, planned: Planned,
-        excitation: Array | None, progress: float,
-    ) -> Task:  # fmt: skip
+        self,
+        tick: int,
+        mode: Mode,
+        reference: Reference,
+        planned: PlanningOutputs,
+        excitation: Array | None,
+        progress: float,
+    ) -> Task:
         """The operator's wish with what is planned."""
-        deviation, outlook = planned.present.deviation, planned.present.outlook
+        deviation, v_ref = planned.present.deviation, planned.present.v_ref
         if excitation is not None:
             deviation = deviation + excitation
         if mode.name != WALK:
@@ -228,26 +258,26 @@ class Agent:
         factor = mode.speed_factor(tick)
         vx, vy = factor * reference.vx, factor * reference.vy
         ahead = None
-        if outlook is not None:
+        if v_ref is not None:
             if not self._feedforward:
                 # Planned roll and pitch are not tracked: the reference would follow the error.
-                vx, vy = float(outlook[0, 0]), float(outlook[0, 1])
+                vx, vy = float(v_ref[0, 0]), float(v_ref[0, 1])
             if self._planned_footholds:
-                ahead = self._velocity_ahead(outlook, progress)
+                ahead = self._velocity_ahead(v_ref, progress)
         return Task(
             vx, vy, factor * reference.wz, reference.height, deviation, self._feedforward, ahead
         )
 
-    def _velocity_ahead(self, outlook: Array, progress: float) -> Array:
+    def _velocity_ahead(self, v_ref: Array, progress: float) -> Array:
         """Mean planned velocity until the middle of the stance to come, (2,), m/s.
 
         Or as far as the plan reaches: it ends before that early in a swing.
         """
         samples = round((1.5 - progress) * self._stance_ms / SAMPLE_MS)
-        mean: Array = outlook[: max(1, samples)].mean(axis=0)
+        mean: Array = v_ref[: max(1, samples)].mean(axis=0)
         return mean
 
-    def _sense(self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float) -> Seen:
+    def _sense(self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float) -> Sensed:
         truth = inputs.truth
         # One that is lost or late is bridged by the filter.
         if self._by_truth and truth is not None and inputs.state.tick - truth.tick <= _TRUTH_AGE_MS:
@@ -258,7 +288,7 @@ class Agent:
         return self._controller.sense(state.low_level, inputs.state, schedule, dt)
 
     def _failures(
-        self, failures: int, solution: Solution, mode: Mode, tick: int
+        self, failures: int, solution: WholeBodySolution, mode: Mode, tick: int
     ) -> tuple[int, Mode]:
         """How many ticks in a row had no solution, and what becomes of the mode."""
         if solution.solved:
@@ -267,7 +297,9 @@ class Agent:
             mode = go_limp(mode, tick, DAMPING, f"qp-{solution.status}")
         return failures + 1, mode
 
-    def _command(self, tick: int, solution: Solution, last_tau: Array, mode: Mode) -> Command:
+    def _command(
+        self, tick: int, solution: WholeBodySolution, last_tau: Array, mode: Mode
+    ) -> Command:
         """The motor command: the QP's torques, the last good ones, or damping."""
         row = np.zeros(60)  # tau, q_des, v_des, kp, kd
         if mode.limp or not solution.solved:
@@ -287,7 +319,7 @@ def _schedules(config: Config, index: int) -> tuple[Schedule, ...]:
 
 
 def _counted(
-    counters: Mapping[str, int], planned: Planned, solution: Solution
+    counters: Mapping[str, int], planned: PlanningOutputs, solution: WholeBodySolution
 ) -> Mapping[str, int]:
     """The counters with what was out of the ordinary at this tick."""
     names = []

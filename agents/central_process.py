@@ -9,25 +9,25 @@ from typing import Final
 
 import numpy as np
 
-from agents.central import Central, CentralOutputs, CentralState
-from agents.planner.central import TeamPlanner
-from agents.planner.horizon import step_ms
-from agents.planning import REFUSED
-from agents.references import allowed
-from agents.rehearsal import rehearse_central
-from shared.barrier import PLANNER, SIM, meet
-from shared.blas import one_blas_thread
-from shared.bus import HERE, POLL, READY, Bus
-from shared.clock import monotonic, monotonic_ns
-from shared.codec import decode, encode
-from shared.config import Config
-from shared.errors import MessageError
-from shared.messages import Event, Measurement, Reference, Status
-from shared.robot import robot_names
-from shared.scheduling import take_priority
-from shared.signals import stop_on_signals
-from shared.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS
-from shared.topics import REFERENCE_EPOCH_MS as EPOCH_MS
+from quadriga.agents.planner.team_planner import TeamPlanner
+from quadriga.agents.planning.local import REFUSED
+from quadriga.agents.planning.operator_references import allowed
+from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
+from quadriga.agents.rehearsal import rehearse_central
+from quadriga.agents.time_grid import step_ms
+from quadriga.shared.bus.barrier import PLANNER, SIM, meet
+from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import MessageError
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.clock import monotonic, monotonic_ns
+from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.signals import stop_on_signals
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Event, Measurement, Reference, Status
+from quadriga.shared.wire.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS
+from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 
 _WORKING: Final = "plan"
 
@@ -47,7 +47,7 @@ def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None
     one_blas_thread()
     team, names = config.team.name, robot_names(config.team.robots)
     with Bus.open(config.bus, team, PLANNER, stopped) as bus:
-        shell = _Shell(config, Central(config, planner, monotonic_ns), bus)
+        shell = _CentralShell(config, Central(config, planner, monotonic_ns), bus)
         for name in names:
             bus.subscribe(MEASUREMENT.key(team, name))
         bus.subscribe(REFERENCE.key(team))
@@ -63,7 +63,7 @@ def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None
         shell.work(stopped)
 
 
-class _Shell:
+class _CentralShell:
     """The loop around `Central.step`."""
 
     def __init__(self, config: Config, central: Central, bus: Bus) -> None:
@@ -136,7 +136,18 @@ class _Shell:
         if state.refused:
             self._counters[REFUSED] = state.refused
         took = np.array([1e-6 * outputs.planner_ns])
-        self._tell(encode(Status(
-            plan.tick, plan.stamp_ns, _WORKING, "", "", {}, dict(self._counters), took,
-            np.zeros(0),
-        )))  # fmt: skip
+        self._tell(
+            encode(
+                Status(
+                    plan.tick,
+                    plan.stamp_ns,
+                    _WORKING,
+                    "",
+                    "",
+                    {},
+                    dict(self._counters),
+                    took,
+                    np.zeros(0),
+                )
+            )
+        )

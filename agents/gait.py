@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.config import Config
-from shared.robot import GRAVITY, N_LEGS, TOTAL_MASS, Array
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import GRAVITY, N_LEGS, TOTAL_MASS, Array
 
 # Diagonal pairs in the leg order FL FR RL RR: row 0 stands in the first half of the period.
 _BITS = np.array([8, 4, 2, 1])

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from shared.record import record
+from quadriga.shared.runtime.record import record
 
 STAND: Final = "stand"
 WALK: Final = "walk"

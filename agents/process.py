@@ -6,24 +6,24 @@ import gc
 from collections.abc import Callable
 from typing import Final
 
-from agents.agent import Agent, AgentState, Inputs, Outputs
-from agents.arrivals import Arrivals, Source
-from agents.intake import Intake
-from agents.pilot import NOTHING, Awaited
-from agents.planner.predictor import Predictor
-from agents.rehearsal import rehearse
-from agents.telemetry import Telemetry
-from shared.barrier import SIM, meet
-from shared.blas import one_blas_thread
-from shared.bus import HERE, POLL, READY, Bus
-from shared.clock import monotonic, monotonic_ns
-from shared.codec import encode
-from shared.config import Config
-from shared.errors import BusError
-from shared.messages import State
-from shared.scheduling import take_priority
-from shared.signals import stop_on_signals
-from shared.topics import COMMAND, INPUTS, MEASUREMENT, PLAN, STATE, STATUS
+from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
+from quadriga.agents.inbox.inbox import Inbox, Source
+from quadriga.agents.inbox.intake_log import Intake
+from quadriga.agents.planning.interface import NOTHING, Expected
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.rehearsal import rehearse
+from quadriga.agents.telemetry import Telemetry
+from quadriga.shared.bus.barrier import SIM, meet
+from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import BusError
+from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.clock import monotonic, monotonic_ns
+from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.signals import stop_on_signals
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import State
+from quadriga.shared.wire.topics import COMMAND, INPUTS, MEASUREMENT, PLAN, STATE, STATUS
 
 _PATIENCE: Final = 3.0  # s of states none of which is newer; long before, the joints are damped
 
@@ -49,7 +49,7 @@ def run(
     stopped = stopped or stop_on_signals()
     one_blas_thread()
     agent = Agent(config, robot, predictor, monotonic_ns)
-    arrivals = Arrivals(config, robot, agent.peers)
+    arrivals = Inbox(config, robot, agent.peers)
     with Bus.open(config.bus, config.team.name, robot, stopped) as bus:
         for key in arrivals.keys:
             bus.subscribe(key)
@@ -68,7 +68,7 @@ def run(
 class _Shell:
     """The loop around `Agent.step`."""
 
-    def __init__(self, config: Config, agent: Agent, arrivals: Arrivals, bus: Bus) -> None:
+    def __init__(self, config: Config, agent: Agent, arrivals: Inbox, bus: Bus) -> None:
         team, realtime = config.team.name, config.world.mode == "realtime"
         self._config, self._agent, self._arrivals, self._bus = config, agent, arrivals, bus
         self._lockstep = not realtime
@@ -143,13 +143,13 @@ class _Shell:
         if status is not None:
             self._put[STATUS](encode(status))
 
-    def _publish_intake(self, last: int, inputs: Inputs, awaited: Awaited) -> None:
+    def _publish_intake(self, last: int, inputs: Inputs, awaited: Expected) -> None:
         """Tell the recorder what was taken in, where it could not tell by itself."""
         record = self._intake.record(last, inputs, awaited)
         if record is not None:
             self._put[INPUTS](encode(record))
 
-    def _complete(self, state: State, awaited: Awaited) -> Inputs:
+    def _complete(self, state: State, awaited: Expected) -> Inputs:
         """The inputs of a step; in lock-step once those who owe a message have sent it.
 
         Who did not within the time-out is not waited for again until he has sent such a message.
@@ -165,7 +165,7 @@ class _Shell:
                 self._receive(min(left, POLL))
         return self._arrivals.inputs(state, awaited)
 
-    def _owing(self, tick: int, awaited: Awaited) -> set[Source]:
+    def _owing(self, tick: int, awaited: Expected) -> set[Source]:
         """Who still owes a message and is worth waiting for."""
         heard, present = self._arrivals.heard, self._bus.present(HERE)
         return {

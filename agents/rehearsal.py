@@ -7,15 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from agents.agent import Agent, AgentState, Inputs
-from agents.central import Central, CentralState
-from agents.gait import nominal_forces, scheduled_stance
-from agents.planner.horizon import step_ms
-from agents.planning import first_step
-from shared.codec import decode, encode
-from shared.config import Config
-from shared.messages import Measurement, Reference, State
-from shared.robot import (
+from quadriga.agents.agent import Agent, AgentState, Inputs
+from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.planning.local import first_step
+from quadriga.agents.planning.team import Central, CentralState
+from quadriga.agents.time_grid import step_ms
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import (
     GRAVITY,
     N_JOINTS,
     N_LEGS,
@@ -23,8 +21,10 @@ from shared.robot import (
     TOTAL_MASS,
     q_stand,
     robot_names,
-)  # fmt: skip
-from shared.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
+)
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Measurement, Reference, State
+from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 
 _LEAN = 0.8  # of the tilt that is a fall
 
@@ -71,6 +71,13 @@ def standing(tick: int, lean: float = 0.0) -> State:
     quat = np.array([np.cos(0.5 * lean), np.sin(0.5 * lean), 0.0, 0.0])
     weight = np.full(N_LEGS, TOTAL_MASS * GRAVITY / N_LEGS)
     return State(
-        tick, tick * 1_000_000, q_stand(), zero, zero, quat, np.zeros(3),
-        np.array([0.0, 0.0, GRAVITY]), weight,
-    )  # fmt: skip
+        tick,
+        tick * 1_000_000,
+        q_stand(),
+        zero,
+        zero,
+        quat,
+        np.zeros(3),
+        np.array([0.0, 0.0, GRAVITY]),
+        weight,
+    )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from shared.messages import Measurement
-from shared.robot import Array
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.messages import Measurement
 
 
 def measured(tick: int, force: Array, outputs: Array, stance: Array) -> Measurement:

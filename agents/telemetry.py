@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from agents.agent import Outputs
-from shared.messages import Status
-from shared.spread import Spread
+from quadriga.agents.agent import Outputs
+from quadriga.shared.runtime.histogram import Histogram
+from quadriga.shared.wire.messages import Status
 
 PERIOD_MS: Final = 100
 _TICK_MS: Final = 1.0  # what a tick may take in real time
@@ -27,7 +27,7 @@ class Telemetry:
             paced: whether the walk is in real time, so that it matters when a tick is answered.
         """
         self._estimator, self._paced = estimator, paced
-        self._jitter = Spread(_BIN_MS)
+        self._jitter = Histogram(_BIN_MS)
         self._missed = 0
         self._taken = (-1, 0)  # tick and wall-clock time of the newest state
         self._mode = ("", "")
@@ -64,10 +64,14 @@ class Telemetry:
         self._mode, self._last = mode, tick - tick % PERIOD_MS
         missed = {"deadlines_missed": self._missed} if self._paced else {}
         status = Status(
-            tick, tick * 1_000_000, *mode, self._estimator,
+            tick,
+            tick * 1_000_000,
+            *mode,
+            self._estimator,
             {**self._ages_ms, **self._jitter.told("jitter")},
             {**outputs.counters, **counters, **missed},
-            np.array(self._planner_ms), np.array(self._tick_us),
-        )  # fmt: skip
+            np.array(self._planner_ms),
+            np.array(self._tick_us),
+        )
         self._planner_ms, self._tick_us = [], []
         return status

@@ -1,6 +1,6 @@
 """Walk what the project promises, process by process over the bus, and compare with its limits.
 
-Run: python benchmarks/acceptance.py [NAME ...] [--out DIR]     (all of it: about an hour)
+Run: python -m benchmarks.acceptance [NAME ...] [--out DIR]     (all of it: about an hour)
 
 Every scenario is a `quadriga walk` of its own; the table and DIR/acceptance.json say what came
 of each seed, the limits it is held against and whether it met them.
@@ -23,7 +23,7 @@ FLAT = ("--terrain", "flat", "--seconds", "20")
 
 
 @dataclass(frozen=True)
-class Scenario:
+class AcceptanceScenario:
     """Options of `quadriga walk`, its seeds, and whether the tolerances of flat ground hold."""
 
     options: tuple[str, ...]
@@ -33,24 +33,24 @@ class Scenario:
 
 
 SCENARIOS = {
-    "flat-1": Scenario(("--robots", "1", *FLAT), tolerances=True),
-    "flat-2": Scenario(("--robots", "2", *FLAT), tolerances=True),
-    "flat-3": Scenario(("--robots", "3", *FLAT), tolerances=True),
-    "flat-5": Scenario(("--robots", "5", *FLAT), tolerances=True),
-    "heightfield-5": Scenario(
+    "flat-1": AcceptanceScenario(("--robots", "1", *FLAT), tolerances=True),
+    "flat-2": AcceptanceScenario(("--robots", "2", *FLAT), tolerances=True),
+    "flat-3": AcceptanceScenario(("--robots", "3", *FLAT), tolerances=True),
+    "flat-5": AcceptanceScenario(("--robots", "5", *FLAT), tolerances=True),
+    "heightfield-5": AcceptanceScenario(
         ("--robots", "5", "--terrain", "heightfield", "--terrain-height", "0.05",
          "--payload", "10", "--seconds", "15")
     ),
-    "boxes-3": Scenario(
+    "boxes-3": AcceptanceScenario(
         ("--robots", "3", "--terrain", "boxes", "--terrain-height", "0.04", "--payload", "4.5",
          "--seconds", "15")
     ),
-    "turn-3": Scenario(("--robots", "3", "--wz", "0.3", "--seconds", "8")),
-    "realtime-1": Scenario(("--robots", "1", "--mode", "realtime", "--seconds", "10")),
+    "turn-3": AcceptanceScenario(("--robots", "3", "--wz", "0.3", "--seconds", "8")),
+    "realtime-1": AcceptanceScenario(("--robots", "1", "--mode", "realtime", "--seconds", "10")),
 }  # fmt: skip
 
 
-def verdict(scenario: Scenario, status: int, figures: dict[str, Any]) -> str:
+def verdict(scenario: AcceptanceScenario, status: int, figures: dict[str, Any]) -> str:
     """What of the promise was not kept; empty if all was."""
     missed = []
     if status:
@@ -81,16 +81,27 @@ def main() -> int:
     unknown = sorted(set(arguments.names) - SCENARIOS.keys())
     if unknown:
         parser.error(f"no scenario {', '.join(unknown)}; there are {', '.join(SCENARIOS)}")
-    table = Table("scenario", "seed", "missed", "vx", "RMSE z mm, vx, roll, pitch", "yoke mm",
-                  "rtf", "gaps")  # fmt: skip
+    table = Table(
+        "scenario", "seed", "missed", "vx", "RMSE z mm, vx, roll, pitch", "yoke mm", "rtf", "gaps"
+    )
     results: dict[str, Any] = {}
     console = Console()
     for name in arguments.names or SCENARIOS:
         scenario = SCENARIOS[name]
         for seed in arguments.seeds or scenario.seeds:
             out = arguments.out / f"{name}-{seed}"
-            command = [sys.executable, "-m", "quadriga", "walk", *scenario.options, "--seed",
-                       str(seed), "--no-render", "--out", str(out)]  # fmt: skip
+            command = [
+                sys.executable,
+                "-m",
+                "quadriga",
+                "walk",
+                *scenario.options,
+                "--seed",
+                str(seed),
+                "--no-render",
+                "--out",
+                str(out),
+            ]
             status = subprocess.run(command, check=False).returncode
             file = out / "summary.json"
             figures = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
@@ -99,12 +110,16 @@ def main() -> int:
             if figures:
                 rmse = figures["rmse"]
                 table.add_row(
-                    name, str(seed), missed or "-", f"{figures['mean_vx']:.3f}",
+                    name,
+                    str(seed),
+                    missed or "-",
+                    f"{figures['mean_vx']:.3f}",
                     f"{1e3 * rmse['z']:.1f}, {rmse['vx']:.4f}, {rmse['roll']:.4f}, "
                     f"{rmse['pitch']:.4f}",
                     f"{1e3 * (figures['yoke_drift_max'] or 0.0):.2f}",
-                    f"{figures['real_time_factor']:.2f}", str(figures["gaps"]),
-                )  # fmt: skip
+                    f"{figures['real_time_factor']:.2f}",
+                    str(figures["gaps"]),
+                )
             else:
                 table.add_row(name, str(seed), missed, "", "", "", "", "")
     (arguments.out / "acceptance.json").write_text(json.dumps(results, indent=2), encoding="utf-8")

@@ -1,6 +1,6 @@
 """What everything costs, on one page: planner, low level, messages, world, recorder, fit, walks.
 
-Run: python benchmarks/bench.py [PART ...] [--robots 1 2 3 5 10] [--seconds 4] [--out FILE]
+Run: python -m benchmarks.bench [PART ...] [--robots 1 2 3 5 10] [--seconds 4] [--out FILE]
 
 Prints a page, writes FILE (JSON) and beside it a picture. Each part is measured by real processes
 and real walks of this machine; what else runs on it is in the figures, so let nothing. A team
@@ -21,12 +21,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import blas_threads
-from bench_options import Options
-
-from shared.clock import monotonic, wall_ns
-from shared.errors import QuadrigaError
-from shared.signals import interrupt_on_sigterm
+from benchmarks import blas_threads
+from benchmarks.bench_options import Options
+from quadriga.shared.errors import QuadrigaError
+from quadriga.shared.runtime.clock import monotonic, wall_ns
+from quadriga.shared.runtime.signals import interrupt_on_sigterm
 
 _VERSIONS = ("eclipse-zenoh", "numpy", "numba", "pin", "mujoco")
 INTERRUPTED = 130
@@ -44,10 +43,11 @@ def main() -> int:
 
 def bench(options: Options) -> int:
     """Every part in turn, then the page."""
-    from bench_figure import draw
-    from bench_page import headline, section, targets
-    from bench_parts import PARTS, prefixed
     from rich.console import Console
+
+    from benchmarks.bench_figure import draw
+    from benchmarks.bench_page import headline, section, targets
+    from benchmarks.bench_parts import PARTS, prefixed
 
     console = Console(width=120, highlight=False)
     result: dict[str, Any] = {"machine": machine(), "quick": options.quick}
@@ -75,34 +75,45 @@ def bench(options: Options) -> int:
 
 def machine() -> dict[str, Any]:
     """What the figures depend on beside the code."""
-    from children import result_of
-
-    from shared.config import Config
-    from shared.scheduling import take_priority
+    from benchmarks.children import result_of
+    from quadriga.shared.config.sections import Config
+    from quadriga.shared.runtime.scheduling import take_priority
 
     realtime = result_of(take_priority, Config())  # what this process starts would inherit it
     cpus = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     models = [line.partition(":")[2].strip() for line in cpus if line.startswith("model name")]
     return {
         "date": datetime.fromtimestamp(1e-9 * wall_ns(), UTC).isoformat(timespec="seconds"),
-        "cores": len(os.sched_getaffinity(0)), "processor": models[0] if models else "?",
-        "python": platform.python_version(), **{name: version(name) for name in _VERSIONS},
+        "cores": len(os.sched_getaffinity(0)),
+        "processor": models[0] if models else "?",
+        "python": platform.python_version(),
+        **{name: version(name) for name in _VERSIONS},
         "scheduling": "realtime" if realtime else "ordinary",
-        "blas_threads": blas_threads.THREADS, "load": os.getloadavg()[0],
-    }  # fmt: skip
+        "blas_threads": blas_threads.THREADS,
+        "load": os.getloadavg()[0],
+    }
 
 
 def arguments(words: Sequence[str] | None = None) -> Options:
     """The command line."""
-    from bench_parts import PARTS
+    from benchmarks.bench_parts import PARTS
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (all)")
-    parser.add_argument("--robots", type=int, nargs="+", default=[1, 2, 3, 5, 10],
-                        help="sizes of the teams that walk")  # fmt: skip
+    parser.add_argument(
+        "--robots",
+        type=int,
+        nargs="+",
+        default=[1, 2, 3, 5, 10],
+        help="sizes of the teams that walk",
+    )
     parser.add_argument("--seconds", type=float, default=4.0, help="length of each walk")
-    parser.add_argument("--planner", default="distributed", help="of the walks (%(default)s)",
-                        choices=("distributed", "decentralised", "none"))  # fmt: skip
+    parser.add_argument(
+        "--planner",
+        default="distributed",
+        help="of the walks (%(default)s)",
+        choices=("distributed", "decentralised", "none"),
+    )
     parser.add_argument("--quick", action="store_true", help="all parts, too short to mean much")
     parser.add_argument("--out", type=Path, default=Path("runs/bench.json"), metavar="FILE")
     given = parser.parse_args(words)

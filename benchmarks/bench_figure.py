@@ -41,8 +41,9 @@ def _factor(axis: Axes, part: Part) -> None:
     axis.axhline(1.0, color=_GREY, linewidth=1.0, linestyle="--")
     axis.plot(sizes, factors, "o-", color=_COLOURS[0], linewidth=1.2)
     for size, factor in zip(sizes, factors, strict=True):
-        axis.annotate(f"{factor:.2f}", (size, factor), xytext=(4, 5), textcoords="offset points",
-                      fontsize=8)  # fmt: skip
+        axis.annotate(
+            f"{factor:.2f}", (size, factor), xytext=(4, 5), textcoords="offset points", fontsize=8
+        )
     axis.set_ylim(bottom=0.0, top=1.2 * max([1.0, *factors]))
     axis.set_xticks(sizes)
     axis.set_xlabel("robots")
@@ -109,8 +110,13 @@ def _memory(axis: Axes, part: Part) -> None:
     found = {name: m for name, m in row["memory_mb"].items() if m}
     names = list(found)[::-1]
     axis.barh(names, [found[name]["rss"] for name in names], 0.6, color="0.85", label="resident")
-    axis.barh(names, [found[name]["pss"] for name in names], 0.6, color=_COLOURS[0],
-              label="its share of it")  # fmt: skip
+    axis.barh(
+        names,
+        [found[name]["pss"] for name in names],
+        0.6,
+        color=_COLOURS[0],
+        label="its share of it",
+    )
     axis.set_xlabel("MB")
     axis.legend(fontsize=8, frameon=False)
     axis.set_title(f"memory while {row['robots']} walk", fontsize=9, loc="left")

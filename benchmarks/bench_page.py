@@ -81,8 +81,9 @@ def _planner(part: Part) -> list[str]:
     return [
         f"n = {row['robots']}, {row['problem']}, {row['name']}: {row['median_ms']:.3f} ms, p99 "
         f"{row['p99_ms']:.3f} (as written × {row['ratio_median']:.0f})"
-        for row in part["rows"] if row["name"] == "daqp"
-    ]  # fmt: skip
+        for row in part["rows"]
+        if row["name"] == "daqp"
+    ]
 
 
 def _low_level(part: Part) -> list[str]:

@@ -7,12 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bench_options import Options
 from rich.console import Console
 
+from benchmarks.bench_options import Options
+
 if TYPE_CHECKING:
-    from agents.planner.predictor import Predictor
-    from shared.config import Config
+    from quadriga.agents.predictor.predictor import Predictor
+    from quadriga.shared.config.sections import Config
 
 Tell = Callable[[str], None]
 Part = dict[str, Any]
@@ -20,8 +21,8 @@ Part = dict[str, Any]
 
 def planner(options: Options, console: Console, tell: Tell) -> Part:
     """What a plan costs, ours and as written; `planner.py` alone does it at length."""
-    from planner import measure, walked
-    from planner_contenders import Local, Team
+    from benchmarks.planner import measure, walked
+    from benchmarks.planner_contenders import Local, Team
 
     robots, seconds = (1, 1.0) if options.quick else (3, 1.2)
     config, predictor, walks = walked(robots, seconds, console)
@@ -34,10 +35,8 @@ def planner(options: Options, console: Console, tell: Tell) -> Part:
 
 def low_level(options: Options, console: Console, tell: Tell) -> Part:
     """The tick of one robot's low level, and its whole-body part against TSID's."""
-    import low_level
-    import low_level_ticks
-    import low_level_tsid
-    from children import result_of
+    from benchmarks import low_level, low_level_ticks, low_level_tsid
+    from benchmarks.children import result_of
 
     seconds, passes = (0.5, 1) if options.quick else (2.5, 3)
     config, _, predictor = team(options, options.middle, seconds, console)
@@ -52,7 +51,7 @@ def low_level(options: Options, console: Console, tell: Tell) -> Part:
 
 def bus(options: Options, _console: Console, tell: Tell) -> Part:
     """The messages of a tick, over the Bus and over raw sockets."""
-    from messaging import measure
+    from benchmarks.messaging import measure
 
     rows = []
     for robots in (2,) if options.quick else (1, 3, 5):
@@ -63,8 +62,8 @@ def bus(options: Options, _console: Console, tell: Tell) -> Part:
 
 def world(options: Options, _console: Console, tell: Tell) -> Part:
     """A tick of the world."""
-    from children import result_of
-    from world_steps import measure
+    from benchmarks.children import result_of
+    from benchmarks.world_steps import measure
 
     rows = []
     for robots, terrain in (*((n, "flat") for n in (1, 3, 5, 10)), (3, "heightfield")):
@@ -75,7 +74,7 @@ def world(options: Options, _console: Console, tell: Tell) -> Part:
 
 def recorder(options: Options, _console: Console, _tell: Tell) -> Part:
     """What the recorder takes in."""
-    from recorder import measure
+    from benchmarks.recorder import measure
 
     with tempfile.TemporaryDirectory() as scratch:
         rate, seconds = (2000.0, 0.5) if options.quick else (20_000.0, 5.0)
@@ -86,8 +85,8 @@ def fit(options: Options, _console: Console, _tell: Tell) -> Part:
     """The predictor's fit for a small team; `fit.py` alone does the large ones."""
     from dataclasses import asdict
 
-    from children import result_of
-    from fit import SIZES, measure
+    from benchmarks.children import result_of
+    from benchmarks.fit import SIZES, measure
 
     size = SIZES[0]
     samples = 2100 if options.quick else size.samples
@@ -96,9 +95,8 @@ def fit(options: Options, _console: Console, _tell: Tell) -> Part:
 
 def walks(options: Options, console: Console, tell: Tell) -> Part:
     """Real walks of every size, and of one with and without the recorder in turns."""
-    from children import result_of
-    from walks import alone, over_the_bus
-
+    from benchmarks.children import result_of
+    from benchmarks.walks import alone, over_the_bus
     from quadriga.warm_up import warm_up
 
     rows = []
@@ -110,16 +108,18 @@ def walks(options: Options, console: Console, tell: Tell) -> Part:
         found = over_the_bus(config, path, predictor, prefixed(tell, f"n = {robots}"))
         rows.append({"robots": robots, "alone": parts, **found})
     return {
-        "rows": rows, "planner": options.planner, "seconds": options.seconds,
+        "rows": rows,
+        "planner": options.planner,
+        "seconds": options.seconds,
         "recorder": None if options.quick else recorder_turns(options, rows, console, tell),
-    }  # fmt: skip
+    }
 
 
 def recorder_turns(options: Options, rows: list[Part], console: Console, tell: Tell) -> Part:
     """Real-time factors of walks with and without recorder, in turns after the one in `rows`."""
     from dataclasses import replace
 
-    from walks import over_the_bus
+    from benchmarks.walks import over_the_bus
 
     middle = options.middle
     config, path, predictor = team(options, middle, options.seconds, console)
@@ -141,12 +141,12 @@ def team(
     options: Options, robots: int, seconds: float, console: Console
 ) -> tuple[Config, Path | None, Predictor | None]:
     """A team that walks on flat ground, its predictor's file and the predictor."""
-    from quadriga.identify import ensure_predictor, load_predictor
-    from shared.config_file import load
+    from quadriga.identification.identify import ensure_predictor, load_predictor
+    from quadriga.shared.config.load import load
 
-    config = load(None, {
-        "team.robots": robots, "world.seconds": seconds, "planner.kind": options.planner,
-    })  # fmt: skip
+    config = load(
+        None, {"team.robots": robots, "world.seconds": seconds, "planner.kind": options.planner}
+    )
     if options.planner == "none":
         return config, None, None
     path = ensure_predictor(config, console)

@@ -11,9 +11,9 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Final
 
-from shared.config import Config
-from shared.scheduling import take_priority
-from shared.signals import die_with_parent, interrupts_held
+from quadriga.shared.config.sections import Config
+from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.signals import die_with_parent, interrupts_held
 
 SPAWN: Final[SpawnContext] = multiprocessing.get_context("spawn")
 _GRACE: Final = 10.0  # s

@@ -4,9 +4,9 @@ Each fit runs in a process of its own, whose peak memory is the fit's. Budgets o
 n = 5, T = 12,000 in 3 s and 0.5 GB; n = 10, T = 20,000 in 12 s (two cores).
 
 On a machine that does other things too, two BLAS threads wait for each other and one is faster:
-OMP_NUM_THREADS=1 python benchmarks/fit.py
+OMP_NUM_THREADS=1 python -m benchmarks.fit
 
-Run: python benchmarks/fit.py [--out FILE] [--kinds ridge causal …] [--sizes 5 10] [--repeats 3]
+Run: python -m benchmarks.fit [--out FILE] [--kinds ridge causal …] [--sizes 5 10] [--repeats 3]
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from pathlib import Path
 
 import numpy as np
 
-from agents.planner.episode import Episode
-from agents.planner.fits import FITS, fit
-from agents.planner.predictor import PredictorMeta
-from shared.clock import monotonic
-from shared.config import Config
-from shared.robot import N_FORCES, N_OUTPUTS
+from quadriga.agents.predictor.episode import Episode
+from quadriga.agents.predictor.fits import FITS, fit
+from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS
+from quadriga.shared.runtime.clock import monotonic
 
 EPISODE = 1050  # samples of one walk
 
@@ -41,11 +41,7 @@ class Size:
     gigabytes: float | None
 
 
-SIZES = (
-    Size(3, 5_250, 1.0, None),
-    Size(5, 12_000, 3.0, 0.5),
-    Size(10, 20_000, 12.0, None),
-)
+SIZES = (Size(3, 5_250, 1.0, None), Size(5, 12_000, 3.0, 0.5), Size(10, 20_000, 12.0, None))
 
 
 @dataclass(frozen=True)
@@ -122,13 +118,20 @@ def main() -> None:
             every = " ".join(f"{run.seconds:.2f}" for run in runs)
             within = best <= size.seconds and peak <= (size.gigabytes or np.inf)
             verdict = ("kept" if within else "MISSED") if kind == "ridge" else "-"
-            print(f"{size.robots:3} {size.samples:6} {kind:8} {best:8.2f} {every:24} "
-                  f"{used:7.2f} {peak:8.2f}  {verdict}", flush=True)  # fmt: skip
+            print(
+                f"{size.robots:3} {size.samples:6} {kind:8} {best:8.2f} {every:24} "
+                f"{used:7.2f} {peak:8.2f}  {verdict}",
+                flush=True,
+            )
             rows += [asdict(run) for run in runs]
     if arguments.out:
-        report = {"runs": rows, "load": os.getloadavg(), "cores": os.cpu_count(),
-                  "blas_threads": os.environ.get("OMP_NUM_THREADS", "all"),
-                  "budgets": [asdict(size) for size in SIZES]}  # fmt: skip
+        report = {
+            "runs": rows,
+            "load": os.getloadavg(),
+            "cores": os.cpu_count(),
+            "blas_threads": os.environ.get("OMP_NUM_THREADS", "all"),
+            "budgets": [asdict(size) for size in SIZES],
+        }
         arguments.out.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
 

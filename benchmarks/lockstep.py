@@ -1,6 +1,6 @@
 """Cost of a lock-step tick over the bus: real world, real Zenoh, agents that merely stand.
 
-Run: python benchmarks/lockstep.py [--robots 1 3 5] [--seconds 4]
+Run: python -m benchmarks.lockstep [--robots 1 3 5] [--seconds 4]
 """
 
 from __future__ import annotations
@@ -11,21 +11,21 @@ from multiprocessing.synchronize import Event
 from typing import Any
 
 import numpy as np
-from children import SPAWN, child, running
 
-from quadriga.endpoint import free_endpoint
-from shared.barrier import SIM, meet, start_together
-from shared.bus import READY, Bus
-from shared.clock import monotonic
-from shared.codec import decode, encode
-from shared.config import Config
-from shared.config_file import load
-from shared.messages import Command, State
-from shared.robot import N_JOINTS, q_stand, robot_names
-from shared.topics import COMMAND, STATE
-from sim_server.lockstep import run_lockstep
-from sim_server.stage import Stage
-from sim_server.world import World
+from benchmarks.children import SPAWN, child, running
+from quadriga.plant.lockstep import run_lockstep
+from quadriga.plant.server import PlantServer
+from quadriga.shared.bus.barrier import SIM, meet, start_together
+from quadriga.shared.bus.zenoh_bus import READY, Bus
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import N_JOINTS, q_stand, robot_names
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Command, State
+from quadriga.shared.wire.topics import COMMAND, STATE
+from quadriga.sim_server.world.world import World
+from quadriga.team.endpoint import free_endpoint
 
 
 def processor_time() -> float:
@@ -61,10 +61,15 @@ def idle(config: Config, name: str, ended: Event) -> None:
 
 def measure(robots: int, seconds: float) -> None:
     """Print the cost of one tick for a team of this size."""
-    config = load(None, {
-        "team.robots": robots, "world.seconds": seconds, "bus.endpoint": free_endpoint(),
-        "recorder.enabled": False,
-    })  # fmt: skip
+    config = load(
+        None,
+        {
+            "team.robots": robots,
+            "world.seconds": seconds,
+            "bus.endpoint": free_endpoint(),
+            "recorder.enabled": False,
+        },
+    )
     ended = SPAWN.Event()
     spent = {name: SPAWN.Value("d", 0.0) for name in robot_names(robots)}
     others = [child(stand, config, name, ended, value) for name, value in spent.items()]
@@ -77,7 +82,7 @@ def measure(robots: int, seconds: float) -> None:
     world = World(config)
     with Bus.open(config.bus, config.team.name, SIM) as bus:
         bus.subscribe(COMMAND.key(config.team.name, "*"))
-        stage = Stage(config, world, bus)
+        stage = PlantServer(config, world, bus)
         with running(*others):
             meet(bus, config, ended.is_set)
             start_together(bus, config, ended.is_set)

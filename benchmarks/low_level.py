@@ -16,18 +16,18 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from low_level_ticks import AgentTick
 
-from agents.agent import Agent, AgentState, Inputs, Outputs
-from agents.controller.controller import Acted, Controller, Schedule, Task
-from agents.controller.memory import Memory
-from agents.controller.sensing import Seen
-from agents.planner.predictor import Predictor
-from shared.clock import monotonic_ns
-from shared.codec import decode, encode
-from shared.config import Config
-from shared.messages import State
-from shared.robot import Array
+from benchmarks.low_level_ticks import AgentTick
+from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
+from quadriga.agents.controller.controller import Controller, ControllerOutputs, Schedule, Task
+from quadriga.agents.controller.memory import Memory
+from quadriga.agents.controller.sensing import Sensed
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.runtime.clock import monotonic_ns
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import State
 
 STAGES: Final = ("decode", "sense", "gait, plan", "terms, references, QP", "encode")
 _L2: Final = Path("/sys/devices/system/cpu/cpu0/cache/index2/size")
@@ -57,9 +57,10 @@ def measure(
             parts = [_staged(watched, watch, ticks, forget)[first:] for _ in range(passes)]
             times, stages = np.concatenate(whole), np.concatenate(parts)
             figures[name] = {
-                "median": float(np.median(times)), "p99": float(np.percentile(times, 99)),
+                "median": float(np.median(times)),
+                "p99": float(np.percentile(times, 99)),
                 "stages": dict(zip(STAGES, np.median(stages, axis=0).tolist(), strict=True)),
-            }  # fmt: skip
+            }
     return figures
 
 
@@ -138,15 +139,15 @@ class _Watched(Controller):
         super().__init__(config)
         self._watch = watch
 
-    def sense(self, memory: Memory | None, state: State, schedule: Schedule, dt: float) -> Seen:
+    def sense(self, memory: Memory | None, state: State, schedule: Schedule, dt: float) -> Sensed:
         begun = monotonic_ns()
         seen = super().sense(memory, state, schedule, dt)
         self._watch.ns["sense"] += monotonic_ns() - begun
         return seen
 
     def act(
-        self, seen: Seen, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
-    ) -> Acted:
+        self, seen: Sensed, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
+    ) -> ControllerOutputs:
         begun = monotonic_ns()
         acted = super().act(seen, schedule, task, dt, new_sample=new_sample)
         self._watch.ns["act"] += monotonic_ns() - begun

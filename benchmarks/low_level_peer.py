@@ -13,12 +13,12 @@ import numpy as np
 import pinocchio as pin
 import tsid
 
-from agents.controller.whole_body_qp import Weights
-from shared.a1_model import build_pinocchio_model
-from shared.robot import FOOT_FRAMES, N_JOINTS, TORQUE_LIMIT, Array
+from quadriga.agents.controller.whole_body_qp import Weights
+from quadriga.shared.robot.a1 import FOOT_FRAMES, N_JOINTS, TORQUE_LIMIT, Array
+from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 
 if TYPE_CHECKING:
-    from low_level_tsid import Case
+    from benchmarks.low_level_tsid import TsidCase
 
 _TRUNK = "root_joint"
 _POSITION = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
@@ -58,16 +58,21 @@ class Tsid:
 
     def _contact(self, frame: str) -> Any:
         contact = tsid.ContactPoint(
-            f"contact_{frame}", self._robot, frame, np.array([0.0, 0.0, 1.0]),
-            self._weights.mu / np.sqrt(2.0), self._weights.force_min, 1e3,
-        )  # fmt: skip
+            f"contact_{frame}",
+            self._robot,
+            frame,
+            np.array([0.0, 0.0, 1.0]),
+            self._weights.mu / np.sqrt(2.0),
+            self._weights.force_min,
+            1e3,
+        )
         contact.setKp(np.zeros(3))
         contact.setKd(np.zeros(3))
         contact.useLocalFrame(False)
         contact.setRegularizationTaskWeightVector(np.ones(3))
         return contact
 
-    def set(self, case: Case) -> None:
+    def set(self, case: TsidCase) -> None:
         """References and contacts of a tick."""
         goal, changed = case.goal, False
         for leg, standing in enumerate(goal.contact > 0.5):
@@ -94,7 +99,7 @@ class Tsid:
                 self._form.removeRigidContact(contact.name, 0.0)
             self._form.addMotionTask(task, self._weights.gamma_defect, 1, 0.0)
 
-    def solve(self, case: Case) -> None:
+    def solve(self, case: TsidCase) -> None:
         """What TSID does at a tick."""
         problem = self._form.computeProblemData(0.0, case.q, case.v)
         self._solution = self._solver.solve(problem)

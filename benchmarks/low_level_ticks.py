@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.agent import Agent, AgentState, Inputs, Outputs
-from agents.planner.predictor import Predictor
-from quadriga.operator import reference_at
-from quadriga.rollout import Rollout
-from shared.codec import encode
-from shared.config import Config
-from shared.messages import Reference
-from shared.topics import REFERENCE_EPOCH_MS
+from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.identification.rollout import Rollout
+from quadriga.shared.config.sections import Config
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Reference
+from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS
+from quadriga.team.operator import reference_at
 
 
 @dataclass(frozen=True, slots=True)

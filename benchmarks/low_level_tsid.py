@@ -16,26 +16,26 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from children import result_of
-from low_level import collector_off
-from low_level_ticks import AgentTick
 
-from agents.agent import Agent
-from agents.controller.controller import Acted, Controller, Schedule, Task
-from agents.controller.model import RigidBody
-from agents.controller.rigid_body import rigid_body_terms
-from agents.controller.sensing import Seen
-from agents.controller.whole_body_qp import Goal, Weights, closed_form, solve_goal
-from agents.planner.predictor import Predictor
-from shared.clock import monotonic_ns
-from shared.config import Config
-from shared.jit import compiled
-from shared.robot import Array
+from benchmarks.children import result_of
+from benchmarks.low_level import collector_off
+from benchmarks.low_level_ticks import AgentTick
+from quadriga.agents.agent import Agent
+from quadriga.agents.controller.controller import Controller, ControllerOutputs, Schedule, Task
+from quadriga.agents.controller.maths.rigid_body import rigid_body_terms
+from quadriga.agents.controller.model import RigidBody
+from quadriga.agents.controller.sensing import Sensed
+from quadriga.agents.controller.whole_body_qp import Goal, Weights, closed_form, solve_goal
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.runtime.clock import monotonic_ns
+from quadriga.shared.runtime.jit import compiled
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
-    """What one tick gives the whole-body part, see `Seen` and `Goal`; q (19,), v (18,)."""
+class TsidCase:
+    """What one tick gives the whole-body part, see `Sensed` and `Goal`; q (19,), v (18,)."""
 
     q: Array
     v: Array
@@ -44,7 +44,7 @@ class Case:
     goal: Goal
 
 
-def cases(config: Config, predictor: Predictor | None, ticks: list[AgentTick]) -> list[Case]:
+def cases(config: Config, predictor: Predictor | None, ticks: list[AgentTick]) -> list[TsidCase]:
     """The whole-body part's inputs at every tick after the stand."""
     agent = Agent(config, "r1", predictor)
     agent._controller = listening = _Listening(config)
@@ -54,7 +54,7 @@ def cases(config: Config, predictor: Predictor | None, ticks: list[AgentTick]) -
     return listening.cases[config.gait.stand_ms :]
 
 
-def compare(config: Config, found: list[Case]) -> dict[str, Any] | None:
+def compare(config: Config, found: list[TsidCase]) -> dict[str, Any] | None:
     """Both on every case, see `_compare`; None if TSID is not there."""
     try:
         answer: dict[str, Any] | None = result_of(_compare, config, found)
@@ -63,7 +63,7 @@ def compare(config: Config, found: list[Case]) -> dict[str, Any] | None:
     return answer
 
 
-def _compare(config: Config, found: list[Case]) -> dict[str, Any] | None:
+def _compare(config: Config, found: list[TsidCase]) -> dict[str, Any] | None:
     """Medians, µs, of both in turns, each first at every other tick, and how torques differ."""
     warnings.simplefilter("ignore", RuntimeWarning)  # two of TSID's converters have one type
     try:
@@ -74,8 +74,8 @@ def _compare(config: Config, found: list[Case]) -> dict[str, Any] | None:
         return _turns(config, found)
 
 
-def _turns(config: Config, found: list[Case]) -> dict[str, Any]:
-    from low_level_peer import Tsid
+def _turns(config: Config, found: list[TsidCase]) -> dict[str, Any]:
+    from benchmarks.low_level_peer import Tsid
 
     # TSID weighs turning like moving, and a foot like the trunk: so do both here.
     weights = replace(Controller(config).weights, tilt_length=1.0, swing_weight=1.0)
@@ -86,7 +86,7 @@ def _turns(config: Config, found: list[Case]) -> dict[str, Any]:
     for k, case in enumerate(found):
         peer.set(case)
         answers: list[Array] = [np.empty(0), np.empty(0)]
-        order: list[tuple[int, Callable[[Case], object], Callable[[], Array]]] = [
+        order: list[tuple[int, Callable[[TsidCase], object], Callable[[], Array]]] = [
             (0, ours.solve, ours.torques), (1, peer.solve, peer.torques),
         ]  # fmt: skip
         for which, solve, torques in order if k % 2 else reversed(order):
@@ -97,11 +97,14 @@ def _turns(config: Config, found: list[Case]) -> dict[str, Any]:
         differences.append(np.abs(answers[0] - answers[1]).max())
     median, p99 = np.median(times, axis=1), np.percentile(times, 99, axis=1)
     return {
-        "ours_us": float(median[0]), "tsid_us": float(median[1]),
-        "ours_us_p99": float(p99[0]), "tsid_us_p99": float(p99[1]),
+        "ours_us": float(median[0]),
+        "tsid_us": float(median[1]),
+        "ours_us_p99": float(p99[0]),
+        "tsid_us_p99": float(p99[1]),
         "ratio": float(median[1] / median[0]),
-        "torque_difference_median_nm": float(np.median(differences)), "ticks": len(found),
-    }  # fmt: skip
+        "torque_difference_median_nm": float(np.median(differences)),
+        "ticks": len(found),
+    }
 
 
 class _Ours:
@@ -111,14 +114,23 @@ class _Ours:
         self._body, self._weights, self._flat = RigidBody(), weights, weights.as_array()
         self._x = np.zeros(42)
 
-    def solve(self, case: Case) -> None:
+    def solve(self, case: TsidCase) -> None:
         """One tick's torques."""
         goal = case.goal
         self._x = np.zeros(42)
         if not _whole_body(
-            case.q, case.v, self._body.links, case.R, case.p_foot, goal.contact, goal.trunk,
-            goal.swing, goal.force, self._flat, self._x,
-        ):  # fmt: skip
+            case.q,
+            case.v,
+            self._body.links,
+            case.R,
+            case.p_foot,
+            goal.contact,
+            goal.trunk,
+            goal.swing,
+            goal.force,
+            self._flat,
+            self._x,
+        ):
             terms = self._body.terms(case.q, case.v)
             self._x = solve_goal(terms, case.R, case.p_foot, goal, self._weights).x
 
@@ -129,9 +141,18 @@ class _Ours:
 
 @compiled
 def _whole_body(
-    q: Array, v: Array, links: Array, R: Array, p_foot: Array, contact: Array, trunk: Array,
-    swing: Array, force: Array, weights: Array, x: Array,
-) -> int:  # fmt: skip
+    q: Array,
+    v: Array,
+    links: Array,
+    R: Array,
+    p_foot: Array,
+    contact: Array,
+    trunk: Array,
+    swing: Array,
+    force: Array,
+    weights: Array,
+    x: Array,
+) -> int:
     """Terms and `closed_form`."""
     M_inverse, nle = np.empty((18, 18)), np.empty(18)
     J, dJ = np.empty((6, 18)), np.empty((6, 18))
@@ -146,16 +167,21 @@ class _Listening(Controller):
 
     def __init__(self, config: Config) -> None:
         super().__init__(config)
-        self.cases: list[Case] = []
+        self.cases: list[TsidCase] = []
 
     def act(
-        self, seen: Seen, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
-    ) -> Acted:
+        self, seen: Sensed, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
+    ) -> ControllerOutputs:
         acted = super().act(seen, schedule, task, dt, new_sample=new_sample)
         q, v = seen.flat[:19].copy(), seen.flat[19:37].copy()
         goal = acted.goal
-        self.cases.append(Case(
-            q, v, seen.R.copy(), seen.p_foot.copy(),
-            Goal(goal.contact.copy(), goal.trunk.copy(), goal.swing.copy(), goal.force.copy()),
-        ))  # fmt: skip
+        self.cases.append(
+            TsidCase(
+                q,
+                v,
+                seen.R.copy(),
+                seen.p_foot.copy(),
+                Goal(goal.contact.copy(), goal.trunk.copy(), goal.swing.copy(), goal.force.copy()),
+            )
+        )
         return acted

@@ -14,19 +14,19 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from children import SPAWN, child, result_of, running
 
-from quadriga.endpoint import free_endpoint
-from shared.barrier import SIM
-from shared.bus import HERE, Bus
-from shared.clock import monotonic, monotonic_ns, sleep
-from shared.codec import encode
-from shared.config import Config
-from shared.config_file import load
-from shared.messages import Command, State
-from shared.robot import N_JOINTS, robot_names
-from shared.scheduling import take_priority
-from shared.topics import COMMAND, STATE
+from benchmarks.children import SPAWN, child, result_of, running
+from quadriga.shared.bus.barrier import SIM
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import N_JOINTS, robot_names
+from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
+from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Command, State
+from quadriga.shared.wire.topics import COMMAND, STATE
+from quadriga.team.endpoint import free_endpoint
 
 TRANSPORTS: Final = ("bus", "socket")
 _BLOCK: Final = 250  # ticks of one transport before the other's turn

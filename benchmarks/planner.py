@@ -1,6 +1,6 @@
 """What a plan costs: the paper's problems as they stand there, against ours, on a real walk.
 
-Run: python benchmarks/planner.py [--robots 3 5] [--seconds 4] [--out FILE]
+Run: python -m benchmarks.planner [--robots 3 5] [--seconds 4] [--out FILE]
 
 Every contender gets every planning step of the same walks, one after the other within each step,
 in one process with one BLAS thread. Times are processor time: what else the machine does
@@ -19,22 +19,22 @@ from pathlib import Path
 from time import thread_time
 from typing import Protocol
 
-import blas_threads
 import numpy as np
 import osqp
-from planner_contenders import AS_WRITTEN, Case, Contender, Deepc, Local, Team
-from planner_peer import AVAILABLE, CvxpyDeepc
-from planner_ticks import PlanningTick, record
 from rich.console import Console
 from rich.table import Table
 from scipy import sparse
 
-from agents.planner.planner_qp import Problem
-from agents.planner.predictor import Predictor
-from quadriga.identify import ensure_data, ensure_predictor, load_predictor
-from shared.config import Config
-from shared.config_file import load
-from shared.robot import Array
+from benchmarks import blas_threads
+from benchmarks.planner_contenders import AS_WRITTEN, Case, Contender, Deepc, Local, Team
+from benchmarks.planner_peer import AVAILABLE, CvxpyDeepc
+from benchmarks.planner_ticks import PlanningTick, record
+from quadriga.agents.planner.planner_qp import PlannerProblem
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.identification.identify import ensure_data, ensure_predictor, load_predictor
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
 
 # What the figures at n = 5 are held to.
 TARGETS = {
@@ -45,8 +45,19 @@ TARGETS = {
 WALKS = ("flat", "boxes")
 TEAM_STEPS = 12  # per walk; as written the problem of 5 robots takes most of a second
 DEEPC_STEPS = {1: 20, 3: 2}  # per walk; as written: 0.3 s for one robot, many for three
-HEADINGS = ("n", "problem", "how", "plans", "median ms", "p99 ms", "× median", "× p99",
-            "cone N", "force N", "gap")  # fmt: skip
+HEADINGS = (
+    "n",
+    "problem",
+    "how",
+    "plans",
+    "median ms",
+    "p99 ms",
+    "× median",
+    "× p99",
+    "cone N",
+    "force N",
+    "gap",
+)
 
 
 Row = dict[str, float | str]
@@ -117,9 +128,15 @@ def deepc(robots: int, seconds: float, console: Console) -> list[Row]:
     extra = []
     if robots == 1 and AVAILABLE:
         peer = CvxpyDeepc(config.planner, episodes)
-        extra.append(Contender("eq. 5", "cvxpy", lambda case: peer.solve(
-            case.tick.past.ravel(), case.y_des, case.tick.stance, case.tick.nominal
-        )))  # fmt: skip
+        extra.append(
+            Contender(
+                "eq. 5",
+                "cvxpy",
+                lambda case: peer.solve(
+                    case.tick.past.ravel(), case.y_des, case.tick.stance, case.tick.nominal
+                ),
+            )
+        )
     elif robots == 1:
         console.print("eq. 5 with CVXPY: left out, cvxpy is not installed (pip install cvxpy)")
     last = [walk[-DEEPC_STEPS.get(robots, 1) :] for walk in walks]
@@ -127,9 +144,11 @@ def deepc(robots: int, seconds: float, console: Console) -> list[Row]:
 
 
 def measure(
-    config: Config, formulation: Formulation, walks: Sequence[Sequence[PlanningTick]],
+    config: Config,
+    formulation: Formulation,
+    walks: Sequence[Sequence[PlanningTick]],
     extra: Sequence[Contender] = (),
-) -> list[Row]:  # fmt: skip
+) -> list[Row]:
     """Give every case to every contender in turn, another one first each time; one row each."""
     contenders = [*formulation.contenders(), *extra]
     cases = [case for walk in walks for tick in walk for case in formulation.cases(tick)]
@@ -148,15 +167,22 @@ def measure(
     return [row(config.team.robots, c, yardstick[c.problem]) for c in contenders]
 
 
-def reference(problem: Problem, f: Array) -> Array:
+def reference(problem: PlannerProblem, f: Array) -> Array:
     """The minimiser by OSQP at 1e-9."""
     solver = osqp.OSQP()
     A = sparse.csc_matrix(np.vstack([np.eye(len(f)), problem.A]))
     P = sparse.csc_matrix(np.triu(problem.H))
     solver.setup(
-        P, f, A, problem.lower, problem.upper,
-        verbose=False, eps_abs=1e-9, eps_rel=1e-9, max_iter=100_000,
-    )  # fmt: skip
+        P,
+        f,
+        A,
+        problem.lower,
+        problem.upper,
+        verbose=False,
+        eps_abs=1e-9,
+        eps_rel=1e-9,
+        max_iter=100_000,
+    )
     result = solver.solve(raise_error=False)
     if result.info.status != "solved":
         raise RuntimeError(f"the reference did not converge: {result.info.status}")
@@ -194,8 +220,19 @@ def row(robots: int, contender: Contender, yardstick: Contender) -> Row:
     values = (robots, contender.problem, contender.name, len(contender.times), float(median),
               float(p99), float(slow / median), float(slow_p99 / p99),
               float(cone), float(force), float(gap))  # fmt: skip
-    keys = ("robots", "problem", "name", "plans", "median_ms", "p99_ms", "ratio_median",
-            "ratio_p99", "cone_violation_n", "applied_force_error_n", "relative_gap")  # fmt: skip
+    keys = (
+        "robots",
+        "problem",
+        "name",
+        "plans",
+        "median_ms",
+        "p99_ms",
+        "ratio_median",
+        "ratio_p99",
+        "cone_violation_n",
+        "applied_force_error_n",
+        "relative_gap",
+    )
     return dict(zip(keys, values, strict=True))
 
 
@@ -211,8 +248,9 @@ def headline(rows: Sequence[Row]) -> dict[str, float]:
     }  # fmt: skip
     return {
         key: float(found[problem][figure])
-        for key, (problem, figure) in wanted.items() if problem in found
-    }  # fmt: skip
+        for key, (problem, figure) in wanted.items()
+        if problem in found
+    }
 
 
 def table(rows: Sequence[Row]) -> Table:

@@ -7,19 +7,25 @@ from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
-from planner_ticks import PlanningTick
 
-from agents.planner.as_written import DeepcQp, PaperQp
-from agents.planner.central import TeamPlanner, centralised
-from agents.planner.deepc import build_model, reduce, select
-from agents.planner.episode import Episode
-from agents.planner.peer_terms import PeerTerms
-from agents.planner.planner import Planner
-from agents.planner.planner_qp import Problem, build_problem, constrain, stance_columns, unpack
-from agents.planner.predictor import Predictor
-from agents.planner.qp_solver import SOLVERS, Solver
-from shared.config import Config
-from shared.robot import Array
+from benchmarks.as_written import DeepcQp, PaperQp
+from benchmarks.planner_ticks import PlanningTick
+from quadriga.agents.planner.peer_terms import PeerTerms
+from quadriga.agents.planner.planner import Planner
+from quadriga.agents.planner.planner_qp import (
+    PlannerProblem,
+    build_problem,
+    constrain,
+    stance_columns,
+    unpack,
+)
+from quadriga.agents.planner.qp_solver import SOLVERS, Solver
+from quadriga.agents.planner.team_planner import TeamPlanner, centralised
+from quadriga.agents.predictor.deepc import build_model, reduce, select
+from quadriga.agents.predictor.episode import Episode
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
 
 AS_WRITTEN = "as written"
 
@@ -38,7 +44,7 @@ class Case:
 
     tick: PlanningTick
     robots: tuple[int, ...]
-    problem: Problem
+    problem: PlannerProblem
     f: Array
     y_free: Array
     y_des: Array
@@ -73,7 +79,7 @@ class Local:
         self._G_u = [np.ascontiguousarray(predictor.block(i, i)[:, past:]) for i in robots]
         self._G_past = [np.ascontiguousarray(predictor.block(i, i)[:, :past]) for i in robots]
         self._planners = [Planner(config, i, predictor) for i in robots]
-        self._problems: dict[tuple[int, bytes], Problem] = {}
+        self._problems: dict[tuple[int, bytes], PlannerProblem] = {}
         self._solvers: dict[tuple[str, int, bytes], Solver] = {}
 
     def cases(self, tick: PlanningTick) -> list[Case]:
@@ -172,12 +178,9 @@ class Team:
         def ours(case: Case) -> Array:
             return (self._planner.step(case.tick.inputs).u - case.tick.nominal).ravel()
 
-        return [
-            Contender("eq. 7", AS_WRITTEN, as_written),
-            Contender("eq. 7", "daqp", ours),
-        ]
+        return [Contender("eq. 7", AS_WRITTEN, as_written), Contender("eq. 7", "daqp", ours)]
 
-    def _build(self, stance: bytes) -> Problem:
+    def _build(self, stance: bytes) -> PlannerProblem:
         pattern = np.frombuffer(stance, dtype=np.bool_).reshape(-1, 4)
         return build_problem(self._config.planner, self._G_u, pattern)
 
@@ -218,7 +221,7 @@ class Deepc:
 
         return [Contender("eq. 5", AS_WRITTEN, as_written), Contender("eq. 5", "daqp", ours)]
 
-    def _build(self, stance: bytes) -> tuple[Problem, Solver]:
+    def _build(self, stance: bytes) -> tuple[PlannerProblem, Solver]:
         pattern = np.frombuffer(stance, dtype=np.bool_).reshape(-1, 4)
         condensed = select(self._model, stance_columns(pattern))
         problem = constrain(self._config.planner, condensed, pattern)

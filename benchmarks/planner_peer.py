@@ -11,10 +11,10 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.planner.episode import U_SCALE, Y_SCALE, Episode
-from agents.planner.hankel import split
-from shared.config import PlannerConfig
-from shared.robot import Array
+from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
+from quadriga.agents.predictor.hankel import split
+from quadriga.shared.config.sections import PlannerConfig
+from quadriga.shared.robot.a1 import Array
 
 AVAILABLE = find_spec("cvxpy") is not None
 
@@ -44,16 +44,22 @@ class CvxpyDeepc:
         cost = (
             cp.sum_squares(cp.multiply(np.sqrt(np.tile(config.Q, N)), y_f - self._y_des))
             + cp.sum_squares(cp.multiply(np.sqrt(np.tile(config.R, 4 * N)), flat))
-            + config.lambda_g * cp.sum_squares(g) + config.lambda_sigma * cp.sum_squares(sigma)
-        )  # fmt: skip
-        self._problem = cp.Problem(cp.Minimize(cost), [
-            data.U_p @ g == self._u_ini,
-            data.Y_p @ g + sigma == self._y_ini,
-            data.U_f @ g == flat / U_SCALE,
-            data.Y_f @ g == cp.multiply(1.0 / np.tile(Y_SCALE, N), y_f),
-            self._u >= self._box_low, self._u <= self._box_high,
-            cp.abs(force[:, 0]) <= c * force[:, 2], cp.abs(force[:, 1]) <= c * force[:, 2],
-        ])  # fmt: skip
+            + config.lambda_g * cp.sum_squares(g)
+            + config.lambda_sigma * cp.sum_squares(sigma)
+        )
+        self._problem = cp.Problem(
+            cp.Minimize(cost),
+            [
+                data.U_p @ g == self._u_ini,
+                data.Y_p @ g + sigma == self._y_ini,
+                data.U_f @ g == flat / U_SCALE,
+                data.Y_f @ g == cp.multiply(1.0 / np.tile(Y_SCALE, N), y_f),
+                self._u >= self._box_low,
+                self._u <= self._box_high,
+                cp.abs(force[:, 0]) <= c * force[:, 2],
+                cp.abs(force[:, 1]) <= c * force[:, 2],
+            ],
+        )
 
     def solve(self, past: Array, y_des: Array, stance: NDArray[np.bool_], nominal: Array) -> Array:
         """Force deviations (12 N,) with CVXPY's choice of solver and settings."""

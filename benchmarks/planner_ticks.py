@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.gait import nominal_forces
-from agents.planner.episode import commanded_outputs, output_base
-from agents.planner.horizon import horizon_stance, step_ms
-from agents.planner.neighbours import FRESH, PeerData, Selection
-from agents.planner.planner import PlannerInputs
-from agents.planner.predictor import Predictor
-from quadriga.operator import reference_at
-from quadriga.rollout import Rollout
-from shared.config import Config
-from shared.messages import Measurement, Plan, Reference
-from shared.robot import Array, robot_names
-from shared.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.planner.neighbours import FRESH, PeerData, Selection
+from quadriga.agents.planner.planner import PlannerInputs
+from quadriga.agents.predictor.episode import commanded_outputs, output_base
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.time_grid import horizon_stance, step_ms
+from quadriga.identification.rollout import Rollout
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array, robot_names
+from quadriga.shared.wire.messages import Measurement, Plan, Reference
+from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
+from quadriga.team.operator import reference_at
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +85,19 @@ def _tick(
     peers = []
     for j, window in enumerate(earlier):
         nominal = nominal_forces(horizon_stance(config, j, step - 1))
-        peers.append(PeerData(
-            robot=f"r{j + 1}", index=j, status=FRESH, step=step - 1, age=0,
-            known=np.ones(config.planner.T_ini, dtype=np.bool_),
-            du_ini=window.u_ini - nominal_forces(window.stance_ini), y_ini=window.y_ini,
-            du=plans[j][step - 1].u - nominal,
-        ))  # fmt: skip
+        peers.append(
+            PeerData(
+                robot=f"r{j + 1}",
+                index=j,
+                status=FRESH,
+                step=step - 1,
+                age=0,
+                known=np.ones(config.planner.T_ini, dtype=np.bool_),
+                du_ini=window.u_ini - nominal_forces(window.stance_ini),
+                y_ini=window.y_ini,
+                du=plans[j][step - 1].u - nominal,
+            )
+        )
     before = [
         np.concatenate([window.past(), peer.du.ravel()])
         for window, peer in zip(earlier, peers, strict=True)

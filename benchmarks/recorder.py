@@ -1,6 +1,6 @@
 """What the recorder takes in: real publishers over real Zenoh, messages/s, gaps, share of a core.
 
-Run: python benchmarks/recorder.py [--rate 20000] [--seconds 5] [--publishers 2] [--json FILE]
+Run: python -m benchmarks.recorder [--rate 20000] [--seconds 5] [--publishers 2] [--json FILE]
 
 Publishers are processes that send commands of a growing tick in real time, each on keys of its own,
 and wait for nobody; `quadriga record --now` writes them down. Gaps are looked for in the file.
@@ -23,19 +23,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from children import SPAWN, child, running
 
-from quadriga.endpoint import free_endpoint
-from shared.barrier import SIM
-from shared.bus import HERE, READY, Bus
-from shared.clock import monotonic, sleep
-from shared.codec import encode
-from shared.config import Config
-from shared.config_file import load
-from shared.config_text import to_toml
-from shared.errors import RecordingError
-from shared.messages import Reference
-from shared.recording import Recording
+from benchmarks.children import SPAWN, child, running
+from quadriga.shared.bus.barrier import SIM
+from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.errors import RecordingError
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Reference
+from quadriga.team.endpoint import free_endpoint
 
 KEYS = 10  # of each publisher
 PROBE = "probe"  # sent until the recorder has heard every publisher
@@ -91,18 +91,34 @@ def measure(rate: float, seconds: float, publishers: int, folder: Path) -> dict[
         sleep(seconds + 1.0)
         used = processor_time(pid) - before
         ended.set()
-    return {**figures(file, sum(count.value for count in counts)), "core": used / seconds,
-            "asked_per_s": rate, "load": os.getloadavg()[0]}  # fmt: skip
+    return {
+        **figures(file, sum(count.value for count in counts)),
+        "core": used / seconds,
+        "asked_per_s": rate,
+        "load": os.getloadavg()[0],
+    }
 
 
 @contextmanager
 def recording(file: Path, config: Path) -> Iterator[int]:
     """Run a recorder, whose process id is given; at the end of the block it closes the file."""
     recorder = subprocess.Popen(
-        [sys.executable, "-m", "quadriga", "record", "--now", "-o", str(file), "--config",
-         str(config), "--parent", str(os.getpid())],
-        stdout=subprocess.DEVNULL, start_new_session=True,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "quadriga",
+            "record",
+            "--now",
+            "-o",
+            str(file),
+            "--config",
+            str(config),
+            "--parent",
+            str(os.getpid()),
+        ],
+        stdout=subprocess.DEVNULL,
+        start_new_session=True,
+    )
     try:
         yield recorder.pid
     finally:
@@ -148,10 +164,12 @@ def figures(file: Path, sent: int) -> dict[str, float]:
         times.append(log_time)
     gaps = sum(int((np.diff(found) != 1).sum()) + found[0] for found in ticks.values())
     return {
-        "sent": sent, "recorded": len(times), "gaps": gaps,
+        "sent": sent,
+        "recorded": len(times),
+        "gaps": gaps,
         "per_s": (len(times) - 1) / max(1e-9 * (times[-1] - times[0]), 1e-9),
         "bytes": file.stat().st_size,
-    }  # fmt: skip
+    }
 
 
 if __name__ == "__main__":

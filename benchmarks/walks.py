@@ -9,22 +9,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
-from low_level import collector_off
-
-from agents.agent import Agent, AgentState, Inputs, Outputs
-from agents.planner.predictor import Predictor
-from agents.planner.store import predictor_sha256
-from quadriga.endpoint import free_endpoint
-from quadriga.launch import Launch, table
-from quadriga.operator import reference_at
-from quadriga.rollout import Rollout
-from shared.bus import Bus
-from shared.clock import monotonic, monotonic_ns
-from shared.codec import decode
-from shared.config import Config
-from shared.config_text import to_toml
-from shared.messages import Reference, Truth
-from shared.topics import REFERENCE_EPOCH_MS, TRUTH
+from benchmarks.low_level import collector_off
+from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.predictor.store import predictor_sha256
+from quadriga.identification.rollout import Rollout
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.runtime.clock import monotonic, monotonic_ns
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Reference, Truth
+from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, TRUTH
+from quadriga.team.endpoint import free_endpoint
+from quadriga.team.launch import Launch, table
+from quadriga.team.operator import reference_at
 
 
 def alone(config: Config, predictor: Predictor | None) -> dict[str, float]:
@@ -34,7 +33,7 @@ def alone(config: Config, predictor: Predictor | None) -> dict[str, float]:
         return reference_at(config, tick) if tick % REFERENCE_EPOCH_MS == 0 else None
 
     rollout = Rollout(config, predictor, reference)
-    timed = [_Timed(Agent(config, n, predictor, monotonic_ns)) for n in rollout.world.names]
+    timed = [_TimedWalk(Agent(config, n, predictor, monotonic_ns)) for n in rollout.world.names]
     rollout.agents = dict(zip(rollout.world.names, timed, strict=True))
     with collector_off():
         rollout.step()  # the first one loads
@@ -47,10 +46,12 @@ def alone(config: Config, predictor: Predictor | None) -> dict[str, float]:
     spent, planners = sum(a.ns for a in timed), sum(a.planner_ns for a in timed)
     share = 1e-3 / max(ticks, 1)
     return {
-        "tick_us": share * took, "physics_us": share * (took - spent),
-        "controllers_us": share * (spent - planners), "planners_us": share * planners,
+        "tick_us": share * took,
+        "physics_us": share * (took - spent),
+        "controllers_us": share * (spent - planners),
+        "planners_us": share * planners,
         "ticks": ticks,
-    }  # fmt: skip
+    }
 
 
 def over_the_bus(
@@ -84,8 +85,7 @@ def over_the_bus(
 
             launch.watch(look)
     factor = watch.factor()
-    return {"rtf": factor, "tick_us": 1e3 / factor, "seconds": watch.seconds,
-            "memory_mb": memory}  # fmt: skip
+    return {"rtf": factor, "tick_us": 1e3 / factor, "seconds": watch.seconds, "memory_mb": memory}
 
 
 def _memory(pid: int) -> dict[str, float]:
@@ -98,7 +98,7 @@ def _memory(pid: int) -> dict[str, float]:
     return {"rss": 1024e-6 * int(fields["Rss"]), "pss": 1024e-6 * int(fields["Pss"])}
 
 
-class _Timed(Agent):
+class _TimedWalk(Agent):
     """An agent whose steps, and its planner's part of them, are timed."""
 
     def __init__(self, agent: Agent) -> None:

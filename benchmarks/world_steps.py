@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from shared.clock import monotonic_ns
-from shared.config_file import load
-from shared.messages import Command
-from shared.robot import N_JOINTS, q_stand
-from sim_server.world import World
+from quadriga.shared.config.load import load
+from quadriga.shared.robot.a1 import N_JOINTS, q_stand
+from quadriga.shared.runtime.clock import monotonic_ns
+from quadriga.shared.wire.messages import Command
+from quadriga.sim_server.world.world import World
 
 _SETTLING = 200  # ticks, until all stand on their feet
 

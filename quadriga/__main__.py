@@ -9,7 +9,7 @@ import sys
 def main() -> int:
     """Run the command line; a signal that comes while it is being imported waits until then."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-    from quadriga.cli import main as command_line
+    from quadriga.commands.parser import main as command_line
 
     return command_line()
 

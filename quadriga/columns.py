@@ -33,5 +33,6 @@ def columns(
 
 def printable(text: str) -> str:
     """Text that comes from elsewhere, without what a terminal would obey."""
-    return "".join("\N{REPLACEMENT CHARACTER}" if category(c) == "Cc" and c != "\n" else c
-                   for c in text)  # fmt: skip
+    return "".join(
+        "\N{REPLACEMENT CHARACTER}" if category(c) == "Cc" and c != "\n" else c for c in text
+    )

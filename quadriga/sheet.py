@@ -11,11 +11,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from quadriga.columns import printable
-from shared.robot import OUTPUTS
+from quadriga.shared.robot.a1 import OUTPUTS
 
 NOTHING: Final = "–"
 _WIDE: Final = 180  # characters a line may have where no terminal says how many there are
-# Unit of each output, and of each of `quadriga.traces.ERRORS`, and its factor from SI.
+# Unit of each output, and of each of `quadriga.recordings.traces.ERRORS`, and its factor from SI.
 UNITS: Final = {
     "z": ("mm", 1e3), "z-felt": ("mm", 1e3), "vx": ("mm/s", 1e3), "vy": ("mm/s", 1e3),
     "roll": ("mrad", 1e3), "pitch": ("mrad", 1e3), "wz": ("mrad/s", 1e3),
@@ -48,9 +48,7 @@ class Sheet:
 
     def to_rich(self) -> Table:
         """For a terminal, without the notes."""
-        table = Table(
-            title=escape(self.title), title_justify="left",
-        )  # fmt: skip
+        table = Table(title=escape(self.title), title_justify="left")
         for k, column in enumerate(self.columns):
             table.add_column(escape(column), justify="right" if k else "left", no_wrap=not k)
         for row in self.rows:

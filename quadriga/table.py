@@ -20,7 +20,7 @@ _ERRORS = {
 
 
 def print_table(summary: dict[str, Any], console: Console) -> None:
-    """Show the figures of `quadriga.summary.summarise`."""
+    """Show the figures of `quadriga.recordings.summary.summarise`."""
     table = Table(show_header=False, title=_title(summary), title_justify="left")
     table.add_column(style="bold", no_wrap=True)
     table.add_column()
@@ -90,12 +90,15 @@ def _against_truth(s: Mapping[str, Any]) -> list[tuple[str, str]]:
         return [("world time", f"{s['duration']:.1f} s, without truth to compare anything with")]
     return [
         ("distance", f"{_text(s['distance'], '.2f')} m in {s['duration']:.1f} s"),
-        ("mean speed", f"vx {_text(s['mean_vx'], '+.3f')}, vy {_text(s['mean_vy'], '+.3f')} m/s, "
-                       f"wz {_text(s['mean_wz'], '+.3f')} rad/s"),
+        (
+            "mean speed",
+            f"vx {_text(s['mean_vx'], '+.3f')}, vy {_text(s['mean_vy'], '+.3f')} m/s, "
+            f"wz {_text(s['mean_wz'], '+.3f')} rad/s",
+        ),
         (f"RMSE from {s['steady_from']:.1f} s", _errors(s["rmse"])),
         (f"estimator ({s['estimator']}) RMSE", _errors(s["estimator_rmse"])),
         ("yoke drift", f"at most {_text(s['yoke_drift_max'], '.2f', 1e3)} mm"),
-    ]  # fmt: skip
+    ]
 
 
 def _counted(counters: Mapping[str, Mapping[str, int]]) -> str:

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from shared.config import Config
-from shared.jit import digest
+from quadriga.shared.config.sections import Config
+from quadriga.shared.runtime.jit import digest
 
 
 def warm_up(config: Config, console: Console) -> None:
     """Rehearse an agent once, unless this code has been compiled on this machine before."""
-    from agents.controller.rotation import roll_pitch_yaw
+    from quadriga.agents.controller.maths.rotation import roll_pitch_yaw
 
     # Beside what the compiler keeps: in __pycache__, or the user's cache if the code is read-only.
     kept = getattr(roll_pitch_yaw, "stats", None)
@@ -30,10 +30,10 @@ def warm_up(config: Config, console: Console) -> None:
 
 def _rehearse_alone(config: Config) -> None:
     """Everything that one agent does, with a predictor that predicts nothing."""
-    from agents.agent import Agent
-    from agents.planner.predictor import Predictor, PredictorMeta
-    from agents.rehearsal import rehearse
-    from shared.robot import N_OUTPUTS
+    from quadriga.agents.agent import Agent
+    from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+    from quadriga.agents.rehearsal import rehearse
+    from quadriga.shared.robot.a1 import N_OUTPUTS
 
     planner = replace(config.planner, kind="distributed", exchanges=0)
     alone = replace(config, team=replace(config.team, robots=1), planner=planner)

@@ -11,8 +11,8 @@ from multiprocessing import resource_tracker
 from queue import SimpleQueue
 from typing import TypeVar
 
-from shared.errors import ProcessError
-from shared.signals import die_with_parent, interrupts_held
+from quadriga.shared.errors import ProcessError
+from quadriga.shared.runtime.signals import die_with_parent, interrupts_held
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -47,8 +47,12 @@ def each_done(
                 future = done.get()
                 yield futures[future], future.result()
         except BrokenProcessPool:
-            raise ProcessError("a worker process", "its death", "an answer",
-                               "killed, perhaps because memory was short") from None  # fmt: skip
+            raise ProcessError(
+                "a worker process",
+                "its death",
+                "an answer",
+                "killed, perhaps because memory was short",
+            ) from None
         except BaseException:  # an interrupt: the pool would first finish every call
             for worker in multiprocessing.active_children():
                 worker.terminate()

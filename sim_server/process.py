@@ -5,16 +5,16 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable
 
-from shared.barrier import SIM, meet, start_together
-from shared.bus import Bus
-from shared.config import Config
-from shared.scheduling import take_priority
-from shared.signals import stop_on_signals
-from shared.topics import COMMAND
-from sim_server.lockstep import run_lockstep
-from sim_server.realtime import run_realtime
-from sim_server.stage import Stage
-from sim_server.world import World
+from quadriga.plant.lockstep import run_lockstep
+from quadriga.plant.realtime import run_realtime
+from quadriga.plant.server import PlantServer
+from quadriga.shared.bus.barrier import SIM, meet, start_together
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.signals import stop_on_signals
+from quadriga.shared.wire.topics import COMMAND
+from quadriga.sim_server.world.world import World
 
 
 def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
@@ -34,7 +34,7 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
     world = World(config)
     with Bus.open(config.bus, config.team.name, SIM, stopped) as bus:
         bus.subscribe(COMMAND.key(config.team.name, "*"))
-        stage = Stage(config, world, bus)
+        stage = PlantServer(config, world, bus)
         if not (meet(bus, config, stopped) and start_together(bus, config, stopped)):
             return
         gc.collect()

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from shared.bus import Bus
-from shared.clock import monotonic, sleep
-from shared.errors import RecordingError
-from shared.recording import Recording
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.errors import RecordingError
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.clock import monotonic, sleep
 
 WAIT = 60.0  # s, far more than anything takes on a busy machine
 

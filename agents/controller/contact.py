@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.controller.memory import Swings
-from shared.jit import compiled
-from shared.robot import FOOT_RADIUS, Array
+from quadriga.agents.controller.memory import Swings
+from quadriga.shared.robot.a1 import FOOT_RADIUS, Array
+from quadriga.shared.runtime.jit import compiled
 
 _EARLIEST_TOUCHDOWN = 0.5  # of swing: before this a load is the foot still leaving the ground
 _EARLIEST_STUMBLE = 0.12  # of swing, likewise
@@ -61,22 +61,31 @@ class ContactRule(NamedTuple):
         patience: time without load after which a stance foot is no contact, s.
         hold: share of the half period for which a foot waits for those that shall stand.
         give_way: time for which a foot gives way once nothing stops it any more, s; 0: never.
-        tell_sides: whether a foot stopped from the side is no contact, and one that landed early
-            and is not loaded any more neither.
+        reject_side_contacts: whether a foot stopped from the side is no contact, and one that
+            landed early and is not loaded any more neither.
     """
 
     threshold: float
     patience: float
     hold: float
     give_way: float
-    tell_sides: bool
+    reject_side_contacts: bool
 
 
 @compiled
 def contacts_by_force(
-    legs0: Array, level0: float, switched: bool, stance: Array, progress: float, foot_force: Array,
-    foot_z: Array, swings: Swings, rule: ContactRule, rate: float, dt: float,
-) -> tuple[Array, float]:  # fmt: skip
+    legs0: Array,
+    level0: float,
+    switched: bool,
+    stance: Array,
+    progress: float,
+    foot_force: Array,
+    foot_z: Array,
+    swings: Swings,
+    rule: ContactRule,
+    rate: float,
+    dt: float,
+) -> tuple[Array, float]:
     """Update the contacts of one robot.
 
     Args:
@@ -107,9 +116,14 @@ def contacts_by_force(
 
 @compiled
 def _stand(
-    legs: Array, switched: bool, stance: Array, loaded: Flags, swings: Swings, rule: ContactRule,
+    legs: Array,
+    switched: bool,
+    stance: Array,
+    loaded: Flags,
+    swings: Swings,
+    rule: ContactRule,
     dt: float,
-) -> bool:  # fmt: skip
+) -> bool:
     """Which of the feet that shall stand are contacts; whether they all carry."""
     contact, early, unloaded, _, _ = legs
     carried = True
@@ -117,7 +131,7 @@ def _stand(
         if stance[leg] < 0.5:
             continue
         carries = loaded[leg]
-        if rule.tell_sides and not switched and contact[leg] < 0.5:
+        if rule.reject_side_contacts and not switched and contact[leg] < 0.5:
             carries = carries and from_below(swings.felt[leg])
         if switched:
             early[leg] = 0.0
@@ -131,9 +145,16 @@ def _stand(
 
 @compiled
 def _swing(
-    legs: Array, switched: bool, stance: Array, progress: float, loaded: Flags, carried: bool,
-    swings: Swings, rule: ContactRule, dt: float,
-) -> None:  # fmt: skip
+    legs: Array,
+    switched: bool,
+    stance: Array,
+    progress: float,
+    loaded: Flags,
+    carried: bool,
+    swings: Swings,
+    rule: ContactRule,
+    dt: float,
+) -> None:
     """Which of the feet that shall swing stay on the ground, land early or stumble."""
     contact, early, unloaded, latched, _ = legs
     lift, stumble, felt = swings
@@ -154,13 +175,13 @@ def _swing(
                 continue
         contact[leg] = 0.0
         since = (progress - lift[leg]) / (1.0 - lift[leg])
-        below = not rule.tell_sides or from_below(felt[leg])
+        below = not rule.reject_side_contacts or from_below(felt[leg])
         if loaded[leg] and below and since > _EARLIEST_TOUCHDOWN:
             early[leg] = 1.0
             unloaded[leg] = 0.0
             stumble[leg] = 0.0
         if early[leg] > 0.5:
-            if rule.tell_sides:
+            if rule.reject_side_contacts:
                 unloaded[leg] = 0.0 if loaded[leg] else unloaded[leg] + dt
             contact[leg] = 1.0 if unloaded[leg] <= rule.patience else 0.0
         elif rule.give_way > 0.0:

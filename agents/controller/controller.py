@@ -11,17 +11,13 @@ from dataclasses import field, replace
 
 import numpy as np
 
-from agents.controller import whole_body_qp
-from agents.controller.estimator import (
-    Estimate,
-    mean_at,
-    standing_mean,
-    sure,
-)
-from agents.controller.feet import feet_constants, feet_demand, foot_velocities
-from agents.controller.friction import FrictionRule, caution
-from agents.controller.load import loaded
-from agents.controller.memory import (
+from quadriga.agents.controller import whole_body_qp
+from quadriga.agents.controller.estimator import Estimate, mean_at, standing_mean, sure
+from quadriga.agents.controller.foot_targets import feet_constants, feet_demand, foot_velocities
+from quadriga.agents.controller.friction import FrictionRule, caution
+from quadriga.agents.controller.maths.rigid_body import rigid_body_terms
+from quadriga.agents.controller.maths.rotation import from_yaw_frame, roll_pitch_yaw
+from quadriga.agents.controller.memory import (
     CAUTION,
     COUNT,
     HEIGHT,
@@ -37,21 +33,11 @@ from agents.controller.memory import (
     legs_of,
     speed_of,
 )
-from agents.controller.model import RigidBody
-from agents.controller.references import (
-    Asked,
-    Integrators,
-    SingleRigidBody,
-    fall_freely,
-    feedback,
-    feedforward,
-    trunk_gains,
-)
-from agents.controller.rigid_body import rigid_body_terms
-from agents.controller.rotation import from_yaw_frame, roll_pitch_yaw
-from agents.controller.sensing import (
+from quadriga.agents.controller.model import RigidBody
+from quadriga.agents.controller.payload_estimate import loaded
+from quadriga.agents.controller.sensing import (
     SEEN_SIZE,
-    Seen,
+    Sensed,
     coordinates_of,
     feet_of,
     foot_force_of,
@@ -60,12 +46,28 @@ from agents.controller.sensing import (
     sensing_constants,
     trunk_of,
 )
-from agents.controller.whole_body_qp import MU, Goal, Problem, Solution, Weights, closed_form
-from shared.config import Config
-from shared.jit import compiled
-from shared.messages import State
-from shared.record import record
-from shared.robot import GRAVITY, TOTAL_MASS, Array
+from quadriga.agents.controller.trunk_feedback import (
+    Asked,
+    Integrators,
+    SingleRigidBody,
+    fall_freely,
+    feedback,
+    feedforward,
+    trunk_gains,
+)
+from quadriga.agents.controller.whole_body_qp import (
+    MU,
+    Goal,
+    Weights,
+    WholeBodyProblem,
+    WholeBodySolution,
+    closed_form,
+)
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import GRAVITY, TOTAL_MASS, Array
+from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.messages import State
 
 
 @record
@@ -106,12 +108,12 @@ class Task:
 
 
 @record
-class Acted:
+class ControllerOutputs:
     """What a tick comes to: the new memory, what the QP was asked for and its answer."""
 
     memory: Memory
     asked: Array
-    solution: Solution
+    solution: WholeBodySolution
 
     @property
     def goal(self) -> Goal:
@@ -127,21 +129,33 @@ class Controller:
         self.body = RigidBody()
         self._sensing = sensing_constants(config)
         self.weights = Weights(
-            controller.gamma_tau, controller.gamma_force, controller.gamma_defect, controller.mu,
-            controller.force_min, controller.tilt_length, controller.swing_weight,
-        )  # fmt: skip
+            controller.gamma_tau,
+            controller.gamma_force,
+            controller.gamma_defect,
+            controller.mu,
+            controller.force_min,
+            controller.tilt_length,
+            controller.swing_weight,
+        )
         self._acting = np.concatenate(
             [
-                trunk_gains(controller), feet_constants(config), self.body.com,
-                self.body.inertia_inverse.ravel(), self.weights.as_array(),
+                trunk_gains(controller),
+                feet_constants(config),
+                self.body.com,
+                self.body.inertia_inverse.ravel(),
+                self.weights.as_array(),
                 [
-                    self.body.mass, float(controller.flight), controller.slip_speed,
-                    controller.slip_load, controller.mu_least, controller.mu_recovery,
+                    self.body.mass,
+                    float(controller.flight),
+                    controller.slip_speed,
+                    controller.slip_load,
+                    controller.mu_min,
+                    controller.mu_recovery,
                 ],
             ]
-        )  # fmt: skip
+        )
 
-    def sense(self, memory: Memory | None, state: State, schedule: Schedule, dt: float) -> Seen:
+    def sense(self, memory: Memory | None, state: State, schedule: Schedule, dt: float) -> Sensed:
         """Where the robot is and on which feet it stands, by its own sensors.
 
         Args:
@@ -156,25 +170,41 @@ class Controller:
             mean[:], covariance[:] = standing_mean(state), sure()
         new, seen = np.empty(SIZE), np.empty(SEEN_SIZE)
         sense(before, state.row, schedule.row, dt, self._sensing, new, seen)
-        return _begun(new, seen) if memory is None else Seen(Memory(new), seen)
+        return _begun(new, seen) if memory is None else Sensed(Memory(new), seen)
 
     def place(
-        self, memory: Memory | None, estimate: Estimate, quat_wxyz: Array, schedule: Schedule,
+        self,
+        memory: Memory | None,
+        estimate: Estimate,
+        quat_wxyz: Array,
+        schedule: Schedule,
         dt: float,
-    ) -> Seen:  # fmt: skip
+    ) -> Sensed:
         """The same for a robot that knows where it is; its filter goes on from there."""
         before = blank() if memory is None else memory.flat
         new, seen = np.empty(SIZE), np.empty(SEEN_SIZE)
         place(
-            before, mean_at(estimate), sure(), quat_wxyz, estimate.R, estimate.omega,
-            estimate.p_foot, estimate.q_joint, estimate.v_joint, estimate.foot_force,
-            schedule.row, dt, self._sensing, new, seen,
-        )  # fmt: skip
-        return _begun(new, seen) if memory is None else Seen(Memory(new), seen)
+            before,
+            mean_at(estimate),
+            sure(),
+            quat_wxyz,
+            estimate.R,
+            estimate.omega,
+            estimate.p_foot,
+            estimate.q_joint,
+            estimate.v_joint,
+            estimate.foot_force,
+            schedule.row,
+            dt,
+            self._sensing,
+            new,
+            seen,
+        )
+        return _begun(new, seen) if memory is None else Sensed(Memory(new), seen)
 
     def act(
-        self, seen: Seen, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
-    ) -> Acted:
+        self, seen: Sensed, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
+    ) -> ControllerOutputs:
         """Torques for what the robot is asked to do.
 
         Where no limit of the QP is active, as at most ticks, this is one compiled call; a singular
@@ -189,18 +219,34 @@ class Controller:
         """
         new, asked, x = np.empty(SIZE), np.empty(_ASKED), np.zeros(42)
         rows = _act(
-            seen.memory.flat, seen.flat, schedule.row, task.vx, task.vy, task.wz, task.height,
-            task.deviation, task.feedforward, _NOW if task.ahead is None else task.ahead, dt,
-            new_sample, self.body.links, self._acting, new, asked, x,
-        )  # fmt: skip
+            seen.memory.flat,
+            seen.flat,
+            schedule.row,
+            task.vx,
+            task.vy,
+            task.wz,
+            task.height,
+            task.deviation,
+            task.feedforward,
+            _NOW if task.ahead is None else task.ahead,
+            dt,
+            new_sample,
+            self.body.links,
+            self._acting,
+            new,
+            asked,
+            x,
+        )
         if rows:
-            return Acted(Memory(new), asked, Solution(x, whole_body_qp.UNCONSTRAINED, rows))
+            return ControllerOutputs(
+                Memory(new), asked, WholeBodySolution(x, whole_body_qp.UNCONSTRAINED, rows)
+            )
         goal = _goal(asked, legs_of(new)[0])
         problem = self.problem(seen, Memory(new), goal)
         solution = whole_body_qp.unpack(problem, goal.contact, *whole_body_qp.solve(problem))
-        return Acted(Memory(new), asked, solution)
+        return ControllerOutputs(Memory(new), asked, solution)
 
-    def problem(self, seen: Seen, memory: Memory, goal: Goal) -> Problem:
+    def problem(self, seen: Sensed, memory: Memory, goal: Goal) -> WholeBodyProblem:
         """The QP of a tick.
 
         Args:
@@ -221,12 +267,12 @@ def _goal(asked: Array, contact: Array) -> Goal:
     return Goal(contact, asked[:6], asked[6:18].reshape(4, 3), asked[18:].reshape(4, 3))
 
 
-def _begun(flat: Array, seen: Array) -> Seen:
+def _begun(flat: Array, seen: Array) -> Sensed:
     """The first tick: feet are anchored where they are, the heading is kept."""
     start, goal = anchors_of(flat)
     start[:] = goal[:] = feet_of(seen)
     flat[YAW] = roll_pitch_yaw(trunk_of(seen).R)[2]
-    return Seen(Memory(flat), seen)
+    return Sensed(Memory(flat), seen)
 
 
 @compiled
@@ -248,14 +294,28 @@ def note_forces(memory: Array, planned: Array, stance: Array, new_sample: bool) 
 
 @compiled
 def _act(
-    memory0: Array, seen: Array, schedule: Array, vx: float, vy: float, wz: float, height: float,
-    planned: Array, feeds_forward: bool, ahead: Array, dt: float, new_sample: bool, links: Array,
-    constants: Array, memory: Array, asked: Array, x: Array,
-) -> int:  # fmt: skip
+    memory0: Array,
+    seen: Array,
+    schedule: Array,
+    vx: float,
+    vy: float,
+    wz: float,
+    height: float,
+    planned: Array,
+    feeds_forward: bool,
+    ahead: Array,
+    dt: float,
+    new_sample: bool,
+    links: Array,
+    constants: Array,
+    memory: Array,
+    asked: Array,
+    x: Array,
+) -> int:
     """Fill the new memory, what is asked and the answer `closed_form` gives, with its result."""
     gains, feet, com = constants[0:12], constants[12:22], constants[22:25]
     inertia_inverse, weights = constants[25:34].reshape(3, 3), constants[34:41].copy()
-    bare_mass, flight, slip_speed, slip_load, mu_least, mu_recovery = constants[41:47]
+    bare_mass, flight, slip_speed, slip_load, mu_min, mu_recovery = constants[41:47]
     stance, progress = schedule[0:4], schedule[4]
     trunk, p_foot = trunk_of(seen), feet_of(seen)
     q, v = coordinates_of(seen)
@@ -268,9 +328,12 @@ def _act(
     deviation = note_forces(memory, planned, stance, new_sample)
     speed, lead = speed_of(memory)
     kept, push, v_des = feedback(
-        Integrators(memory0[HEIGHT], speed, lead, memory0[YAW]), gains, trunk,
-        Asked(np.array([vx, vy]), wz, memory0[LEVEL] + height), dt,
-    )  # fmt: skip
+        Integrators(memory0[HEIGHT], speed, lead, memory0[YAW]),
+        gains,
+        trunk,
+        Asked(np.array([vx, vy]), wz, memory0[LEVEL] + height),
+        dt,
+    )
     memory[HEIGHT], speed[:], lead[:], memory[YAW] = kept
     if feeds_forward:
         body = SingleRigidBody(mass, com, inertia_inverse)
@@ -279,7 +342,7 @@ def _act(
     if flight > 0.5:
         fall_freely(push, contact)
     v_foot = foot_velocities(J, v, p_foot)
-    rule = FrictionRule(slip_speed, slip_load, weights[MU], mu_least, mu_recovery)
+    rule = FrictionRule(slip_speed, slip_load, weights[MU], mu_min, mu_recovery)
     memory[CAUTION] = caution(
         memory0[CAUTION], contact, stance, progress, v_foot, foot_force_of(seen), rule, dt
     )

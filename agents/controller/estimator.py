@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.controller.kinematics import leg_kinematics
-from agents.controller.rotation import cross, rotation_matrix
-from shared.config import EstimatorConfig
-from shared.jit import compiled
-from shared.messages import State, Truth
-from shared.robot import FOOT_RADIUS, GRAVITY, STAND_HEIGHT, Array
+from quadriga.agents.controller.maths.leg_kinematics import leg_kinematics
+from quadriga.agents.controller.maths.rotation import cross, rotation_matrix
+from quadriga.shared.config.sections import EstimatorConfig
+from quadriga.shared.robot.a1 import FOOT_RADIUS, GRAVITY, STAND_HEIGHT, Array
+from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.wire.messages import State, Truth
 
 _SURE = (1e-6, 1e-4, 1e-5, 1e-5, 1e-5, 1e-5)  # variances of a state that is known, m², m²/s²
 
@@ -106,9 +106,17 @@ def _update(mean: Array, covariance: Array, h: Array, innovation: Array, varianc
 
 @compiled
 def filter_step(
-    mean0: Array, covariance0: Array, quat: Array, gyro: Array, accel: Array,
-    q_joint: Array, v_joint: Array, trust: Array, noise: Array, dt: float,
-) -> tuple[Array, Array, Array]:  # fmt: skip
+    mean0: Array,
+    covariance0: Array,
+    quat: Array,
+    gyro: Array,
+    accel: Array,
+    q_joint: Array,
+    v_joint: Array,
+    trust: Array,
+    noise: Array,
+    dt: float,
+) -> tuple[Array, Array, Array]:
     """Predict with the accelerometer over `dt`, correct with the leg kinematics.
 
     Rows of the mean (6, 3) are trunk position, trunk velocity, feet FL FR RL RR; the covariance
@@ -175,6 +183,12 @@ def trunk_from_truth(truth: Truth, robot: str, state: State) -> Estimate:
     position, velocity = truth.base_pos[index], truth.base_vel[index]
     p_leg, _, _ = leg_kinematics(state.q_joint, state.v_joint)
     return Estimate(
-        position.copy(), velocity.copy(), R, R.T @ truth.base_omega[index],
-        position + p_leg @ R.T, state.q_joint, state.v_joint, state.foot_force,
-    )  # fmt: skip
+        position.copy(),
+        velocity.copy(),
+        R,
+        R.T @ truth.base_omega[index],
+        position + p_leg @ R.T,
+        state.q_joint,
+        state.v_joint,
+        state.foot_force,
+    )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from shared.jit import compiled
-from shared.robot import Array
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.runtime.jit import compiled
 
 _SETTLED = 0.2  # of a half period: before this a foot may still be landing
 _LOSS = 15.0  # 1/s, of the coefficient counted on while a foot slides
@@ -19,28 +19,34 @@ class FrictionRule(NamedTuple):
         slip_load: force from which on it matters, N: a foot that hardly bears load is easily
             dragged along, and tells nothing of the ground.
         mu: coefficient counted on where nothing slides.
-        mu_least: coefficient that is always counted on.
+        mu_min: coefficient that is always counted on.
         recovery: by which what is taken off falls, 1/s.
     """
 
     slip_speed: float
     slip_load: float
     mu: float
-    mu_least: float
+    mu_min: float
     recovery: float
 
 
 @compiled
 def caution(
-    caution0: float, contact: Array, stance: Array, progress: float, v_foot: Array,
-    foot_force: Array, rule: FrictionRule, dt: float,
-) -> float:  # fmt: skip
+    caution0: float,
+    contact: Array,
+    stance: Array,
+    progress: float,
+    v_foot: Array,
+    foot_force: Array,
+    rule: FrictionRule,
+    dt: float,
+) -> float:
     """What is taken off the friction coefficient, so that feet that slide find hold again.
 
     A foot in contact slides where it moves along the ground faster than rolling would make it. A
     foot that slides gives less than the QP asks of it, and not in the direction asked; friction
     that is not there is then not counted on: ċ = 15/s while one slides, ċ = −`recovery` else, and
-    0 ≤ c ≤ `mu` − `mu_least`.
+    0 ≤ c ≤ `mu` − `mu_min`.
 
     Args:
         caution0: c at the last tick.
@@ -60,4 +66,4 @@ def caution(
             if contact[leg] > 0.5 and stance[leg] > 0.5 and foot_force[leg] >= rule.slip_load:
                 slides = slides or v_foot[leg, 0] ** 2 + v_foot[leg, 1] ** 2 > rule.slip_speed**2
     rate = _LOSS if slides else -rule.recovery
-    return min(max(0.0, rule.mu - rule.mu_least), max(0.0, caution0 + rate * dt))
+    return min(max(0.0, rule.mu - rule.mu_min), max(0.0, caution0 + rate * dt))

@@ -9,9 +9,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from shared.jit import compiled
-from shared.record import record
-from shared.robot import Array
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.runtime.record import record
 
 SIZE: Final = 141
 LEVEL: Final = 102  # filtered height of the ground under the stance feet, m

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from agents.controller.load import loaded
-from agents.controller.rigid_body import link_table, rigid_body_terms
-from shared.a1_model import build_pinocchio_model
-from shared.record import record
-from shared.robot import Array, q_stand
+from quadriga.agents.controller.maths.rigid_body import link_table, rigid_body_terms
+from quadriga.agents.controller.payload_estimate import loaded
+from quadriga.shared.robot.a1 import Array, q_stand
+from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
+from quadriga.shared.runtime.record import record
 
 
 def _single_rigid_body(model: pin.Model) -> tuple[Array, Array]:

@@ -6,15 +6,23 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from agents.controller.contact import ContactRule, contacts_by_force, contacts_by_schedule
-from agents.controller.estimator import filter_step, foot_trust, noise_parameters
-from agents.controller.load import felt_load
-from agents.controller.memory import HALF, LEVEL, LOAD, Memory, filter_of, legs_of, swings_of
-from agents.controller.rotation import roll_pitch_yaw
-from shared.config import Config
-from shared.jit import compiled
-from shared.record import record
-from shared.robot import TOTAL_MASS, Array
+from quadriga.agents.controller.contact import ContactRule, contacts_by_force, contacts_by_schedule
+from quadriga.agents.controller.estimator import filter_step, foot_trust, noise_parameters
+from quadriga.agents.controller.maths.rotation import roll_pitch_yaw
+from quadriga.agents.controller.memory import (
+    HALF,
+    LEVEL,
+    LOAD,
+    Memory,
+    filter_of,
+    legs_of,
+    swings_of,
+)
+from quadriga.agents.controller.payload_estimate import felt_load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import TOTAL_MASS, Array
+from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.runtime.record import record
 
 SEEN_SIZE: Final = 72
 SWITCHED: Final = 67  # 1 if stances and swings have just ended
@@ -61,7 +69,7 @@ def foot_force_of(flat: Array) -> Array:
 
 
 @record
-class Seen:
+class Sensed:
     """What a robot sees of itself at one tick; `flat` is (72,) and not to be changed.
 
     Attributes:
@@ -108,13 +116,19 @@ def sensing_constants(config: Config) -> Array:
     controller, estimator = config.controller, config.estimator
     return np.array(
         [
-            estimator.trust_ramp, estimator.contact_force, float(controller.contact_detection),
-            controller.contact_force, 1e-3 * controller.lost_contact_ms,
+            estimator.trust_ramp,
+            estimator.contact_force,
+            float(controller.contact_detection),
+            controller.contact_force,
+            1e-3 * controller.lost_contact_ms,
             1e-3 * controller.ground_filter_ms,
-            controller.liftoff_hold_ms / config.gait.stance_ms, 1e-3 * controller.give_way_ms,
-            float(controller.tell_sides), controller.load_time, *noise_parameters(estimator),
+            controller.liftoff_hold_ms / config.gait.stance_ms,
+            1e-3 * controller.reflex_ms,
+            float(controller.reject_side_contacts),
+            controller.load_time,
+            *noise_parameters(estimator),
         ]
-    )  # fmt: skip
+    )
 
 
 @compiled
@@ -125,14 +139,19 @@ def sensors_of(row: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
 
 @compiled
 def sense(
-    memory0: Array, state: Array, schedule: Array, dt: float, constants: Array, memory: Array,
+    memory0: Array,
+    state: Array,
+    schedule: Array,
+    dt: float,
+    constants: Array,
+    memory: Array,
     seen: Array,
-) -> None:  # fmt: skip
+) -> None:
     """Estimate the trunk's state and the contacts.
 
     From the memory at the last tick, the row of a `State`, the gait's `Schedule.row` and the time
-    since the last tick, s, `memory` and `seen` are filled: see `Memory` and `Seen`. `constants` are
-    `sensing_constants`.
+    since the last tick, s, `memory` and `seen` are filled: see `Memory` and `Sensed`.
+    `constants` are `sensing_constants`.
     """
     q_joint, v_joint, quat, gyro, accel, foot_force = sensors_of(state)
     stance, progress = schedule[0:4], schedule[4]
@@ -143,17 +162,42 @@ def sense(
         mean0, covariance0, quat, gyro, accel, q_joint, v_joint, trust, constants[10:15], dt
     )
     place(
-        memory0, mean, covariance, quat, frame[:3], gyro, frame[3:], q_joint, v_joint, foot_force,
-        schedule, dt, constants, memory, seen,
-    )  # fmt: skip
+        memory0,
+        mean,
+        covariance,
+        quat,
+        frame[:3],
+        gyro,
+        frame[3:],
+        q_joint,
+        v_joint,
+        foot_force,
+        schedule,
+        dt,
+        constants,
+        memory,
+        seen,
+    )
 
 
 @compiled
 def place(
-    memory0: Array, mean: Array, covariance: Array, quat: Array, R: Array, omega: Array,
-    p_foot: Array, q_joint: Array, v_joint: Array, foot_force: Array, schedule: Array,
-    dt: float, constants: Array, memory: Array, seen: Array,
-) -> None:  # fmt: skip
+    memory0: Array,
+    mean: Array,
+    covariance: Array,
+    quat: Array,
+    R: Array,
+    omega: Array,
+    p_foot: Array,
+    q_joint: Array,
+    v_joint: Array,
+    foot_force: Array,
+    schedule: Array,
+    dt: float,
+    constants: Array,
+    memory: Array,
+    seen: Array,
+) -> None:
     """The same once the trunk is known: `mean` and `covariance` of the filter, R, its rate."""
     stance, progress, half = schedule[0:4], schedule[4], schedule[5]
     level0 = memory0[LEVEL]
@@ -179,19 +223,34 @@ def place(
     new_mean[:], new_covariance[:] = mean, covariance
     switched = half != memory0[HALF]
     seen[SWITCHED] = 1.0 if switched else 0.0
-    (by_force, least_force, lost_after, ground_filter, hold, give_way, tell_sides,
-     load_time) = constants[2:10]  # fmt: skip
+    (
+        by_force,
+        least_force,
+        lost_after,
+        ground_filter,
+        hold,
+        give_way,
+        reject_side_contacts,
+        load_time,
+    ) = constants[2:10]
     rate = dt / (ground_filter + dt)
     if by_force > 0.5:
-        rule = ContactRule(least_force, lost_after, hold, give_way, tell_sides > 0.5)
+        rule = ContactRule(least_force, lost_after, hold, give_way, reject_side_contacts > 0.5)
         legs, level = contacts_by_force(
-            legs_of(memory0), level0, switched, stance, progress, foot_force, p_foot[:, 2],
-            swings_of(memory), rule, rate, dt,
-        )  # fmt: skip
+            legs_of(memory0),
+            level0,
+            switched,
+            stance,
+            progress,
+            foot_force,
+            p_foot[:, 2],
+            swings_of(memory),
+            rule,
+            rate,
+            dt,
+        )
     else:
-        legs, level = contacts_by_schedule(
-            legs_of(memory0)[4], level0, stance, p_foot[:, 2], rate
-        )  # fmt: skip
+        legs, level = contacts_by_schedule(legs_of(memory0)[4], level0, stance, p_foot[:, 2], rate)
     legs_of(memory)[:] = legs
     memory[LEVEL], memory[HALF] = level, half
     if load_time > 0.0:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from agents.controller.kinematics import hip_neutral
-from agents.controller.rotation import heading
-from shared.jit import compiled
-from shared.robot import FOOT_RADIUS, Array
+from quadriga.agents.controller.maths.leg_kinematics import hip_neutral
+from quadriga.agents.controller.maths.rotation import heading
+from quadriga.shared.robot.a1 import FOOT_RADIUS, Array
+from quadriga.shared.runtime.jit import compiled
 
 _PLANE_DONE = 0.9  # of swing: the foot comes down vertically
 _PENETRATION = 0.005  # m below the expected ground, so that touchdown is felt
@@ -15,9 +15,16 @@ _PENETRATION = 0.005  # m below the expected ground, so that touchdown is felt
 
 @compiled
 def foothold(
-    leg: int, position: Array, velocity: Array, R: Array, v_des: Array, wz: float,
-    remaining: float, stance_time: float, gain: float,
-) -> Array:  # fmt: skip
+    leg: int,
+    position: Array,
+    velocity: Array,
+    R: Array,
+    v_des: Array,
+    wz: float,
+    remaining: float,
+    stance_time: float,
+    gain: float,
+) -> Array:
     """Raibert foothold p = p_hip + v·t_remaining + v·T_stance/2 + k (v − v_des). Shape (2,), m.
 
     `velocity`, `v_des` are the trunk's in the odometry frame; the hip's own velocity from the
@@ -55,9 +62,14 @@ def within_reach(
 
 @compiled
 def swing_reference(
-    start: Array, target: Array, ground: float, apex: float, progress: float, duration: float,
+    start: Array,
+    target: Array,
+    ground: float,
+    apex: float,
+    progress: float,
+    duration: float,
     delay: float,
-) -> Array:  # fmt: skip
+) -> Array:
     """Reference of one swing foot's centre. Shape (3, 3): rows position, velocity, acceleration.
 
     Args:

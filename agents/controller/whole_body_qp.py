@@ -19,9 +19,7 @@ from typing import Final
 import daqp
 import numpy as np
 
-from agents.controller.model import Terms
-from agents.controller.rotation import cross
-from agents.controller.small import (
+from quadriga.agents.controller.maths.dense import (
     add_gram,
     factorise,
     mirror,
@@ -30,9 +28,11 @@ from agents.controller.small import (
     times,
     transposed_times,
 )
-from shared.jit import compiled
-from shared.record import record
-from shared.robot import TORQUE_LIMIT, Array
+from quadriga.agents.controller.maths.rotation import cross
+from quadriga.agents.controller.model import Terms
+from quadriga.shared.robot.a1 import TORQUE_LIMIT, Array
+from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.runtime.record import record
 
 UNCONSTRAINED: Final = "unconstrained"
 MU: Final = 3  # place of the friction coefficient in `Weights.as_array`
@@ -72,14 +72,19 @@ class Weights:
         """As the compiled assembly takes them. Shape (7,)."""
         return np.array(
             [
-                self.gamma_tau, self.gamma_force, self.gamma_defect, self.mu, self.force_min,
-                self.tilt_length, self.swing_weight,
+                self.gamma_tau,
+                self.gamma_force,
+                self.gamma_defect,
+                self.mu,
+                self.force_min,
+                self.tilt_length,
+                self.swing_weight,
             ]
-        )  # fmt: skip
+        )
 
 
 @record
-class Problem:
+class WholeBodyProblem:
     """min ½ τᵀ H τ + gᵀ τ  s.t. |τ| ≤ τ_max, C τ ≥ c; the forces are f = A τ + a₀."""
 
     H: Array
@@ -93,7 +98,7 @@ class Problem:
 
 
 @record
-class Solution:
+class WholeBodySolution:
     """What came of the QP and how.
 
     Attributes:
@@ -128,23 +133,35 @@ class Solution:
         return not self.status.startswith("infeasible")
 
 
-def solve_goal(terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights) -> Solution:
+def solve_goal(
+    terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights
+) -> WholeBodySolution:
     """Build, solve, unpack; numbers beyond all bounds or a singular problem are no solution."""
     problem = build(terms, R, p_foot, goal, weights)
     return unpack(problem, goal.contact, *solve(problem))
 
 
-def build(terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights) -> Problem:
+def build(terms: Terms, R: Array, p_foot: Array, goal: Goal, weights: Weights) -> WholeBodyProblem:
     """Assemble the reduced QP at one instant."""
-    return Problem(
+    return WholeBodyProblem(
         *_assemble(
-            terms.M_inverse, terms.nle, terms.J, terms.dJ, terms.v, R, p_foot,
-            goal.contact, goal.trunk, goal.swing, goal.force, weights.as_array(),
+            terms.M_inverse,
+            terms.nle,
+            terms.J,
+            terms.dJ,
+            terms.v,
+            R,
+            p_foot,
+            goal.contact,
+            goal.trunk,
+            goal.swing,
+            goal.force,
+            weights.as_array(),
         )
-    )  # fmt: skip
+    )
 
 
-def solve(problem: Problem) -> tuple[Array, str]:
+def solve(problem: WholeBodyProblem) -> tuple[Array, str]:
     """The optimal torques and the status; the closed form where no limit is active."""
     tau, feasible = _unconstrained(problem.H, problem.g, problem.C, problem.c, TORQUE_LIMIT)
     if feasible:
@@ -165,18 +182,18 @@ def solve(problem: Problem) -> tuple[Array, str]:
     return np.clip(tau, -TORQUE_LIMIT, TORQUE_LIMIT), "constrained"
 
 
-def unpack(problem: Problem, contact: Array, tau: Array, status: str) -> Solution:
+def unpack(problem: WholeBodyProblem, contact: Array, tau: Array, status: str) -> WholeBodySolution:
     """Forces and defect that the torques imply."""
     x = np.zeros(42)
     _imply(problem.A, problem.a0, problem.B, problem.defect0, contact, tau, x)
-    return Solution(x, status, len(problem.defect0))
+    return WholeBodySolution(x, status, len(problem.defect0))
 
 
 @compiled
 def _imply(
     A: Array, a0: Array, B: Array, defect0: Array, contact: Array, tau: Array, x: Array
 ) -> None:
-    """Fill torques, forces and defect, see `Solution`."""
+    """Fill torques, forces and defect, see `WholeBodySolution`."""
     x[:12] = tau
     row = 0
     for leg in range(4):
@@ -225,10 +242,20 @@ def _foot_jacobian(
 
 @compiled
 def _assemble(
-    M_inverse: Array, nle: Array, J: Array, dJ: Array, v: Array, R: Array, p_foot: Array,
-    contact: Array, trunk: Array, swing: Array, force: Array, weights: Array,
-) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:  # fmt: skip
-    """H, g, C, c, A, a₀, B, b₀ − a_des of `Problem`; NaN where no slip cannot be had."""
+    M_inverse: Array,
+    nle: Array,
+    J: Array,
+    dJ: Array,
+    v: Array,
+    R: Array,
+    p_foot: Array,
+    contact: Array,
+    trunk: Array,
+    swing: Array,
+    force: Array,
+    weights: Array,
+) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:
+    """H, g, C, c, A, a₀, B, b₀ − a_des of `WholeBodyProblem`; NaN where no slip cannot be had."""
     gamma_tau, gamma_force, gamma_defect, mu, force_min, tilt_length, swing_weight = weights
     n_c = 0
     for leg in range(4):
@@ -307,10 +334,24 @@ def _assemble(
 
 @compiled
 def closed_form(
-    M_inverse: Array, nle: Array, J: Array, dJ: Array, v: Array, R: Array, p_foot: Array,
-    contact: Array, trunk: Array, swing: Array, force: Array, weights: Array, x: Array,
-) -> int:  # fmt: skip
-    """Fill `x`, see `Solution`, with the optimum without limits; its rows, 0 if it breaks any."""
+    M_inverse: Array,
+    nle: Array,
+    J: Array,
+    dJ: Array,
+    v: Array,
+    R: Array,
+    p_foot: Array,
+    contact: Array,
+    trunk: Array,
+    swing: Array,
+    force: Array,
+    weights: Array,
+    x: Array,
+) -> int:
+    """Fill `x`, see `WholeBodySolution`, with the optimum without limits.
+
+    Returns its rows, 0 if it breaks any.
+    """
     H, g, C, c, A, a0, B, defect0 = _assemble(
         M_inverse, nle, J, dJ, v, R, p_foot, contact, trunk, swing, force, weights
     )

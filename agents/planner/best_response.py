@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy import linalg
 
-from agents.planner.horizon import horizon_stance, phase_of, walking_steps
-from agents.planner.planner_qp import build_problem
-from agents.planner.predictor import Predictor
-from shared.config import Config
-from shared.robot import Array
+from quadriga.agents.planner.planner_qp import build_problem
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
 
 
 def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
@@ -29,10 +29,11 @@ def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
     rows = []
     for i, problem in enumerate(problems):
         coupling = [
-            np.zeros_like(problem.H) if i == j
+            np.zeros_like(problem.H)
+            if i == j
             else problem.gradient @ predictor.forced(i, j, phase)[:, problems[j].columns]
             for j in range(n)
-        ]  # fmt: skip
+        ]
         factor = linalg.cho_factor(problem.H)
         rows.append(-linalg.cho_solve(factor, np.concatenate(coupling, axis=1)))
     return np.concatenate(rows)

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.gait import NOMINAL_FORCES
-from agents.planner.planner_qp import Problem
-from agents.planner.plausible import OUTPUT_MAX
-from agents.planner.qp_solver import ClosedForm, unconstrained
-from shared.jit import compiled
-from shared.robot import N_FORCES, N_OUTPUTS, Array
+from quadriga.agents.gait import NOMINAL_FORCES
+from quadriga.agents.planner.planner_qp import PlannerProblem
+from quadriga.agents.planner.plausible import OUTPUT_MAX
+from quadriga.agents.planner.qp_solver import ClosedForm, unconstrained
+from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.runtime.jit import compiled
 
 
 class FreeStep:
@@ -26,7 +26,7 @@ class FreeStep:
         nominal: nominal forces of the horizon, (N, 12), N.
     """
 
-    def __init__(self, problem: Problem, closed: ClosedForm, nominal: Array) -> None:
+    def __init__(self, problem: PlannerProblem, closed: ClosedForm, nominal: Array) -> None:
         self.residuals = closed.residuals
         condensed = problem.condensed
         self._fixed = (
@@ -35,9 +35,15 @@ class FreeStep:
         )  # fmt: skip
 
     def plan(
-        self, u_ini: Array, y_ini: Array, stance_ini: NDArray[np.bool_], y_base_ini: Array,
-        y_base: Array, y_des: Array, effect: Array | float,
-    ) -> tuple[Array, Array, Array, Array] | None:  # fmt: skip
+        self,
+        u_ini: Array,
+        y_ini: Array,
+        stance_ini: NDArray[np.bool_],
+        y_base_ini: Array,
+        y_base: Array,
+        y_des: Array,
+        effect: Array | float,
+    ) -> tuple[Array, Array, Array, Array] | None:
         """The plan of `PlannerInputs` and the effect of `PeerTerms`.
 
         Returns:
@@ -52,11 +58,24 @@ class FreeStep:
 
 @compiled
 def _free_step(
-    u_ini: Array, y_ini: Array, stance_ini: NDArray[np.bool_], y_base_ini: Array, y_base: Array,
-    y_des: Array, effect: Array | float, Y_past: Array, gradient: Array, minus_inverse: Array,
-    lower: Array, upper: Array, slope: float, Y_v: Array, columns: NDArray[np.int64],
-    nominal: Array, nominal_table: Array,
-) -> tuple[Array, Array, bool]:  # fmt: skip
+    u_ini: Array,
+    y_ini: Array,
+    stance_ini: NDArray[np.bool_],
+    y_base_ini: Array,
+    y_base: Array,
+    y_des: Array,
+    effect: Array | float,
+    Y_past: Array,
+    gradient: Array,
+    minus_inverse: Array,
+    lower: Array,
+    upper: Array,
+    slope: float,
+    Y_v: Array,
+    columns: NDArray[np.int64],
+    nominal: Array,
+    nominal_table: Array,
+) -> tuple[Array, Array, bool]:
     """Forces u and du, (2, N, 12); outputs y and y_nominal, (2, N, 6); is the plan usable?"""
     T_ini, N = len(u_ini), len(y_des)
     past = np.empty(T_ini * (N_FORCES + N_OUTPUTS))

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
-from agents.planner.best_response import best_response_radius
-from agents.planner.episode import Y_SCALE, Episode
-from agents.planner.horizon import gait_phase, horizon_stance, phase_of, walking_steps
-from agents.planner.predictor import Predictor
-from agents.planner.regression import scaled_blocks
-from shared.config import Config, ControllerConfig
-from shared.errors import PredictorError
-from shared.robot import N_LEGS, N_OUTPUTS, OUTPUTS, TOTAL_MASS, Array
-from shared.topics import SAMPLE_MS
+from quadriga.agents.planner.best_response import best_response_radius
+from quadriga.agents.predictor.episode import Y_SCALE, Episode
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.predictor.regression import scaled_blocks
+from quadriga.agents.time_grid import gait_phase, horizon_stance, phase_of, walking_steps
+from quadriga.shared.config.sections import Config, ControllerConfig
+from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.a1 import N_LEGS, N_OUTPUTS, OUTPUTS, TOTAL_MASS, Array
+from quadriga.shared.wire.topics import SAMPLE_MS
 
 _GAIN_FORCE = 10.0  # N, on the robot looked at
 _GAIN_TIMES = (0.1, 0.25)  # s
@@ -89,25 +89,29 @@ class GateReport:
         """
         if not self.error < 1.0:
             raise PredictorError(
-                "predictor: held-out error", f"{self.error:.3f} of persistence", "below 1",
+                "predictor: held-out error",
+                f"{self.error:.3f} of persistence",
+                "below 1",
                 "too little data, or a plant that the data do not show; collect more",
-            )  # fmt: skip
+            )
         low, high = self.gain_limits
         for robot, row in enumerate(self.gains, start=1):
             for time, gain in zip(self.gain_times, row, strict=True):
                 if not low <= gain <= high:
                     raise PredictorError(
-                        f"predictor: height gain of r{robot} at {time:g} s", f"{gain:.2f}",
+                        f"predictor: height gain of r{robot} at {time:g} s",
+                        f"{gain:.2f}",
                         f"{low:g} … {high:g} of the physical response",
                         "forces in the data that follow the outputs (feedback bias), "
                         "or a controller stiffer than the interface assumes",
-                    )  # fmt: skip
+                    )
         if kind == "distributed" and not self.radius < self.radius_limit:
             raise PredictorError(
-                "predictor: radius of the best-response map", f"{self.radius:.3f}",
+                "predictor: radius of the best-response map",
+                f"{self.radius:.3f}",
                 f"below {self.radius_limit:g}",
                 "the agents' plans would diverge; raise identification.block_weight",
-            )  # fmt: skip
+            )
 
 
 def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode]) -> GateReport:
@@ -163,9 +167,11 @@ def held_out_error(
         count += windows
     if count == 0:
         raise PredictorError(
-            "held-out data", "no episode that long", f"at least {length} samples",
+            "held-out data",
+            "no episode that long",
+            f"at least {length} samples",
             "did every held-out walk end in a fall?",
-        )  # fmt: skip
+        )
     total = count * N * predictor.meta.robots
     rmse, persistence = np.sqrt(squares / total), np.sqrt(naive / total)
     ratio = np.linalg.norm(rmse / Y_SCALE) / np.linalg.norm(persistence / Y_SCALE)

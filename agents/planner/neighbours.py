@@ -15,14 +15,14 @@ from typing import Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.gait import nominal_forces, scheduled_stance
-from agents.planner.horizon import horizon_stance, patience, sample_starts, step_ms
-from agents.planner.plausible import plausible
-from shared.config import Config
-from shared.messages import Measurement, Message, Plan
-from shared.record import record
-from shared.robot import N_FORCES, N_OUTPUTS, Array, robot_names
-from shared.topics import SAMPLE_MS
+from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.planner.plausible import plausible
+from quadriga.agents.time_grid import horizon_stance, patience, sample_starts, step_ms
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array, robot_names
+from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.messages import Measurement, Message, Plan
+from quadriga.shared.wire.topics import SAMPLE_MS
 
 M = TypeVar("M", bound=Message)
 K = TypeVar("K", int, tuple[int, int])

@@ -8,13 +8,13 @@ from dataclasses import field
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.planner.coupling import Coupling, fill_deviations
-from agents.planner.horizon import horizon_stance, phase_of, place_in, walking_steps
-from agents.planner.neighbours import PeerData, Selection
-from agents.planner.predictor import Predictor
-from shared.config import Config
-from shared.record import record
-from shared.robot import Array
+from quadriga.agents.planner.neighbours import PeerData, Selection
+from quadriga.agents.predictor.coupling import Coupling, fill_deviations
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.runtime.record import record
 
 
 @record

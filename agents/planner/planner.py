@@ -8,18 +8,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.gait import nominal_forces
-from agents.planner.free_step import FreeStep
-from agents.planner.horizon import horizon_stance, phase_of, place_in, walking_steps
-from agents.planner.neighbours import Selection
-from agents.planner.peer_terms import Peers, PeerTerms
-from agents.planner.planner_qp import Problem, build_problem, unpack
-from agents.planner.plausible import plausible_outputs
-from agents.planner.predictor import Predictor, check_sizes
-from agents.planner.qp_solver import SOLVED, SOLVERS, Residuals, Solver, no_solution
-from shared.config import Config
-from shared.record import record
-from shared.robot import Array
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.planner.free_step import FreeStep
+from quadriga.agents.planner.neighbours import Selection
+from quadriga.agents.planner.peer_terms import Peers, PeerTerms
+from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem, unpack
+from quadriga.agents.planner.plausible import plausible_outputs
+from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS, Residuals, Solver, no_solution
+from quadriga.agents.predictor.predictor import Predictor, check_sizes
+from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.runtime.record import record
 
 PEER_LOST: Final = "peer-lost"
 IMPLAUSIBLE: Final = "implausible"
@@ -100,7 +100,7 @@ class PlanResult:
 class _Setup:
     """What one step of the gait's cycle needs; nominal forces of the horizon, (N, 12), N."""
 
-    problem: Problem
+    problem: PlannerProblem
     solver: Solver
     nominal: Array
     free: FreeStep | None
@@ -112,7 +112,7 @@ class Planner:
     Args:
         config: the team's configuration.
         index: this agent's place in the team, 0-based.
-        predictor: fitted for this team (see `agents.planner.store.load`).
+        predictor: fitted for this team (see `quadriga.agents.predictor.store.load`).
 
     Raises:
         PredictorError: the predictor's sizes are not the configuration's.
@@ -138,9 +138,12 @@ class Planner:
         return self._peers.terms(before, selection, step, y_base)
 
     def step(
-        self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms,
+        self,
+        state: PlannerState,
+        inputs: PlannerInputs,
+        peers: PeerTerms,
         G_ii: Array | None = None,
-    ) -> tuple[PlannerState, PlanResult]:  # fmt: skip
+    ) -> tuple[PlannerState, PlanResult]:
         """Plan the horizon of one planning step, or plan it again with the peers' newer terms.
 
         Args:
@@ -194,7 +197,7 @@ class Planner:
         )
         return PlannerState(inputs.step, du, state.solves + solves), result
 
-    def _damped(self, problem: Problem, x: Array, state: PlannerState, step: int) -> Array:
+    def _damped(self, problem: PlannerProblem, x: Array, state: PlannerState, step: int) -> Array:
         """A solution with a share of the last plan, whose forces past its end are nominal.
 
         Both satisfy the constraints on forces, which are convex, so their mixture does.
@@ -233,9 +236,14 @@ class Planner:
 def _unbounded(free: FreeStep, inputs: PlannerInputs, peers: PeerTerms) -> PlanResult | None:
     """The plan if no bound is active at the optimum."""
     plan = free.plan(
-        inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini, inputs.y_base,
-        inputs.y_des, peers.effect,
-    )  # fmt: skip
+        inputs.u_ini,
+        inputs.y_ini,
+        inputs.stance_ini,
+        inputs.y_base_ini,
+        inputs.y_base,
+        inputs.y_des,
+        peers.effect,
+    )
     if plan is None:
         return None
     return PlanResult(SOLVED, *plan, peers.used, peers.lost, free.residuals, 0)

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.gait import nominal_forces
-from shared.config import PlannerConfig
-from shared.robot import N_FORCES, N_OUTPUTS, Array
+from quadriga.agents.gait import nominal_forces
+from quadriga.shared.config.sections import PlannerConfig
+from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
 
 NO_BOUNDS = "none"
 HARD = "hard"
@@ -56,7 +56,7 @@ class Condensed:
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class PlannerProblem:
     """The QP of one stance pattern; its unknowns are v and, with soft output bounds, slacks.
 
     Attributes:
@@ -133,7 +133,7 @@ def condense(
 
 def build_problem(
     config: PlannerConfig, G_u: Array, stance: NDArray[np.bool_], G_past: Array | None = None
-) -> Problem:
+) -> PlannerProblem:
     """The QP of eq. 12 (one agent) or eq. 7 (a team) for one stance pattern of the horizon.
 
     Args:
@@ -146,7 +146,9 @@ def build_problem(
     return constrain(config, condense(config, past, G_u, stance), stance)
 
 
-def constrain(config: PlannerConfig, condensed: Condensed, stance: NDArray[np.bool_]) -> Problem:
+def constrain(
+    config: PlannerConfig, condensed: Condensed, stance: NDArray[np.bool_]
+) -> PlannerProblem:
     """Add friction cone, force bounds and output bounds to a cost.
 
     The cone is a pyramid inside it: |fx|, |fy| ≤ c fz with c = mu/√2 and f = nominal + v, so
@@ -180,7 +182,7 @@ def constrain(config: PlannerConfig, condensed: Condensed, stance: NDArray[np.bo
             nothing = np.full(slacks, np.inf)
             lower += [-nothing, -limit[bounded[:slacks]]]
             upper += [limit[bounded[:slacks]], nothing]
-    return Problem(
+    return PlannerProblem(
         condensed, H, columns, A, np.concatenate(lower), np.concatenate(upper), bounded, c
     )
 
@@ -205,7 +207,7 @@ def stance_columns(stance: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.flatnonzero(np.repeat(stance, 3, axis=1))
 
 
-def unpack(problem: Problem, x: Array, y_free: Array) -> tuple[Array, Array]:
+def unpack(problem: PlannerProblem, x: Array, y_free: Array) -> tuple[Array, Array]:
     """Force deviations (N n, 12), swing legs zero, and output deviations (N n, 6) of a solution."""
     v = x[: len(problem.columns)]
     dy = y_free + problem.condensed.Y_v @ v

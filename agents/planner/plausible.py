@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from shared.config import PlannerConfig
-from shared.robot import GRAVITY, TOTAL_MASS, Array
+from quadriga.shared.config.sections import PlannerConfig
+from quadriga.shared.robot.a1 import GRAVITY, TOTAL_MASS, Array
 
 # N, each component of each foot's: ten times the weight on one foot, several times what the motors
 # can press. A planner that is allowed deviations beyond that may tell of them.

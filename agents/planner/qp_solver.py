@@ -13,9 +13,9 @@ import numpy as np
 import osqp
 from scipy import linalg, sparse
 
-from agents.planner.planner_qp import Problem
-from shared.jit import compiled
-from shared.robot import Array
+from quadriga.agents.planner.planner_qp import PlannerProblem
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.runtime.jit import compiled
 
 SOLVED: Final = "solved"
 _FAR: Final = 1e30  # DAQP's infinity
@@ -45,7 +45,7 @@ class Residuals:
 
 
 @dataclass(frozen=True, slots=True)
-class Solution:
+class QpSolution:
     """What a solver answered; with any status but "solved" `x` is zero: no deviation."""
 
     status: str
@@ -69,16 +69,16 @@ class ClosedForm:
 
 
 class Solver(Protocol):
-    """Solves one `Problem` for any f and bounds; the answer does not depend on earlier solves."""
+    """Solves one `PlannerProblem` for any f and bounds; no answer depends on earlier solves."""
 
-    def __init__(self, problem: Problem) -> None: ...
+    def __init__(self, problem: PlannerProblem) -> None: ...
 
     @property
     def closed_form(self) -> ClosedForm | None:
         """What answers as `solve` does wherever its x keeps to the bounds; None: nothing does."""
         ...
 
-    def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> Solution:
+    def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> QpSolution:
         """The minimiser, or the reason why there is none. Never raises for a bad f.
 
         Args:
@@ -95,7 +95,7 @@ class DaqpSolver:
     Every solve starts from the empty active set, so that equal data give equal bits.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: PlannerProblem) -> None:
         self._problem = problem
         inverse = linalg.inv(problem.H)
         self._closed = ClosedForm(-inverse, Residuals(_inversion_error(problem.H, inverse), 0, 0))
@@ -105,9 +105,13 @@ class DaqpSolver:
         self._model = daqp.Model()
         self._model.settings = {"primal_tol": 1e-8}
         self._ready, _ = self._model.setup(
-            problem.H, np.zeros(len(problem.H)), problem.A,
-            np.minimum(problem.upper, _FAR), np.maximum(problem.lower, -_FAR), self._cold,
-        )  # fmt: skip
+            problem.H,
+            np.zeros(len(problem.H)),
+            problem.A,
+            np.minimum(problem.upper, _FAR),
+            np.maximum(problem.lower, -_FAR),
+            self._cold,
+        )
 
     @property
     def closed_form(self) -> ClosedForm | None:
@@ -116,7 +120,7 @@ class DaqpSolver:
         usable = exact and self._ready >= 0 and not len(self._problem.bounded)
         return self._closed if usable else None
 
-    def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> Solution:
+    def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> QpSolution:
         """See `Solver`."""
         if self._ready < 0:  # bounds that contradict each other are found at set-up
             return no_solution(self._problem, _DAQP_STATUS.get(self._ready, "failed"))
@@ -128,14 +132,13 @@ class DaqpSolver:
         if closed is not None:
             x, inside = unconstrained(closed.minus_inverse, f, low, high, self._problem.slope)
             if inside:
-                return Solution(SOLVED, x, self._free, closed.residuals, 0)
+                return QpSolution(SOLVED, x, self._free, closed.residuals, 0)
         if upper is None:
             self._model.update(f=f, sense=self._cold)
         else:
             self._model.update(
-                f=f, sense=self._cold,
-                bupper=np.minimum(high, _FAR), blower=np.maximum(low, -_FAR),
-            )  # fmt: skip
+                f=f, sense=self._cold, bupper=np.minimum(high, _FAR), blower=np.maximum(low, -_FAR)
+            )
         x, _, flag, info = self._model.solve()
         status = _DAQP_STATUS.get(flag, "failed")
         return judge(self._problem, f, x, info["lam"], status, int(info["iterations"]), low, high)
@@ -144,7 +147,7 @@ class DaqpSolver:
 class OsqpSolver:
     """Operator splitting, as in the paper; set up anew for each f so that nothing is carried."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: PlannerProblem) -> None:
         self._problem = problem
         self._P = sparse.csc_matrix(np.triu(problem.H))
         self._A = sparse.csc_matrix(np.vstack([np.eye(len(problem.H)), problem.A]))
@@ -154,7 +157,7 @@ class OsqpSolver:
         """See `Solver`: this one is to answer as the paper's does."""
         return None
 
-    def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> Solution:
+    def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> QpSolution:
         """See `Solver`."""
         if not np.isfinite(f).all():
             return no_solution(self._problem, "not-finite")
@@ -164,10 +167,18 @@ class OsqpSolver:
             return no_solution(self._problem, "infeasible")
         solver = osqp.OSQP()
         solver.setup(
-            self._P, f, self._A, low, high,
-            verbose=False, eps_abs=1e-8, eps_rel=1e-9, max_iter=20000,
-            adaptive_rho=1, adaptive_rho_interval=50,  # by iterations, never by time
-        )  # fmt: skip
+            self._P,
+            f,
+            self._A,
+            low,
+            high,
+            verbose=False,
+            eps_abs=1e-8,
+            eps_rel=1e-9,
+            max_iter=20000,
+            adaptive_rho=1,
+            adaptive_rho_interval=50,  # by iterations, never by time
+        )
         result = solver.solve(raise_error=False)
         status = result.info.status.replace(" ", "-")
         status = "infeasible" if status.startswith("primal-infeasible") else status
@@ -202,29 +213,39 @@ SOLVERS: Final[Mapping[str, type[Solver]]] = MappingProxyType(
 )
 
 
-def no_solution(problem: Problem, status: str) -> Solution:
+def no_solution(problem: PlannerProblem, status: str) -> QpSolution:
     """The typed answer "no solution" with its reason."""
     worst = Residuals(np.inf, np.inf, np.inf)
-    return Solution(status, np.zeros(len(problem.H)), np.zeros(len(problem.upper)), worst, 0)
+    return QpSolution(status, np.zeros(len(problem.H)), np.zeros(len(problem.upper)), worst, 0)
 
 
 def judge(
-    problem: Problem, f: Array, v: Array, multipliers: Array, status: str, iterations: int,
-    lower: Array | None = None, upper: Array | None = None,
-) -> Solution:  # fmt: skip
+    problem: PlannerProblem,
+    f: Array,
+    v: Array,
+    multipliers: Array,
+    status: str,
+    iterations: int,
+    lower: Array | None = None,
+    upper: Array | None = None,
+) -> QpSolution:
     """Hold a solver's claim against the conditions of optimality; what fails is "inaccurate"."""
     if status != SOLVED:
         return no_solution(problem, status)
     found = residuals(problem, f, v, multipliers, lower, upper)
     if not (found.primal <= _MAX_VIOLATION and found.stationarity <= _MAX_STATIONARITY):
         return replace(no_solution(problem, "inaccurate"), residuals=found)
-    return Solution(SOLVED, v, multipliers, found, iterations)
+    return QpSolution(SOLVED, v, multipliers, found, iterations)
 
 
 def residuals(
-    problem: Problem, f: Array, v: Array, multipliers: Array,
-    lower: Array | None = None, upper: Array | None = None,
-) -> Residuals:  # fmt: skip
+    problem: PlannerProblem,
+    f: Array,
+    v: Array,
+    multipliers: Array,
+    lower: Array | None = None,
+    upper: Array | None = None,
+) -> Residuals:
     """Karush-Kuhn-Tucker residuals; positive multipliers belong to upper bounds."""
     low = problem.lower if lower is None else lower
     high = problem.upper if upper is None else upper

@@ -15,12 +15,12 @@ from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateCha
 from quadriga.export.layout import Layout
 from quadriga.export.protobuf import ProtobufType, type_of
 from quadriga.export.scene import Scene, path_ticks, stamp_of
-from quadriga.export.source import Item, Source
+from quadriga.export.source import ExportedMessage, Source
 from quadriga.export.tracking import NAMES, Tracking
 from quadriga.export.written import Progress
-from quadriga.poses import Poses, read_poses, truth_ticks
-from shared.messages import Event, Measurement, Message, Truth
-from shared.topics import MEASUREMENT, TRUTH
+from quadriga.pictures.poses import Poses, read_poses, truth_ticks
+from quadriga.shared.wire.messages import Event, Measurement, Message, Truth
+from quadriga.shared.wire.topics import MEASUREMENT, TRUTH
 
 _PICTURE: Final = 10  # ms, least time between two poses of the team
 _WARNINGS: Final = ("fall", "fault")
@@ -78,7 +78,7 @@ class _Scalars:
         self._tracking = Tracking(source.recording) if MEASUREMENT.name in source.topics else None
         self._tracked = ProtobufType("Tracking", [("tick", int)], [], NAMES)
 
-    def log(self, item: Item, time: int) -> None:
+    def log(self, item: ExportedMessage, time: int) -> None:
         message, layout = item.message, item.layout
         kind = self._types.get(layout.kind)
         if kind is None:
@@ -142,6 +142,8 @@ def _plain(message: Message, layout: Layout) -> dict[str, object]:
 def _said(event: Event) -> fox.Log:
     level = fox.LogLevel.Warning if event.kind in _WARNINGS else fox.LogLevel.Info
     return fox.Log(
-        timestamp=stamp_of(event.tick), level=level, name=event.robot or "world",
+        timestamp=stamp_of(event.tick),
+        level=level,
+        name=event.robot or "world",
         message=f"{event.kind}: {event.detail}",
-    )  # fmt: skip
+    )

@@ -9,10 +9,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from shared.config import Config
-from shared.messages import Message
-from shared.robot import JOINT_NAMES, OUTPUTS, Array, Leg, robot_names
-from shared.yokes import yoke_pairs
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.yokes import yoke_pairs
+from quadriga.shared.robot.a1 import JOINT_NAMES, OUTPUTS, Array, Leg, robot_names
+from quadriga.shared.wire.messages import Message
 
 LEGS: Final = tuple(leg.name for leg in Leg)
 JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)

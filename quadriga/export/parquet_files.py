@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from quadriga.export.source import Item, Source
+from quadriga.export.source import ExportedMessage, Source
 from quadriga.export.tables import Columns, build_columns, rows
 from quadriga.export.written import Progress, file_of
 
@@ -45,7 +45,7 @@ class _Table:
         self._writer = pq.ParquetWriter(path, self._schema, compression="zstd")
         self._rows: list[tuple[list[Any], list[float], list[list[float]]]] = []
 
-    def append(self, item: Item) -> None:
+    def append(self, item: ExportedMessage) -> None:
         self._rows.extend(rows(item))
         if len(self._rows) >= _BATCH:
             self._flush()

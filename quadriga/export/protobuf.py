@@ -11,14 +11,16 @@ import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
 from quadriga.export.layout import Layout
-from shared.robot import Array
+from quadriga.shared.robot.a1 import Array
 
 _PACKAGE: Final = "quadriga"
 _SAMPLES: Final = "samples"
 _Field: Final = descriptor_pb2.FieldDescriptorProto
 _TYPES: Final[Mapping[type, int]] = {
-    int: _Field.TYPE_INT64, float: _Field.TYPE_DOUBLE, str: _Field.TYPE_STRING,
-}  # fmt: skip
+    int: _Field.TYPE_INT64,
+    float: _Field.TYPE_DOUBLE,
+    str: _Field.TYPE_STRING,
+}
 _MARK: Final = 0x41235EEDABCD0000  # of a double that nothing else in a message looks like
 
 
@@ -29,9 +31,13 @@ class ProtobufType:
     """
 
     def __init__(
-        self, name: str, plain: Sequence[tuple[str, type]], lists: Sequence[str],
-        numbers: Sequence[str], samples: Sequence[str] = (),
-    ) -> None:  # fmt: skip
+        self,
+        name: str,
+        plain: Sequence[tuple[str, type]],
+        lists: Sequence[str],
+        numbers: Sequence[str],
+        samples: Sequence[str] = (),
+    ) -> None:
         """Declare the type.
 
         Args:

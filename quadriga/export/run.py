@@ -12,9 +12,9 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 from quadriga.export.source import Source
 from quadriga.export.written import remove
-from shared.clock import monotonic
-from shared.errors import ConfigError, RecordingError
-from shared.recording import Recording
+from quadriga.shared.errors import ConfigError, RecordingError
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.clock import monotonic
 
 _WRITERS: Final = {  # module, function, what the default output is called
     "foxglove": ("foxglove_file", "write_foxglove", "{}.foxglove.mcap"),
@@ -44,16 +44,24 @@ def run(path: Path, form: str, out: Path | None, console: Console) -> None:
     write = _imported(module, function, form)
     out = out or path.with_name(name.format(path.stem))
     if out.exists():
-        raise ConfigError("--output", f"{out}, which exists", "a new file or folder",
-                          "an export overwrites nothing")  # fmt: skip
+        raise ConfigError(
+            "--output",
+            f"{out}, which exists",
+            "a new file or folder",
+            "an export overwrites nothing",
+        )
     begun = monotonic()
     source = Source(recording)
     if not source.topics:
         raise RecordingError(str(path), "no message of a known topic", "a recorded walk")
     bar = Progress(
-        TextColumn("exporting"), BarColumn(), TextColumn("{task.completed:.1f}/{task.total:.1f} s"),
-        console=console, transient=True, disable=not console.is_terminal,
-    )  # fmt: skip
+        TextColumn("exporting"),
+        BarColumn(),
+        TextColumn("{task.completed:.1f}/{task.total:.1f} s"),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
     with bar:
         task = bar.add_task("", total=source.last / 1000)
         shown = 0
@@ -84,8 +92,10 @@ def run(path: Path, form: str, out: Path | None, console: Console) -> None:
     lines = [f"{out}{count}, {size / 1e6:.1f} MB in {monotonic() - begun:.1f} s"]
     if recording.cut:
         lines.append(f"only as far as the recording goes: {recording.cut}")
-    lines += [f"left out {many} messages of {key}: not a valid message of a known topic"
-              for key, many in sorted(source.left_out.items())]  # fmt: skip
+    lines += [
+        f"left out {many} messages of {key}: not a valid message of a known topic"
+        for key, many in sorted(source.left_out.items())
+    ]
     for line in lines:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
 
@@ -95,6 +105,8 @@ def _imported(module: str, function: str, form: str) -> Any:
         return getattr(import_module(f"quadriga.export.{module}"), function)
     except ModuleNotFoundError as error:
         raise ConfigError(
-            f"--to {form}", f"no Python package {error.name}", "the extra 'export'",
+            f"--to {form}",
+            f"no Python package {error.name}",
+            "the extra 'export'",
             "pip install -e '.[export]' in the project's folder",
-        ) from None  # fmt: skip
+        ) from None

@@ -9,11 +9,11 @@ import foxglove.messages as fox
 import mujoco
 import numpy as np
 
-from quadriga.poses import PosedTeam
-from quadriga.truth_trace import Ticks
-from shared.config import Config
-from shared.robot import Array
-from sim_server.terrain import Terrain
+from quadriga.pictures.poses import PosedTeam
+from quadriga.recordings.truth import Ticks
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
+from quadriga.sim_server.terrain.terrain import Terrain
 
 WORLD: Final = "world"
 _NEWTON: Final = 0.002  # m of arrow per N
@@ -51,13 +51,15 @@ class Scene:
         return fox.FrameTransforms(
             transforms=[
                 fox.FrameTransform(
-                    timestamp=stamp, parent_frame_id=WORLD, child_frame_id=link,
+                    timestamp=stamp,
+                    parent_frame_id=WORLD,
+                    child_frame_id=link,
                     translation=fox.Vector3(x=x, y=y, z=z),
                     rotation=fox.Quaternion(w=qw, x=qx, y=qy, z=qz),
                 )
                 for link, (x, y, z), (qw, qx, qy, qz) in poses
             ]
-        )  # fmt: skip
+        )
 
     def bodies(self, tick: int) -> fox.SceneUpdate:
         """What the links look like; drawn once, they move with their frames."""
@@ -69,10 +71,15 @@ class Scene:
             if shapes:
                 entities.append(
                     fox.SceneEntity(
-                        timestamp=stamp_of(tick), frame_id=link, id=link, frame_locked=True,
-                        cubes=shapes.cubes, spheres=shapes.spheres, cylinders=shapes.cylinders,
+                        timestamp=stamp_of(tick),
+                        frame_id=link,
+                        id=link,
+                        frame_locked=True,
+                        cubes=shapes.cubes,
+                        spheres=shapes.spheres,
+                        cylinders=shapes.cylinders,
                     )
-                )  # fmt: skip
+                )
         return fox.SceneUpdate(entities=entities)
 
     def terrain(self, tick: int, path: Array) -> fox.SceneUpdate:
@@ -85,9 +92,11 @@ class Scene:
         x, y = np.meshgrid(*(np.arange(low[k], high[k], _CELL) for k in (0, 1)))
         points = np.stack([x, y, terrain.height(x, y)], axis=-1).reshape(-1, 3)
         surface = fox.TriangleListPrimitive(
-            pose=_pose(), color=_GROUND, indices=_triangles(*x.shape).tolist(),
+            pose=_pose(),
+            color=_GROUND,
+            indices=_triangles(*x.shape).tolist(),
             points=[fox.Point3(x=a, y=b, z=c) for a, b, c in points.tolist()],
-        )  # fmt: skip
+        )
         entity = fox.SceneEntity(
             timestamp=stamp_of(tick), frame_id=WORLD, id="terrain", triangles=[surface]
         )
@@ -98,9 +107,12 @@ class Scene:
         anchors = self._anchors()
         points = [_point(anchors[i]) for pair in self._yokes for i in pair]
         lines = fox.LinePrimitive(
-            type=fox.LinePrimitiveLineType.LineList, pose=_pose(), thickness=0.02, points=points,
+            type=fox.LinePrimitiveLineType.LineList,
+            pose=_pose(),
+            thickness=0.02,
+            points=points,
             color=_YOKE,
-        )  # fmt: skip
+        )
         stamp = stamp_of(tick)
         return fox.SceneUpdate(
             entities=[
@@ -122,10 +134,13 @@ class Scene:
             if size >= _LEAST:
                 length = _NEWTON * size
                 yield fox.ArrowPrimitive(
-                    pose=_pose(foot, _along(force / size)), shaft_length=0.8 * length,
-                    shaft_diameter=0.012, head_length=0.2 * length, head_diameter=0.03,
+                    pose=_pose(foot, _along(force / size)),
+                    shaft_length=0.8 * length,
+                    shaft_diameter=0.012,
+                    head_length=0.2 * length,
+                    head_diameter=0.03,
                     color=_FORCE,
-                )  # fmt: skip
+                )
 
 
 class _Shapes:

@@ -8,16 +8,16 @@ from dataclasses import fields
 from typing import NamedTuple
 
 from quadriga.export.layout import Layout, build_layout
-from shared.codec import decode
-from shared.errors import MessageError
-from shared.messages import Message
-from shared.recording import Recording
-from shared.recording_config import recorded_config
-from shared.robot import Array
-from shared.topics import TABLE, topic_of
+from quadriga.shared.errors import MessageError
+from quadriga.shared.recording.config import recorded_config
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Message
+from quadriga.shared.wire.topics import TABLE, topic_of
 
 
-class Item(NamedTuple):
+class ExportedMessage(NamedTuple):
     """One decoded message: where it was published, and its numbers by `layout`."""
 
     name: str  # the key without the team
@@ -69,13 +69,14 @@ class Source:
                     found[topic.type, name] |= getattr(message, name).keys()
         self.layouts = {
             kind: build_layout(
-                kind, self.config,
+                kind,
+                self.config,
                 {name: tuple(sorted(found[kind, name])) for name in maps[topic_name]},
             )
             for topic_name, kind in kinds.items()
-        }  # fmt: skip
+        }
 
-    def items(self) -> Iterator[Item]:
+    def items(self) -> Iterator[ExportedMessage]:
         """All messages that can be exported, in the order of the recording."""
         self.left_out.clear()
         for key, _, log_time_ns, payload in self.recording.entries():
@@ -90,4 +91,6 @@ class Source:
             if numbers is None or not len(numbers):
                 self.left_out[key] += 1
                 continue
-            yield Item(key.partition("/")[2], robot, log_time_ns, message, layout, numbers)
+            yield ExportedMessage(
+                key.partition("/")[2], robot, log_time_ns, message, layout, numbers
+            )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from quadriga.export.layout import Layout
-from quadriga.export.source import Item
+from quadriga.export.source import ExportedMessage
 
 TIMES: Final = ("tick", "stamp_ns", "log_time_ns")
 SAMPLE: Final = "sample"
@@ -49,7 +49,7 @@ def build_columns(layout: Layout, robot: str) -> Columns:
     )
 
 
-def rows(item: Item) -> Iterator[tuple[list[Any], list[float], list[list[float]]]]:
+def rows(item: ExportedMessage) -> Iterator[tuple[list[Any], list[float], list[list[float]]]]:
     """Rows of one message: values of `head`, `numbers` and `lists`."""
     message, layout = item.message, item.layout
     times = [message.tick, message.stamp_ns, item.log_time_ns]

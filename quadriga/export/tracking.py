@@ -6,12 +6,12 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.figures import stitched
-from quadriga.traces import in_force, read_traces
-from quadriga.truth_trace import Ticks
-from shared.recording import Recording
-from shared.robot import OUTPUTS, Array
-from shared.topics import MEASUREMENT, PLAN, REFERENCE, SAMPLE_MS, TRUTH
+from quadriga.pictures.figures import stitched
+from quadriga.recordings.traces import in_force, read_traces
+from quadriga.recordings.truth import Ticks
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import OUTPUTS, Array
+from quadriga.shared.wire.topics import MEASUREMENT, PLAN, REFERENCE, SAMPLE_MS, TRUTH
 
 NAMES: Final = (
     *(f"{what}.{output}" for what in ("true", "estimated", "planned") for output in OUTPUTS),
@@ -35,10 +35,11 @@ class Tracking:
             tick, estimated = traces.measurements[robot].tick, traces.measurements[robot].y
             begin, _, planned = stitched(traces.plans[robot], traces.config.planner.applied)
             rows = [
-                _at(tick, traces.truth.tick, traces.truth.y[:, i]), estimated,
+                _at(tick, traces.truth.tick, traces.truth.y[:, i]),
+                estimated,
                 _at(tick, np.rint(1000 * begin).astype(np.int64) + SAMPLE_MS, planned),
                 in_force(traces.references, tick),
-            ]  # fmt: skip
+            ]
             self._rows[robot] = tick, np.concatenate(rows, axis=1)
 
     def row(self, robot: str, tick: int) -> Array | None:

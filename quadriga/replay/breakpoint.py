@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from agents.agent import Agent, AgentState, Inputs
-from shared.messages import Message
+from quadriga.agents.agent import Agent, AgentState, Inputs
+from quadriga.shared.wire.messages import Message
 
 
 def stop_here(

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from agents.agent import Agent
-from shared.config import CENTRAL, Config
-from shared.config_file import build, overlaid
-from shared.config_text import departures
-from shared.errors import ConfigError
+from quadriga.agents.agent import Agent
+from quadriga.shared.config.load import build, overlaid
+from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.write import departures
+from quadriga.shared.errors import ConfigError
 
 
 def changed_config(config: Config, given: Mapping[str, Any]) -> Config:
@@ -47,9 +47,15 @@ def check_change(old: Agent, new: Agent) -> None:
     central = [config.planner.kind in CENTRAL for config in (was, now)]
     if central[0] != central[1] or unheard:
         raise ConfigError(
-            "planner.kind", repr(now.planner.kind), f"one like the recorded {was.planner.kind!r}",
+            "planner.kind",
+            repr(now.planner.kind),
+            f"one like the recorded {was.planner.kind!r}",
             f"the agent had taken in no plans of {', '.join(unheard) or 'such a planner'}",
-        )  # fmt: skip
+        )
     if now.estimator.kind == "truth" != was.estimator.kind:
-        raise ConfigError("estimator.kind", "'truth'", f"{was.estimator.kind!r} as recorded",
-                          "the agent had not taken in the truth")  # fmt: skip
+        raise ConfigError(
+            "estimator.kind",
+            "'truth'",
+            f"{was.estimator.kind!r} as recorded",
+            "the agent had not taken in the truth",
+        )

@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from shared.errors import RecordingError
-from shared.messages import Command, Measurement, Message, Plan
-from shared.robot import JOINT_NAMES, OUTPUTS, Array, Leg
-from shared.topics import SAMPLE_MS
+from quadriga.shared.errors import RecordingError
+from quadriga.shared.robot.a1 import JOINT_NAMES, OUTPUTS, Array, Leg
+from quadriga.shared.wire.messages import Command, Measurement, Message, Plan
+from quadriga.shared.wire.topics import SAMPLE_MS
 
 _BLUE, _ORANGE = "#1f77b4", "#e6550d"
 _TINY: Final = 1e-9
@@ -27,9 +27,11 @@ _NAMES: Final = {
     "torque": [f"{name.removesuffix('_joint')} [N·m]" for name in JOINT_NAMES],
 }
 _TITLES: Final = {
-    "force": "planned force", "plan": "planned output", "output": "estimated output",
+    "force": "planned force",
+    "plan": "planned output",
+    "output": "estimated output",
     "torque": "motor torque",
-}  # fmt: skip
+}
 
 
 class Curves:
@@ -104,16 +106,21 @@ def _fill(both: Axes, apart: Axes, curves: Curves, kind: str) -> None:
         return
     style: Any = "steps-post" if kind == "force" else "default"
     for values, colour, width, label in (
-        (old, _BLUE, 1.4, "recorded"), (new, _ORANGE, 0.9, "recomputed"),
-    ):  # fmt: skip
-        both.plot(time, values[:, column], color=colour, linewidth=width, drawstyle=style,
-                  label=label)  # fmt: skip
+        (old, _BLUE, 1.4, "recorded"),
+        (new, _ORANGE, 0.9, "recomputed"),
+    ):
+        both.plot(
+            time, values[:, column], color=colour, linewidth=width, drawstyle=style, label=label
+        )
     difference = new[:, column] - old[:, column]
     apart.plot(time, difference, color="0.25", linewidth=0.9, drawstyle=style)
     worst = int(np.abs(difference).argmax())
     rms = float(np.sqrt(np.mean(difference**2)))
     apart.set_title(
         f"recomputed − recorded: at most {abs(difference[worst]):.3g}, at {time[worst]:.2f} s; "
-        f"rms {rms:.3g}" if difference.any() else "the same",
-        loc="left", fontsize="small",
-    )  # fmt: skip
+        f"rms {rms:.3g}"
+        if difference.any()
+        else "the same",
+        loc="left",
+        fontsize="small",
+    )

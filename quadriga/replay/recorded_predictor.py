@@ -10,12 +10,12 @@ from typing import Final
 
 import numpy as np
 
-from agents.planner.predictor import Predictor
-from agents.planner.store import predictor_sha256, read
-from shared.config import CENTRAL, Config
-from shared.errors import PredictorError, RecordingError
-from shared.places import cache_dir
-from shared.recording import Recording
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.predictor.store import predictor_sha256, read
+from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.errors import PredictorError, RecordingError
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.places import cache_dir
 
 PREDICTOR: Final = "predictor.npz"  # its name in a run folder
 
@@ -51,9 +51,11 @@ def recorded_predictor(
     if config.planner.kind in ("none", *CENTRAL):
         if given is not None:
             raise PredictorError(
-                f"--predictor {given}", f"planner.kind {config.planner.kind!r}",
-                "agents that plan for themselves", "the recorded ones had no predictor",
-            )  # fmt: skip
+                f"--predictor {given}",
+                f"planner.kind {config.planner.kind!r}",
+                "agents that plan for themselves",
+                "the recorded ones had no predictor",
+            )
         return None, True
     sha256 = recording.metadata.get("predictor_sha256", "")
     if given is not None:
@@ -65,10 +67,12 @@ def recorded_predictor(
             return read(path)[0], True
     wanted = f"with digest {sha256[:16]}…" if sha256 else "of unknown digest"
     raise PredictorError(
-        f"predictor of {recording.path}", f"none in {beside.parent} or {cache_dir()}",
+        f"predictor of {recording.path}",
+        f"none in {beside.parent} or {cache_dir()}",
         f"the one the team walked with, {wanted}",
-        f"give it with --predictor FILE: `quadriga walk` leaves it in its run folder as {PREDICTOR}"
-    )  # fmt: skip
+        "give it with --predictor FILE: `quadriga walk` leaves it in its run folder as "
+        f"{PREDICTOR}",
+    )
 
 
 def _digest(path: Path) -> str:

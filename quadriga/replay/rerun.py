@@ -7,15 +7,15 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from agents.agent import Agent, AgentState, Inputs, Outputs
-from agents.arrivals import order_of
-from quadriga.difference import Difference, difference
-from quadriga.replay.feed import Feed
-from quadriga.replay.tape import Serial, Tape
-from shared.codec import decode, encode
-from shared.errors import MessageError
-from shared.messages import Message
-from shared.topics import COMMAND, MEASUREMENT, PLAN, TABLE, Topic
+from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
+from quadriga.agents.inbox.inbox import order_of
+from quadriga.replay.agent_log import AgentLog, Serial
+from quadriga.replay.difference import Difference, difference
+from quadriga.replay.intake import Feed
+from quadriga.shared.errors import MessageError
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Message
+from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, TABLE, Topic
 
 # In the order in which one follows from the other within a step.
 COMPARED = (MEASUREMENT, PLAN, COMMAND)
@@ -38,7 +38,7 @@ class Step:
 
 
 @dataclass(slots=True)
-class Verdict:
+class ReplayVerdict:
     """What a replay found.
 
     Attributes:
@@ -66,9 +66,12 @@ class Verdict:
 
 
 def rerun(
-    agent: Agent, feed: Feed, note: Callable[[Step], None],
-    missed: Callable[[int, str], bool], look: Callable[[AgentState, Inputs], None],
-) -> None:  # fmt: skip
+    agent: Agent,
+    feed: Feed,
+    note: Callable[[Step], None],
+    missed: Callable[[int, str], bool],
+    look: Callable[[AgentState, Inputs], None],
+) -> None:
     """Step the agent over everything it took in.
 
     Args:
@@ -107,9 +110,11 @@ class Comparison:
         pair: given each two messages that differ or not, if anyone wants to see them.
     """
 
-    def __init__(self, tape: Tape, pair: Callable[[Message, Message], None] | None = None) -> None:
+    def __init__(
+        self, tape: AgentLog, pair: Callable[[Message, Message], None] | None = None
+    ) -> None:
         self._said, self._pair = tape.said, pair
-        self.verdict = Verdict()
+        self.verdict = ReplayVerdict()
 
     def recorded(self, tick: int) -> dict[str, Message]:
         """What was recorded of a step that is still to be noted, by topic."""
@@ -140,7 +145,7 @@ class Comparison:
                     verdict.first = difference(tick, topic.name, recorded[0], message)
                     verdict.step = step
 
-    def finish(self) -> Verdict:
+    def finish(self) -> ReplayVerdict:
         """The verdict, with messages counted that were recorded but are not recomputed."""
         verdict = self.verdict
         for (name, *_), payloads in sorted(self._said.items()):

@@ -14,27 +14,27 @@ from typing import Any, Final
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from agents.agent import Agent, AgentState, Inputs
-from agents.arrivals import Arrivals
+from quadriga.agents.agent import Agent, AgentState, Inputs
+from quadriga.agents.inbox.inbox import Inbox
+from quadriga.replay.agent_log import read_tape
 from quadriga.replay.breakpoint import stop_here
 from quadriga.replay.changed import changed_config, changes, check_change
-from quadriga.replay.feed import Feed
 from quadriga.replay.figure import Curves, draw
+from quadriga.replay.intake import Feed
 from quadriga.replay.recorded_predictor import recorded_predictor
-from quadriga.replay.rerun import Comparison, Verdict, rerun
+from quadriga.replay.rerun import Comparison, ReplayVerdict, rerun
 from quadriga.replay.saved_qp import PLANNER, WHOLE_BODY, captured, save
-from quadriga.replay.tape import read_tape
 from quadriga.replay.text import in_short
+from quadriga.shared.errors import ConfigError, QuadrigaError, RecordingError
+from quadriga.shared.recording.config import recorded_config
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.wire.messages import Message
+from quadriga.shared.wire.topics import PLAN
 from quadriga.warm_up import warm_up
 from quadriga.workers import each_done
-from shared.blas import one_blas_thread
-from shared.clock import monotonic
-from shared.errors import ConfigError, QuadrigaError, RecordingError
-from shared.messages import Message
-from shared.recording import Recording
-from shared.recording_config import recorded_config
-from shared.robot import robot_names
-from shared.topics import PLAN
 
 _JOBS: Final = 2  # robots side by side
 _SHOWN_EVERY: Final = 100  # ticks
@@ -44,7 +44,7 @@ Look = Callable[[Agent, AgentState, Inputs, Mapping[str, Message]], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class ReplayJob:
     """One robot's replay.
 
     Attributes:
@@ -63,7 +63,7 @@ class Job:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class ReplayOutcome:
     """What came of one robot's replay.
 
     Attributes:
@@ -77,7 +77,7 @@ class Outcome:
     """
 
     robot: str
-    verdict: Verdict
+    verdict: ReplayVerdict
     changed: str
     seconds: float
     wall: float
@@ -91,9 +91,13 @@ class Outcome:
 
 
 def replay(
-    path: Path, robots: tuple[str, ...], given: Mapping[str, Any], predictor: Path | None,
-    out: Path | None, console: Console,
-) -> list[Outcome]:  # fmt: skip
+    path: Path,
+    robots: tuple[str, ...],
+    given: Mapping[str, Any],
+    predictor: Path | None,
+    out: Path | None,
+    console: Console,
+) -> list[ReplayOutcome]:
     """Replay robots of a recording; their outcomes in the team's order.
 
     Args:
@@ -111,7 +115,7 @@ def replay(
     """
     config = recorded_config(Recording(path))
     jobs = [
-        Job(path, robot, given, predictor, _folder(path, out))
+        ReplayJob(path, robot, given, predictor, _folder(path, out))
         for robot in _known(robots, robot_names(config.team.robots))
     ]
     warm_up(config, console)
@@ -128,14 +132,18 @@ def replay(
     for _, outcome in found:
         if isinstance(outcome, QuadrigaError):
             raise outcome
-    outcomes = {job.robot: outcome for job, outcome in found if isinstance(outcome, Outcome)}
+    outcomes = {job.robot: outcome for job, outcome in found if isinstance(outcome, ReplayOutcome)}
     return [outcomes[job.robot] for job in jobs]
 
 
 def break_in(
-    path: Path, robot: str, given: Mapping[str, Any], predictor: Path | None, out: Path | None,
+    path: Path,
+    robot: str,
+    given: Mapping[str, Any],
+    predictor: Path | None,
+    out: Path | None,
     seconds: float,
-) -> Outcome:  # fmt: skip
+) -> ReplayOutcome:
     """Replay one robot with a stop in the debugger before the step at a time, s.
 
     Raises:
@@ -146,7 +154,7 @@ def break_in(
     if not isfinite(seconds):
         raise ConfigError("--break", f"{seconds}", "a time [s]")
     _known((robot,), robot_names(recorded_config(Recording(path)).team.robots))
-    job = Job(path, robot, given, predictor, _folder(path, out))
+    job = ReplayJob(path, robot, given, predictor, _folder(path, out))
     try:
         return replay_one(job, look=stop_here, at=round(1000 * seconds))
     except bdb.BdbQuit:
@@ -154,8 +162,8 @@ def break_in(
 
 
 def replay_one(
-    job: Job, show: Show = lambda doing, tick: None, look: Look | None = None, at: int = 0
-) -> Outcome:
+    job: ReplayJob, show: Show = lambda doing, tick: None, look: Look | None = None, at: int = 0
+) -> ReplayOutcome:
     """Replay one robot.
 
     Args:
@@ -178,7 +186,7 @@ def replay_one(
     changed = changes(config, new) + ("" if own else f" predictor {job.predictor}")
     agent = Agent(new, job.robot, predictor) if changed else recorded_agent
     check_change(recorded_agent, agent)
-    arrivals = Arrivals(config, job.robot, recorded_agent.peers)
+    arrivals = Inbox(config, job.robot, recorded_agent.peers)
     tape = read_tape(
         recording, config, recorded_agent, arrivals, lambda tick: show("reading", tick)
     )
@@ -210,9 +218,11 @@ def replay_one(
     wall = monotonic() - begun
     if look is not None and not looked:
         raise ConfigError(
-            "--break", f"{at / 1000:g} s", f"a time up to {tape.last / 1000:g} s",
+            "--break",
+            f"{at / 1000:g} s",
+            f"a time up to {tape.last / 1000:g} s",
             f"{job.robot} has no step after it",
-        )  # fmt: skip
+        )
     files: tuple[Path, ...] = ()
     if curves is not None:
         title = f"{job.robot} of {job.path.parent.name}/{job.path.name}: {changed.strip()}"
@@ -220,15 +230,20 @@ def replay_one(
         draw(curves, title, files[0])
     elif verdict.first is not None:
         files = _save_problem(job, agent, verdict)
-    outcome = Outcome(
-        job.robot, verdict, changed.strip(), (verdict.last + 1) / 1000, wall,
-        "" if verdict.step is None else in_short(verdict.step), files,
-    )  # fmt: skip
+    outcome = ReplayOutcome(
+        job.robot,
+        verdict,
+        changed.strip(),
+        (verdict.last + 1) / 1000,
+        wall,
+        "" if verdict.step is None else in_short(verdict.step),
+        files,
+    )
     verdict.step = None  # not to be carried between processes
     return outcome
 
 
-def _save_problem(job: Job, agent: Agent, verdict: Verdict) -> tuple[Path, ...]:
+def _save_problem(job: ReplayJob, agent: Agent, verdict: ReplayVerdict) -> tuple[Path, ...]:
     """The problem behind the first difference, if one was solved."""
     if verdict.first is None or verdict.step is None:
         return ()
@@ -242,7 +257,7 @@ def _save_problem(job: Job, agent: Agent, verdict: Verdict) -> tuple[Path, ...]:
     return (path,)
 
 
-def _in_worker(job: Job) -> Outcome | QuadrigaError:
+def _in_worker(job: ReplayJob) -> ReplayOutcome | QuadrigaError:
     try:
         return replay_one(job)
     except QuadrigaError as error:
@@ -268,6 +283,10 @@ def _folder(path: Path, out: Path | None) -> Path:
 
 def _bar(console: Console) -> Progress:
     return Progress(
-        TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=console,
-        transient=True, disable=not console.is_terminal,
-    )  # fmt: skip
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )

@@ -24,12 +24,12 @@ from typing import Any, Final
 import daqp
 import numpy as np
 
-from agents.controller.controller import Acted, Controller
-from agents.controller.sensing import Seen
-from agents.planner.free_step import FreeStep
-from agents.planner.qp_solver import SOLVERS
-from shared.errors import RecordingError
-from shared.robot import TORQUE_LIMIT, Array
+from quadriga.agents.controller.controller import Controller, ControllerOutputs
+from quadriga.agents.controller.sensing import Sensed
+from quadriga.agents.planner.free_step import FreeStep
+from quadriga.agents.planner.qp_solver import SOLVERS
+from quadriga.shared.errors import RecordingError
+from quadriga.shared.robot.a1 import TORQUE_LIMIT, Array
 
 WHOLE_BODY: Final = "command"  # the topic that is made of it
 PLANNER: Final = "plan"
@@ -70,9 +70,15 @@ def save(path: Path, qp: SavedQp) -> None:
     """
     try:
         np.savez(
-            path, H=qp.H, f=qp.f, A=qp.A, lower=qp.lower, upper=qp.upper, x=qp.x,
+            path,
+            H=qp.H,
+            f=qp.f,
+            A=qp.A,
+            lower=qp.lower,
+            upper=qp.upper,
+            x=qp.x,
             about=np.array(qp.about),
-        )  # fmt: skip
+        )
     except OSError as error:
         raise RecordingError(str(path), error.strerror or str(error), "a new file") from None
 
@@ -99,16 +105,22 @@ def captured(about: str) -> Iterator[dict[str, SavedQp]]:
     """
     found: dict[str, SavedQp] = {}
 
-    def whole_body(act: Callable[..., Acted]) -> Callable[..., Acted]:
-        def observed(low_level: Controller, seen: Seen, *arguments: Any, **named: Any) -> Acted:
+    def whole_body(act: Callable[..., ControllerOutputs]) -> Callable[..., ControllerOutputs]:
+        def observed(
+            low_level: Controller, seen: Sensed, *arguments: Any, **named: Any
+        ) -> ControllerOutputs:
             acted = act(low_level, seen, *arguments, **named)
             problem = low_level.problem(seen, acted.memory, acted.goal)
             box = np.full(len(problem.H), TORQUE_LIMIT)
             found[WHOLE_BODY] = SavedQp(
-                problem.H, problem.g, problem.C, np.concatenate([-box, problem.c]),
-                np.concatenate([box, np.full(len(problem.c), _FAR)]), acted.solution.tau,
+                problem.H,
+                problem.g,
+                problem.C,
+                np.concatenate([-box, problem.c]),
+                np.concatenate([box, np.full(len(problem.c), _FAR)]),
+                acted.solution.tau,
                 f"whole-body QP of {about}, {acted.solution.status}: x is the torques [N·m]",
-            )  # fmt: skip
+            )
             return acted
 
         return observed
@@ -121,10 +133,15 @@ def captured(about: str) -> Iterator[dict[str, SavedQp]]:
             low = problem.lower if lower is None else lower
             high = problem.upper if upper is None else upper
             found[PLANNER] = SavedQp(
-                problem.H, f, problem.A, np.maximum(low, -_FAR), np.minimum(high, _FAR), answer.x,
+                problem.H,
+                f,
+                problem.A,
+                np.maximum(low, -_FAR),
+                np.minimum(high, _FAR),
+                answer.x,
                 f"planner's QP of {about}, {answer.status}: x is the force deviations of the "
                 "stance legs over the horizon [N], then slacks",
-            )  # fmt: skip
+            )
             return answer
 
         return observed

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import TYPE_CHECKING, Final
 
-from agents.intake import taken_in
+from quadriga.agents.inbox.intake_log import taken_in
 from quadriga.replay.rerun import COMPARED, Step
 
 if TYPE_CHECKING:
-    from quadriga.replay.run import Outcome
+    from quadriga.replay.run import ReplayOutcome
 
 _SHOWN: Final = 3  # messages missing from the recording that are named
 
@@ -26,7 +26,7 @@ def in_short(step: Step) -> str:
     return "; ".join([*parts, f"mode {step.before.mode.name}"])
 
 
-def described(outcome: Outcome) -> str:
+def described(outcome: ReplayOutcome) -> str:
     """The lines about one robot."""
     lines = [f"{outcome.robot}: {_counts(outcome)}; {_pace(outcome)}"]
     verdict = outcome.verdict
@@ -47,7 +47,7 @@ def described(outcome: Outcome) -> str:
     return "\n".join(lines)
 
 
-def _counts(outcome: Outcome) -> str:
+def _counts(outcome: ReplayOutcome) -> str:
     """What differs, what is equal, what the recorder lost."""
     verdict, names = outcome.verdict, [topic.name for topic in reversed(COMPARED)]
     differing = [
@@ -71,7 +71,7 @@ def _some(count: int, name: str) -> str:
     return f"{count} {name}{'' if count == 1 else 's'}"
 
 
-def _pace(outcome: Outcome) -> str:
+def _pace(outcome: ReplayOutcome) -> str:
     factor = outcome.seconds / max(outcome.wall, 1e-9)
     return f"{outcome.seconds:.1f} s in {outcome.wall:.1f} s, {factor:.1f} × real time"
 

@@ -8,12 +8,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.recorded_metadata import recorded_versions
+from quadriga.recordings.metadata import recorded_versions
 from quadriga.report.run import Run
-from shared.config import Config
-from shared.config_text import departures
-from shared.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, STATE, STATUS, TRUTH
-from shared.trace import ROW_END
+from quadriga.shared.config.reference_trace import ROW_END
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import departures
+from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, STATE, STATUS, TRUTH
 
 _DIGITS: Final = 12  # of a digest
 
@@ -59,8 +59,10 @@ def facts(run: Run) -> Iterator[tuple[str, str]]:
     if world.push:
         yield "pushes", world.push
     if world.push_force:
-        yield "pushes in turn", f"{world.push_force:g} N for {world.push_duration:g} s every " \
-            f"{world.push_every:g} s"  # fmt: skip
+        yield (
+            "pushes in turn",
+            f"{world.push_force:g} N for {world.push_duration:g} s every {world.push_every:g} s",
+        )
     if world.weak_motor:
         yield "weak motors", f"{world.weak_motor} at {100 * world.weak_share:g} %"
     asked = config.reference

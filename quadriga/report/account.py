@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from agents.gait import nominal_forces, scheduled_stance
-from agents.planner.horizon import step_ms
+from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.time_grid import step_ms
 from quadriga.report.run import Run
 from quadriga.report.samples import Samples, slipping
 from quadriga.report.second import (
@@ -21,10 +21,10 @@ from quadriga.report.second import (
     down_since,
     window_before,
 )
-from shared.config import CENTRAL
-from shared.messages import Plan
-from shared.robot import N_LEGS, Leg
-from shared.topics import REFERENCE, SAMPLE_MS
+from quadriga.shared.config.sections import CENTRAL
+from quadriga.shared.robot.a1 import N_LEGS, Leg
+from quadriga.shared.wire.messages import Plan
+from quadriga.shared.wire.topics import REFERENCE, SAMPLE_MS
 
 _AT_LIMIT: Final = 0.99  # share of a planned force's limit
 
@@ -49,9 +49,10 @@ def build_account(run: Run, index: int, tick: int) -> Account:
     if (down := down_since(run, robot, tick)) is not None:
         return Account(robot, ((f"down since {down / 1000:.2f} s", False),))
     window = window_before(run.samples[robot], tick)
-    return Account(robot, (
-        *_trunk(window), *_feet(window), *_planning(run, index, tick), _age(run, robot, tick),
-    ))  # fmt: skip
+    return Account(
+        robot,
+        (*_trunk(window), *_feet(window), *_planning(run, index, tick), _age(run, robot, tick)),
+    )
 
 
 def _trunk(window: Samples) -> Iterator[tuple[str, bool]]:

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from shared.robot import Array
+from quadriga.shared.robot.a1 import Array
 
 _LOG_FLOOR: Final = 1e-3
 

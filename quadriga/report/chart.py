@@ -20,10 +20,18 @@ _LINE, _NARROW, _WIDE = 15.0, 40.0, 60.0  # px between values of an axis, at lea
 
 
 def draw(
-    panels: Sequence[Panel], begin: float, end: float, *, marks: Sequence[Mark] = (),
-    columns: int = 1, height: float = 90.0, points: int = 1600, name: str = "",
-    across: str = TIME, left: float = _LEFT,
-) -> str:  # fmt: skip
+    panels: Sequence[Panel],
+    begin: float,
+    end: float,
+    *,
+    marks: Sequence[Mark] = (),
+    columns: int = 1,
+    height: float = 90.0,
+    points: int = 1600,
+    name: str = "",
+    across: str = TIME,
+    left: float = _LEFT,
+) -> str:
     """An SVG of panels that share the time from `begin` to `end`, s, row by row.
 
     Or anything else that `across` names: what is said of times here is then said of that.

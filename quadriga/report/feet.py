@@ -7,15 +7,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.figures import stitched
+from quadriga.pictures.figures import stitched
+from quadriga.recordings.truth import Ticks
 from quadriga.report.chart import draw
 from quadriga.report.panel import Bars, Curve, Panel
 from quadriga.report.path import spells
 from quadriga.report.run import Run
 from quadriga.report.tracks import falls, until
-from quadriga.truth_trace import Ticks
-from shared.robot import Leg
-from shared.topics import SAMPLE_MS
+from quadriga.shared.robot.a1 import Leg
+from quadriga.shared.wire.topics import SAMPLE_MS
 
 _GAP: Final = 1.5e-3 * SAMPLE_MS
 _STRIDES: Final = 4  # enlarged
@@ -27,9 +27,14 @@ def whole(run: Run) -> str:
     """Vertical force of every robot's front-right foot, as the paper's Fig. 3."""
     panels = [_panel(run, i, Leg.FR, f"{robot} front right [N]") for i, robot in _robots(run)]
     return draw(
-        panels, run.begin / 1000, run.end / 1000, marks=falls(run), height=80.0,
-        points=1200, name="vertical forces",
-    )  # fmt: skip
+        panels,
+        run.begin / 1000,
+        run.end / 1000,
+        marks=falls(run),
+        height=80.0,
+        points=1200,
+        name="vertical forces",
+    )
 
 
 def enlarged(run: Run) -> tuple[str, float, float]:
@@ -38,8 +43,15 @@ def enlarged(run: Run) -> tuple[str, float, float]:
     panels = [
         _panel(run, i, leg, f"{robot} {leg.name} [N]") for i, robot in _robots(run) for leg in Leg
     ]
-    svg = draw(panels, begin, end, marks=falls(run), columns=4, height=70.0,
-               name="vertical forces, four strides")  # fmt: skip
+    svg = draw(
+        panels,
+        begin,
+        end,
+        marks=falls(run),
+        columns=4,
+        height=70.0,
+        name="vertical forces, four strides",
+    )
     return svg, begin, end
 
 
@@ -61,12 +73,15 @@ def gait_panel(run: Run, index: int) -> Panel:
     robot = run.traces.robots[index]
     samples = run.samples[robot]
     rows = [
-        Bars(leg.name, [
-            *_bars(samples.tick, samples.stance[:, leg], "stance", shift=-SAMPLE_MS),
-            *_bars(samples.tick, samples.contact[:, leg], "contact"),
-        ])
+        Bars(
+            leg.name,
+            [
+                *_bars(samples.tick, samples.stance[:, leg], "stance", shift=-SAMPLE_MS),
+                *_bars(samples.tick, samples.contact[:, leg], "contact"),
+            ],
+        )
         for leg in Leg
-    ]  # fmt: skip
+    ]
     return Panel(robot, rows=rows)
 
 

@@ -66,9 +66,13 @@ def time_link(tick: int) -> str:
 
 
 def table(
-    head: Sequence[str], rows: Sequence[Sequence[str]], *, named: bool = False,
-    numbers: bool = False, raw: bool = False,
-) -> str:  # fmt: skip
+    head: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *,
+    named: bool = False,
+    numbers: bool = False,
+    raw: bool = False,
+) -> str:
     """A table of text.
 
     Args:

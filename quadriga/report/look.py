@@ -93,8 +93,11 @@ if(a&&a.hash===location.hash)go()});go();
 
 def style_sheet() -> str:
     """All rules of the page."""
-    rules = [f":root{{color-scheme:light dark;{_LIGHT}}}",
-             f"@media(prefers-color-scheme:dark){{:root{{{_DARK}}}}}", _RULES]  # fmt: skip
+    rules = [
+        f":root{{color-scheme:light dark;{_LIGHT}}}",
+        f"@media(prefers-color-scheme:dark){{:root{{{_DARK}}}}}",
+        _RULES,
+    ]
     for k in range(10):
         colour = f"var(--{_ROBOTS[k % len(_ROBOTS)]})"
         dashes = ";stroke-dasharray:4 2" if k >= len(_ROBOTS) else ""

@@ -23,8 +23,8 @@ from quadriga.report.second import (
     down_since,
     window_before,
 )
-from shared.robot import Leg
-from shared.topics import SAMPLE_MS
+from quadriga.shared.robot.a1 import Leg
+from quadriga.shared.wire.topics import SAMPLE_MS
 
 _TELLING: Final = ("push", "plan", "counted", "gap", "mode")  # kinds of moments that are signs
 
@@ -39,7 +39,7 @@ class Sign:
 
 
 @dataclass(frozen=True, slots=True)
-class Episode:
+class Trouble:
     """A fall or fault, and the second before it.
 
     Attributes:
@@ -61,7 +61,7 @@ class Episode:
         return tuple(dict.fromkeys(moment.robot for moment in ordered if moment.robot))
 
 
-def episodes(run: Run) -> list[Episode]:
+def episodes(run: Run) -> list[Trouble]:
     """All troubles of a run, those that come together as one."""
     groups: list[list[Moment]] = []
     for moment in run.moments:
@@ -73,7 +73,7 @@ def episodes(run: Run) -> list[Episode]:
     return [_episode(run, group) for group in groups]
 
 
-def _episode(run: Run, troubles: Sequence[Moment]) -> Episode:
+def _episode(run: Run, troubles: Sequence[Moment]) -> Trouble:
     tick = troubles[0].tick
     signs = [
         Sign(m.tick, m.robot, _told(m, tick))
@@ -89,7 +89,7 @@ def _episode(run: Run, troubles: Sequence[Moment]) -> Episode:
     signs += _planless(run, tick)
     signs.sort(key=lambda sign: sign.tick)
     accounts = tuple(build_account(run, index, tick) for index in range(len(run.traces.robots)))
-    return Episode(tick, tuple(troubles), tuple(signs), accounts)
+    return Trouble(tick, tuple(troubles), tuple(signs), accounts)
 
 
 def _told(moment: Moment, tick: int) -> str:

@@ -7,20 +7,20 @@ from typing import Final
 
 import numpy as np
 
-from agents.planner.horizon import step_ms
+from quadriga.agents.time_grid import step_ms
 from quadriga.report.chart import draw
 from quadriga.report.feet import gait_panel
 from quadriga.report.look import BARS
-from quadriga.report.look_at import Episode
+from quadriga.report.look_at import Trouble
 from quadriga.report.panel import Bars, Curve, Mark, Panel
 from quadriga.report.run import Run
 from quadriga.report.samples import slipping
 from quadriga.report.second import BEFORE_MS, SLIP, TILT
 from quadriga.report.tracks import falls, figure, style
-from shared.barrier import PLANNER
-from shared.messages import Status
-from shared.robot import Array
-from shared.topics import REFERENCE
+from quadriga.shared.bus.barrier import PLANNER
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.messages import Status
+from quadriga.shared.wire.topics import REFERENCE
 
 _AFTER_MS: Final = 200  # of a close-up, shown after the second that is judged
 _SENT_S: Final = 0.3  # statuses further apart than this are not joined
@@ -76,9 +76,14 @@ def times(run: Run) -> str:
         tick.append(_worst(statuses, [s.tick_us for s in statuses], colour))
     panels = [
         Panel("longest planner solve in 100 ms [ms]", planner, log=True, span=1.0),
-        Panel("longest control tick in 100 ms [µs]", tick, log=True, span=1.0,
-              levels=[(1000.0, "1 kHz")]),
-    ]  # fmt: skip
+        Panel(
+            "longest control tick in 100 ms [µs]",
+            tick,
+            log=True,
+            span=1.0,
+            levels=[(1000.0, "1 kHz")],
+        ),
+    ]
     return figure(run, panels, "solve and tick times", height=130.0)
 
 
@@ -111,8 +116,11 @@ def ages(run: Run) -> str:
     for robot in traces.robots:
         curves = []
         for index, peer in enumerate(traces.robots):
-            used = [(p.tick, step * (p.step - p.used[peer])) for p in traces.plans[robot]
-                    if peer in p.used]  # fmt: skip
+            used = [
+                (p.tick, step * (p.step - p.used[peer]))
+                for p in traces.plans[robot]
+                if peer in p.used
+            ]
             if used:
                 time, age = np.array(used, dtype=float).T
                 curves.append(Curve(time / 1000, age, style(index), "step", gap=2.1e-3 * step))
@@ -126,7 +134,7 @@ def ages(run: Run) -> str:
     return figure(run, panels, "ages of inputs", height=70.0)
 
 
-def closeup(run: Run, episode: Episode) -> str:
+def closeup(run: Run, episode: Trouble) -> str:
     """The second before a trouble: tilt, slip and torque of all robots, feet of those concerned."""
     begin = max(run.begin, episode.tick - BEFORE_MS) / 1000
     end = min(run.end, episode.tick + _AFTER_MS) / 1000
@@ -139,12 +147,18 @@ def closeup(run: Run, episode: Episode) -> str:
         torque.append(Curve(time, 100 * samples.torque, style(index), gap=0.05))
     fall_tilt = run.traces.config.controller.fall_tilt
     panels = [
-        Panel("tilt [rad]", tilt, span=0.3, floor=0.0,
-              levels=[(TILT, "unusual"), (fall_tilt, "fall")]),
-        Panel("fastest foot in stance and contact [m/s]", slip, span=0.4, floor=0.0,
-              levels=[(SLIP, "slips")]),
+        Panel(
+            "tilt [rad]", tilt, span=0.3, floor=0.0, levels=[(TILT, "unusual"), (fall_tilt, "fall")]
+        ),
+        Panel(
+            "fastest foot in stance and contact [m/s]",
+            slip,
+            span=0.4,
+            floor=0.0,
+            levels=[(SLIP, "slips")],
+        ),
         Panel("greatest joint torque [% of its limit]", torque, span=100.0, floor=0.0),
-    ]  # fmt: skip
+    ]
     robots = [run.traces.robots.index(r) for r in episode.robots if r in run.traces.robots]
     panels += [gait_panel(run, index) for index in robots[:3]]
     fell = {m.robot for m in run.moments if m.kind == "fall"}

@@ -8,11 +8,11 @@ from typing import Final
 
 import numpy as np
 
-from agents.modes import STAND, WALK
-from quadriga.traces import Traces
-from quadriga.truth_trace import Ticks
-from shared.messages import Plan, Status
-from shared.topics import MEASUREMENT, STATE, TRUTH
+from quadriga.agents.modes import STAND, WALK
+from quadriga.recordings.traces import Traces
+from quadriga.recordings.truth import Ticks
+from quadriga.shared.wire.messages import Plan, Status
+from quadriga.shared.wire.topics import MEASUREMENT, STATE, TRUTH
 
 FALL: Final = "fall"
 FAULT: Final = "fault"

@@ -11,13 +11,13 @@ from quadriga.report import about, feet, machine, tracks
 from quadriga.report.account import COLUMNS
 from quadriga.report.html import cells, details, document, figure, key, keys, table, time_link
 from quadriga.report.look import SCRIPT
-from quadriga.report.look_at import Episode, episodes
+from quadriga.report.look_at import Trouble, episodes
 from quadriga.report.moments import Moment
 from quadriga.report.run import Run
+from quadriga.shared.bus.barrier import PLANNER
+from quadriga.shared.config.sections import CENTRAL
+from quadriga.shared.errors import RecordingError
 from quadriga.table import rows as summary_rows
-from shared.barrier import PLANNER
-from shared.config import CENTRAL
-from shared.errors import RecordingError
 
 PAGE: Final = "report.html"
 _EPISODES: Final = 6  # shown in full
@@ -59,10 +59,15 @@ def _sections(run: Run) -> Iterator[Section]:
     yield from _trunks(run)
     yield from _feet(run)
     yield from _machine(run)
-    yield "traffic", "The recording", table(
-        ("key", "messages", "rate [Hz]", "from … to [s]", "missing", "invalid"),
-        about.traffic(run), numbers=True,
-    )  # fmt: skip
+    yield (
+        "traffic",
+        "The recording",
+        table(
+            ("key", "messages", "rate [Hz]", "from … to [s]", "missing", "invalid"),
+            about.traffic(run),
+            numbers=True,
+        ),
+    )
 
 
 def _absent(run: Run) -> str:
@@ -78,11 +83,12 @@ def _run(run: Run) -> str:
         return facts + "<p>Every key of the configuration has its default value.</p>"
     return facts + details(
         f"Keys of the configuration that differ from their defaults: {len(changed)}",
-        table(("key", "value", "default", "meaning"), changed), opened=True,
-    )  # fmt: skip
+        table(("key", "value", "default", "meaning"), changed),
+        opened=True,
+    )
 
 
-def _look(run: Run, troubles: Sequence[Episode]) -> str:
+def _look(run: Run, troubles: Sequence[Trouble]) -> str:
     parts = [
         "<p>For each fall, fault or stop: the second before it, what was out of the ordinary then "
         "and in which order it came. Unusual figures are marked.</p>"
@@ -95,15 +101,17 @@ def _look(run: Run, troubles: Sequence[Episode]) -> str:
     return "".join(parts)
 
 
-def _episode(run: Run, episode: Episode) -> str:
+def _episode(run: Run, episode: Trouble) -> str:
     what = "; ".join(f"{m.robot or 'world'} {m.kind}: {m.text}" for m in episode.troubles)
     signs = [
         (time_link(sign.tick), escape(sign.robot or "world"), escape(sign.text))
         for sign in episode.signs
     ]
-    told = table(("time", "robot", "what"), signs, raw=True) if signs else (
-        "<p>Nothing out of the ordinary was recorded in this second.</p>"
-    )  # fmt: skip
+    told = (
+        table(("time", "robot", "what"), signs, raw=True)
+        if signs
+        else ("<p>Nothing out of the ordinary was recorded in this second.</p>")
+    )
     accounts = [[(a.robot, False), *a.cells] for a in episode.accounts]
     robots = "".join(key(tracks.style(i), r) for i, r in enumerate(run.traces.robots))
     return (
@@ -116,10 +124,13 @@ def _episode(run: Run, episode: Episode) -> str:
 
 def _timeline(run: Run) -> str:
     legend = keys(
-        ("mode-walk", "walk"), ("mode-stand", "stand"), ("mode-stopping", "stopping; plan faded"),
-        ("mode-damping", "damping, e-stop; messages missing"), ("nominal", "other plan status"),
+        ("mode-walk", "walk"),
+        ("mode-stand", "stand"),
+        ("mode-stopping", "stopping; plan faded"),
+        ("mode-damping", "damping, e-stop; messages missing"),
+        ("nominal", "other plan status"),
         ("count", "counted by the agent"),
-    )  # fmt: skip
+    )
     main = machine.timeline(run).replace("<svg ", '<svg data-main="" ', 1)
     rows = [_moment(moment) for moment in run.moments[:_MOMENTS]]
     more = len(run.moments) - len(rows)
@@ -144,9 +155,12 @@ def _trunks(run: Run) -> Iterator[Section]:
     named = "".join(key(tracks.style(i), robot) for i, robot in enumerate(robots))
     asked = key("asked", "asked for")
     if any(len(run.measured(i)[0]) for i in range(len(robots))):
-        legend = (key("true", "measured (truth)") if run.has_truth else "") + key(
-            "own", "estimated by the agent"
-        ) + key("planned", "planned") + asked  # fmt: skip
+        legend = (
+            (key("true", "measured (truth)") if run.has_truth else "")
+            + key("own", "estimated by the agent")
+            + key("planned", "planned")
+            + asked
+        )
         parts = []
         for i, robot in enumerate(robots):
             whole = figure(tracks.trajectories(run, i), legend)
@@ -192,9 +206,11 @@ def _feet(run: Run) -> Iterator[Section]:
         yield "forces", "Vertical forces", figure(feet.whole(run), legend) + text + figure(svg)
     if any(len(samples.tick) for samples in run.samples.values()):
         svg, begin, end = feet.gait(run)
-        text = "" if (begin, end) == (run.begin / 1000, run.end / 1000) else (
-            f"<p>From {begin:.2f} to {end:.2f} s.</p>"
-        )  # fmt: skip
+        text = (
+            ""
+            if (begin, end) == (run.begin / 1000, run.end / 1000)
+            else (f"<p>From {begin:.2f} to {end:.2f} s.</p>")
+        )
         yield "gait", "Gait", text + figure(svg, _gait_keys(run))
 
 
@@ -208,8 +224,17 @@ def _machine(run: Run) -> Iterator[Section]:
         return
     central = run.traces.config.planner.kind in CENTRAL
     named = "".join(key(tracks.style(i), robot) for i, robot in enumerate(run.traces.robots))
-    head = ("process", "solves", "median [ms]", "99 % [ms]", "greatest [ms]",
-            "ticks", "median [µs]", "99 % [µs]", "greatest [µs]")  # fmt: skip
+    head = (
+        "process",
+        "solves",
+        "median [ms]",
+        "99 % [ms]",
+        "greatest [ms]",
+        "ticks",
+        "median [µs]",
+        "99 % [µs]",
+        "greatest [µs]",
+    )
     drawn = figure(machine.times(run), named + (key("asked", PLANNER) if central else ""))
     told = table(head, machine.times_table(run), numbers=True)
     yield "times", "Solve and tick times", drawn + told

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from shared.robot import Array
+from quadriga.shared.robot.a1 import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.robot import Array
+from quadriga.shared.robot.a1 import Array
 
 TENTH = 10.0  # units of a path's coordinates per pixel
 

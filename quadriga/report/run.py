@@ -9,15 +9,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.gaps import end_of_world
+from quadriga.recordings.gaps import end_of_world
+from quadriga.recordings.summary import summary_of
+from quadriga.recordings.traces import Traces, read_traces
+from quadriga.recordings.truth import Ticks
 from quadriga.report.moments import Moment, build_moments
 from quadriga.report.samples import Samples, read_samples
-from quadriga.summary import summary_of
-from quadriga.traces import Traces, read_traces
-from quadriga.truth_trace import Ticks
-from shared.recording import Recording
-from shared.robot import Array
-from shared.topics import COMMAND, MEASUREMENT, STATE, STATUS, TRUTH
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, STATE, STATUS, TRUTH
 
 _PACED: Final = tuple(topic.name for topic in (STATE, COMMAND, MEASUREMENT, STATUS, TRUTH))
 _FORGED: Final = 60_000  # ms after the configured end: later ticks are not of this world

@@ -9,16 +9,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from agents.controller.kinematics import leg_kinematics
-from agents.gait import scheduled_stance
-from quadriga.traces import Traces
-from quadriga.truth_trace import Ticks, stack, ticks_of
-from shared.codec import decode
-from shared.errors import MessageError
-from shared.messages import Measurement, State
-from shared.recording import Recording
-from shared.robot import FOOT_RADIUS, N_FORCES, N_LEGS, TORQUE_LIMIT, Array, robot_names
-from shared.topics import MEASUREMENT, SAMPLE_MS, STATE, topic_of
+from quadriga.agents.controller.maths.leg_kinematics import leg_kinematics
+from quadriga.agents.gait import scheduled_stance
+from quadriga.recordings.traces import Traces
+from quadriga.recordings.truth import Ticks, stack, ticks_of
+from quadriga.shared.errors import MessageError
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import FOOT_RADIUS, N_FORCES, N_LEGS, TORQUE_LIMIT, Array, robot_names
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Measurement, State
+from quadriga.shared.wire.topics import MEASUREMENT, SAMPLE_MS, STATE, topic_of
 
 _STALE_MS: Final = 100  # a stance said longer ago than this is not that of now
 _LOADED: Final = 10.0  # N of true force that is a contact
@@ -78,9 +78,11 @@ def _samples(
     quat = stack(states, "imu_quat_wxyz", 4)
     force = stack(states, "foot_force", N_LEGS)
     stance = _newest(
-        tick, ticks_of(measured), stack(measured, "stance", N_LEGS) > 0.5,
+        tick,
+        ticks_of(measured),
+        stack(measured, "stance", N_LEGS) > 0.5,
         scheduled_stance(traces.config, index, tick - SAMPLE_MS),
-    )  # fmt: skip
+    )
     contact = force > traces.config.controller.contact_force
     truth = traces.truth
     if len(truth.tick):
@@ -128,11 +130,13 @@ def _tilt_rotation(quat_wxyz: Array) -> Array:
     cos_pitch = (1.0 - sin_pitch**2) ** 0.5
     roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     sr, cr = float(np.sin(roll)), float(np.cos(roll))
-    return np.array([
-        [cos_pitch, sin_pitch * sr, sin_pitch * cr],
-        [0.0, cr, -sr],
-        [-sin_pitch, cos_pitch * sr, cos_pitch * cr],
-    ])  # fmt: skip
+    return np.array(
+        [
+            [cos_pitch, sin_pitch * sr, sin_pitch * cr],
+            [0.0, cr, -sr],
+            [-sin_pitch, cos_pitch * sr, cos_pitch * cr],
+        ]
+    )
 
 
 def _at(tick: Ticks, known: Ticks, values: Any, otherwise: Any) -> Any:

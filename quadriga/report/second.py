@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from agents.modes import DAMPING, ESTOP
+from quadriga.agents.modes import DAMPING, ESTOP
 from quadriga.report.moments import FALL, STOP
 from quadriga.report.path import spells
 from quadriga.report.run import Run
 from quadriga.report.samples import Samples
-from shared.topics import SAMPLE_MS
+from quadriga.shared.wire.topics import SAMPLE_MS
 
 BEFORE_MS: Final = 1000
 TOGETHER_MS: Final = 200  # troubles this close are one episode

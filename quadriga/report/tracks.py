@@ -6,16 +6,16 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.figures import stitched
+from quadriga.pictures.figures import stitched
+from quadriga.recordings.traces import estimate_errors, in_force
+from quadriga.recordings.truth import Ticks
 from quadriga.report.axis import nice
 from quadriga.report.chart import WIDTH, draw
 from quadriga.report.panel import Curve, Mark, Panel
 from quadriga.report.run import Run
-from quadriga.traces import estimate_errors, in_force
-from quadriga.truth_trace import Ticks
-from shared.robot import OUTPUTS, Array
-from shared.topics import SAMPLE_MS
-from shared.yokes import yoke_pairs
+from quadriga.shared.config.yokes import yoke_pairs
+from quadriga.shared.robot.a1 import OUTPUTS, Array
+from quadriga.shared.wire.topics import SAMPLE_MS
 
 NAMES: Final = ("z [m]", "vx [m/s]", "vy [m/s]", "roll [rad]", "pitch [rad]", "wz [rad/s]")
 _SPANS: Final = (0.04, 0.3, 0.2, 0.1, 0.1, 0.4)
@@ -56,9 +56,15 @@ def figure(
 ) -> str:
     """Panels over the whole run, two in a row."""
     return draw(
-        panels, run.begin / 1000, run.end / 1000, marks=falls(run), columns=2, height=height,
-        points=most, name=name,
-    )  # fmt: skip
+        panels,
+        run.begin / 1000,
+        run.end / 1000,
+        marks=falls(run),
+        columns=2,
+        height=height,
+        points=most,
+        name=name,
+    )
 
 
 def trajectories(run: Run, index: int, part: tuple[float, float] | None = None) -> str:

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from agents.agent import Agent, AgentState, Inputs, Outputs
-from agents.planner.predictor import Predictor, PredictorMeta
-from quadriga.rollout import Rollout
-from shared.codec import decode, encode
-from shared.config import Config, PlannerConfig, TeamConfig
-from shared.messages import Reference, State
-from shared.robot import N_FORCES, N_OUTPUTS, Array
+from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.identification.rollout import Rollout
+from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
+from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Reference, State
 
 CONFIG = Config(team=TeamConfig(robots=2), planner=PlannerConfig(latency_ms=0))
 FIRST_PLAN = 320  # ms: the first multiple of 40 ms after the stand of 300 ms

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from agents.agent import Agent, AgentState, Inputs, Outputs
-from agents.rehearsal import standing
-from shared.codec import encode
-from shared.config import Config, TeamConfig
-from shared.messages import Reference, State
+from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
+from quadriga.agents.rehearsal import standing
+from quadriga.shared.config.sections import Config, TeamConfig
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Reference, State
 from tests.agents.duet import asked, over_the_bus, simple_predictor
 
 ALONE = Config(team=TeamConfig(robots=1))

@@ -13,12 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from agents.agent import Agent
-from agents.gait import nominal_forces, scheduled_stance
-from agents.pilot import Awaited
-from quadriga.rollout import Rollout
-from shared.codec import decode, encode
-from shared.robot import TORQUE_LIMIT, Array
+from quadriga.agents.agent import Agent
+from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.planning.interface import Expected
+from quadriga.identification.rollout import Rollout
+from quadriga.shared.robot.a1 import TORQUE_LIMIT, Array
+from quadriga.shared.wire.codec import decode, encode
 from tests.agents.duet import (
     CONFIG,
     FIRST_PLAN,
@@ -143,17 +143,17 @@ def test_a_plan_is_sent_every_forty_ticks_and_uses_the_peers_last_one(duet: Reco
 
 def test_awaited_names_what_lock_step_must_have_received() -> None:
     agent = Agent(CONFIG, "r1", simple_predictor(CONFIG))
-    assert agent.awaited(0) == Awaited(reference_tick=0)
-    assert agent.awaited(301) == Awaited()
+    assert agent.awaited(0) == Expected(reference_tick=0)
+    assert agent.awaited(301) == Expected()
     # Half a step after each planning step its plans, and the samples they were made of.
-    assert agent.awaited(FIRST_PLAN - 20) == Awaited(None, FIRST_PLAN - 40, 300)
-    assert agent.awaited(FIRST_PLAN) == Awaited()
-    assert agent.awaited(340) == Awaited((8, 0), 320)
-    assert agent.awaited(380) == Awaited((9, 0), 360)
-    assert agent.awaited(400) == Awaited(reference_tick=400)
-    assert Agent(CONFIG, "r1", None).awaited(400) == Awaited(reference_tick=400)
+    assert agent.awaited(FIRST_PLAN - 20) == Expected(None, FIRST_PLAN - 40, 300)
+    assert agent.awaited(FIRST_PLAN) == Expected()
+    assert agent.awaited(340) == Expected((8, 0), 320)
+    assert agent.awaited(380) == Expected((9, 0), 360)
+    assert agent.awaited(400) == Expected(reference_tick=400)
+    assert Agent(CONFIG, "r1", None).awaited(400) == Expected(reference_tick=400)
     truthful = replace(CONFIG, estimator=replace(CONFIG.estimator, kind="truth"))
-    assert Agent(truthful, "r1", None).awaited(401) == Awaited(truth=True)
+    assert Agent(truthful, "r1", None).awaited(401) == Expected(truth=True)
 
 
 def test_excitation_is_added_on_the_stance_feet_while_walking() -> None:
@@ -267,9 +267,14 @@ def test_whatever_is_sensed_the_command_is_finite_and_within_the_limit(
     """A wild state in the middle of a walk, and the tick after it."""
     step = duet["r1"][place]
     wild = replace(
-        step.inputs.state, q_joint=step.inputs.state.q_joint + dq, v_joint=v, imu_quat_wxyz=quat,
-        imu_gyro=imu[:3], imu_accel=imu[3:], foot_force=force,
-    )  # fmt: skip
+        step.inputs.state,
+        q_joint=step.inputs.state.q_joint + dq,
+        v_joint=v,
+        imu_quat_wxyz=quat,
+        imu_gyro=imu[:3],
+        imu_accel=imu[3:],
+        foot_force=force,
+    )
     agent, state = observer(), step.before
     for tick in range(2):
         now = replace(wild, tick=wild.tick + tick)

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from agents.controller import controller, whole_body_qp
-from agents.controller.whole_body_qp import Problem
-from agents.rehearsal import standing
-from agents.telemetry import Telemetry
-from shared.codec import decode, encode
-from shared.messages import EStop, State, Status
-from shared.robot import Array
+from quadriga.agents.controller import controller, whole_body_qp
+from quadriga.agents.controller.whole_body_qp import WholeBodyProblem
+from quadriga.agents.rehearsal import standing
+from quadriga.agents.telemetry import Telemetry
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import EStop, State, Status
 from tests.agents.duet import CONFIG, FIRST_PLAN, over_the_bus
 from tests.agents.lone_robot import ALONE, Robot, is_damping, tilted
 
@@ -80,7 +80,7 @@ def test_an_orientation_that_is_no_number_damps_the_joints_at_once() -> None:
 
 
 def fail(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_solution(problem: Problem) -> tuple[Array, str]:
+    def no_solution(problem: WholeBodyProblem) -> tuple[Array, str]:
         return np.zeros(12), "infeasible:-1"
 
     def limits_matter(*arguments: Any) -> int:

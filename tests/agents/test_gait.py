@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.gait import (
+from quadriga.agents.gait import (
     nominal_forces,
     phase_offset_ms,
     scheduled_stance,
     stance_of_half,
     stance_progress,
 )
-from shared.config import Config, GaitConfig
-from shared.robot import GRAVITY, TOTAL_MASS, Leg
+from quadriga.shared.config.sections import Config, GaitConfig
+from quadriga.shared.robot.a1 import GRAVITY, TOTAL_MASS, Leg
 
 GAITS = st.builds(
     GaitConfig,

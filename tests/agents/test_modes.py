@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.modes import (
+from quadriga.agents.modes import (
     DAMPING,
     ESTOP,
     SLOW_DOWN_MS,

@@ -7,15 +7,15 @@ from typing import Any, cast
 
 import pytest
 
-from agents import process
-from agents.agent import Agent
-from agents.arrivals import Arrivals
-from agents.rehearsal import standing
-from shared.bus import Bus, Packet
-from shared.codec import decode, encode
-from shared.config_file import load
-from shared.errors import BusError
-from shared.messages import Command
+from quadriga.agents import process
+from quadriga.agents.agent import Agent
+from quadriga.agents.inbox.inbox import Inbox
+from quadriga.agents.rehearsal import standing
+from quadriga.shared.bus.zenoh_bus import Bus, Packet
+from quadriga.shared.config.load import load
+from quadriga.shared.errors import BusError
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Command
 
 SECOND = 1000  # packets
 
@@ -51,7 +51,7 @@ def walk(monkeypatch: pytest.MonkeyPatch, ticks: Iterable[int | None]) -> Line:
     given: dict[str, Any] = {"team.robots": 1, "planner.kind": "none", "world.mode": "realtime"}
     line, config = Line(ticks), load(None, given)
     monkeypatch.setattr(process, "monotonic", lambda: line.now)
-    arrivals, agent = Arrivals(config, "r1", ()), Agent(config, "r1", None)
+    arrivals, agent = Inbox(config, "r1", ()), Agent(config, "r1", None)
     shell = process._Shell(config, agent, arrivals, cast("Bus", line))
     shell.walk(lambda: line.ended)
     return line
@@ -59,8 +59,9 @@ def walk(monkeypatch: pytest.MonkeyPatch, ticks: Iterable[int | None]) -> Line:
 
 @pytest.mark.parametrize(
     ("first", "then"),
-    [([0, 4000], 0), ([1 << 41], 0), ([0], 10**6)], ids=["restarted", "forged", "set ahead"],
-)  # fmt: skip
+    [([0, 4000], 0), ([1 << 41], 0), ([0], 10**6)],
+    ids=["restarted", "forged", "set ahead"],
+)
 def test_a_clock_that_has_been_set_ends_the_process_with_a_word(
     monkeypatch: pytest.MonkeyPatch, first: list[int], then: int
 ) -> None:

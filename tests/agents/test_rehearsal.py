@@ -9,23 +9,23 @@ from typing import Any
 
 import pytest
 
-from agents.agent import Agent
-from agents.modes import WALK
-from agents.planner import qp_solver
-from agents.rehearsal import rehearse
-from shared.config import Config, TeamConfig
+from quadriga.agents.agent import Agent
+from quadriga.agents.modes import WALK
+from quadriga.agents.planner import qp_solver
+from quadriga.agents.rehearsal import rehearse
+from quadriga.shared.config.sections import Config, TeamConfig
 from tests.agents.duet import simple_predictor
 
 ALONE = Config(team=TeamConfig(robots=1))
 
 FIRST_CALLS = """
-from agents.agent import Agent
-from agents.rehearsal import rehearse
-from shared import flat_layout
-from shared.config import Config, TeamConfig
-from sim_server import motors
-from sim_server.commands import CommandBox
-from sim_server.world import World
+from quadriga.agents.agent import Agent
+from quadriga.agents.rehearsal import rehearse
+from quadriga.shared.wire import flat_layout
+from quadriga.shared.config.sections import Config, TeamConfig
+from quadriga.sim_server.world import motors
+from quadriga.plant.commands import CommandBox
+from quadriga.sim_server.world.world import World
 config = Config(team=TeamConfig(robots=1))
 WHAT
 first = flat_layout._read.signatures + motors.drive.signatures
@@ -38,7 +38,7 @@ def test_limits_of_both_qps_are_met(monkeypatch: pytest.MonkeyPatch) -> None:
     judged: list[int] = []
     judge = qp_solver.judge
 
-    def counting(*arguments: Any) -> qp_solver.Solution:
+    def counting(*arguments: Any) -> qp_solver.QpSolution:
         answer = judge(*arguments)
         judged.append(answer.iterations)
         return answer
@@ -58,7 +58,11 @@ def test_limits_of_both_qps_are_met(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_nothing_of_the_first_tick_is_left_to_compile(what: str) -> None:
     """On a machine that has compiled nothing yet it takes seconds, of a walk in real time."""
     done = subprocess.run(
-        [sys.executable, "-c", FIRST_CALLS.replace("WHAT", what)], capture_output=True, text=True,
-        timeout=300.0, check=True, cwd=Path(__file__).parents[2],
-    )  # fmt: skip
+        [sys.executable, "-c", FIRST_CALLS.replace("WHAT", what)],
+        capture_output=True,
+        text=True,
+        timeout=300.0,
+        check=True,
+        cwd=Path(__file__).parents[2],
+    )
     assert done.stdout == "1\n"

@@ -9,10 +9,10 @@ import pinocchio as pin
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.controller.estimator import Estimate
-from agents.controller.sensing import outputs_at
-from agents.sampling import measured
-from shared.robot import Array
+from quadriga.agents.controller.estimator import Estimate
+from quadriga.agents.controller.sensing import outputs_at
+from quadriga.agents.sampling import measured
+from quadriga.shared.robot.a1 import Array
 from tests.agents.controller.poses import random_pose, standing_pose
 
 

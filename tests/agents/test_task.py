@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from agents.agent import Agent, Outputs
-from agents.controller.controller import Acted, Schedule, Task
-from quadriga.rollout import Rollout
-from shared.config import Config, TeamConfig
-from shared.messages import Plan
-from shared.robot import Array
-from shared.topics import SAMPLE_MS
+from quadriga.agents.agent import Agent, Outputs
+from quadriga.agents.controller.controller import ControllerOutputs, Schedule, Task
+from quadriga.identification.rollout import Rollout
+from quadriga.shared.config.sections import Config, TeamConfig
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.messages import Plan
+from quadriga.shared.wire.topics import SAMPLE_MS
 from tests.agents.duet import every_100_ms, simple_predictor
 
 ALONE = Config(team=TeamConfig(robots=1))
@@ -33,7 +33,9 @@ class Watched:
         agent: Agent = self.rollout.agents["r1"]
         act = agent._controller.act
 
-        def seen(at: Any, schedule: Schedule, task: Task, *rest: Any, **named: Any) -> Acted:
+        def seen(
+            at: Any, schedule: Schedule, task: Task, *rest: Any, **named: Any
+        ) -> ControllerOutputs:
             self._tasks.append((schedule, task))
             return act(at, schedule, task, *rest, **named)
 
@@ -49,7 +51,7 @@ class Watched:
         return self
 
 
-def outlook(tick: int, plan: Plan) -> Array:
+def v_ref(tick: int, plan: Plan) -> Array:
     """Planned vx, vy from the sample of `tick` on."""
     return plan.y[(tick - plan.tick) // SAMPLE_MS :, 1:3]
 
@@ -60,7 +62,7 @@ def test_planned_speeds_are_tracked_with_the_interface_force(
     seen = Watched(monkeypatch, interface="force").walk(600).asked
     assert len(seen) > 200
     for tick, _, task, plan in seen:
-        np.testing.assert_array_equal([task.vx, task.vy], outlook(tick, plan)[0])
+        np.testing.assert_array_equal([task.vx, task.vy], v_ref(tick, plan)[0])
         assert task.ahead is None
 
 
@@ -86,7 +88,7 @@ def test_planned_footholds_count_on_the_way_to_the_middle_of_the_stance_to_come(
         ahead_ms = (1.0 - schedule.progress) * STANCE_MS + 0.5 * STANCE_MS
         assert task.ahead is not None
         wanted = max(1, round(ahead_ms / SAMPLE_MS))
-        planned = outlook(tick, plan)[:wanted]
+        planned = v_ref(tick, plan)[:wanted]
         reached.add(len(planned) == wanted)
         np.testing.assert_allclose(task.ahead, planned.mean(axis=0), atol=1e-12)
         assert task.vy == 0.0

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.agent import Outputs
-from agents.telemetry import Telemetry
-from shared.messages import Command
+from quadriga.agents.agent import Outputs
+from quadriga.agents.telemetry import Telemetry
+from quadriga.shared.wire.messages import Command
 
 ZERO = np.zeros(12)
 

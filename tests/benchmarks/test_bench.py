@@ -12,18 +12,20 @@ from typing import Any
 
 import pytest
 
-from shared.clock import monotonic, sleep
+from quadriga.shared.runtime.clock import monotonic, sleep
 
-BENCH = Path(__file__).parents[2] / "benchmarks" / "bench.py"
+TOP = Path(__file__).parents[2]
 NO_TSID = "raise ImportError('not installed')\n"
 
 
 def command(out: Path, *words: str) -> list[str]:
-    return [sys.executable, str(BENCH), *words, "--quick", "--out", str(out)]
+    return [sys.executable, "-m", "benchmarks.bench", *words, "--quick", "--out", str(out)]
 
 
 def run(out: Path, *words: str) -> tuple[str, dict[str, Any]]:
-    done = subprocess.run(command(out, *words), check=False, capture_output=True, text=True)
+    done = subprocess.run(
+        command(out, *words), cwd=TOP, check=False, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout, json.loads(out.read_text(encoding="utf-8"))
 
@@ -69,7 +71,7 @@ def test_walks_are_measured_with_and_without_the_bus(tmp_path: Path) -> None:
 
 def test_an_unknown_part_is_refused_by_name(tmp_path: Path) -> None:
     words = command(tmp_path / "b.json", "wrold")
-    done = subprocess.run(words, check=False, capture_output=True, text=True)
+    done = subprocess.run(words, cwd=TOP, check=False, capture_output=True, text=True)
     assert done.returncode == 2
     assert "no part wrold" in done.stderr
 
@@ -77,7 +79,7 @@ def test_an_unknown_part_is_refused_by_name(tmp_path: Path) -> None:
 def test_an_interrupt_leaves_no_process_and_no_file(tmp_path: Path) -> None:
     words = command(tmp_path / "b.json", "bus")
     with subprocess.Popen(
-        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        words, cwd=TOP, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as bench:
         children = awaited_children(bench.pid, 2)
         bench.send_signal(signal.SIGINT)

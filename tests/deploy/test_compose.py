@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 import yaml
 
-from quadriga.cli import parser
-from quadriga.launch import Row, table
-from shared.config_file import load
-from shared.robot import robot_names
+from quadriga.commands.parser import parser
+from quadriga.shared.config.load import load
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.team.launch import ProcessSpec, table
 
 TOP = Path(__file__).parents[2]
 COMPOSE: dict[str, Any] = yaml.safe_load((TOP / "docker-compose.yml").read_text(encoding="utf-8"))
@@ -42,7 +42,7 @@ def environment() -> dict[str, str]:
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
-def test_every_process_of_a_walk_has_a_service(row: Row) -> None:
+def test_every_process_of_a_walk_has_a_service(row: ProcessSpec) -> None:
     verb = row.command.index("quadriga") + 1
     launched, contained = parser().parse_args(row.command[verb:]), arguments_of(row.name)
     assert contained.verb is launched.verb
@@ -136,11 +136,16 @@ def test_one_image_on_a_base_of_ones_choice() -> None:
 def test_the_build_gets_every_package_and_the_scenarios() -> None:
     project = tomllib.loads((TOP / "pyproject.toml").read_text(encoding="utf-8"))
     setup = project["tool"]["setuptools"]
-    packages = {name.split(".")[0] for name in setup["packages"]}
+    assert setup["packages"]["find"]["include"] == ["quadriga", "quadriga.*"]
+    linked = {path.name for path in (TOP / "quadriga").iterdir() if path.is_symlink()}
+    packages = {"quadriga"} | linked
     files = {str(Path(name).parent) for names in setup["data-files"].values() for name in names}
     ignore = (TOP / ".dockerignore").read_text(encoding="utf-8").splitlines()
     let_through = {line[1:] for line in ignore if line.startswith("!")}
-    copied = {name for line in re.findall(r"^COPY (?!--)(.*) \S+$", DOCKERFILE, re.M)
-              for name in line.split()}  # fmt: skip
+    copied = {
+        name
+        for line in re.findall(r"^COPY (?!--)(.*) \S+$", DOCKERFILE, re.M)
+        for name in line.split()
+    }
     assert copied == let_through == packages | files | {"pyproject.toml", "requirements.lock"}
     assert all((TOP / name).exists() for name in copied)

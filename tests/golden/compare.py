@@ -9,10 +9,10 @@ from itertools import zip_longest
 
 import numpy as np
 
-from quadriga.difference import Difference, difference
-from shared.codec import decode
-from shared.messages import Message
-from shared.topics import topic_of
+from quadriga.replay.difference import Difference, difference
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Message
+from quadriga.shared.wire.topics import topic_of
 
 TOLERANCE = 1e-6  # of a field's largest magnitude in the recording, for arrays
 
@@ -54,8 +54,9 @@ def largest_deviations(recorded: Packets, recomputed: Packets) -> dict[str, floa
             field = f"{name}.{item.name}"
             scale[field] = max(scale[field], float(np.abs(a).max(initial=0.0)))
             found[field] = max(found[field], float(np.abs(b - a).max(initial=0.0)))
-    return {field: value / (scale[field] or 1.0) if value else 0.0
-            for field, value in found.items()}  # fmt: skip
+    return {
+        field: value / (scale[field] or 1.0) if value else 0.0 for field, value in found.items()
+    }
 
 
 def _decoded(key: str, payload: bytes) -> Message:

@@ -21,19 +21,19 @@ import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 from rich.console import Console
 
-from agents.planner.predictor import Predictor
-from agents.planner.store import load, predictor_sha256, save
-from quadriga.identify import ensure_predictor
-from quadriga.recorder import metadata
-from shared.clock import wall_ns
-from shared.codec import encode
-from shared.config import Config
-from shared.config_file import load as load_config
-from shared.errors import PredictorError, QuadrigaError, RecordingError
-from shared.recording import PROFILE, Recording
-from shared.robot import Array, robot_names
-from shared.schema import json_schema
-from shared.topics import topic_of
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.predictor.store import load, predictor_sha256, save
+from quadriga.identification.identify import ensure_predictor
+from quadriga.recorder.process import metadata
+from quadriga.shared.config.load import load as load_config
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import PredictorError, QuadrigaError, RecordingError
+from quadriga.shared.recording.reader import PROFILE, Recording
+from quadriga.shared.robot.a1 import Array, robot_names
+from quadriga.shared.runtime.clock import wall_ns
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.schema import json_schema
+from quadriga.shared.wire.topics import topic_of
 from tests.golden import scenario
 from tests.golden.arithmetic import arithmetic
 from tests.golden.compare import first_difference
@@ -47,9 +47,10 @@ _CHUNK: Final = 4 << 20  # bytes; large chunks compress better
 def main() -> int:
     """Renew the recording and write down why."""
     parser = argparse.ArgumentParser(
-        prog="python -m tests.golden.renew", description=__doc__,
+        prog="python -m tests.golden.renew",
+        description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
+    )
     doc = "what the agents do differently now, and why that is right"
     parser.add_argument("--reason", required=True, metavar="TEXT", help=doc)
     parser.add_argument("--fit", action="store_true", help="fit the predictor anew as well")
@@ -122,8 +123,12 @@ def write(path: Path, config: Config, predictor: Predictor) -> None:
     about = metadata(config, predictor_sha256(predictor))
     about[ARITHMETIC] = json.dumps(arithmetic())
     with path.open("wb") as file:
-        writer = Writer(file, chunk_size=_CHUNK, compression=CompressionType.ZSTD,
-                        index_types=IndexType.ALL ^ IndexType.MESSAGE)  # fmt: skip
+        writer = Writer(
+            file,
+            chunk_size=_CHUNK,
+            compression=CompressionType.ZSTD,
+            index_types=IndexType.ALL ^ IndexType.MESSAGE,
+        )
         writer.start(PROFILE, "quadriga")
         writer.add_metadata(PROFILE, about)
         _write(writer, scenario.walk(config, predictor))

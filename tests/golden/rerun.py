@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import groupby
 
-from agents.agent import Agent
-from agents.arrivals import Arrivals
-from agents.planner.predictor import Predictor
-from shared.blas import one_blas_thread
-from shared.codec import encode
-from shared.config import Config
-from shared.recording import Entry
-from shared.topics import COMMAND, MEASUREMENT, PLAN
+from quadriga.agents.agent import Agent
+from quadriga.agents.inbox.inbox import Inbox
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.shared.config.sections import Config
+from quadriga.shared.recording.reader import ChunkEntry
+from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN
 
 OUTPUTS = (COMMAND, MEASUREMENT, PLAN)
 
 
 def rerun(
-    entries: Iterable[Entry], config: Config, robot: str, predictor: Predictor
+    entries: Iterable[ChunkEntry], config: Config, robot: str, predictor: Predictor
 ) -> list[tuple[str, bytes]]:
     """What the agent of `robot` sends when it hears a recording again: keys and payloads.
 
@@ -26,7 +26,7 @@ def rerun(
     """
     one_blas_thread()
     agent = Agent(config, robot, predictor)
-    arrivals = Arrivals(config, robot, agent.peers)
+    arrivals = Inbox(config, robot, agent.peers)
     memory, sent = agent.initial(), []
     for _, packets in groupby(entries, key=lambda entry: entry.tick):
         for entry in packets:
@@ -43,7 +43,7 @@ def rerun(
     return sent
 
 
-def recorded(entries: Iterable[Entry], config: Config, robot: str) -> list[tuple[str, bytes]]:
+def recorded(entries: Iterable[ChunkEntry], config: Config, robot: str) -> list[tuple[str, bytes]]:
     """What the agent of `robot` was recorded to have sent, in the order of the recording."""
     keys = {topic.key(config.team.name, robot) for topic in OUTPUTS}
     return [(entry.key, entry.payload) for entry in entries if entry.key in keys]

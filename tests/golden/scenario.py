@@ -9,16 +9,24 @@ from typing import Any, Final
 
 import numpy as np
 
-from agents.planner.predictor import Predictor
-from quadriga.operator import reference_at
-from quadriga.rollout import Rollout
-from shared.codec import decode, encode
-from shared.config import Config
-from shared.config_file import load
-from shared.messages import Message, State
-from shared.robot import robot_names
-from shared.topics import COMMAND, EVENT, MEASUREMENT, PLAN, REFERENCE, REFERENCE_EPOCH_MS, STATE
-from sim_server.world import World
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.identification.rollout import Rollout
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Message, State
+from quadriga.shared.wire.topics import (
+    COMMAND,
+    EVENT,
+    MEASUREMENT,
+    PLAN,
+    REFERENCE,
+    REFERENCE_EPOCH_MS,
+    STATE,
+)
+from quadriga.sim_server.world.world import World
+from quadriga.team.operator import reference_at
 
 FOLDER: Final = Path(__file__).parent
 RECORDING: Final = FOLDER / "golden.mcap"

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.planner.store import load
-from shared.codec import decode, encode
-from shared.config import Config
-from shared.messages import Command, Message, State
-from shared.recording import Entry, Recording
+from quadriga.agents.predictor.store import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.recording.reader import ChunkEntry, Recording
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Command, Message, State
 from tests.golden import scenario
 from tests.golden.arithmetic import arithmetic, differences
 from tests.golden.compare import TOLERANCE, first_difference
@@ -32,28 +32,30 @@ Sent = list[tuple[str, bytes]]
 
 
 @pytest.fixture(scope="module")
-def entries() -> list[Entry]:
+def entries() -> list[ChunkEntry]:
     return list(Recording(scenario.RECORDING).entries())
 
 
-def heard_again(entries: list[Entry], robot: str, config: Config = CONFIG) -> Sent:
+def heard_again(entries: list[ChunkEntry], robot: str, config: Config = CONFIG) -> Sent:
     return rerun(entries, config, robot, load(scenario.PREDICTOR, CONFIG)[0])
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_agents_do_what_they_did(
-    entries: list[Entry], robot: str, record_property: Callable[[str, object], None]
+    entries: list[ChunkEntry], robot: str, record_property: Callable[[str, object], None]
 ) -> None:
     made_by = json.loads(Recording(scenario.RECORDING).metadata[ARITHMETIC])
     verdict = judge(
-        robot, recorded(entries, CONFIG, robot), heard_again(entries, robot),
+        robot,
+        recorded(entries, CONFIG, robot),
+        heard_again(entries, robot),
         differences(arithmetic(), made_by),
-    )  # fmt: skip
+    )
     assert verdict.ok, f"\n{verdict.text}"
     record_property("golden", verdict.text)
 
 
-def test_the_golden_walk_is_worth_repeating(entries: list[Entry]) -> None:
+def test_the_golden_walk_is_worth_repeating(entries: list[ChunkEntry]) -> None:
     for robot in ROBOTS:
         kinds = [key.rpartition("/")[2] for key, _ in recorded(entries, CONFIG, robot)]
         assert [kinds.count(kind) for kind in ("command", "measurement", "plan")] == [600, 59, 12]
@@ -62,8 +64,8 @@ def test_the_golden_walk_is_worth_repeating(entries: list[Entry]) -> None:
 
 
 def changed(
-    entries: list[Entry], key: str, tick: int, change: Callable[[State], Message]
-) -> list[Entry]:
+    entries: list[ChunkEntry], key: str, tick: int, change: Callable[[State], Message]
+) -> list[ChunkEntry]:
     """The same recording with one other message."""
     return [
         entry._replace(payload=encode(change(decode(entry.payload, State))))
@@ -79,7 +81,7 @@ def flip_last_bit(state: State) -> State:
     return replace(state, v_joint=bits.view(np.float64))
 
 
-def test_one_bit_of_one_sensor_is_found_at_its_tick(entries: list[Entry]) -> None:
+def test_one_bit_of_one_sensor_is_found_at_its_tick(entries: list[ChunkEntry]) -> None:
     before = heard_again(entries, "r2")
     after = heard_again(changed(entries, "team/r2/state", 433, flip_last_bit), "r2")
     found = first_difference(before, after)
@@ -89,7 +91,7 @@ def test_one_bit_of_one_sensor_is_found_at_its_tick(entries: list[Entry]) -> Non
     assert heard_again(entries, "r2") == before, "nothing is remembered from one run to the next"
 
 
-def test_a_changed_gain_is_a_change_of_behaviour(entries: list[Entry]) -> None:
+def test_a_changed_gain_is_a_change_of_behaviour(entries: list[ChunkEntry]) -> None:
     stiffer = replace(CONFIG, controller=replace(CONFIG.controller, kp_z=400.1))
     verdict = judge("r1", heard_again(entries, "r1"), heard_again(entries, "r1", stiffer), ())
     assert not verdict.ok

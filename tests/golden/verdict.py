@@ -37,13 +37,19 @@ def judge(robot: str, recorded: Packets, recomputed: Packets, unlike: Sequence[s
     field = max(deviations, key=lambda name: deviations[name])
     largest = f"largest deviation {deviations[field]:.1e} in {field}"
     if unlike and deviations[field] <= TOLERANCE:
-        return Verdict(True, (
-            f"{robot}: {len(recorded)} messages equal within {TOLERANCE:g}, not to the byte "
-            f"({largest}), since this machine computes with {'; '.join(unlike)}"
-        ))  # fmt: skip
+        return Verdict(
+            True,
+            (
+                f"{robot}: {len(recorded)} messages equal within {TOLERANCE:g}, not to the byte "
+                f"({largest}), since this machine computes with {'; '.join(unlike)}"
+            ),
+        )
     elsewhere = f"\nThis machine computes with {'; '.join(unlike)}." if unlike else ""
-    return Verdict(False, (
-        f"The agent of {robot} no longer does what the golden recording holds.\n"
-        f"First difference: {difference}\n{largest}, relative to its largest magnitude."
-        f"{elsewhere}\n{REMEDY}"
-    ))  # fmt: skip
+    return Verdict(
+        False,
+        (
+            f"The agent of {robot} no longer does what the golden recording holds.\n"
+            f"First difference: {difference}\n{largest}, relative to its largest magnitude."
+            f"{elsewhere}\n{REMEDY}"
+        ),
+    )

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.gait import nominal_forces, scheduled_stance
-from quadriga.recorder import metadata
-from shared import messages as msg
-from shared.codec import encode
-from shared.config import Config, ReferenceConfig, TeamConfig, WorldConfig
-from shared.recording import RecordingWriter
-from shared.robot import q_stand, robot_names
-from sim_server.team_model import formation
+from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.recorder.process import metadata
+from quadriga.shared.config.sections import Config, ReferenceConfig, TeamConfig, WorldConfig
+from quadriga.shared.recording.reader import RecordingWriter
+from quadriga.shared.robot.a1 import q_stand, robot_names
+from quadriga.shared.wire import messages as msg
+from quadriga.shared.wire.codec import encode
+from quadriga.sim_server.world.team_model import formation
 
 SECONDS = 6.0
 SPEED = 0.51  # m/s along the yaw axis, 0.01 more than asked for
@@ -48,16 +48,29 @@ def truth(config: Config, tick: int, yaw: float) -> msg.Truth:
     half = np.stack([np.full(n, yaw), y[:, 4], y[:, 3]]) / 2  # yaw, pitch, roll
     (cy, cp, cr), (sy, sp, sr) = np.cos(half), np.sin(half)
     quat = np.stack(
-        [cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy,
-         cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy], axis=1,
-    )  # fmt: skip
+        [
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        ],
+        axis=1,
+    )
     stance = np.stack([scheduled_stance(config, i, np.array([tick]))[0] for i in range(n)])
     grf = nominal_forces(stance).reshape(n, 4, 3) + 3.0 * stance[..., None]
     pairs = n * (n - 1) // 2
     return msg.Truth(
-        tick, tick * 1_000_000, robot_names(n), pos, quat, vel, np.zeros((n, 3)), grf,
-        np.full(pairs, -0.0004 * np.sin(tick / 1000)), np.zeros(pairs),
-    )  # fmt: skip
+        tick,
+        tick * 1_000_000,
+        robot_names(n),
+        pos,
+        quat,
+        vel,
+        np.zeros((n, 3)),
+        grf,
+        np.full(pairs, -0.0004 * np.sin(tick / 1000)),
+        np.zeros(pairs),
+    )
 
 
 def reference(config: Config, tick: int) -> msg.Reference:
@@ -86,10 +99,19 @@ def agent_messages(config: Config, index: int, tick: int) -> Iterator[Packet]:
         )
     if tick % 100 == 0:
         solves = np.array([0.2, 0.3, 1.0]) if tick >= 400 else np.zeros(0)
-        yield key + "status", msg.Status(
-            *head, "walk" if tick >= 300 else "stand", "", "kalman", {"state": 0.0},
-            {"qp_fallback": tick // 1000}, solves, np.array([50.0, 60.0]),
-        )  # fmt: skip
+        yield (
+            key + "status",
+            msg.Status(
+                *head,
+                "walk" if tick >= 300 else "stand",
+                "",
+                "kalman",
+                {"state": 0.0},
+                {"qp_fallback": tick // 1000},
+                solves,
+                np.array([50.0, 60.0]),
+            ),
+        )
 
 
 def packets(config: Config, yaw: float) -> Iterator[Packet]:

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from quadriga import cache as keys
-from quadriga.cache import data_path
-from quadriga.collect import Dataset
-from quadriga.identify import write_data
-from shared.config import Config
-from shared.config_file import load
-from tests.agents.planner.conftest import LinearTeam
+from quadriga.identification import cache as keys
+from quadriga.identification.cache import data_path
+from quadriga.identification.collect import Dataset
+from quadriga.identification.identify import write_data
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from tests.agents.conftest import LinearTeam
 
 # Short horizons, so that fits are cheap; the linear team's low level has no height integrator.
 OPTIONS: dict[str, Any] = {

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from quadriga.recorder import metadata
-from shared.codec import encode
-from shared.config import Config
-from shared.config_file import load
-from shared.messages import Command, Event
-from shared.recording import RecordingWriter
-from shared.robot import q_stand
-from sim_server.world import World
+from quadriga.recorder.process import metadata
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.recording.reader import RecordingWriter
+from quadriga.shared.robot.a1 import q_stand
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Command, Event
+from quadriga.sim_server.world.world import World
 
 Packet = tuple[str, bytes]
 Change = Callable[[int, str, bytes], bytes | None]
@@ -32,8 +32,15 @@ SCENE = {
 def command(tick: int, robot: int) -> Command:
     rng = np.random.default_rng((tick, robot))
     q_des = q_stand() + 0.1 * rng.standard_normal(12)
-    return Command(tick, 10**6 * tick, rng.standard_normal(12), q_des, np.zeros(12),
-                   np.full(12, 60.0), np.full(12, 2.0))  # fmt: skip
+    return Command(
+        tick,
+        10**6 * tick,
+        rng.standard_normal(12),
+        q_des,
+        np.zeros(12),
+        np.full(12, 60.0),
+        np.full(12, 2.0),
+    )
 
 
 def config(**keys: object) -> Config:

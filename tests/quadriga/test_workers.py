@@ -38,7 +38,11 @@ def test_an_interrupt_at_any_moment_ends_the_calls(tmp_path: Path) -> None:
     script.write_text(INTERRUPTED, encoding="utf-8")
     for delay in (0.002, 0.006, 0.01, 0.02, 0.03):
         done = subprocess.run(
-            [sys.executable, str(script), str(delay)], capture_output=True, text=True,
-            timeout=60.0, check=True, env={"PYTHONPATH": str(Path(__file__).parents[2])},
-        )  # fmt: skip
+            [sys.executable, str(script), str(delay)],
+            capture_output=True,
+            text=True,
+            timeout=60.0,
+            check=True,
+            env={"PYTHONPATH": str(Path(__file__).parents[2])},
+        )
         assert done.stdout == "interrupted\n", done.stderr

@@ -11,16 +11,16 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from quadriga.endpoint import free_endpoint
-from quadriga.launch import Launch, Row, table
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.team.endpoint import free_endpoint
+from quadriga.team.launch import Launch, ProcessSpec, table
 from quadriga.warm_up import warm_up
-from shared.bus import Bus
-from shared.clock import monotonic, sleep
-from shared.config import Config
-from shared.config_file import load
-from shared.config_text import to_toml
-from shared.recording import Recording
-from shared.robot import robot_names
 
 WAIT = 60.0  # s, more than anything here takes on a busy machine
 
@@ -32,13 +32,13 @@ class Team:
     config: Config
     folder: Path
 
-    def rows(self, *, standing: bool) -> tuple[Row, ...]:
+    def rows(self, *, standing: bool) -> tuple[ProcessSpec, ...]:
         """The launcher's table, with agents that merely stand if asked for."""
         (self.folder / "config.toml").write_text(to_toml(self.config), encoding="utf-8")
         rows = table(self.config, self.folder, None, "")
         return tuple(self._standing(row) if standing else row for row in rows)
 
-    def _standing(self, row: Row) -> Row:
+    def _standing(self, row: ProcessSpec) -> ProcessSpec:
         if row.name not in robot_names(self.config.team.robots):
             return row
         module = (sys.executable, "-m", "tests.runtime.standing_agent")
@@ -79,8 +79,13 @@ def make_team(tmp_path: Path) -> Make:
     """A function that makes a team of a test's own; keyword `section__key` sets a key."""
 
     def make(**keys: object) -> Team:
-        given = {"team.robots": 2, "planner.kind": "none", "bus.endpoint": free_endpoint(),
-                 "bus.barrier_timeout": WAIT, "recorder.enabled": False}  # fmt: skip
+        given = {
+            "team.robots": 2,
+            "planner.kind": "none",
+            "bus.endpoint": free_endpoint(),
+            "bus.barrier_timeout": WAIT,
+            "recorder.enabled": False,
+        }
         given |= {name.replace("__", "."): value for name, value in keys.items()}
         return Team(load(None, given), tmp_path)
 
@@ -109,7 +114,7 @@ def watcher() -> Iterator[Callable[[Team], Bus]]:
         bus.close()
 
 
-def run_alone(row: Row) -> tuple[int, str]:
+def run_alone(row: ProcessSpec) -> tuple[int, str]:
     """Run one row's command to its end: exit status and what it said on stderr."""
     done = subprocess.run(row.command, capture_output=True, text=True, timeout=WAIT, check=False)
     return done.returncode, done.stderr

@@ -9,12 +9,12 @@ from typing import Final
 
 import pytest
 
-from quadriga.launch import Launch
-from shared.bus import Bus
-from shared.clock import monotonic
-from shared.codec import decode
-from shared.messages import Command, Event, Truth
-from shared.topics import COMMAND, EVENT, TRUTH
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Command, Event, Truth
+from quadriga.shared.wire.topics import COMMAND, EVENT, TRUTH
+from quadriga.team.launch import Launch
 from tests.runtime.conftest import WAIT
 
 TEAM: Final = "team"

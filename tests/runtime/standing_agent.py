@@ -10,17 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from shared.barrier import SIM, meet
-from shared.bus import HERE, POLL, READY, Bus
-from shared.codec import decode, encode
-from shared.config import Config
-from shared.config_file import load
-from shared.errors import MessageError
-from shared.messages import Command, Event, State
-from shared.robot import N_JOINTS, q_stand
-from shared.scheduling import take_priority
-from shared.signals import die_with_parent, stop_on_signals
-from shared.topics import COMMAND, EVENT, STATE
+from quadriga.shared.bus.barrier import SIM, meet
+from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import MessageError
+from quadriga.shared.robot.a1 import N_JOINTS, q_stand
+from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.signals import die_with_parent, stop_on_signals
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Command, Event, State
+from quadriga.shared.wire.topics import COMMAND, EVENT, STATE
 
 
 def run(config: Config, robot: str) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from shared.clock import monotonic, sleep
+from quadriga.shared.runtime.clock import monotonic, sleep
 from tests.runtime.conftest import WAIT
 
 pytestmark = pytest.mark.usefixtures("_compiled")
@@ -38,11 +38,22 @@ def alive(pid: int) -> bool:
 )
 def test_an_interrupted_collection(tmp_path: Path, number: signal.Signals, status: int) -> None:
     collection = subprocess.Popen(
-        [sys.executable, "-m", "quadriga", "collect", "--robots", "1",
-         "--set", "identification.seconds=600"],
-        env={**os.environ, "XDG_CACHE_HOME": str(tmp_path)}, start_new_session=True,
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "quadriga",
+            "collect",
+            "--robots",
+            "1",
+            "--set",
+            "identification.seconds=600",
+        ],
+        env={**os.environ, "XDG_CACHE_HOME": str(tmp_path)},
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     deadline = monotonic() + WAIT
     # The workers and multiprocessing's resource tracker.
     while len(workers := descendants(collection.pid)) < 2 and monotonic() < deadline:

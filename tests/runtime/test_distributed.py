@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from agents.gait import nominal_forces
-from agents.planner.horizon import horizon_stance
-from quadriga.identify import ensure_predictor
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.time_grid import horizon_stance
+from quadriga.identification.identify import ensure_predictor
 from quadriga.replay.run import replay
-from shared.config import Config
-from shared.config_file import load
-from shared.messages import Plan
-from shared.recording import Recording
-from shared.robot import robot_names
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.wire.messages import Plan
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
@@ -35,8 +35,21 @@ def walks(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     ensure_predictor(config, Console(stderr=True))
     folders = [tmp_path_factory.mktemp("walk") / "run" for _ in range(2)]
     for folder in folders:
-        command = [sys.executable, "-m", "quadriga", "walk", "--robots", str(ROBOTS), "--seconds",
-                   str(SECONDS), "--seed", "3", "--no-render", "--out", str(folder)]  # fmt: skip
+        command = [
+            sys.executable,
+            "-m",
+            "quadriga",
+            "walk",
+            "--robots",
+            str(ROBOTS),
+            "--seconds",
+            str(SECONDS),
+            "--seed",
+            "3",
+            "--no-render",
+            "--out",
+            str(folder),
+        ]
         done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
         assert (done.returncode, done.stderr) == (0, "")
     return folders

@@ -10,14 +10,14 @@ from dataclasses import replace
 
 import pytest
 
-from quadriga import launch
-from shared.bus import Bus
-from shared.clock import monotonic, sleep
-from shared.codec import decode
-from shared.config_text import to_toml
-from shared.errors import ProcessError
-from shared.messages import EStop, Event, Status
-from shared.topics import EVENT
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.errors import ProcessError
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import EStop, Event, Status
+from quadriga.shared.wire.topics import EVENT
+from quadriga.team import launch
 from tests.runtime.conftest import WAIT, Make, run_alone
 from tests.runtime.frozen import PATIENCE, TEAM, await_tick, freeze
 
@@ -127,8 +127,18 @@ def test_an_emergency_stop_damps_every_robot(make_team: Make, watcher: Watcher) 
     with team.launch(standing=False) as running:
         team.await_log("sim", "start")
         bus = watcher(team)
-        stop = launch.Row("estop", (*launch.QUADRIGA, "estop", "--reason", "smoke", "--config",
-                                    str(team.folder / "config.toml")), 5.0)  # fmt: skip
+        stop = launch.ProcessSpec(
+            "estop",
+            (
+                *launch.QUADRIGA,
+                "estop",
+                "--reason",
+                "smoke",
+                "--config",
+                str(team.folder / "config.toml"),
+            ),
+            5.0,
+        )
         assert run_alone(stop) == (0, "")
         modes: dict[str, str] = {}
         deadline = monotonic() + WAIT
@@ -176,7 +186,7 @@ def test_a_process_alone_names_the_absent(make_team: Make, verb: tuple[str, ...]
     file = team.folder / "config.toml"
     file.write_text(to_toml(team.config), encoding="utf-8")
     words = [str(team.folder / "alone.mcap") if word == "RUN" else word for word in verb]
-    row = launch.Row("alone", (*launch.QUADRIGA, *words, "--config", str(file)), 5.0)
+    row = launch.ProcessSpec("alone", (*launch.QUADRIGA, *words, "--config", str(file)), 5.0)
     status, said = run_alone(row)
     assert status == 2
     others = {"sim": "operator, r1, r2", "operate": "r1, r2, sim"}

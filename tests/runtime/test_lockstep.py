@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shared.bus import READY, Bus
-from shared.clock import monotonic
-from shared.codec import M, decode, encode
-from shared.errors import MessageError
-from shared.messages import Command, Event, Reference, State, Status, Truth
-from shared.recording import Recording
-from shared.robot import robot_names
-from shared.topics import ESTOP, EVENT, STATUS, TABLE, TRUTH
+from quadriga.shared.bus.zenoh_bus import READY, Bus
+from quadriga.shared.errors import MessageError
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.wire.codec import M, decode, encode
+from quadriga.shared.wire.messages import Command, Event, Reference, State, Status, Truth
+from quadriga.shared.wire.topics import ESTOP, EVENT, STATUS, TABLE, TRUTH
 from tests.runtime.conftest import WAIT, Make, Team, run_alone
 
 
@@ -112,8 +112,13 @@ def valid(recording: Recording, key: str, kind: type[M]) -> list[M]:
 def inject_noise(bus: Bus, team: Team) -> None:
     """Publish what is no message on every key of the team, but where it is an emergency stop."""
     nan = np.full(12, np.nan)
-    noise = [b"", b"\xc1\xff", b"\x81\xa6schema\x01", bytes(70_000),
-             encode(Command(1, 1, nan, nan, nan, nan, nan))]  # fmt: skip
+    noise = [
+        b"",
+        b"\xc1\xff",
+        b"\x81\xa6schema\x01",
+        bytes(70_000),
+        encode(Command(1, 1, nan, nan, nan, nan, nan)),
+    ]
     for topic in (topic for topic in TABLE if topic is not ESTOP):
         for robot in robot_names(team.config.team.robots) if topic.per_robot else ("",):
             put = bus.publisher(topic.key(team.config.team.name, robot))

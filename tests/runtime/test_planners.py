@@ -9,21 +9,21 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from agents.planner.horizon import step_ms
-from agents.planner.store import load as load_predictor
-from agents.planning import first_step
-from quadriga.endpoint import free_endpoint
-from quadriga.identify import ensure_predictor, team_planner
-from quadriga.launch import Launch, table
-from quadriga.operator import reference_at
-from quadriga.rollout import Rollout
-from shared.codec import decode, encode
-from shared.config import CENTRAL, Config
-from shared.config_file import load
-from shared.config_text import to_toml
-from shared.messages import Command, Measurement, Plan
-from shared.recording import Recording
-from shared.robot import robot_names
+from quadriga.agents.planning.local import first_step
+from quadriga.agents.predictor.store import load as load_predictor
+from quadriga.agents.time_grid import step_ms
+from quadriga.identification.identify import ensure_predictor, team_planner
+from quadriga.identification.rollout import Rollout
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Command, Measurement, Plan
+from quadriga.team.endpoint import free_endpoint
+from quadriga.team.launch import Launch, table
+from quadriga.team.operator import reference_at
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
@@ -38,9 +38,12 @@ KINDS: dict[str, dict[str, object]] = {
 
 def config_of(kind: str) -> Config:
     given: dict[str, object] = {
-        "team.robots": ROBOTS, "world.seconds": SECONDS, "world.seed": 4,
-        "bus.endpoint": free_endpoint(), **KINDS[kind],
-    }  # fmt: skip
+        "team.robots": ROBOTS,
+        "world.seconds": SECONDS,
+        "world.seed": 4,
+        "bus.endpoint": free_endpoint(),
+        **KINDS[kind],
+    }
     return load(None, given)
 
 
@@ -48,10 +51,11 @@ def in_one_process(config: Config, predictor: Path) -> dict[str, list[bytes]]:
     """Commands, measurements and (of agents that make them) plans, by key."""
     fitted, central = load_predictor(predictor, config)[0], config.planner.kind in CENTRAL
     rollout = Rollout(
-        config, None if central else fitted,
+        config,
+        None if central else fitted,
         lambda tick: reference_at(config, tick) if tick % 100 == 0 else None,
         planner=team_planner(config, fitted) if central else None,
-    )  # fmt: skip
+    )
     sent: dict[str, list[bytes]] = defaultdict(list)
     for tick in rollout.ticks(round(1000 * SECONDS)):
         for name, outputs in tick.outputs.items():

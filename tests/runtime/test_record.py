@@ -9,20 +9,30 @@ import subprocess
 import sys
 from pathlib import Path
 
-from quadriga.survey import survey
-from shared.clock import monotonic, sleep
-from shared.messages import Event
+from quadriga.recordings.survey import survey
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.wire.messages import Event
 from tests.runtime.conftest import WAIT, Make, Team
 
 
 def beside(team: Team, name: str, room: int = -1) -> subprocess.Popen[str]:
     """A `quadriga record` of its own, which may write no more than `room` bytes."""
     return subprocess.Popen(
-        [sys.executable, "-m", "quadriga", "record", "-o", str(team.folder / name), "--config",
-         str(team.folder / "config.toml")],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        [
+            sys.executable,
+            "-m",
+            "quadriga",
+            "record",
+            "-o",
+            str(team.folder / name),
+            "--config",
+            str(team.folder / "config.toml"),
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, -1)),
-    )  # fmt: skip
+    )
 
 
 def test_recorders_die_beside_a_team_that_walks_on(make_team: Make) -> None:
@@ -33,9 +43,10 @@ def test_recorders_die_beside_a_team_that_walks_on(make_team: Make) -> None:
         with team.launch() as running:
             team.await_log("sim", "start")
             others = [
-                beside(team, "full.mcap", 60_000), beside(team, "killed.mcap"),
+                beside(team, "full.mcap", 60_000),
+                beside(team, "killed.mcap"),
                 beside(team, "late.mcap"),
-            ]  # fmt: skip
+            ]
             await_size(team.folder / "killed.mcap", 50_000)
             others[1].kill()
             others[0].wait(WAIT)

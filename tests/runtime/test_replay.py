@@ -15,20 +15,20 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from agents.planner.store import load as load_predictor
-from agents.planner.store import predictor_sha256
-from quadriga.cli import main
-from quadriga.endpoint import free_endpoint
-from quadriga.identify import ensure_predictor
-from quadriga.launch import Launch, table
+from quadriga.agents.predictor.store import load as load_predictor
+from quadriga.agents.predictor.store import predictor_sha256
+from quadriga.commands.parser import main
+from quadriga.identification.identify import ensure_predictor
+from quadriga.plant.lockstep import ANSWERS
 from quadriga.replay.recorded_predictor import keep
-from quadriga.replay.run import Outcome, replay
+from quadriga.replay.run import ReplayOutcome, replay
 from quadriga.replay.saved_qp import load as load_qp
-from shared.bus import Bus
-from shared.config import CENTRAL
-from shared.config_file import load
-from shared.config_text import to_toml
-from shared.messages import (
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import CENTRAL
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.wire.messages import (
     Command,
     Consumed,
     Measurement,
@@ -37,8 +37,8 @@ from shared.messages import (
     State,
     Status,
 )
-from shared.recording import Recording
-from sim_server.lockstep import ANSWERS
+from quadriga.team.endpoint import free_endpoint
+from quadriga.team.launch import Launch, table
 from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
 from tests.runtime.conftest import WAIT
 from tests.runtime.frozen import PATIENCE, await_event, await_tick, freeze
@@ -73,7 +73,7 @@ def lockstep(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return walked(tmp_path_factory.mktemp("lockstep") / "run", world__seconds=1.0)
 
 
-def replayed(path: Path, *robots: str, **keys: Any) -> list[Outcome]:
+def replayed(path: Path, *robots: str, **keys: Any) -> list[ReplayOutcome]:
     """Outcomes of a replay, `section__key` changed."""
     given: dict[str, dict[str, Any]] = {}
     for name, value in keys.items():
@@ -82,7 +82,7 @@ def replayed(path: Path, *robots: str, **keys: Any) -> list[Outcome]:
     return replay(path, robots, given, None, None, Console(stderr=True))
 
 
-def check_exact(path: Path, outcomes: list[Outcome], *, plans: bool = True) -> None:
+def check_exact(path: Path, outcomes: list[ReplayOutcome], *, plans: bool = True) -> None:
     """Every recorded message of every robot is recomputed to the byte."""
     recording = Recording(path)
     assert [outcome.robot for outcome in outcomes] == ["r1", "r2"]
@@ -204,19 +204,27 @@ def test_the_debugger_stops_with_the_agent_in_scope(lockstep: Path) -> None:
     typed = "p 'ticks', memory.tick, inputs.state.tick, recorded['command'].tick\nc\n"
     command = [sys.executable, "-m", "quadriga", "replay", str(lockstep), "--robot", "r1"]
     done = subprocess.run(
-        [*command, "--break", "0.6"], input=typed, capture_output=True, text=True, check=True,
+        [*command, "--break", "0.6"],
+        input=typed,
+        capture_output=True,
+        text=True,
+        check=True,
         timeout=WAIT,
-    )  # fmt: skip
+    )
     assert "('ticks', 599, 600, 600)" in done.stdout
     assert "measurements equal to the byte" in done.stdout
     done = subprocess.run(
-        [*command, "--break", "0.6"], input="q\n", capture_output=True, text=True, check=False,
+        [*command, "--break", "0.6"],
+        input="q\n",
+        capture_output=True,
+        text=True,
+        check=False,
         timeout=WAIT,
-    )  # fmt: skip
+    )
     assert (done.returncode, done.stderr) == (130, "quadriga: interrupted\n")
 
 
-def check_exact_up_to_a_loss(path: Path, outcome: Outcome) -> None:
+def check_exact_up_to_a_loss(path: Path, outcome: ReplayOutcome) -> None:
     """All that was said before the recorder lost an input, if it did, is recomputed to the byte."""
     recording, verdict = Recording(path), outcome.verdict
     assert verdict.first is None
@@ -273,9 +281,12 @@ def frozen_for_a_while(running: Launch, endpoint: str) -> None:
 
 def test_waits_that_were_given_up_are_replayed_to_the_byte(tmp_path: Path) -> None:
     run = walked(
-        tmp_path / "run", frozen_for_a_while, world__seconds=600.0, world__command_timeout=PATIENCE,
+        tmp_path / "run",
+        frozen_for_a_while,
+        world__seconds=600.0,
+        world__command_timeout=PATIENCE,
         planner__peer_timeout=0.1,
-    )  # fmt: skip
+    )
     recording = Recording(run)
     records = {robot: list(recording.messages(Consumed, robot)) for robot in ("r1", "r2")}
     assert any("plan/r1" in record.owed for record in records["r2"])

@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import pytest
 
-from quadriga.cli import main
-from shared.bus import Bus
+from quadriga.commands.parser import main
+from quadriga.shared.bus.zenoh_bus import Bus
 from tests.runtime.conftest import Make
 from tests.runtime.frozen import PATIENCE, freeze
 
@@ -18,9 +18,11 @@ def test_a_walk_with_a_frozen_robot_comes_out_equal(
     make_team: Make, watcher: Callable[..., Bus], capsys: pytest.CaptureFixture[str]
 ) -> None:
     team = make_team(
-        recorder__enabled=True, world__seconds=600.0, world__command_timeout=PATIENCE,
+        recorder__enabled=True,
+        world__seconds=600.0,
+        world__command_timeout=PATIENCE,
         world__push="r1:50:90:0.3:0.1",
-    )  # fmt: skip
+    )
     with team.launch() as running:
         team.await_log("sim", "start")
         freeze(running, watcher(team), "r2", tick=100, ticks=300)

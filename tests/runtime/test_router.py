@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from shared.bus import Bus
-from shared.clock import monotonic, sleep
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.runtime.clock import monotonic, sleep
 from tests.runtime.conftest import WAIT, Make, Team, run_alone
 from tests.runtime.test_lockstep import payloads
 
@@ -23,8 +23,15 @@ QUADRIGA = (sys.executable, "-m", "quadriga")
 def router(team: Team, *options: str) -> Iterator[subprocess.Popen[str]]:
     """A router's process for `team`."""
     endpoint, timeout = team.config.bus.endpoint, team.config.bus.barrier_timeout
-    command = (*QUADRIGA, "router", "--listen", endpoint, *options,
-               "--set", f"bus.barrier_timeout={timeout}")  # fmt: skip
+    command = (
+        *QUADRIGA,
+        "router",
+        "--listen",
+        endpoint,
+        *options,
+        "--set",
+        f"bus.barrier_timeout={timeout}",
+    )
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         try:
             yield process
@@ -98,9 +105,10 @@ def left(pids: dict[str, int]) -> set[str]:
     """Names of those that have ended; nobody has waited for them yet."""
     stats = {name: Path(f"/proc/{pid}/stat") for name, pid in pids.items()}
     return {
-        name for name, stat in stats.items()
+        name
+        for name, stat in stats.items()
         if not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] == "Z"
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.parametrize("name", ["sim", "r1", "operator", "recorder"])

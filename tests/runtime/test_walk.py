@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from shared.clock import monotonic, sleep
-from shared.messages import Command
-from shared.recording import Recording
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.wire.messages import Command
 from tests.runtime.conftest import WAIT
 
 Start = Callable[..., subprocess.Popen[str]]
@@ -59,8 +59,11 @@ def start(out: Path) -> Iterator[Start]:
     def start_walk(*options: str) -> subprocess.Popen[str]:
         walk = subprocess.Popen(
             [sys.executable, "-m", "quadriga", "walk", *OPTIONS, "--out", str(out), *options],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-        )  # fmt: skip
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
         walks.append(walk)
         return walk
 

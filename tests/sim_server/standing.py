@@ -8,10 +8,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from shared.config import Config, SensorsConfig, TeamConfig, WorldConfig
-from shared.messages import Command
-from shared.robot import N_JOINTS, q_stand
-from sim_server.world import World
+from quadriga.shared.config.sections import Config, SensorsConfig, TeamConfig, WorldConfig
+from quadriga.shared.robot.a1 import N_JOINTS, q_stand
+from quadriga.shared.wire.messages import Command
+from quadriga.sim_server.world.world import World
 
 SILENT = SensorsConfig(**{item.name: 0.0 for item in fields(SensorsConfig)})
 

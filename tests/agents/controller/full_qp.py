@@ -9,8 +9,8 @@ import osqp
 import pinocchio as pin
 from scipy import sparse
 
-from agents.controller.whole_body_qp import Goal, Weights
-from shared.robot import TORQUE_LIMIT, Array
+from quadriga.agents.controller.whole_body_qp import Goal, Weights
+from quadriga.shared.robot.a1 import TORQUE_LIMIT, Array
 from tests.agents.controller.poses import FEET, MODEL, Pose
 
 _FRAME = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -45,12 +45,13 @@ def dynamics(pose: Pose, contact: Array) -> Dynamics:
     trunk[:3, :3] = trunk[3:, 3:6] = R
     centripetal = np.concatenate([R @ np.cross(pose.v[3:6], pose.v[:3]), np.zeros(3)])
     return Dynamics(
-        np.linalg.inv(np.triu(M) + np.triu(M, 1).T), nle,
+        np.linalg.inv(np.triu(M) + np.triu(M, 1).T),
+        nle,
         np.vstack([np.zeros((0, 18)), *(J[leg] for leg in on)]),
         np.concatenate([np.zeros(0), *(d[leg] for leg in on)]),
         np.vstack([trunk, *(J[leg] for leg in off)]),
         np.concatenate([centripetal, *(d[leg] for leg in off)]),
-    )  # fmt: skip
+    )
 
 
 def desired(goal: Goal) -> Array:
@@ -76,17 +77,23 @@ def solve_full(pose: Pose, goal: Goal, weights: Weights) -> tuple[Array, Array, 
     q = np.concatenate([np.zeros(12), -weights.gamma_force * f_des, np.zeros(n_h)])
     drive = np.hstack([dyn.M_inverse @ _S, dyn.M_inverse @ dyn.J_c.T])
     free = dyn.M_inverse @ dyn.nle
-    cone = np.array([[0, 0, 1], *([sx, sy, weights.mu / np.sqrt(2)] for sx, sy in
-                                  ((1, 0), (-1, 0), (0, 1), (0, -1)))])  # fmt: skip
-    A = np.vstack([
-        np.hstack([dyn.J_c @ drive, np.zeros((n_f, n_h))]),
-        np.hstack([dyn.J_h @ drive, -np.eye(n_h)]),
-        np.eye(12, 12 + n_f + n_h),
-        np.hstack([np.zeros((5 * n_c, 12)), np.kron(np.eye(n_c), cone), np.zeros((5 * n_c, n_h))]),
-    ])  # fmt: skip
-    fixed = np.concatenate([
-        dyn.J_c @ free - dyn.d_c, dyn.J_h @ free - dyn.d_h + desired(goal)
-    ])  # fmt: skip
+    cone = np.array(
+        [
+            [0, 0, 1],
+            *([sx, sy, weights.mu / np.sqrt(2)] for sx, sy in ((1, 0), (-1, 0), (0, 1), (0, -1))),
+        ]
+    )
+    A = np.vstack(
+        [
+            np.hstack([dyn.J_c @ drive, np.zeros((n_f, n_h))]),
+            np.hstack([dyn.J_h @ drive, -np.eye(n_h)]),
+            np.eye(12, 12 + n_f + n_h),
+            np.hstack(
+                [np.zeros((5 * n_c, 12)), np.kron(np.eye(n_c), cone), np.zeros((5 * n_c, n_h))]
+            ),
+        ]
+    )
+    fixed = np.concatenate([dyn.J_c @ free - dyn.d_c, dyn.J_h @ free - dyn.d_h + desired(goal)])
     limit = np.full(12, TORQUE_LIMIT)
     least = np.tile([weights.force_min, 0.0, 0.0, 0.0, 0.0], n_c)
     lower = np.concatenate([fixed, -limit, least])
@@ -104,10 +111,18 @@ def _osqp(P: Array, q: Array, A: Array, lower: Array, upper: Array) -> Array:
     row = 1.0 / np.linalg.norm(A * column, axis=1)
     solver = osqp.OSQP()
     solver.setup(
-        sparse.identity(len(P), format="csc"), column * q,
-        sparse.csc_matrix(row[:, None] * A * column), row * lower, row * upper, verbose=False,
-        eps_abs=1e-10, eps_rel=1e-10, max_iter=200_000, polishing=True, adaptive_rho_interval=50,
-    )  # fmt: skip
+        sparse.identity(len(P), format="csc"),
+        column * q,
+        sparse.csc_matrix(row[:, None] * A * column),
+        row * lower,
+        row * upper,
+        verbose=False,
+        eps_abs=1e-10,
+        eps_rel=1e-10,
+        max_iter=200_000,
+        polishing=True,
+        adaptive_rho_interval=50,
+    )
     result = solver.solve(raise_error=False)
     if result.info.status != "solved":
         raise RuntimeError(f"the reference: {result.info.status}")

@@ -6,28 +6,22 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from agents.controller.contact import ContactRule, contacts_by_force, contacts_by_schedule
-from agents.controller.controller import Task
-from agents.controller.estimator import (
-    Estimate,
-    filter_step,
-    mean_at,
-    standing_mean,
-    sure,
-)
-from agents.controller.memory import Swings
-from agents.controller.model import RigidBody
-from agents.controller.references import (
+from quadriga.agents.controller.contact import ContactRule, contacts_by_force, contacts_by_schedule
+from quadriga.agents.controller.controller import Task
+from quadriga.agents.controller.estimator import Estimate, filter_step, mean_at, standing_mean, sure
+from quadriga.agents.controller.memory import Swings
+from quadriga.agents.controller.model import RigidBody
+from quadriga.agents.controller.sensing import Trunk
+from quadriga.agents.controller.trunk_feedback import (
     Asked,
     Integrators,
     SingleRigidBody,
     feedback,
     feedforward,
 )
-from agents.controller.sensing import Trunk
-from shared.config import ControllerConfig
-from shared.messages import State
-from shared.robot import Array
+from quadriga.shared.config.sections import ControllerConfig
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.messages import State
 
 
 @dataclass(frozen=True)
@@ -53,13 +47,27 @@ def estimate_trunk(
 ) -> tuple[FilterState, Estimate]:
     """One step of the estimator."""
     mean, covariance, frame = filter_step(
-        previous.mean, previous.covariance, state.imu_quat_wxyz, state.imu_gyro, state.imu_accel,
-        state.q_joint, state.v_joint, trust, noise, dt,
-    )  # fmt: skip
+        previous.mean,
+        previous.covariance,
+        state.imu_quat_wxyz,
+        state.imu_gyro,
+        state.imu_accel,
+        state.q_joint,
+        state.v_joint,
+        trust,
+        noise,
+        dt,
+    )
     estimate = Estimate(
-        mean[0], mean[1], frame[:3], state.imu_gyro, frame[3:], state.q_joint, state.v_joint,
+        mean[0],
+        mean[1],
+        frame[:3],
+        state.imu_gyro,
+        frame[3:],
+        state.q_joint,
+        state.v_joint,
         state.foot_force,
-    )  # fmt: skip
+    )
     return FilterState(mean, covariance), estimate
 
 
@@ -85,23 +93,41 @@ def initial_contact() -> ContactState:
 
 
 def step_contact(
-    previous: ContactState, config: ControllerConfig, stance: Array, progress: float, half: int,
-    foot_force: Array, foot_z: Array, dt: float, stance_time: float = 0.2,
-) -> ContactState:  # fmt: skip
+    previous: ContactState,
+    config: ControllerConfig,
+    stance: Array,
+    progress: float,
+    half: int,
+    foot_force: Array,
+    foot_z: Array,
+    dt: float,
+    stance_time: float = 0.2,
+) -> ContactState:
     """One step of the contact detection; what the feet feel stays as it is."""
     p, rate = previous, dt / (1e-3 * config.ground_filter_ms + dt)
     before = np.array([p.contact, p.early, p.unloaded, p.latched, p.ground])
     lift, stumble = p.lift.copy(), p.stumble.copy()
     if config.contact_detection:
         rule = ContactRule(
-            config.contact_force, 1e-3 * config.lost_contact_ms,
-            1e-3 * config.liftoff_hold_ms / stance_time, 1e-3 * config.give_way_ms,
-            config.tell_sides,
-        )  # fmt: skip
+            config.contact_force,
+            1e-3 * config.lost_contact_ms,
+            1e-3 * config.liftoff_hold_ms / stance_time,
+            1e-3 * config.reflex_ms,
+            config.reject_side_contacts,
+        )
         legs, level = contacts_by_force(
-            before, p.level, half != p.half, stance, progress, foot_force, foot_z,
-            Swings(lift, stumble, p.felt), rule, rate, dt,
-        )  # fmt: skip
+            before,
+            p.level,
+            half != p.half,
+            stance,
+            progress,
+            foot_force,
+            foot_z,
+            Swings(lift, stumble, p.felt),
+            rule,
+            rate,
+            dt,
+        )
     else:
         legs, level = contacts_by_schedule(p.ground, p.level, stance, foot_z, rate)
     contact, early, unloaded, latched, ground = legs
@@ -126,9 +152,15 @@ def rigid(body: RigidBody) -> SingleRigidBody:
 
 
 def trunk_acceleration(
-    previous: Integrators, gains: Array, body: RigidBody, estimate: Estimate, task: Task,
-    level: float, stance: Array, dt: float,
-) -> tuple[Integrators, Array, Array]:  # fmt: skip
+    previous: Integrators,
+    gains: Array,
+    body: RigidBody,
+    estimate: Estimate,
+    task: Task,
+    level: float,
+    stance: Array,
+    dt: float,
+) -> tuple[Integrators, Array, Array]:
     """One step of the trunk's references."""
     trunk = trunk_at(estimate)
     asked = Asked(np.array([task.vx, task.vy]), task.wz, level + task.height)

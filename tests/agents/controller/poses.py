@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from agents.controller.estimator import Estimate
-from agents.controller.model import RigidBody, Terms
-from shared.a1_model import build_pinocchio_model
-from shared.robot import FOOT_FRAMES, N_JOINTS, STAND_HEIGHT, Array, q_stand
+from quadriga.agents.controller.estimator import Estimate
+from quadriga.agents.controller.model import RigidBody, Terms
+from quadriga.shared.robot.a1 import FOOT_FRAMES, N_JOINTS, STAND_HEIGHT, Array, q_stand
+from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 
 MODEL = build_pinocchio_model()
 FEET = tuple(MODEL.getFrameId(name) for name in FOOT_FRAMES)
@@ -39,9 +39,15 @@ def pose_of(q: Array, v: Array, foot_force: float = 30.0) -> Pose:
     R = pin.Quaternion(q[3:7]).matrix()
     p_foot = np.array([data.oMf[frame].translation for frame in FEET])
     estimate = Estimate(
-        q[:3].copy(), R @ v[:3], np.ascontiguousarray(R), v[3:6].copy(), p_foot, q[7:].copy(),
-        v[6:].copy(), np.full(4, foot_force),
-    )  # fmt: skip
+        q[:3].copy(),
+        R @ v[:3],
+        np.ascontiguousarray(R),
+        v[3:6].copy(),
+        p_foot,
+        q[7:].copy(),
+        v[6:].copy(),
+        np.full(4, foot_force),
+    )
     return Pose(q, v, estimate, np.array([q[6], q[3], q[4], q[5]]))
 
 

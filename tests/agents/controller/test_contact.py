@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from shared.config import ControllerConfig
-from shared.robot import FOOT_RADIUS, Array
+from quadriga.shared.config.sections import ControllerConfig
+from quadriga.shared.robot.a1 import FOOT_RADIUS, Array
 from tests.agents.controller.parts import ContactState, initial_contact, step_contact
 
 DETECTING = ControllerConfig()
@@ -66,7 +66,7 @@ def test_a_single_tick_of_load_starts_the_patience_anew() -> None:
 
 @pytest.mark.parametrize("tells_sides", [False, True])
 def test_a_foot_that_lands_early_is_a_contact_until_the_switch(tells_sides: bool) -> None:
-    feet = Feet(replace(DETECTING, tell_sides=tells_sides))
+    feet = Feet(replace(DETECTING, reject_side_contacts=tells_sides))
     feet.force[1:3] = 0.0
     feet.run(50, PAIR, 0.3, 0)
     feet.force[1], feet.z[1] = LOAD, FOOT_RADIUS + 0.03
@@ -100,9 +100,9 @@ def test_a_foot_stopped_from_the_side_is_no_contact_but_stumbles() -> None:
     feet = stopped_from_the_side()
     state = feet.run(1, PAIR, 0.6, 0)
     np.testing.assert_array_equal(state.contact, PAIR)
-    assert state.stumble[1] == pytest.approx(1e-3 * DETECTING.give_way_ms)
+    assert state.stumble[1] == pytest.approx(1e-3 * DETECTING.reflex_ms)
     feet.force[1] = 0.0
-    assert feet.run(DETECTING.give_way_ms - 1, PAIR, 0.65, 0).lift[1] == 0.0
+    assert feet.run(DETECTING.reflex_ms - 1, PAIR, 0.65, 0).lift[1] == 0.0
     state = feet.run(2, PAIR, 0.65, 0)
     assert state.lift[1] == 0.65
     assert state.stumble[1] == 0.0

@@ -9,16 +9,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from agents.controller import whole_body_qp
-from agents.controller.controller import Acted, Controller, Schedule, Task
-from agents.controller.estimator import foot_trust, noise_parameters
-from agents.controller.memory import Memory
-from agents.controller.references import trunk_gains
-from agents.controller.swing import foothold, swing_reference
-from agents.gait import nominal_forces
-from agents.rehearsal import standing
-from shared.config import Config
-from shared.robot import GRAVITY, STAND_HEIGHT, TOTAL_MASS, Array
+from quadriga.agents.controller import whole_body_qp
+from quadriga.agents.controller.controller import Controller, ControllerOutputs, Schedule, Task
+from quadriga.agents.controller.estimator import foot_trust, noise_parameters
+from quadriga.agents.controller.memory import Memory
+from quadriga.agents.controller.swing import foothold, swing_reference
+from quadriga.agents.controller.trunk_feedback import trunk_gains
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.rehearsal import standing
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import GRAVITY, STAND_HEIGHT, TOTAL_MASS, Array
 from tests.agents.controller.parts import (
     estimate_trunk,
     initial_contact,
@@ -40,9 +40,13 @@ def controller_of(**settings: Any) -> Controller:
 
 
 def step(
-    controller: Controller, memory: Memory | None, pose: Pose, schedule: Schedule,
-    task: Task = REST, load: Array | None = None,
-) -> Acted:  # fmt: skip
+    controller: Controller,
+    memory: Memory | None,
+    pose: Pose,
+    schedule: Schedule,
+    task: Task = REST,
+    load: Array | None = None,
+) -> ControllerOutputs:
     """One tick of a robot that knows its pose."""
     estimate = replace(pose.estimate, foot_force=np.full(4, 30.0) if load is None else load)
     seen = controller.place(memory, estimate, pose.quat_wxyz, schedule, 1e-3)
@@ -110,13 +114,25 @@ def test_swing_feet_follow_their_reference(seed: int, ahead: np.ndarray | None) 
     pin.forwardKinematics(MODEL, data, pose.q, pose.v)
     for leg in (1, 2):
         target = foothold(
-            leg, estimate.position, velocity, estimate.R, v_des, 0.3, 0.6 * 0.2, 0.2,
+            leg,
+            estimate.position,
+            velocity,
+            estimate.R,
+            v_des,
+            0.3,
+            0.6 * 0.2,
+            0.2,
             config.raibert_gain,
-        )  # fmt: skip
+        )
         x, v, a = swing_reference(
-            before.estimate.p_foot[leg], target, ground[[0, 3]].mean(),
-            ground.max() + config.swing_height, 0.4, 0.2, config.swing_delay,
-        )  # fmt: skip
+            before.estimate.p_foot[leg],
+            target,
+            ground[[0, 3]].mean(),
+            ground.max() + config.swing_height,
+            0.4,
+            0.2,
+            config.swing_delay,
+        )
         world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         v_foot = pin.getFrameVelocity(MODEL, data, FEET[leg], world).linear
         expected = a + config.kp_swing * (x - estimate.p_foot[leg])
@@ -125,7 +141,7 @@ def test_swing_feet_follow_their_reference(seed: int, ahead: np.ndarray | None) 
     assert not acted.goal.swing[[0, 3]].any()
 
 
-def hanging(controller: Controller, pose: Pose, ticks: int = 30) -> Acted:
+def hanging(controller: Controller, pose: Pose, ticks: int = 30) -> ControllerOutputs:
     """A robot whose scheduled stance feet find nothing to stand on."""
     memory = step(controller, None, standing_pose(), STANDING).memory
     for _ in range(ticks):
@@ -162,8 +178,8 @@ def test_a_foot_that_stumbles_rises_and_moves_away_from_what_stopped_it() -> Non
         controller, memory, pose, Schedule(TROT, 0.4, 0), task, np.array([30.0, 30.0, 0.0, 30.0])
     )
     assert acted.memory.contact[1] == 0.0
-    assert acted.memory.stumble[1] == pytest.approx(1e-3 * config.give_way_ms)
-    away = config.kd_swing * config.stumble_lift
+    assert acted.memory.stumble[1] == pytest.approx(1e-3 * config.reflex_ms)
+    away = config.kd_swing * config.reflex_lift
     np.testing.assert_allclose(acted.goal.swing[1], [-0.3 * away, 0.0, away], atol=1e-9)
     for tick in range(81, 100):
         memory = acted.memory
@@ -246,20 +262,23 @@ def test_the_tick_in_one_piece_is_its_parts_one_by_one() -> None:
         trust = foot_trust(TROT, 0.3, state.foot_force, ramp, config.estimator.contact_force)
         filtered, estimate = estimate_trunk(filtered, state, trust, noise, 1e-3)
         contacts = step_contact(
-            contacts, config.controller, TROT, 0.3, 0, state.foot_force, estimate.p_foot[:, 2],
-            1e-3,
-        )  # fmt: skip
+            contacts, config.controller, TROT, 0.3, 0, state.foot_force, estimate.p_foot[:, 2], 1e-3
+        )
         integrators, trunk, _ = trunk_acceleration(
-            integrators, trunk_gains(config.controller), controller.body, estimate,
-            replace(task, deviation=task.deviation * np.repeat(TROT, 3)), contacts.level, TROT,
+            integrators,
+            trunk_gains(config.controller),
+            controller.body,
+            estimate,
+            replace(task, deviation=task.deviation * np.repeat(TROT, 3)),
+            contacts.level,
+            TROT,
             1e-3,
-        )  # fmt: skip
+        )
         q = np.concatenate([estimate.position, [0.0, 0.0, 0.0, 1.0], estimate.q_joint])
         v = np.concatenate([estimate.velocity, estimate.omega, estimate.v_joint])
         solution = whole_body_qp.solve_goal(
-            controller.body.terms(q, v), estimate.R, estimate.p_foot, acted.goal,
-            controller.weights,
-        )  # fmt: skip
+            controller.body.terms(q, v), estimate.R, estimate.p_foot, acted.goal, controller.weights
+        )
     np.testing.assert_allclose(acted.memory.mean, filtered.mean, atol=1e-12)
     np.testing.assert_allclose(acted.memory.contact, contacts.contact)
     np.testing.assert_allclose(acted.memory.ground, contacts.ground, atol=1e-12)

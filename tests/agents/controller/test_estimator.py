@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.controller.estimator import (
+from quadriga.agents.controller.estimator import (
     Estimate,
     foot_trust,
     noise_parameters,
     trunk_from_truth,
 )
-from shared.config import EstimatorConfig
-from shared.messages import State, Truth
-from shared.robot import FOOT_RADIUS, GRAVITY, N_JOINTS, STAND_HEIGHT, Array, q_stand
+from quadriga.shared.config.sections import EstimatorConfig
+from quadriga.shared.robot.a1 import FOOT_RADIUS, GRAVITY, N_JOINTS, STAND_HEIGHT, Array, q_stand
+from quadriga.shared.wire.messages import State, Truth
 from tests.agents.controller.parts import estimate_trunk, filter_at, initial_filter
 from tests.agents.controller.poses import FEET, MODEL, pose_of
 
@@ -34,9 +34,16 @@ def sensed(q: Array, v: Array, acceleration: Array | None = None) -> State:
     force = np.array([0.0, 0.0, GRAVITY]) + (0.0 if acceleration is None else acceleration)
     quat = np.array([q[6], q[3], q[4], q[5]])
     return State(
-        0, 0, q[7:].copy(), v[6:].copy(), np.zeros(N_JOINTS), quat, v[3:6].copy(), R.T @ force,
+        0,
+        0,
+        q[7:].copy(),
+        v[6:].copy(),
+        np.zeros(N_JOINTS),
+        quat,
+        v[3:6].copy(),
+        R.T @ force,
         np.full(4, 30.0),
-    )  # fmt: skip
+    )
 
 
 def standing() -> tuple[Array, Array]:
@@ -201,9 +208,17 @@ def moving(seed: int) -> tuple[Truth, State, Estimate]:
     both = (np.array([a, b]) for a, b in zip(first, (*row, omega), strict=True))
     base_pos, base_quat, base_vel, base_omega = both
     truth = Truth(
-        0, 0, ("r1", "r2"), base_pos, base_quat, base_vel, base_omega, np.zeros((2, 4, 3)),
-        np.zeros(1), np.zeros(1),
-    )  # fmt: skip
+        0,
+        0,
+        ("r1", "r2"),
+        base_pos,
+        base_quat,
+        base_vel,
+        base_omega,
+        np.zeros((2, 4, 3)),
+        np.zeros(1),
+        np.zeros(1),
+    )
     return truth, sensed(q, v), pose.estimate
 
 

@@ -5,17 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agents.controller.friction import FrictionRule, caution
-from shared.robot import Array
+from quadriga.agents.controller.friction import FrictionRule, caution
+from quadriga.shared.robot.a1 import Array
 
 CONTACT, STANCE = np.array([1.0, 0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0, 1.0])
 MU, LEAST, SPEED, LOAD, RECOVERY, DT = 0.6, 0.25, 0.25, 20.0, 0.02, 1e-3
 
 
 def after(
-    ticks: int, v_foot: Array, before: float = 0.0, progress: float = 0.5, speed: float = SPEED,
-    contact: Array = CONTACT, force: float = LOAD,
-) -> float:  # fmt: skip
+    ticks: int,
+    v_foot: Array,
+    before: float = 0.0,
+    progress: float = 0.5,
+    speed: float = SPEED,
+    contact: Array = CONTACT,
+    force: float = LOAD,
+) -> float:
     foot_force, rule = np.full(4, force), FrictionRule(speed, LOAD, MU, LEAST, RECOVERY)
     for _ in range(ticks):
         before = caution(before, contact, STANCE, progress, v_foot, foot_force, rule, DT)

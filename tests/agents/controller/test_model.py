@@ -8,9 +8,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from agents.controller.rigid_body import link_table
-from shared.errors import ConfigError
-from shared.robot import TOTAL_MASS, q_stand
+from quadriga.agents.controller.maths.rigid_body import link_table
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.robot.a1 import TOTAL_MASS, q_stand
 from tests.agents.controller.poses import BODY, FEET, MODEL, random_pose
 
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from agents.controller.kinematics import hip_neutral
-from agents.controller.swing import foothold, swing_reference, within_reach
-from shared.robot import FOOT_RADIUS, Array
+from quadriga.agents.controller.maths.leg_kinematics import hip_neutral
+from quadriga.agents.controller.swing import foothold, swing_reference, within_reach
+from quadriga.shared.robot.a1 import FOOT_RADIUS, Array
 
 START, TARGET = np.array([0.1, -0.2, 0.03]), np.array([0.25, -0.15])
 GROUND, APEX, DURATION = 0.01, 0.12, 0.2
@@ -51,14 +51,22 @@ def test_at_half_time_the_foot_is_at_its_apex() -> None:
 @given(
     arrays(np.float64, 3, elements=st.floats(-0.3, 0.3)),
     arrays(np.float64, 2, elements=st.floats(-0.3, 0.3)),
-    st.floats(-0.1, 0.1), st.floats(0.05, 0.2), st.floats(0.01, 0.99), st.floats(0.1, 0.5),
+    st.floats(-0.1, 0.1),
+    st.floats(0.05, 0.2),
+    st.floats(0.01, 0.99),
+    st.floats(0.1, 0.5),
     st.floats(0.0, 0.3),
-)  # fmt: skip
+)
 @settings(deadline=None, max_examples=50)
 def test_velocity_and_acceleration_are_the_derivatives(
-    start: Array, target: Array, ground: float, apex: float, progress: float, duration: float,
+    start: Array,
+    target: Array,
+    ground: float,
+    apex: float,
+    progress: float,
+    duration: float,
     delay: float,
-) -> None:  # fmt: skip
+) -> None:
     if min(abs(progress - 0.9), abs(progress - delay)) < 1e-3:
         progress = 0.5  # the plane's jerk jumps where it begins and where it is done
     h = 1e-4
@@ -82,9 +90,11 @@ def test_a_delayed_swing_rises_before_it_goes_forward() -> None:
 
 
 @given(
-    arrays(np.float64, 2, elements=st.floats(-0.3, 0.3)), st.floats(1.0, 200.0),
-    st.floats(0.02, 0.3), st.floats(0.0, 0.3),
-)  # fmt: skip
+    arrays(np.float64, 2, elements=st.floats(-0.3, 0.3)),
+    st.floats(1.0, 200.0),
+    st.floats(0.02, 0.3),
+    st.floats(0.0, 0.3),
+)
 @settings(deadline=None, max_examples=50)
 def test_a_foothold_within_reach_asks_for_no_more_acceleration(
     way: Array, acceleration: float, duration: float, delay: float

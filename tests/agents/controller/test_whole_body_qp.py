@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.optimize import nnls
 
-from agents.controller.whole_body_qp import (
+from quadriga.agents.controller.whole_body_qp import (
     Goal,
-    Problem,
-    Solution,
     Weights,
+    WholeBodyProblem,
+    WholeBodySolution,
     build,
     solve,
     solve_goal,
 )
-from shared.robot import GRAVITY, TORQUE_LIMIT, TOTAL_MASS, Array
+from quadriga.shared.robot.a1 import GRAVITY, TORQUE_LIMIT, TOTAL_MASS, Array
 from tests.agents.controller.full_qp import desired, dynamics, solve_full
 from tests.agents.controller.poses import Pose, random_pose, standing_pose
 
@@ -44,15 +44,15 @@ def random_goal(random: np.random.Generator, contact: Array, size: float) -> Goa
     return replace(goal, force=goal.force + size * random.normal(size=(4, 3)))
 
 
-def problem_of(pose: Pose, goal: Goal, weights: Weights = WEIGHTS) -> Problem:
+def problem_of(pose: Pose, goal: Goal, weights: Weights = WEIGHTS) -> WholeBodyProblem:
     return build(pose.terms(), pose.estimate.R, pose.estimate.p_foot, goal, weights)
 
 
-def solution_of(pose: Pose, goal: Goal, weights: Weights = WEIGHTS) -> Solution:
+def solution_of(pose: Pose, goal: Goal, weights: Weights = WEIGHTS) -> WholeBodySolution:
     return solve_goal(pose.terms(), pose.estimate.R, pose.estimate.p_foot, goal, weights)
 
 
-def check_limits(solution: Solution, goal: Goal, weights: Weights = WEIGHTS) -> None:
+def check_limits(solution: WholeBodySolution, goal: Goal, weights: Weights = WEIGHTS) -> None:
     assert np.abs(solution.tau).max() <= TORQUE_LIMIT
     in_contact = goal.contact > 0.5
     assert not solution.force[~in_contact].any()
@@ -169,8 +169,9 @@ def test_standing_needs_no_limits_and_carries_the_weight() -> None:
 
 def test_without_contact_only_the_feet_can_be_moved() -> None:
     swing = np.tile([1.0, -2.0, 3.0], (4, 1))
-    solution = solution_of(standing_pose(), goal_of(np.zeros(4), np.array([0, 0, -9.81, 0, 0, 0.0]),
-                                                    swing))  # fmt: skip
+    solution = solution_of(
+        standing_pose(), goal_of(np.zeros(4), np.array([0, 0, -9.81, 0, 0, 0.0]), swing)
+    )
     assert solution.solved
     assert not solution.force.any()
     assert np.abs(solution.defect[:3]).max() < 2.0  # the trunk falls freely but for the legs' pull

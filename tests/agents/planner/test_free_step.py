@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.gait import nominal_forces
-from agents.planner.free_step import FreeStep
-from agents.planner.planner import PlannerInputs
-from agents.planner.planner_qp import build_problem, unpack
-from agents.planner.qp_solver import SOLVED, SOLVERS
-from shared.config import PlannerConfig
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.planner.free_step import FreeStep
+from quadriga.agents.planner.planner import PlannerInputs
+from quadriga.agents.planner.planner_qp import build_problem, unpack
+from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS
+from quadriga.shared.config.sections import PlannerConfig
 
 T_INI, N = 3, 5
 CONFIG = replace(PlannerConfig(), T_ini=T_INI, N=N)
@@ -57,9 +57,14 @@ def test_both_ways_lead_to_the_same_plan(free: FreeStep, seed: int, size: float)
     f = PROBLEM.gradient @ (y_free - (inputs.y_des - inputs.y_base).ravel())
     solution = SOLVER.solve(f)
     plan = free.plan(
-        inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini, inputs.y_base,
-        inputs.y_des, effect,
-    )  # fmt: skip
+        inputs.u_ini,
+        inputs.y_ini,
+        inputs.stance_ini,
+        inputs.y_base_ini,
+        inputs.y_base,
+        inputs.y_des,
+        effect,
+    )
     assert solution.status == SOLVED
     if plan is None:  # a bound is active
         assert solution.iterations > 0
@@ -76,9 +81,14 @@ def test_small_errors_are_free_and_large_ones_are_not(free: FreeStep) -> None:
     zero = np.zeros((N, 6))
     for size, is_free in ((1e-6, True), (10.0, False)):
         plan = free.plan(
-            nominal_forces(STANCE[:T_INI]), zero[:T_INI], STANCE[:T_INI], zero[:T_INI], zero,
-            np.full((N, 6), size), np.zeros(6 * N),
-        )  # fmt: skip
+            nominal_forces(STANCE[:T_INI]),
+            zero[:T_INI],
+            STANCE[:T_INI],
+            zero[:T_INI],
+            zero,
+            np.full((N, 6), size),
+            np.zeros(6 * N),
+        )
         assert (plan is not None) is is_free
 
 
@@ -86,10 +96,18 @@ def test_a_number_that_is_not_finite_is_left_to_the_solver(free: FreeStep) -> No
     inputs = inputs_of(1, 0.01)
     for bad in (np.nan, np.inf):
         effect = np.full(6 * N, bad)
-        assert free.plan(
-            inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini, inputs.y_base,
-            inputs.y_des, effect,
-        ) is None  # fmt: skip
+        assert (
+            free.plan(
+                inputs.u_ini,
+                inputs.y_ini,
+                inputs.stance_ini,
+                inputs.y_base_ini,
+                inputs.y_base,
+                inputs.y_des,
+                effect,
+            )
+            is None
+        )
 
 
 def test_outputs_that_no_robot_reaches_are_no_plan(free: FreeStep) -> None:
@@ -97,7 +115,12 @@ def test_outputs_that_no_robot_reaches_are_no_plan(free: FreeStep) -> None:
     zero = np.zeros((N, 6))
     for height, is_plan in ((99.0, True), (101.0, False), (np.nan, False)):
         plan = free.plan(
-            nominal_forces(STANCE[:T_INI]), zero[:T_INI], STANCE[:T_INI], zero[:T_INI],
-            zero + height, zero + height, np.zeros(6 * N),
-        )  # fmt: skip
+            nominal_forces(STANCE[:T_INI]),
+            zero[:T_INI],
+            STANCE[:T_INI],
+            zero[:T_INI],
+            zero + height,
+            zero + height,
+            np.zeros(6 * N),
+        )
         assert (plan is not None) == is_plan

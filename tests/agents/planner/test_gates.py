@@ -12,22 +12,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate, optimize
 
-from agents.planner.best_response import best_response_map, best_response_radius
-from agents.planner.episode import Y_SCALE
-from agents.planner.fits import fit_ridge
-from agents.planner.gates import (
+from quadriga.agents.planner.best_response import best_response_map, best_response_radius
+from quadriga.agents.planner.gates import (
     GateReport,
     height_gains,
     held_out_error,
     physical_height,
     run_gates,
 )
-from agents.planner.horizon import horizon_stance
-from agents.planner.planner_qp import build_problem
-from agents.planner.predictor import Predictor, PredictorMeta
-from shared.config import Config
-from shared.errors import PredictorError
-from shared.robot import TOTAL_MASS, Array
+from quadriga.agents.planner.planner_qp import build_problem
+from quadriga.agents.predictor.episode import Y_SCALE
+from quadriga.agents.predictor.fits import fit_ridge
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.time_grid import horizon_stance
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.a1 import TOTAL_MASS, Array
 
 Team = Callable[..., Any]
 
@@ -73,8 +73,10 @@ def test_held_out_error_against_windows_predicted_one_by_one(
     errors, naive = [], []
     for k in range(30 - T_ini - N + 1):
         past, future = slice(k, k + T_ini), slice(k + T_ini, k + T_ini + N)
-        z = [np.concatenate([du[past, j].ravel(), dy[past, j].ravel(), du[future, j].ravel()])
-             for j in range(2)]  # fmt: skip
+        z = [
+            np.concatenate([du[past, j].ravel(), dy[past, j].ravel(), du[future, j].ravel()])
+            for j in range(2)
+        ]
         for i in range(2):
             y = sum(predictor.block(i, j) @ z[j] for j in range(2))
             errors.append(y.reshape(N, 6) - dy[future, i])
@@ -135,8 +137,9 @@ def test_the_qp_lets_the_share_of_a_force_through_that_minimises_its_cost(plant:
             + controller.gamma_defect / 2 * (2 * f / TOTAL_MASS) ** 2
         )
 
-    realised = optimize.minimize_scalar(cost, bounds=(0.0, half), method="bounded",
-                                        options={"xatol": 1e-10}).x  # fmt: skip
+    realised = optimize.minimize_scalar(
+        cost, bounds=(0.0, half), method="bounded", options={"xatol": 1e-10}
+    ).x
     z = physical_height(controller, "force", 25)
     assert z[-1] == pytest.approx(0.5 * 2 * realised / TOTAL_MASS * 0.25**2, rel=1e-6)
 
@@ -159,8 +162,10 @@ def test_a_figure_that_is_not_a_number_is_refused() -> None:
     report.check()
     nan = float("nan")
     for broken in (
-        replace(report, error=nan), replace(report, radius=nan), replace(report, gains=((nan,),)),
-    ):  # fmt: skip
+        replace(report, error=nan),
+        replace(report, radius=nan),
+        replace(report, gains=((nan,),)),
+    ):
         with pytest.raises(PredictorError, match="got nan"):
             broken.check()
 

@@ -10,12 +10,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.gait import nominal_forces, scheduled_stance
-from agents.planner.horizon import horizon_stance
-from agents.planner.neighbours import FRESH, HELD, LOST, SHIFTED, Neighbours, PeerData, PeerMemory
-from shared.config import Config
-from shared.messages import Measurement, Plan
-from shared.robot import Array
+from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.planner.neighbours import (
+    FRESH,
+    HELD,
+    LOST,
+    SHIFTED,
+    Neighbours,
+    PeerData,
+    PeerMemory,
+)
+from quadriga.agents.time_grid import horizon_stance
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.messages import Measurement, Plan
 
 CONFIG = Config()
 CONFIG = replace(
@@ -49,18 +57,24 @@ def plan(robot: str, step: int, exchange: int = 0) -> Plan:
     nominal = nominal_forces(horizon_stance(CONFIG, INDEX[robot], step))
     k = np.arange(PLANNER.N)[:, None]
     return Plan(
-        40 * step, 0, step=step, u=nominal + told(step, k),
-        y=np.tile(told(step, k), (1, 6)), status="solved", used={},
+        40 * step,
+        0,
+        step=step,
+        u=nominal + told(step, k),
+        y=np.tile(told(step, k), (1, 6)),
+        status="solved",
+        used={},
         exchange=exchange,
-    )  # fmt: skip
+    )
 
 
 def remember(step: int, plans: list[int], ticks: list[int], robot: str = "r2") -> PeerMemory:
     return NEIGHBOURS.remember(
-        NEIGHBOURS.initial(), 40 * step,
+        NEIGHBOURS.initial(),
+        40 * step,
         [(robot, measurement(robot, tick)) for tick in ticks],
         [(robot, plan(robot, s)) for s in plans],
-    )  # fmt: skip
+    )
 
 
 def of(memory: PeerMemory, step: int, robot: str = "r2") -> PeerData:
@@ -224,10 +238,11 @@ def test_loss_repetition_and_reordering(
     memory = NEIGHBOURS.initial()
     for kind, value in arrivals:
         memory = NEIGHBOURS.remember(
-            memory, 40 * step,
+            memory,
+            40 * step,
             [("r2", measurement("r2", value))] if kind == "sample" else [],
             [("r2", plan("r2", value))] if kind == "plan" else [],
-        )  # fmt: skip
+        )
     peer = of(memory, step)
 
     usable = [s for s in steps if s < step]

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from agents.gait import nominal_forces
-from agents.planner.fits import fit_ridge
-from agents.planner.horizon import horizon_stance, walking_steps
-from agents.planner.neighbours import HELD, LOST, PeerData, Selection
-from agents.planner.peer_terms import PeerTerms
-from agents.planner.planner import Planner
-from agents.planner.predictor import Predictor, PredictorMeta
-from shared.config import Config
-from tests.agents.planner.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, plan, terms_of
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.planner.neighbours import HELD, LOST, PeerData, Selection
+from quadriga.agents.planner.peer_terms import PeerTerms
+from quadriga.agents.planner.planner import Planner
+from quadriga.agents.predictor.fits import fit_ridge
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.time_grid import horizon_stance, walking_steps
+from quadriga.shared.config.sections import Config
+from tests.agents.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, plan, terms_of
 
 
 def test_the_peers_base_is_that_of_its_own_window(small: Config, predictor: Predictor) -> None:
@@ -92,13 +92,16 @@ def test_a_silent_peers_effect_is_held_while_the_legs_change(
     ids=["plain", "compensated", "exchanging"],
 )
 def test_on_the_way_nothing_is_set_up_any_more(
-    small: Config, predictor: Predictor, monkeypatch: pytest.MonkeyPatch,
-    changes: dict[str, Any], behind: tuple[int, ...],
-) -> None:  # fmt: skip
+    small: Config,
+    predictor: Predictor,
+    monkeypatch: pytest.MonkeyPatch,
+    changes: dict[str, Any],
+    behind: tuple[int, ...],
+) -> None:
     config = replace(small, planner=replace(small.planner, **changes))
     planner = Planner(config, 0, predictor)
-    monkeypatch.setattr("agents.planner.peer_terms.Coupling", None)
-    monkeypatch.setattr("agents.planner.planner.build_problem", None)
+    monkeypatch.setattr("quadriga.agents.planner.peer_terms.Coupling", None)
+    monkeypatch.setattr("quadriga.agents.planner.planner.build_problem", None)
     base, state, terms = np.tile(BASE, (4, 1)), planner.initial(), NOTHING
     first = walking_steps(config).start
     for step in range(first, first + 3 * len(walking_steps(config))):

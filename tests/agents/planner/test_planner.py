@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from agents.gait import nominal_forces
-from agents.planner.horizon import horizon_stance
-from agents.planner.planner import Planner, PlannerState
-from agents.planner.predictor import Predictor
-from shared.config import Config
-from shared.errors import PredictorError
-from shared.robot import Array
-from tests.agents.planner.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, plan, terms_of
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.planner.planner import Planner, PlannerState
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.time_grid import horizon_stance
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.a1 import Array
+from tests.agents.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, plan, terms_of
 
 
 def test_at_rest_on_the_command_the_plan_is_nominal(small: Config, predictor: Predictor) -> None:
@@ -135,17 +135,26 @@ def closed_loop(config: Config, predictor: Predictor, team: Any, x: Array, steps
     for step in range(STEP, STEP + steps):
         u_past, y_past = np.array(du[-T_ini - applied :]), np.array(y[-T_ini - applied :])
         data = [
-            peer(config, robot=f"r{j + 1}", index=j, step=step - 1, du_ini=u_past[:T_ini, j],
-                 y_ini=y_past[:T_ini, j], du=before[j])
+            peer(
+                config,
+                robot=f"r{j + 1}",
+                index=j,
+                step=step - 1,
+                du_ini=u_past[:T_ini, j],
+                y_ini=y_past[:T_ini, j],
+                du=before[j],
+            )
             for j in range(n)
-        ]  # fmt: skip
+        ]
         results = []
         for i, planner in enumerate(planners):
             own = inputs_of(
-                config, step=step, y_ini=y_past[applied:, i],
+                config,
+                step=step,
+                y_ini=y_past[applied:, i],
                 u_ini=u_past[applied:, i],
                 stance_ini=np.ones((T_ini, 4), dtype=np.bool_),
-            )  # fmt: skip
+            )
             own = replace(own, u_ini=own.u_ini + nominal_forces(own.stance_ini))
             terms = terms_of(config, planner, *data[:i], *data[i + 1 :])
             results.append(planner.step(planner.initial(), own, terms)[1])

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import optimize
 
-from agents.gait import nominal_forces
-from agents.planner.horizon import horizon_stance
-from agents.planner.planner_qp import Problem, build_problem, unpack
-from agents.planner.qp_solver import SOLVED, SOLVERS, Solver, judge, residuals
-from shared.config import Config, PlannerConfig
-from shared.robot import Array
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem, unpack
+from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS, Solver, judge, residuals
+from quadriga.agents.time_grid import horizon_stance
+from quadriga.shared.config.sections import Config, PlannerConfig
+from quadriga.shared.robot.a1 import Array
 
 N = 8
 PLANNER = replace(Config().planner, N=N)
@@ -35,11 +35,11 @@ def stance_of(step: int) -> NDArray[np.bool_]:
     return horizon_stance(CONFIG, 0, step)
 
 
-def problem_of(seed: int, step: int = 20, planner: PlannerConfig = PLANNER) -> Problem:
+def problem_of(seed: int, step: int = 20, planner: PlannerConfig = PLANNER) -> PlannerProblem:
     return build_problem(planner, response(seed), stance_of(step))
 
 
-def solver_of(problem: Problem, name: str = "daqp") -> Solver:
+def solver_of(problem: PlannerProblem, name: str = "daqp") -> Solver:
     return SOLVERS[name](problem)
 
 
@@ -188,8 +188,10 @@ def test_a_wrong_answer_is_not_taken_for_a_solution() -> None:
     np.testing.assert_array_equal(right.x, good.x)
     nan = good.x * np.nan
     for v, multipliers in (
-        (1.01 * good.x, good.multipliers), (good.x, 0 * good.multipliers), (nan, good.multipliers),
-    ):  # fmt: skip
+        (1.01 * good.x, good.multipliers),
+        (good.x, 0 * good.multipliers),
+        (nan, good.multipliers),
+    ):
         wrong = judge(problem, f, v, multipliers, SOLVED, 7)
         assert wrong.status == "inaccurate"
         assert (wrong.x == 0).all()
@@ -204,8 +206,12 @@ def test_swing_legs_are_removed_exactly() -> None:
     whole = build_problem(replace(PLANNER, mu=1e6, deviation_max=(1e6,) * 3), G_u, everything)
     y_free = 0.002 * np.random.default_rng(10).normal(size=6 * N)
     swing = np.setdiff1d(np.arange(12 * N), problem.columns)
-    K = np.block([[whole.H, np.eye(12 * N)[:, swing]],
-                  [np.eye(12 * N)[swing], np.zeros((len(swing), len(swing)))]])  # fmt: skip
+    K = np.block(
+        [
+            [whole.H, np.eye(12 * N)[:, swing]],
+            [np.eye(12 * N)[swing], np.zeros((len(swing), len(swing)))],
+        ]
+    )
     pinned = np.linalg.solve(K, np.concatenate([-whole.gradient @ y_free, np.zeros(len(swing))]))
     free = np.asarray(-np.linalg.solve(problem.H, problem.gradient @ y_free), np.float64)
     du, _ = unpack(problem, free, y_free)

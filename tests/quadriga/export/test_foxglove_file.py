@@ -16,15 +16,15 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from quadriga.cli import main
-from shared.a1_model import build_pinocchio_model
-from shared.codec import decode
-from shared.config import WorldConfig
-from shared.errors import MessageError
-from shared.messages import Measurement, Plan, Reference, State, Truth
-from shared.recording import Recording
-from shared.robot import FOOT_FRAMES, Array
-from sim_server.team_model import build_team_model
+from quadriga.commands.parser import main
+from quadriga.shared.config.sections import WorldConfig
+from quadriga.shared.errors import MessageError
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import FOOT_FRAMES, Array
+from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Measurement, Plan, Reference, State, Truth
+from quadriga.sim_server.world.team_model import build_team_model
 from tests.quadriga.conftest import ESTIMATOR_ERROR, WriteRun, outputs, run_config
 from tests.quadriga.conftest import truth as truth_message
 from tests.quadriga.export.conftest import PLAN
@@ -135,9 +135,11 @@ def test_bodies_are_drawn_once_on_their_frames(topics: Topics) -> None:
     assert {e.frame_id for e in first.entities} <= frames
     assert all(entity.frame_locked for entity in first.entities)
     shapes = Counter(
-        kind for e in first.entities for kind in ("cubes", "spheres", "cylinders")
+        kind
+        for e in first.entities
+        for kind in ("cubes", "spheres", "cylinders")
         for _ in getattr(e, kind)
-    )  # fmt: skip
+    )
     assert shapes == {"cubes": 2, "spheres": 8, "cylinders": 2 * 4 * 3}
     assert all(min(array(c.size)) > 0.01 for e in first.entities for c in e.cylinders)
 
@@ -149,9 +151,10 @@ def test_arrows_stand_on_the_feet_along_the_forces(topics: Topics, truths: list[
         update = topics["/scene/forces"][at][1]
         by_id = {entity.id: entity for entity in update.entities}
         loaded = [
-            (foot, force) for foot, force in zip(feet, truths[at].grf.reshape(-1, 3), strict=True)
+            (foot, force)
+            for foot, force in zip(feet, truths[at].grf.reshape(-1, 3), strict=True)
             if np.linalg.norm(force) > 1.0
-        ]  # fmt: skip
+        ]
         assert len(by_id["forces"].arrows) == len(loaded) in (4, 8)
         for arrow, (foot, force) in zip(by_id["forces"].arrows, loaded, strict=True):
             np.testing.assert_allclose(array(arrow.pose.position), foot, atol=1e-9)
@@ -236,10 +239,13 @@ def test_rerun_finds_nothing_wrong_and_shows_named_columns(
 ) -> None:
     chunk = pytest.importorskip("rerun.chunk", reason="rerun-sdk is not installed")
     done = subprocess.run(
-        [sys.executable, "-m", "rerun", "mcap", "check", str(exported)], check=False,
-        capture_output=True, text=True, timeout=60,
+        [sys.executable, "-m", "rerun", "mcap", "check", str(exported)],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=60,
         env={"HOME": str(tmp_path)},  # in its first session it reports to nobody
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     parts = [
         part.to_record_batch().to_pydict()["quadriga.State:message"]

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from quadriga.export.layout import build_layout
-from shared.config import Config
-from shared.config_file import load
-from shared.messages import Measurement, Plan, State, Status, Truth
-from shared.topics import TABLE, Topic
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.wire.messages import Measurement, Plan, State, Status, Truth
+from quadriga.shared.wire.topics import TABLE, Topic
 
 
 @pytest.mark.parametrize("topic", TABLE, ids=lambda topic: topic.name)
@@ -40,8 +40,9 @@ def test_numbers_stand_under_their_names() -> None:
     layout = build_layout(Truth, load(None, {"team.robots": 2}), {})
     arrays = {
         item.name: rng.random([{"n": 2, "k": 1}.get(d, d) for d in item.metadata["shape"]])
-        for item in fields(Truth) if "shape" in item.metadata
-    }  # fmt: skip
+        for item in fields(Truth)
+        if "shape" in item.metadata
+    }
     truth = Truth(5, 5, ("r1", "r2"), **arrays)
     numbers = layout.numbers_of(truth)
     assert numbers is not None
@@ -64,8 +65,12 @@ def test_maps_have_the_names_that_occur_whatever_they_are() -> None:
     entries = {"ages_ms": ("plan.r1", "plan_r1", "", "état"), "counters": ("n",)}
     layout = build_layout(Status, Config(), entries)
     assert layout.numbers == (
-        "ages_ms.plan_r1", "ages_ms.plan_r1_", "ages_ms._", "ages_ms._tat", "counters.n"
-    )  # fmt: skip
+        "ages_ms.plan_r1",
+        "ages_ms.plan_r1_",
+        "ages_ms._",
+        "ages_ms._tat",
+        "counters.n",
+    )
     nothing = np.zeros(0)
     status = Status(0, 0, "walk", "", "kalman", {"plan_r1": 7.0}, {"n": 2}, nothing, nothing)
     numbers = layout.numbers_of(status)

@@ -35,8 +35,14 @@ def test_plain_fields_lists_and_numbers_come_back_to_the_bit(
     plain = {"tick": tick, "mode": "ständ", "vx": numbers[0], "ms": ms}
     found = READ.FromString(KIND.encode(plain, np.array(numbers)))
     assert (found.tick, found.mode) == (tick, "ständ")
-    back = [found.q.FL_hip, found.q.FL_calf, found.r1_r2.error, found.z, found.q._3rd,
-            found.a.b.c.d]  # fmt: skip
+    back = [
+        found.q.FL_hip,
+        found.q.FL_calf,
+        found.r1_r2.error,
+        found.z,
+        found.q._3rd,
+        found.a.b.c.d,
+    ]
     assert np.array(back).tobytes() == np.array(numbers).tobytes()
     assert np.array([found.vx, *found.ms]).tobytes() == np.array([numbers[0], *ms]).tobytes()
 

@@ -8,18 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from quadriga.cli import main, parser
+from quadriga.commands.parser import main, parser
 from quadriga.export import csv_files
 from quadriga.export.run import FORMATS
 from quadriga.export.source import Source
 from quadriga.export.written import Progress
-from quadriga.recorder import metadata
-from shared.config import Config
-from shared.recording import RecordingWriter
+from quadriga.recorder.process import metadata
+from quadriga.shared.config.sections import Config
+from quadriga.shared.recording.reader import RecordingWriter
 
 SMALL = """
 import resource, signal, sys
-from quadriga.cli import main
+from quadriga.commands.parser import main
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, -1))
 sys.exit(main(sys.argv[1:]))
@@ -55,9 +55,13 @@ def test_mistakes(capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
     ("form", "package"), [("foxglove", "foxglove"), ("rerun", "google"), ("parquet", "pyarrow")]
 )
 def test_a_package_that_is_not_installed_is_named_with_its_remedy(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, file: Path, tmp_path: Path,
-    form: str, package: str,
-) -> None:  # fmt: skip
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    file: Path,
+    tmp_path: Path,
+    form: str,
+    package: str,
+) -> None:
     for name in list(sys.modules):
         if name.partition(".")[0] == package or name.startswith("quadriga.export."):
             monkeypatch.delitem(sys.modules, name)

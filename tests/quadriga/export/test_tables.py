@@ -10,12 +10,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from quadriga.cli import main
-from shared.codec import decode
-from shared.errors import MessageError
-from shared.messages import Message, Plan, State, Status, Truth
-from shared.recording import Recording
-from shared.topics import topic_of
+from quadriga.commands.parser import main
+from quadriga.shared.errors import MessageError
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Message, Plan, State, Status, Truth
+from quadriga.shared.wire.topics import topic_of
 from tests.quadriga.export.conftest import FALL, PLAN, STATUS
 
 Sent = dict[str, list[Message]]

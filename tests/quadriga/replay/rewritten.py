@@ -9,16 +9,19 @@ from typing import Any, Final
 
 import msgpack
 
-from shared.recording import Entry, Recording, RecordingWriter
+from quadriga.shared.recording.reader import ChunkEntry, Recording, RecordingWriter
 
 BIN8: Final = 0xC4
-Edit = Callable[[Entry], bytes | None]
+Edit = Callable[[ChunkEntry], bytes | None]
 
 
 def rewritten(
-    source: Path, target: Path, edit: Edit = lambda entry: entry.payload,
-    config: Mapping[str, Any] | None = None, metadata: Mapping[str, str] | None = None,
-) -> Path:  # fmt: skip
+    source: Path,
+    target: Path,
+    edit: Edit = lambda entry: entry.payload,
+    config: Mapping[str, Any] | None = None,
+    metadata: Mapping[str, str] | None = None,
+) -> Path:
     """A copy of a recording.
 
     Args:
@@ -53,7 +56,7 @@ def planted_bit(key: str, tick: int, name: str) -> Edit:
     It is the lowest bit of the double's third highest byte: a change of about 1 in 2^12.
     """
 
-    def edit(entry: Entry) -> bytes:
+    def edit(entry: ChunkEntry) -> bytes:
         if (entry.key, entry.tick) != (key, tick):
             return entry.payload
         payload = bytearray(entry.payload)

@@ -9,26 +9,26 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from agents.agent import Agent
-from agents.arrivals import Arrivals
-from agents.intake import Intake
-from agents.planner.gates import GateReport
-from agents.planner.predictor import Predictor, PredictorMeta
-from agents.planner.store import Provenance, predictor_sha256, save
-from agents.rehearsal import standing
-from quadriga.cli import main
-from quadriga.recorder import metadata
+from quadriga.agents.agent import Agent
+from quadriga.agents.inbox.inbox import Inbox
+from quadriga.agents.inbox.intake_log import Intake
+from quadriga.agents.planner.gates import GateReport
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.store import Provenance, predictor_sha256, save
+from quadriga.agents.rehearsal import standing
+from quadriga.commands.parser import main
+from quadriga.recorder.process import metadata
 from quadriga.replay.recorded_predictor import PREDICTOR, keep, recorded_predictor
 from quadriga.replay.run import replay
 from quadriga.replay.saved_qp import SavedQp
 from quadriga.replay.saved_qp import load as load_qp
 from quadriga.replay.saved_qp import save as save_qp
-from shared.codec import encode
-from shared.config import Config
-from shared.config_file import load
-from shared.errors import PredictorError, RecordingError
-from shared.messages import Command, Reference
-from shared.recording import Recording, RecordingWriter
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import PredictorError, RecordingError
+from quadriga.shared.recording.reader import Recording, RecordingWriter
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Command, Reference
 from tests.quadriga.replay.rewritten import rewritten
 
 REPORT = GateReport(1, {}, {}, 0.5, (0.1,), ((1.0,),), (0.3, 2.0), 0.1, 0.5, (), ())
@@ -123,7 +123,7 @@ def test_recordings_that_lack_what_a_replay_needs(
 def test_a_stop_that_could_not_be_read_is_handed_over_where_it_was_taken_in(tmp_path: Path) -> None:
     run, config = tmp_path / "run.mcap", configured()
     agent = Agent(config, "r1", None)
-    arrivals = Arrivals(config, "r1", agent.peers)
+    arrivals = Inbox(config, "r1", agent.peers)
     memory, intake = agent.initial(), Intake(config, arrivals)
     with RecordingWriter(run, metadata(config, "")) as to:
         for tick in range(5):

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from quadriga.report.account import COLUMNS
-from quadriga.report.look_at import Episode, Sign, episodes
+from quadriga.report.look_at import Sign, Trouble, episodes
 from quadriga.report.run import read_run
-from shared import messages as msg
-from shared.messages import Command, Message, Plan, State, Status, Truth
-from shared.robot import TORQUE_LIMIT
+from quadriga.shared.robot.a1 import TORQUE_LIMIT
+from quadriga.shared.wire import messages as msg
+from quadriga.shared.wire.messages import Command, Message, Plan, State, Status, Truth
 from tests.quadriga.conftest import Change, WriteRun, run_config
 from tests.quadriga.report.test_page import fallen
 
@@ -29,17 +29,17 @@ def told(write_run: WriteRun, change: Change = lambda _, message: message, **mor
     )
 
 
-def only(folder: Path) -> Episode:
+def only(folder: Path) -> Trouble:
     (episode,) = episodes(read_run(folder / "run.mcap"))
     return episode
 
 
-def cell(episode: Episode, robot: str, column: str) -> tuple[str, bool]:
+def cell(episode: Trouble, robot: str, column: str) -> tuple[str, bool]:
     account = next(account for account in episode.accounts if account.robot == robot)
     return account.cells[COLUMNS.index(column)]
 
 
-def signs(episode: Episode, robot: str) -> list[Sign]:
+def signs(episode: Trouble, robot: str) -> list[Sign]:
     return [sign for sign in episode.signs if sign.robot == robot]
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 from quadriga.report.about import not_usual
 from quadriga.report.moments import Moment
 from quadriga.report.run import read_run
-from shared.config_file import load
-from shared.messages import Command, Message, Plan, State, Status
+from quadriga.shared.config.load import load
+from quadriga.shared.wire.messages import Command, Message, Plan, State, Status
 from tests.quadriga.conftest import Change, WriteRun, run_config
 
 CONFIG = run_config(1, 1.2)
@@ -62,8 +62,9 @@ def test_counts_that_follow_each_other_are_summed_up(write_run: WriteRun) -> Non
 
     found = [moment for moment in moments(write_run, change) if moment.kind == "counted"]
     assert [(m.tick, m.stop, m.text) for m in found] == [
-        (400, 500, "dropped_plan 5"), (1100, 1100, "dropped_plan 1"),
-    ]  # fmt: skip
+        (400, 500, "dropped_plan 5"),
+        (1100, 1100, "dropped_plan 1"),
+    ]
 
 
 def test_a_stretch_without_messages_is_a_gap_and_a_single_one_is_not(write_run: WriteRun) -> None:

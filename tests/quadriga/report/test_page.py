@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.cli import main
+from quadriga.commands.parser import main
+from quadriga.recordings.traces import MeasurementTrace
+from quadriga.recordings.truth import TruthTrace
 from quadriga.report.page import build_page, write_page
 from quadriga.report.run import Run, read_run
-from quadriga.traces import MeasurementTrace
-from quadriga.truth_trace import TruthTrace
-from shared import messages as msg
-from shared.errors import RecordingError
-from shared.recording import RecordingWriter
+from quadriga.shared.errors import RecordingError
+from quadriga.shared.recording.reader import RecordingWriter
+from quadriga.shared.wire import messages as msg
 from tests.quadriga.conftest import Packet, WriteRun, run_config
 from tests.quadriga.report.outline import Outline
 
@@ -77,9 +77,10 @@ def _long(run: Run, samples: int) -> Run:
     }
     y = noise.standard_normal((samples, 6))
     traces = replace(
-        run.traces, truth=TruthTrace(**arrays | {"tick": tick}),
+        run.traces,
+        truth=TruthTrace(**arrays | {"tick": tick}),
         measurements=dict.fromkeys(run.traces.robots, MeasurementTrace(tick, y)),
-    )  # fmt: skip
+    )
     return replace(run, traces=traces, end=10 * samples)
 
 
@@ -121,12 +122,21 @@ class _Without:
         ((msg.Status, msg.Plan), {"times", "ages"}, "No plan"),
         (
             (msg.Truth, msg.Plan, msg.Status, msg.Measurement, msg.State, msg.Reference),
-            {"trajectories", "paths", "estimator", "yokes", "forces", "gait", "times", "ages",
-             "reference"},
+            {
+                "trajectories",
+                "paths",
+                "estimator",
+                "yokes",
+                "forces",
+                "gait",
+                "times",
+                "ages",
+                "reference",
+            },
             "No state",
         ),
     ],
-)  # fmt: skip
+)
 def test_what_is_absent_is_left_out_and_said_so(
     write_run: WriteRun, lost: tuple[type[msg.Message], ...], left_out: Container[str], said: str
 ) -> None:

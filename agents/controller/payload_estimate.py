@@ -1,0 +1,52 @@
+"""How much a robot carries that its model does not know of, from what its feet bear."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from quadriga.shared.robot.a1 import GRAVITY, Array
+from quadriga.shared.runtime.jit import compiled
+
+_MOST = 25.0  # kg; two robots' weight is no load that legs carry
+_HEIGHT = 0.08  # m, of a load's centre above the trunk's origin
+
+
+@compiled
+def felt_load(load0: float, foot_force: Array, mass: float, rate: float) -> float:
+    """The load, kg, filtered: on average the feet bear the weight of robot and load.
+
+    What yokes pull up or down counts as load. Robots that are lifted carry nothing.
+
+    Args:
+        load0: at the last tick, kg.
+        foot_force: measured normal forces, (4,), N.
+        mass: of the robot alone, kg.
+        rate: share of a tick in the filter.
+    """
+    carried = np.sum(foot_force) / GRAVITY - mass
+    return min(_MOST, max(0.0, load0 + rate * (carried - load0)))
+
+
+@compiled
+def loaded(links: Array, load: float) -> Array:
+    """The rows of `link_table` with a load, kg, on the middle of the trunk's top.
+
+    Two bodies that move as one: the centre is the mean, and about it I = I₁ + I₂ +
+    m₁ m₂ / (m₁ + m₂) (|d|² 1 − d dᵀ); the load is taken for a point.
+    """
+    rows = links.copy()
+    trunk = rows[0]
+    mass = trunk[0] + load
+    x, y, z = -trunk[1], -trunk[2], _HEIGHT - trunk[3]
+    share, reduced = load / mass, trunk[0] * load / mass
+    trunk[0] = mass
+    trunk[1] += share * x
+    trunk[2] += share * y
+    trunk[3] += share * z
+    trunk[4] += reduced * (y * y + z * z)
+    trunk[5] -= reduced * x * y
+    trunk[6] -= reduced * x * z
+    trunk[7] += reduced * (x * x + z * z)
+    trunk[8] -= reduced * y * z
+    trunk[9] += reduced * (x * x + y * y)
+    return rows

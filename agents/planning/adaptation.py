@@ -1,0 +1,72 @@
+"""Adaptation to a plant that is not the one of the data: an agent corrects its own block G_ii."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.planner.plausible import plausible
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.predictor.recursive import (
+    Correction,
+    Forgetting,
+    begin,
+    block_correction,
+    take_in,
+)
+from quadriga.agents.time_grid import gait_phase
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.messages import Measurement
+
+
+class Adapter:
+    """Fixed data of one agent's adaptation; its functions depend on their arguments alone.
+
+    What the peers did in a window is not looked up again: it counts as noise, which forgets.
+
+    Args:
+        config: the team's configuration.
+        index: the agent's place in the team, 0-based.
+        predictor: the fitted predictor, which is corrected.
+
+    Attributes:
+        samples: length of a window, T_ini + N.
+    """
+
+    def __init__(self, config: Config, index: int, predictor: Predictor) -> None:
+        self._config, self._index, self._predictor = config, index, predictor
+        self._how = Forgetting(config.planner.forgetting)
+        self.samples = config.planner.T_ini + config.planner.N
+
+    def learn(
+        self, learned: Correction | None, own: tuple[Measurement, ...], y_base: Array
+    ) -> Correction:
+        """Take in the newest window, unless it says what no robot can mean.
+
+        Args:
+            learned: so far; None before the first window.
+            own: the agent's samples of the window, without gaps, `samples` of them.
+            y_base: base of the outputs at their ends, shape (samples, 6).
+        """
+        if learned is None:
+            learned = begin(self._predictor.meta, self._index, (self._index,), self._how)
+        T_ini, gait = self._config.planner.T_ini, self._config.gait
+        stance = np.array([sample.stance for sample in own]) > 0.5
+        u, y = np.array([sample.u for sample in own]), np.array([sample.y for sample in own])
+        if not plausible(self._config.planner, u, y):
+            return learned.refuse()
+        du, dy = u - nominal_forces(stance), y - y_base
+        z = np.zeros((self._predictor.meta.robots, self._predictor.meta.width))
+        z[self._index] = np.concatenate(
+            [du[:T_ini].ravel(), dy[:T_ini].ravel(), du[T_ini:].ravel()]
+        )
+        phase = gait_phase(
+            own[T_ini - 1].tick, gait.stand_ms, gait.stance_ms, self._predictor.phases
+        )
+        return take_in(learned, self._predictor, z, dy[T_ini:].ravel(), phase, self._how)
+
+    def block(self, learned: Correction, phase: int) -> Array:
+        """The corrected G_ii. Shape (6 N, 18 T_ini + 12 N)."""
+        G_ii = self._predictor.block(self._index, self._index, phase)
+        return G_ii + block_correction(self._predictor.meta, learned)

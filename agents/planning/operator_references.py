@@ -1,0 +1,73 @@
+"""What the operator asked for, and which of it is in force at a tick."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+
+from quadriga.agents.predictor.episode import output_base
+from quadriga.shared.config.sections import Config, ReferenceConfig
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.messages import Reference
+from quadriga.shared.wire.topics import SAMPLE_MS
+
+# What an operator may ask for, whoever he is: the limits of the configuration's own reference.
+_LIMITS: Final = {
+    name: (key.metadata["low"], key.metadata["high"])
+    for name, key in ReferenceConfig.__dataclass_fields__.items()
+    if name in ("vx", "vy", "wz", "height")
+}
+AHEAD_MS: Final = 1000  # of the present: whoever speaks of later must be there to say it then
+_KEPT_MS = 2000  # long enough for the windows of the oldest plan that may still be used
+
+
+def allowed(reference: Reference) -> bool:
+    """Whether a reference is within the limits of `ReferenceConfig`."""
+    return all(low <= getattr(reference, name) <= high for name, (low, high) in _LIMITS.items())
+
+
+def remember_references(
+    known: tuple[Reference, ...], new: Iterable[Reference], tick: int
+) -> tuple[Reference, ...]:
+    """The references worth keeping at `tick`, one per tick (the first heard), oldest first."""
+    fresh = tuple(new)
+    if not fresh:
+        return known
+    by_tick = {item.tick: item for item in (*reversed(fresh), *reversed(known))}
+    ordered = [by_tick[key] for key in sorted(by_tick)]
+    # The newest of the old ones stays in force at the far end of the window.
+    first = sum(item.tick <= tick - _KEPT_MS for item in ordered)
+    return tuple(ordered[max(0, first - 1) :])
+
+
+def in_force(references: tuple[Reference, ...], tick: int, height: float) -> tuple[Reference, int]:
+    """The reference in force at `tick` and its age [ms]; standing still before the first."""
+    for item in reversed(references):
+        if item.tick <= tick:
+            return item, tick - item.tick
+    return Reference(0, 0, 0.0, 0.0, 0.0, height), tick
+
+
+def base_of_window(
+    config: Config, end: int, references: tuple[Reference, ...], now: int | None = None
+) -> Array:
+    """Base of the outputs at the ends of the T_ini samples up to the tick `end`. (T_ini, 6).
+
+    For samples after the tick `now` it is that of `now`.
+    """
+    return base_of_samples(config, end, config.planner.T_ini, references, now)
+
+
+def base_of_samples(
+    config: Config, end: int, count: int, references: tuple[Reference, ...], now: int | None = None
+) -> Array:
+    """The same for the last `count` samples, shape (count, 6)."""
+    interface, height = config.planner.interface, config.reference.height
+    ticks = range(end - SAMPLE_MS * (count - 1), end + 1, SAMPLE_MS)
+    known = [tick if now is None else min(tick, now) for tick in ticks]
+    first, last = (in_force(references, tick, height)[0] for tick in (known[0], known[-1]))
+    if first is last:  # as nearly always
+        return np.tile(output_base(interface, last), (len(known), 1))
+    return np.array([output_base(interface, in_force(references, t, height)[0]) for t in known])

@@ -1,0 +1,165 @@
+"""The fits of G by name, all on scaled deviations of one team's episodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from quadriga.agents.predictor.arx import roll_out
+from quadriga.agents.predictor.episode import Episode
+from quadriga.agents.predictor.hankel import split
+from quadriga.agents.predictor.least_squares import solve_gamma, solve_pinv
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.regression import (
+    by_phase,
+    check,
+    normal_equations,
+    physical,
+    robots_first,
+)
+from quadriga.agents.predictor.ridge import Solutions, members_of, solve_causal, solve_ridge
+from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS
+
+Fit = Callable[[Sequence[Episode], PredictorMeta], Predictor]
+
+
+def fit(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
+    """The fit that `meta.kind` names.
+
+    Raises:
+        PredictorError: no data, too little, of another team, or a singular problem.
+    """
+    return FITS[meta.kind](episodes, meta)
+
+
+def fit_pinv(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
+    """G = Y_f [U_p; Y_p; U_f]† (eq. 6), through the Gram matrix.
+
+    Raises:
+        PredictorError: no data, too little, or of another team.
+    """
+    found = solve_pinv(normal_equations(episodes, meta), meta)
+    return _one_phase(found, _unpenalised(meta, "pinv"))
+
+
+def fit_ridge(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
+    """Block-weighted ridge regression of G; with w = 1 the plain one.
+
+    Row i minimises ‖Y_f^i − Σ_j G_ij Z_j‖² + ridge · M · (‖G_ii‖² + w² Σ_{j≠i} ‖G_ij‖²) with M
+    columns: what the peers are not clearly seen to do is not attributed to them, without which
+    the agents' best responses to each other's last plans diverge.
+
+    Raises:
+        PredictorError: no data, too little, of another team, or a singular problem.
+    """
+    found = solve_ridge(normal_equations(episodes, meta), meta, meta.ridge)
+    return _one_phase(found, replace(meta, kind="ridge", phases=1))
+
+
+def fit_gamma(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
+    """γ-DDPC: G from the LQ factors of [Z_p; U_f; Y_f] (see `solve_gamma`), without a penalty.
+
+    Raises:
+        PredictorError: no data, too little, of another team, or forces that do not excite.
+    """
+    found = solve_gamma(normal_equations(episodes, meta), meta)
+    return _one_phase(found, _unpenalised(meta, "gamma"))
+
+
+def fit_causal(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
+    """Block-weighted ridge with a block-lower-triangular U_f part: no force acts before its time.
+
+    Raises:
+        PredictorError: no data, too little, of another team, or a singular problem.
+    """
+    found = solve_causal(normal_equations(episodes, meta), meta, meta.ridge)
+    return _one_phase(found, replace(meta, kind="causal", phases=1))
+
+
+def fit_arx(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
+    """One-step block-weighted ridge regression, rolled out over N steps by the whole team.
+
+    With yoked neighbours only, what reaches a robot through a neighbour's neighbour within the
+    horizon is cut off: G_ij is zero wherever i and j are not yoked.
+
+    Raises:
+        PredictorError: no data, too little, of another team, or a singular problem.
+    """
+    check(episodes, meta)
+    one_step = replace(meta, N=1)
+    found = solve_ridge(normal_equations(episodes, one_step), one_step, meta.ridge)
+    x = roll_out(found.x, meta)
+    for i in range(meta.robots):
+        strangers = [j for j in range(meta.robots) if j not in members_of(meta, i)]
+        x[i].reshape(meta.robots, meta.width, -1)[strangers] = 0.0
+    return _one_phase(Solutions(x, found.condition), replace(meta, kind="arx", phases=1))
+
+
+def fit_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
+    """One G for each phase of the gait, drawn towards the ridge fit of all data together.
+
+    Row i of phase p minimises over its own windows the error plus phase_ridge · M_p times the
+    block-weighted square of the departure from the pooled fit: without data of its own a phase
+    has that of all.
+
+    Raises:
+        PredictorError: no data, too little, of another team, or a singular problem.
+    """
+    pooled = solve_ridge(normal_equations(episodes, meta), meta, meta.ridge).x
+    blocks, condition = [], 0.0
+    for regression in by_phase(episodes, meta):
+        if regression.windows == 0:
+            blocks.append(physical(pooled, meta))
+            continue
+        explained = np.einsum("ab,ibk->aik", regression.zz, pooled, optimize=True)
+        left = replace(regression, zy=regression.zy - explained)
+        found = solve_ridge(left, meta, meta.phase_ridge)
+        blocks.append(physical(pooled + found.x, meta))
+        condition = max(condition, found.condition)
+    return Predictor(replace(meta, kind="phase"), np.stack(blocks), condition)
+
+
+def fit_hankel(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
+    """G = Y_f [U_p; Y_p; U_f]† (eq. 6) as the paper has it; forms the Hankel matrices.
+
+    The independent reference of the other fits; takes minutes where they take seconds.
+
+    Raises:
+        PredictorError: no data, too little, or of another team.
+    """
+    check(episodes, meta)
+    u, y = zip(*(episode.scaled() for episode in episodes), strict=True)
+    parts = split(u, y, meta.T_ini, meta.N)
+    Z = np.concatenate([parts.U_p, parts.Y_p, parts.U_f])
+    G = parts.Y_f @ np.linalg.pinv(Z)
+    n, m, p = meta.robots, N_FORCES, N_OUTPUTS
+    past_u, past_y, future_u = np.split(
+        np.arange(len(Z)), [n * m * meta.T_ini, n * (m + p) * meta.T_ini]
+    )
+    columns_of = np.concatenate(
+        [robots_first(x, n, d) for x, d in ((past_u, m), (past_y, p), (future_u, m))], axis=1
+    ).ravel()
+    rows_of = robots_first(np.arange(len(G)), n, p)
+    x = G[rows_of[:, None, :], columns_of[:, None]]
+    return _one_phase(Solutions(x, float(np.linalg.cond(Z)) ** 2), _unpenalised(meta, "pinv"))
+
+
+FITS: Final[Mapping[str, Fit]] = {
+    "pinv": fit_pinv,
+    "ridge": fit_ridge,
+    "gamma": fit_gamma,
+    "causal": fit_causal,
+    "arx": fit_arx,
+    "phase": fit_phase,
+}
+
+
+def _one_phase(found: Solutions, meta: PredictorMeta) -> Predictor:
+    return Predictor(meta, physical(found.x, meta)[None], found.condition)
+
+
+def _unpenalised(meta: PredictorMeta, kind: str) -> PredictorMeta:
+    return replace(meta, kind=kind, phases=1, ridge=0.0, block_weight=1.0)

@@ -1,0 +1,127 @@
+"""Block Hankel matrices of one or several episodes (eq. 2, 4), and their Gram matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy import linalg
+
+from quadriga.shared.robot.a1 import Array
+
+# Singular values below 1e-6 of the largest count as zero (Gram eigenvalues are their squares).
+_RANK_TOLERANCE = 1e-12
+
+
+def hankel(signal: Array, L: int) -> Array:
+    """H_L of eq. 2: column c stacks samples c … c+L−1.
+
+    Args:
+        signal: shape (T, m), T ≥ L.
+        L: number of block rows.
+
+    Returns:
+        Shape (m L, T − L + 1).
+    """
+    windows = sliding_window_view(signal, L, axis=0)  # (M, m, L)
+    return windows.transpose(2, 1, 0).reshape(L * signal.shape[1], -1)
+
+
+def mosaic(signals: Iterable[Array], L: int) -> Array:
+    """The Hankel matrices of several episodes side by side; no column straddles two of them."""
+    return np.concatenate([hankel(signal, L) for signal in signals], axis=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """Past and future of a data set (eq. 4).
+
+    Shapes: U_p (m T_ini, M), Y_p (p T_ini, M), U_f (m N, M), Y_f (p N, M).
+    """
+
+    U_p: Array
+    Y_p: Array
+    U_f: Array
+    Y_f: Array
+
+
+def split(u: Sequence[Array], y: Sequence[Array], T_ini: int, N: int) -> Split:
+    """Split the Hankel matrices of inputs (T, m) and outputs (T, p) of several episodes (eq. 4)."""
+    U, Y = mosaic(u, T_ini + N), mosaic(y, T_ini + N)
+    m, p = u[0].shape[1], y[0].shape[1]
+    return Split(U[: m * T_ini], Y[: p * T_ini], U[m * T_ini :], Y[p * T_ini :])
+
+
+def required_samples(m: int, T_ini: int, N: int, n: int) -> int:
+    """Least T for a sufficiently rich Hankel matrix, (m+1)(T_ini+N+n)−1; n is the order."""
+    return (m + 1) * (T_ini + N + n) - 1
+
+
+def columns(signals: Iterable[Array], L: int) -> int:
+    """Number of columns of `mosaic(signals, L)`."""
+    return sum(max(len(signal) - L + 1, 0) for signal in signals)
+
+
+def gram(signals: Sequence[Array], L: int) -> Array:
+    """H Hᵀ of H = mosaic(signals, L), without forming H. Shape (L q, L q) for signals (T, q).
+
+    The diagonal blocks slide: S(a+1, b+1) = S(a, b) + w_{a+M} w_{b+M}ᵀ − w_a w_bᵀ with M columns,
+    so only the first block row needs products over all samples. Episodes shorter than L add none.
+    """
+    q = signals[0].shape[1]
+    S = np.zeros((L * q, L * q))
+    episodes = [(np.ascontiguousarray(w), len(w) - L + 1) for w in signals if len(w) >= L]
+    for w, M in episodes:
+        for b in range(L):
+            S[:q, b * q : (b + 1) * q] += w[:M].T @ w[b : b + M]
+    for a in range(L - 1):
+        row = S[(a + 1) * q : (a + 2) * q, (a + 1) * q :]
+        row[:] = S[a * q : (a + 1) * q, a * q : (L - 1) * q]
+        row += _products([w[a + M :] for w, M in episodes])
+        row -= _products([w[a : L - 1] for w, _ in episodes])
+    for a in range(L - 1):
+        S[(a + 1) * q :, a * q : (a + 1) * q] = S[a * q : (a + 1) * q, (a + 1) * q :].T
+    return S
+
+
+def _products(windows: Sequence[Array]) -> Array:
+    """Σ w_0 [w_0 w_1 …]ᵀ over windows of equal length."""
+    stacked = np.stack([window.ravel() for window in windows])
+    return np.stack([window[0] for window in windows]).T @ stacked
+
+
+@dataclass(frozen=True, slots=True)
+class Excitation:
+    """Result of the rank test: persistently exciting of `order` if `rank` equals `rows`."""
+
+    order: int
+    rows: int
+    columns: int
+    rank: int
+
+    @property
+    def persistent(self) -> bool:
+        """Whether the Hankel matrix has full row rank (definition 1)."""
+        return self.rank == self.rows
+
+
+def excitation(inputs: Sequence[Array], order: int) -> Excitation:
+    """Rank of the Hankel matrix of `order` of the inputs of all episodes together.
+
+    Args:
+        inputs: per episode shape (T, m).
+        order: L + n, horizon plus system order.
+    """
+    rows, count = order * inputs[0].shape[1], columns(inputs, order)
+    S = gram(inputs, order)
+    floor = _RANK_TOLERANCE * max(float(np.linalg.norm(S)), np.finfo(float).tiny)
+    S.flat[:: rows + 1] -= floor
+    try:  # all eigenvalues above the floor: one Cholesky says so 20 times sooner than they do
+        linalg.cholesky(S.T, lower=True, overwrite_a=True, check_finite=False)
+        rank = rows
+    except linalg.LinAlgError:
+        eigenvalues = linalg.eigvalsh(gram(inputs, order), overwrite_a=True, check_finite=False)
+        rank = int((eigenvalues > floor).sum())
+    return Excitation(order, rows, count, rank)

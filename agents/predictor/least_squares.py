@@ -1,0 +1,105 @@
+"""Solutions of the normal equations without a penalty: pseudo-inverse (eq. 6) and LQ factors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from scipy import linalg
+
+from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.regression import Index, Regression, past_first
+from quadriga.agents.predictor.ridge import Solutions, condition_number, factorise, members_of
+from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.a1 import N_OUTPUTS, Array
+
+# Rounding leaves the Gram matrix eigenvalues of up to 1e-16 · (number of rows) of the largest
+# where there should be none: below 1e-12, which is 1e-6 in singular values of the data, nothing
+# can be told from nothing.
+RANK_TOLERANCE = 1e-12
+
+Solve = Callable[[Array, Array], tuple[Array, float]]
+
+
+def solve_pinv(regression: Regression, meta: PredictorMeta) -> Solutions:
+    """Y_f Z† = (Σ y zᵀ)(Σ z zᵀ)†, the solution of least norm where several are best."""
+    return _solve_groups(regression, meta, _least_norm)
+
+
+def solve_gamma(regression: Regression, meta: PredictorMeta) -> Solutions:
+    """γ-DDPC: with [Z_p; U_f; Y_f] = L Q, G = [L_31 L_32] [L_11 0; L_21 L_22]⁻¹, γ_3 = 0.
+
+    L is the Cholesky factor of the Gram matrix. Where Z_p has fewer independent rows than rows
+    (data without noise), L_11 is that of an independent selection of them, found by pivoting.
+
+    Raises:
+        PredictorError: U_f is not exciting: L_22 is singular.
+    """
+
+    def solve(A: Array, b: Array) -> tuple[Array, float]:
+        past = len(A) * meta.past // meta.width
+        L_11, pivots, rank, _ = linalg.lapack.dpstrf(
+            A[:past, :past], tol=RANK_TOLERANCE * A.diagonal().max(), lower=1
+        )
+        rows = np.concatenate([pivots[:rank] - 1, np.arange(past, len(A))])
+        L_21 = linalg.solve_triangular(L_11[:rank, :rank], A[rows[:rank], past:], lower=True).T
+        rest = A[past:, past:] - L_21 @ L_21.T
+        floor = RANK_TOLERANCE * A.diagonal().max()
+        try:
+            L_22 = linalg.cholesky(rest, lower=True)
+            singular = bool(L_22.diagonal().min() ** 2 < floor)
+        except linalg.LinAlgError:
+            singular = True
+        if singular:
+            raise PredictorError(
+                "the data's future forces",
+                "combinations of the past and of each other",
+                "forces that excite every direction",
+                "more noise (identification.noise), or more data",
+            )
+        L = np.zeros((len(rows), len(rows)))
+        L[:rank, :rank] = np.tril(L_11[:rank, :rank])
+        L[rank:, :rank], L[rank:, rank:] = L_21, L_22
+        x = np.zeros_like(b)
+        x[rows] = linalg.cho_solve((L, True), b[rows])
+        norm = float(np.linalg.norm(A[np.ix_(rows, rows)], 1))
+        return x, condition_number(norm, np.asfortranarray(L))
+
+    return _solve_groups(regression, meta, solve)
+
+
+def _least_norm(A: Array, b: Array) -> tuple[Array, float]:
+    floor = RANK_TOLERANCE * float(np.linalg.norm(A))
+    norm = float(np.linalg.norm(A, 1))
+    try:  # every eigenvalue above the floor: a Cholesky factor says so long before they do
+        shifted = A.copy(order="F")
+        shifted.flat[:: len(A) + 1] -= floor
+        factorise(shifted)
+        factor = factorise(A.copy(order="F"))
+        x: Array = linalg.cho_solve((factor, True), b, check_finite=False)
+        return x, condition_number(norm, factor)
+    except PredictorError:
+        values, vectors = linalg.eigh(A, check_finite=False)
+        kept = values > floor
+        V = vectors[:, kept]
+        return V @ ((V.T @ b) / values[kept, None]), float(values[-1] / values[kept][0])
+
+
+def _solve_groups(regression: Regression, meta: PredictorMeta, solve: Solve) -> Solutions:
+    """Solve once for all robots whose regressions have the same columns."""
+    n, outputs = meta.robots, N_OUTPUTS * meta.N
+    x, condition = np.zeros((n, n * meta.width, outputs)), 0.0
+    for robots, rows in _groups(meta):
+        b = regression.zy[np.ix_(rows, robots)].reshape(len(rows), -1)
+        found, one = solve(regression.zz[np.ix_(rows, rows)], b)
+        x[np.ix_(robots, rows)] = found.reshape(len(rows), len(robots), -1).transpose(1, 0, 2)
+        condition = max(condition, one)
+    return Solutions(x, condition)
+
+
+def _groups(meta: PredictorMeta) -> Iterator[tuple[Index, Index]]:
+    groups: dict[tuple[int, ...], list[int]] = {}
+    for i in range(meta.robots):
+        groups.setdefault(members_of(meta, i), []).append(i)
+    for members, robots in groups.items():
+        yield np.array(robots), past_first(meta, members)

@@ -1,0 +1,159 @@
+"""G, the data-driven state-transition matrix over N steps (eq. 6), and its blocks (eq. 9)."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
+
+# Keys of the controller that act only after something has gone wrong, not on the plant fitted.
+_SAFETY_KEYS: Final = ("damping", "fall_tilt", "max_failures")
+
+
+@dataclass(frozen=True, slots=True)
+class PredictorMeta:
+    """What a predictor was fitted for, where it may be used alone, and how it was fitted.
+
+    Attributes:
+        kind: name of the fit, a key of `quadriga.agents.predictor.fits.FITS`.
+        phases: parts of the gait's period with a G of their own (see `horizon.gait_phase`).
+        neighbours: "all", or "yoked": G_ij is zero unless i and j are yoked.
+    """
+
+    robots: int
+    N: int
+    T_ini: int
+    interface: str
+    yokes: str
+    alternate_phase: bool
+    stance_ms: int
+    ridge: float
+    block_weight: float
+    controller: tuple[tuple[str, float | str | bool], ...]  # the low level that is part of G
+    kind: str
+    phases: int
+    phase_ridge: float
+    neighbours: str
+    stand_ms: int  # where the gait's period, and with it phase 0, begins
+
+    @classmethod
+    def of(cls, config: Config) -> PredictorMeta:
+        """The meta of a predictor fitted for `config`."""
+        controller = {k: v for k, v in asdict(config.controller).items() if k not in _SAFETY_KEYS}
+        ident = config.identification
+        return cls(
+            robots=config.team.robots,
+            N=config.planner.N,
+            T_ini=config.planner.T_ini,
+            interface=config.planner.interface,
+            yokes=config.team.yokes,
+            alternate_phase=config.team.alternate_phase,
+            stance_ms=config.gait.stance_ms,
+            ridge=ident.ridge,
+            block_weight=ident.block_weight,
+            controller=tuple(sorted(controller.items())),
+            kind=ident.predictor,
+            phases=ident.phases if ident.predictor == "phase" else 1,
+            phase_ridge=ident.phase_ridge,
+            neighbours=ident.neighbours,
+            stand_ms=config.gait.stand_ms,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """A form that JSON can carry."""
+        return asdict(self) | {"controller": dict(self.controller)}
+
+    @classmethod
+    def from_dict(cls, body: dict[str, Any]) -> PredictorMeta:
+        """The inverse of `to_dict`.
+
+        Raises:
+            TypeError, AttributeError: fields are missing, unknown or of another type.
+        """
+        return cls(**body | {"controller": tuple(sorted(body.get("controller", {}).items()))})
+
+    @property
+    def width(self) -> int:
+        """Columns of a block: length of one robot's [u_ini; y_ini; u]."""
+        return (N_FORCES + N_OUTPUTS) * self.T_ini + N_FORCES * self.N
+
+    @property
+    def past(self) -> int:
+        """Columns of a block that belong to [u_ini; y_ini]."""
+        return (N_FORCES + N_OUTPUTS) * self.T_ini
+
+
+@dataclass(frozen=True, slots=True)
+class Predictor:
+    """y^i = Σ_j G_ij [u_ini^j; y_ini^j; u^j] in deviations and physical units (eq. 10).
+
+    Attributes:
+        meta: what it was fitted for.
+        G: shape (P, n, n, 6 N, 18 T_ini + 12 N), read-only, one for each of the P phases; rows
+            and columns are time-major (sample 0's twelve forces, sample 1's twelve, …), N and m,
+            m/s, rad, rad/s.
+        condition: number of the regression it was fitted by, penalty included; None: unknown.
+    """
+
+    meta: PredictorMeta
+    G: Array
+    condition: float | None = None
+
+    def __post_init__(self) -> None:
+        n = self.meta.robots
+        expected = (self.meta.phases, n, n, N_OUTPUTS * self.meta.N, self.meta.width)
+        if self.G.shape != expected:
+            raise PredictorError("predictor.G", f"shape {self.G.shape}", f"{expected}")
+        self.G.setflags(write=False)
+
+    @property
+    def phases(self) -> int:
+        """P, the number of phases with a G of their own; `horizon.phase_of` says which is due."""
+        return self.meta.phases
+
+    def block(self, i: int, j: int, phase: int = 0) -> Array:
+        """G_ij of a phase, what agent j does to agent i. Shape (6 N, 18 T_ini + 12 N)."""
+        block: Array = self.G[phase, i, j]
+        return block
+
+    def forced(self, i: int, j: int, phase: int = 0) -> Array:
+        """The columns of G_ij that multiply the future forces. Shape (6 N, 12 N)."""
+        forced: Array = self.G[phase, i, j, :, self.meta.past :]
+        return forced
+
+    def predict(self, z: Array, phase: int = 0) -> Array:
+        """Predicted output deviations of the whole team.
+
+        Args:
+            z: per robot [u_ini; y_ini; u], shape (n, 18 T_ini + 12 N) or, for many windows
+                at once, (n, 18 T_ini + 12 N, C).
+            phase: that the end of [u_ini; y_ini] lies in.
+
+        Returns:
+            Shape (n, 6 N) or (n, 6 N, C).
+        """
+        stacked = z.reshape(-1, *z.shape[2:])
+        rows = [np.concatenate(list(row), axis=1) @ stacked for row in self.G[phase]]
+        return np.stack(rows)
+
+
+def check_sizes(config: Config, predictor: Predictor) -> None:
+    """Refuse a predictor whose sizes are not the configuration's.
+
+    Raises:
+        PredictorError: it is of another team or horizon.
+    """
+    meta, planner = predictor.meta, config.planner
+    got, expected = (
+        (meta.robots, meta.N, meta.T_ini),
+        (config.team.robots, planner.N, planner.T_ini),
+    )
+    if got != expected:
+        raise PredictorError(
+            "predictor", f"(robots, N, T_ini) = {got}", f"{expected}", "of another team?"
+        )

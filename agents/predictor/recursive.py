@@ -1,0 +1,160 @@
+"""Correction of one robot's row of G from new windows: recursive least squares that forgets.
+
+Forgets only along the directions that new windows speak about (Kulhavý's directional forgetting):
+with the plain kind a team that stands or trots evenly would forget all that it does not excite,
+and its covariance would grow as λ^−k.
+
+A changed plant (a load nobody told of) shows in what the predictor leaves unexplained. That is
+regressed on the robot's own [u_ini; y_ini; u], which corrects G_ii, or on those of all robots.
+The same correction serves every phase. All in scaled deviations, so that one prior fits all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.regression import scales
+from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.a1 import N_OUTPUTS, Array
+
+_LARGEST = 100.0  # of an entry of D; the largest ones of a predictor, as scaled, are about 1
+_NOTHING = 1e-12  # zᵀPz of a regressor that says nothing about anything not known
+
+
+@dataclass(frozen=True, slots=True)
+class Forgetting:
+    """How the recursion weighs old and new.
+
+    Attributes:
+        factor: λ, what a window leaves of the older information on its own direction; 1: all.
+        prior: variance of an entry of the correction before the first window.
+        bound: largest mean variance; where it would be passed, nothing is forgotten.
+    """
+
+    factor: float = 0.999
+    prior: float = 1e-3
+    bound: float = 1e-2
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.factor <= 1.0:
+            raise PredictorError("forgetting.factor", f"{self.factor:g}", "above 0, at most 1")
+        if not 0.0 < self.prior <= self.bound:
+            raise PredictorError(
+                "forgetting.prior", f"{self.prior:g}", f"above 0, at most the bound {self.bound:g}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """What is known so far of the departure of one robot's row from the predictor.
+
+    Attributes:
+        robot: i, whose row it is.
+        sources: the robots j whose blocks G_ij are corrected, ascending.
+        D: scaled correction [ΔG_ij …], shape (6 N, k), k = (18 T_ini + 12 N) · sources.
+        P: covariance over the noise variance, shape (k, k), exactly symmetric.
+        updates: windows that were taken in.
+        skipped: windows that told nothing new.
+        refused: windows that were implausible themselves, or would have made D so.
+    """
+
+    robot: int
+    sources: tuple[int, ...]
+    D: Array
+    P: Array
+    updates: int = 0
+    skipped: int = 0
+    refused: int = 0
+
+    def refuse(self) -> Correction:
+        """The same after one more window that was not taken in."""
+        return replace(self, refused=self.refused + 1)
+
+
+def begin(meta: PredictorMeta, robot: int, sources: Sequence[int], how: Forgetting) -> Correction:
+    """No correction yet.
+
+    Raises:
+        PredictorError: robots that are not in the team.
+    """
+    chosen = tuple(sorted(set(sources)))
+    if not chosen or not set((robot, *chosen)) <= set(range(meta.robots)):
+        raise PredictorError(
+            "robots of the correction", f"{robot} and {list(sources)}", f"0 … {meta.robots - 1}"
+        )
+    size = meta.width * len(chosen)
+    return Correction(robot, chosen, np.zeros((N_OUTPUTS * meta.N, size)), how.prior * np.eye(size))
+
+
+def take_in(
+    state: Correction, predictor: Predictor, z: Array, y: Array, phase: int, how: Forgetting
+) -> Correction:
+    """Take in one window that has been measured to its end.
+
+    Args:
+        state: so far.
+        predictor: that is corrected, itself unchanged since the beginning.
+        z: [u_ini; y_ini; u] of all robots, deviations, shape (n, 18 T_ini + 12 N), N, m, ….
+        y: measured output deviations of robot i, shape (6 N,).
+        phase: of the window.
+        how: weights.
+
+    Raises:
+        PredictorError: another shape, or numbers that are not finite.
+    """
+    meta = predictor.meta
+    if z.shape != (meta.robots, meta.width) or y.shape != (N_OUTPUTS * meta.N,):
+        raise PredictorError(
+            "window",
+            f"shapes {z.shape}, {y.shape}",
+            f"{(meta.robots, meta.width)}, {(N_OUTPUTS * meta.N,)}",
+        )
+    if not (np.isfinite(z).all() and np.isfinite(y).all()):
+        raise PredictorError("window", "NaN or infinity", "finite numbers")
+    left = y - np.einsum("jab,jb->a", predictor.G[phase, state.robot], z)
+    z_scale, y_scale = scales(meta)
+    return update(state, (z[list(state.sources)] / z_scale).ravel(), left / y_scale, how)
+
+
+def update(state: Correction, z: Array, left: Array, how: Forgetting) -> Correction:
+    """One step: least squares of the new window and what is known, then forgetting along z.
+
+    With s = zᵀPz: D ← D + (left − D z) zᵀP / (1 + s); P ← P − PzzᵀP (λ s − 1 + λ) / (λ s (1 + s)),
+    which leaves zᵀPz = s / (λ (1 + s)). With λ = 1 that is batch least squares,
+    min Σ ‖left − D z‖² + ‖D‖² / prior; with one direction alone, exponentially weighted. Under a
+    constant z the variance along it settles at (1 − λ) / λ and no other direction is touched.
+
+    A window after which an entry of D would be no number, or far from all a plant can be, is
+    refused: from then on everything that is planned would be.
+
+    Args:
+        state: so far.
+        z: scaled regressor, shape (k,).
+        left: scaled outputs that the predictor does not explain, shape (6 N,).
+        how: weights.
+    """
+    Pz = state.P @ z
+    s = float(z @ Pz)
+    if s <= _NOTHING:
+        return replace(state, skipped=state.skipped + 1)
+    lost, size = (how.factor * s - 1.0 + how.factor) / (how.factor * s * (1.0 + s)), float(Pz @ Pz)
+    if state.P.trace() - lost * size > how.bound * len(Pz):
+        lost = 1.0 / (1.0 + s)
+    D = state.D + np.outer(left - state.D @ z, Pz / (1.0 + s))
+    if not (np.abs(D).max() <= _LARGEST and math.isfinite(lost * size)):
+        return state.refuse()
+    P = state.P - lost * np.outer(Pz, Pz)
+    return replace(state, D=D, P=P, updates=state.updates + 1)
+
+
+def block_correction(meta: PredictorMeta, state: Correction, place: int = 0) -> Array:
+    """What the correction adds to the block of one of its sources. (6 N, 18 T_ini + 12 N)."""
+    z_scale, y_scale = scales(meta)
+    columns = slice(place * meta.width, (place + 1) * meta.width)
+    added: Array = state.D[:, columns] * y_scale[:, None] / z_scale
+    return added

@@ -1,0 +1,167 @@
+"""Solutions of the penalised normal equations (Σ z zᵀ + D_i) x_i = Σ z y^iᵀ of every robot i."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.regression import Regression, past_first
+from quadriga.shared.config.yokes import neighbours
+from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
+
+
+@dataclass(frozen=True, slots=True)
+class Solutions:
+    """What a solver found.
+
+    Attributes:
+        x: scaled solutions, shape (n, n W, 6 N); zero in the rows of robots left out.
+        condition: of the regularised normal equations, in the 1-norm, of one robot or the worst.
+    """
+
+    x: Array
+    condition: float
+
+
+def members_of(meta: PredictorMeta, i: int) -> tuple[int, ...]:
+    """Robots whose columns the regression of robot `i` has, in order, `i` among them."""
+    if meta.neighbours == "all":
+        return tuple(range(meta.robots))
+    return tuple(sorted({i, *neighbours(meta.robots, meta.yokes, i)}))
+
+
+def solve_ridge(regression: Regression, meta: PredictorMeta, ridge: float) -> Solutions:
+    """Penalty ridge · M on robot i's own columns and w² times as much on its peers'.
+
+    Raises:
+        PredictorError: a singular problem.
+    """
+    n, W = meta.robots, meta.width
+    light, heavy = penalties(regression, meta, ridge)
+    everyone = all(len(members_of(meta, i)) == n for i in range(n))
+    if everyone:
+        A = _penalised(regression.zz, np.where(np.arange(n * W) < W, light, heavy))
+        condition = condition_number(_norm(A), factorise(A))
+        return Solutions(_solve_each(regression.zz, regression.zy, W, light, heavy), condition)
+    x, condition = np.zeros((n, n * W, N_OUTPUTS * meta.N)), 0.0
+    for i in range(n):
+        members = members_of(meta, i)
+        rows = (np.array(members)[:, None] * W + np.arange(W)).ravel()
+        A = _penalised(regression.zz[np.ix_(rows, rows)], np.where(rows // W == i, light, heavy))
+        norm, factor = _norm(A), factorise(A)
+        x[i, rows] = linalg.cho_solve((factor, True), regression.zy[rows, i], check_finite=False)
+        condition = max(condition, condition_number(norm, factor))
+    return Solutions(x, condition)
+
+
+def solve_causal(regression: Regression, meta: PredictorMeta, ridge: float) -> Solutions:
+    """The same with y at sample t explained by [u_ini; y_ini] and u_0 … u_t alone.
+
+    With columns in the order of time the normal equations of sample t are a leading block of
+    those of the last, and so are their Cholesky factors: one factor serves all N of them. u_k is
+    the mean force over the 10 ms that end with y_k, hence the direct feedthrough.
+
+    Raises:
+        PredictorError: a singular problem.
+    """
+    n, W = meta.robots, meta.width
+    light, heavy = penalties(regression, meta, ridge)
+    x, condition = np.zeros((n, n * W, N_OUTPUTS * meta.N)), 0.0
+    for i in range(n):
+        members = members_of(meta, i)
+        rows = past_first(meta, members)
+        A = _penalised(regression.zz[np.ix_(rows, rows)], np.where(rows // W == i, light, heavy))
+        norm, factor = _norm(A), factorise(A)
+        half = linalg.solve_triangular(
+            factor, regression.zy[rows, i], lower=True, check_finite=False
+        )
+        for t in range(meta.N):
+            k = len(members) * (meta.past + N_FORCES * (t + 1))
+            at = slice(N_OUTPUTS * t, N_OUTPUTS * (t + 1))
+            x[i, rows[:k], at] = linalg.solve_triangular(
+                factor[:k, :k], half[:k, at], lower=True, trans=1, check_finite=False
+            )
+        condition = max(condition, condition_number(norm, factor))
+    return Solutions(x, condition)
+
+
+def penalties(regression: Regression, meta: PredictorMeta, ridge: float) -> tuple[float, float]:
+    """Penalty on a robot's own columns and on those of its peers."""
+    own = ridge * regression.windows
+    return own, own * meta.block_weight**2
+
+
+def factorise(A: Array) -> Array:
+    """Lower Cholesky factor of `A`, which is overwritten; its upper triangle is not set.
+
+    Raises:
+        PredictorError: `A` is not positive definite.
+    """
+    try:
+        return linalg.cho_factor(A, lower=True, overwrite_a=True, check_finite=False)[0]
+    except linalg.LinAlgError:
+        raise PredictorError(
+            "the predictor's regression",
+            "a singular problem",
+            "data that excite every direction, or a larger identification.ridge",
+            "too little noise or data",
+        ) from None
+
+
+def condition_number(norm: float, factor: Array) -> float:
+    """Estimate of ‖A‖₁ ‖A⁻¹‖₁ from ‖A‖₁ and the lower Cholesky factor of A."""
+    reciprocal, _ = linalg.lapack.dpocon(factor, norm, uplo="L")
+    return 1.0 / reciprocal if reciprocal > 0.0 else np.inf
+
+
+def _norm(A: Array) -> float:
+    return float(np.linalg.norm(A, 1))
+
+
+def _penalised(A: Array, penalty: Array | float) -> Array:
+    """A copy of `A` in LAPACK's order with a penalty on its diagonal."""
+    copy: Array = A.T.copy(order="F")  # symmetric: the transpose is the same and copies faster
+    copy.flat[:: len(A) + 1] += penalty
+    return copy
+
+
+def _solve_each(A: Array, b: Array, W: int, light: float, heavy: float) -> Array:
+    """Solutions x_i of (A + D_i) x_i = b_i, D_i = light on block i and heavy on all others.
+
+    Eliminating one half of the blocks, all heavy there, leaves the same problem for each block of
+    the other half; so all n solutions cost 7/3 of one factorisation. Unlike correcting one common
+    factorisation for each block this loses no digits to a large ratio of the penalties.
+
+    Args:
+        A: shape (n W, n W).
+        b: right-hand sides, shape (n W, n, k).
+        W: size of a block.
+        light: penalty on the own block.
+        heavy: penalty on the others.
+
+    Returns:
+        Shape (n, n W, k).
+    """
+    n, k = len(A) // W, b.shape[2]
+    if n == 1:
+        factor = factorise(_penalised(A, light))
+        return linalg.cho_solve((factor, True), b[:, 0], check_finite=False)[None]
+    x = np.empty((n, n * W, k))
+    for kept, gone in ((slice(0, n // 2), slice(n // 2, n)), (slice(n // 2, n), slice(0, n // 2))):
+        K, D = (slice(s.start * W, s.stop * W) for s in (kept, gone))
+        factor = factorise(_penalised(A[D, D], heavy))
+        X, R = (
+            linalg.solve_triangular(factor, rhs, lower=True, check_finite=False)
+            for rhs in (A[D, K], b[D, kept].reshape(D.stop - D.start, -1))
+        )
+        rest = b[K, kept] - (X.T @ R).reshape(K.stop - K.start, -1, k)
+        found = _solve_each(A[K, K] - X.T @ X, rest, W, light, heavy)
+        x[kept, K] = found
+        across = R - (X @ found.transpose(1, 0, 2).reshape(K.stop - K.start, -1))
+        back = linalg.solve_triangular(factor, across, lower=True, trans=1, check_finite=False)
+        x[kept, D] = back.reshape(D.stop - D.start, -1, k).transpose(1, 0, 2)
+    return x

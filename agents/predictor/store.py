@@ -1,0 +1,188 @@
+"""Predictor files: G, what it was fitted for, where it comes from, and what it has shown."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import zipfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from quadriga.agents.planner.best_response import best_response_radius
+from quadriga.agents.planner.gates import GateReport
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import PredictorFileError
+
+FORMAT: Final = 2
+_PACKAGES: Final = ("quadriga", "numpy", "scipy", "mujoco", "pin", "daqp")
+_REMEDY: Final = "fit one with `quadriga fit`"
+_MATCHED: Final = (
+    "robots", "stance_ms", "alternate_phase", "yokes", "interface", "N", "T_ini",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """Where a predictor comes from.
+
+    Attributes:
+        config_digest: of the configuration that the data were collected with.
+        seeds: of the training episodes.
+        samples: of each training episode, at 100 Hz.
+        held_out: samples of each episode held out.
+        versions: of the packages that took part.
+        gates: figures it was accepted with.
+    """
+
+    config_digest: str
+    seeds: tuple[int, ...]
+    samples: tuple[int, ...]
+    held_out: tuple[int, ...]
+    versions: Mapping[str, str]
+    gates: GateReport
+
+    @classmethod
+    def from_dict(cls, body: dict[str, Any]) -> Provenance:
+        """The inverse of `asdict`, also after JSON has made lists of tuples."""
+        frozen: dict[str, Any] = {
+            k: tuple(v) if isinstance(v, list) else v for k, v in body.items()
+        }
+        return cls(**frozen | {"gates": GateReport.from_dict(body["gates"])})
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that a fit depends on."""
+    found = {"python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def predictor_sha256(predictor: Predictor) -> str:
+    """Digest of G and its meta: equal predictors have equal digests, however they were stored."""
+    G = np.ascontiguousarray(predictor.G, dtype="<f8")
+    head = json.dumps([predictor.meta.to_dict(), G.shape], sort_keys=True)
+    return hashlib.sha256(head.encode() + b"\0" + G.tobytes()).hexdigest()
+
+
+def save(path: Path, predictor: Predictor, provenance: Provenance) -> str:
+    """Write a predictor file; a file half written never has the name `path`.
+
+    Returns:
+        The predictor's digest (`predictor_sha256`).
+
+    Raises:
+        PredictorFileError: the file cannot be written.
+    """
+    digest = predictor_sha256(predictor)
+    document = {
+        "format": FORMAT,
+        "sha256": digest,
+        "meta": predictor.meta.to_dict(),
+        "provenance": asdict(provenance),
+    }
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with partial.open("wb") as file:
+            np.savez(file, G=predictor.G, document=np.array(json.dumps(document, sort_keys=True)))
+        partial.replace(path)
+    except OSError as error:
+        raise PredictorFileError(
+            str(path), error.strerror or str(error), "a file that can be written"
+        ) from None
+    return digest
+
+
+def load(path: Path, config: Config) -> tuple[Predictor, Provenance]:
+    """Read a predictor and refuse any that is not for this team or has not passed its gates.
+
+    The gates are held against the limits of `config`; with other weights Q, R than those the
+    radius was computed for, it is computed anew.
+
+    Raises:
+        PredictorFileError: no such file, not a predictor, corrupt, fitted for another team, gait,
+            horizon, interface or low level.
+        PredictorError: beyond a gate's limit.
+    """
+    predictor, provenance = read(path)
+    _check_meta(path, predictor.meta, PredictorMeta.of(config))
+    gates, planner = provenance.gates, config.planner
+    weights = (tuple(planner.Q), tuple(planner.R))
+    if weights != (gates.Q, gates.R):
+        gates = replace(
+            gates, radius=best_response_radius(config, predictor), Q=planner.Q, R=planner.R
+        )
+    limits = config.identification
+    gates = replace(gates, gain_limits=tuple(limits.gain_range), radius_limit=limits.max_radius)
+    gates.check(planner.kind)
+    return predictor, replace(provenance, gates=gates)
+
+
+def read(path: Path) -> tuple[Predictor, Provenance]:
+    """Read a predictor file whatever it was fitted for (to show what is in it).
+
+    Raises:
+        PredictorFileError: no such file, not a predictor, or corrupt.
+    """
+    try:
+        # An own handle: numpy leaves its open when the archive turns out to be broken.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            G, document = archive["G"], json.loads(str(archive["document"]))
+        if document["format"] != FORMAT:
+            raise PredictorFileError(
+                f"predictor {path}", f"format {document['format']}", f"format {FORMAT}", _REMEDY
+            )
+        meta = PredictorMeta.from_dict(document["meta"])
+        provenance = Provenance.from_dict(document["provenance"])
+        predictor = Predictor(meta, np.asarray(G, dtype=np.float64), provenance.gates.condition)
+    except FileNotFoundError:
+        raise PredictorFileError(f"predictor {path}", "no such file", "a file", _REMEDY) from None
+    except (
+        OSError,
+        ValueError,
+        TypeError,
+        KeyError,
+        AttributeError,
+        EOFError,
+        zipfile.BadZipFile,
+    ) as error:
+        raise PredictorFileError(
+            f"predictor {path}",
+            f"something else ({type(error).__name__})",
+            "a predictor that quadriga wrote",
+            f"truncated or not a predictor: delete it; {_REMEDY}",
+        ) from None
+    if document["sha256"] != predictor_sha256(predictor):
+        raise PredictorFileError(
+            f"predictor {path}",
+            "content that its digest does not match",
+            "an unchanged file",
+            f"corrupt: delete it; {_REMEDY}",
+        )
+    return predictor, provenance
+
+
+def _check_meta(path: Path, got: PredictorMeta, expected: PredictorMeta) -> None:
+    pairs = [(name, getattr(got, name), getattr(expected, name)) for name in _MATCHED]
+    fitted = dict(got.controller)
+    pairs += [(f"controller.{k}", fitted.get(k), wanted) for k, wanted in expected.controller]
+    for name, found, wanted in pairs:
+        if found != wanted:
+            raise PredictorFileError(
+                f"predictor {path}: {name}",
+                repr(found),
+                f"{wanted!r} as configured",
+                f"fitted for another setting; {_REMEDY}",
+            )

@@ -1,0 +1,65 @@
+"""The planner's time grid: samples, planning steps, and the stance pattern of a horizon."""
+
+from __future__ import annotations
+
+from math import lcm
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadriga.agents.gait import scheduled_stance
+from quadriga.shared.config.sections import Config
+from quadriga.shared.wire.topics import SAMPLE_MS
+
+
+def step_ms(config: Config) -> int:
+    """World time between two plans: the applied samples of each."""
+    return SAMPLE_MS * config.planner.applied
+
+
+def exchange_ms(config: Config) -> int:
+    """World time from a planning step to its first exchange, and between two of them.
+
+    Peers' last answers are taken in after as much time again, which leaves the rest of the step
+    for their terms, off the critical path.
+    """
+    return step_ms(config) // (config.planner.exchanges + 2)
+
+
+def sample_starts(tick: int, count: int) -> NDArray[np.int64]:
+    """Ticks at which `count` samples from `tick` on begin; sample k covers [t_k, t_k + 10 ms]."""
+    return tick + SAMPLE_MS * np.arange(count, dtype=np.int64)
+
+
+def horizon_stance(config: Config, index: int, step: int) -> NDArray[np.bool_]:
+    """Scheduled stance of robot `index` at the N samples of planning step `step`. Shape (N, 4)."""
+    ticks = sample_starts(step * step_ms(config), config.planner.N)
+    return scheduled_stance(config, index, ticks)
+
+
+def walking_steps(config: Config) -> range:
+    """Planning steps after the initial stand until the gait and the plans line up again."""
+    first = -(-config.gait.stand_ms // step_ms(config))
+    return range(first, first + lcm(2 * config.gait.stance_ms, step_ms(config)) // step_ms(config))
+
+
+def place_in(cycle: range, step: int) -> int:
+    """The step of the first cycle (`walking_steps`) that does the same as `step`."""
+    return cycle.start + (step - cycle.start) % len(cycle) if step >= cycle.start else step
+
+
+def patience(config: Config) -> int:
+    """Planning steps for which a team does without a plan that ought to be there."""
+    return config.planner.max_peer_age + config.planner.hold_steps
+
+
+def gait_phase(tick: int, stand_ms: int, stance_ms: int, phases: int) -> int:
+    """Which of `phases` equal parts of the gait's period (two stance times) a tick lies in."""
+    period = 2 * stance_ms
+    return (tick - stand_ms) % period * phases // period
+
+
+def phase_of(config: Config, step: int, phases: int) -> int:
+    """Which of `phases` equal parts of the gait's period planning step `step` lies in."""
+    gait = config.gait
+    return gait_phase(step * step_ms(config), gait.stand_ms, gait.stance_ms, phases)

@@ -1,0 +1,58 @@
+"""The real-time world's account: how old the commands were that it used, how late it was itself."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+
+from quadriga.shared.runtime.histogram import Histogram
+from quadriga.shared.wire.messages import Status
+
+PERIOD_MS: Final = 1000
+MODE: Final = "realtime"
+_BIN_MS: Final = 0.02
+
+
+class Deadlines:
+    """Counts from the first tick on.
+
+    Attributes:
+        late: of each robot ticks without a command of that tick, by name; those held and damped by
+            name and grade.
+    """
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self.late: Counter[str] = Counter()
+        self._ages = {name: Histogram(1.0) for name in names}
+        self._jitter = Histogram(_BIN_MS)
+        self._lateness_us: list[float] = []
+
+    def used(self, robot: str, age_ms: int) -> None:
+        """A tick has been taken with a robot's command of this age."""
+        self._ages[robot].add(age_ms)
+        self.late[robot] += age_ms > 0
+
+    def woke(self, late_s: float) -> None:
+        """The world went on this much later than its clock says."""
+        self._jitter.add(1e3 * late_s)
+        self._lateness_us.append(1e6 * late_s)
+
+    def status(self, tick: int, overruns: int) -> Status:
+        """All of it, as `<team>/sim/status` carries it.
+
+        `ages_ms` holds median, p99 and max of `<robot>.command` and of the world's own `jitter`;
+        counters are `<robot>.late`, `.held`, `.damped`, `ticks` and `overruns`; `tick_us` holds the
+        lateness of each tick since the last status.
+        """
+        ages: dict[str, float] = self._jitter.told("jitter")
+        for robot, spread in self._ages.items():
+            ages |= spread.told(f"{robot}.command")
+        counters = {"overruns": overruns, "ticks": tick}
+        for name, count in sorted(self.late.items()):
+            robot, _, grade = name.partition(" ")
+            counters[f"{robot}.{grade or 'late'}"] = count
+        lateness, self._lateness_us = np.array(self._lateness_us), []
+        return Status(tick, tick * 1_000_000, MODE, "", "", ages, counters, np.zeros(0), lateness)

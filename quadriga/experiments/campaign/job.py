@@ -1,0 +1,76 @@
+"""One trial as a worker process walks it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import version
+
+from quadriga.agents.predictor.store import versions
+from quadriga.experiments.campaign.outcome import TrialOutcome, outcome
+from quadriga.experiments.campaign.plan import Group, seeded
+from quadriga.experiments.campaign.predictors import Fitted
+from quadriga.experiments.trial.trial_job import walked
+from quadriga.identification.cache import trial_code
+from quadriga.identification.fit_report import reason
+from quadriga.shared.config.reference_trace import trace_sha256
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import config_sha256
+from quadriga.shared.errors import PredictorError, PredictorFileError, ProcessError
+from quadriga.shared.runtime.clock import monotonic
+
+
+@dataclass(frozen=True, slots=True)
+class TrialJob:
+    """A trial: its group's configuration, predictor and trace, and the code it is meant for."""
+
+    group: Group
+    seed: int
+    config: Config
+    fitted: Fitted
+    versions: str
+    trace_sha256: str = ""
+
+    @property
+    def name(self) -> str:
+        """Of this trial alone."""
+        return f"{self.group.name}-{self.seed}"
+
+
+@lru_cache(maxsize=1)
+def origin() -> str:
+    """Code and libraries of this process, as every row names them."""
+    more = {name: version(name) for name in ("numba", "example-robot-data")}
+    found = {**versions(), **more, "code": trial_code()}
+    return ", ".join(f"{name} {version}" for name, version in found.items())
+
+
+def walk(job: TrialJob) -> TrialOutcome:
+    """Walk a trial in this process, to its end or to the first fall.
+
+    Raises:
+        ProcessError: this process has other code, libraries or trace than the campaign.
+        ConfigError: the configuration cannot be walked.
+        PredictorFileError: the predictor's file, or that of its data, is gone or damaged.
+    """
+    mine = origin()
+    if mine != job.versions:
+        raise ProcessError(
+            "a worker's code and libraries", mine, job.versions, "install the same version there"
+        )
+    if trace_sha256(job.config) != job.trace_sha256:
+        raise ProcessError(
+            "a worker's reference.trace",
+            f"another {job.config.reference.trace}",
+            "the campaign's",
+            "install the same version there",
+        )
+    config, begun = seeded(job.config, job.seed), monotonic()
+    try:
+        found = job.fitted.refused or walked(config, job.fitted.path, job.fitted.data)
+    except PredictorFileError:
+        raise  # a row would be kept, and the trial never be walked
+    except PredictorError as error:
+        found = reason(error)
+    shas = (config_sha256(config), job.fitted.sha256)
+    return outcome(job.group, job.seed, shas, found, monotonic() - begun, mine)

@@ -1,0 +1,137 @@
+"""What a campaign consists of, as its folder says: enough to go on with it, and to report on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+from quadriga.experiments.campaign.plan import Group
+from quadriga.shared.errors import ConfigError
+
+FILE: Final = "campaign.json"
+FORMAT: Final = 1
+_REMEDY: Final = "trials of both must not be mixed: use a new folder"
+
+
+@dataclass(frozen=True, slots=True)
+class GroupEntry:
+    """A group: its names, seeds, and digests.
+
+    `config_sha256` is that of its configuration with seed 0, and of the trace that this names.
+    """
+
+    scenario: str
+    variant: str
+    swept: tuple[str, ...]
+    config_sha256: str
+    predictor_sha256: str
+    seeds: tuple[int, ...]
+
+    @property
+    def group(self) -> Group:
+        """Its names."""
+        return Group(self.scenario, self.variant, self.swept)
+
+
+@dataclass(frozen=True, slots=True)
+class SweepEntry:
+    """A swept key, and what a figure calls it."""
+
+    key: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Manifest:
+    """A campaign.
+
+    Attributes:
+        typed: commands that walked it, oldest first.
+        baseline: the variant that others are compared with.
+        variants: keys of each variant, by name.
+        sweeps: swept keys.
+        groups: everything that is to be walked.
+        versions: of code and libraries; trials of others are not mixed with these.
+    """
+
+    typed: tuple[str, ...]
+    baseline: str
+    variants: Mapping[str, Mapping[str, Any]]
+    sweeps: tuple[SweepEntry, ...]
+    groups: tuple[GroupEntry, ...]
+    versions: str
+    format: int = FORMAT
+
+    @classmethod
+    def from_dict(cls, body: Mapping[str, Any]) -> Manifest:
+        """The inverse of `asdict`, after JSON.
+
+        Raises:
+            ValueError, KeyError, TypeError: it is something else.
+        """
+        if body["format"] != FORMAT:
+            raise ValueError(f"format {body['format']} instead of {FORMAT}")
+        groups = tuple(
+            GroupEntry(**{**g, "swept": tuple(g["swept"]), "seeds": tuple(g["seeds"])})
+            for g in body["groups"]
+        )
+        sweeps = tuple(SweepEntry(**sweep) for sweep in body["sweeps"])
+        return cls(**{**body, "typed": tuple(body["typed"]), "groups": groups, "sweeps": sweeps})
+
+    @property
+    def trials(self) -> int:
+        """Trials to be walked in all."""
+        return sum(len(entry.seeds) for entry in self.groups)
+
+    def check_versions(self, versions: str, folder: Path) -> None:
+        """Refuse to go on with other code or libraries.
+
+        Raises:
+            ConfigError: they are not those that the folder's trials were walked with.
+        """
+        if versions != self.versions:
+            raise ConfigError(
+                f"--out {folder}",
+                f"trials with code and versions {self.versions}",
+                versions,
+                _REMEDY,
+            )
+
+    def merged(self, more: Manifest, folder: Path) -> Manifest:
+        """This one with more to walk.
+
+        Raises:
+            ConfigError: trials of the two would not belong together.
+        """
+        name = f"--out {folder}"
+        self.check_versions(more.versions, folder)
+        mine, theirs = ([sweep.name for sweep in one.sweeps] for one in (self, more))
+        if mine != theirs:
+            raise ConfigError(name, f"trials with swept keys {mine}", f"{theirs}", _REMEDY)
+        groups = {entry.group: entry for entry in self.groups}
+        for entry in more.groups:
+            kept = groups.setdefault(entry.group, entry)
+            for what, old, new in (
+                ("configuration", kept.config_sha256, entry.config_sha256),
+                ("predictor", kept.predictor_sha256, entry.predictor_sha256),
+            ):
+                if old != new:
+                    raise ConfigError(
+                        f"{name}: {entry.group.name}",
+                        f"trials of {what} {old[:12]}",
+                        f"of {new[:12]}",
+                        _REMEDY,
+                    )
+            groups[entry.group] = replace(kept, seeds=_union(kept.seeds, entry.seeds))
+        return replace(
+            more,
+            typed=(*self.typed, *(t for t in more.typed if t not in self.typed)),
+            variants={**self.variants, **more.variants},
+            groups=tuple(groups.values()),
+        )
+
+
+def _union(one: Sequence[int], other: Sequence[int]) -> tuple[int, ...]:
+    return tuple(sorted({*one, *other}))

@@ -1,0 +1,66 @@
+"""Where experiments are kept: `deploy/experiments`, beside the code that they are walked with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from quadriga.experiments.published.experiment import Experiment
+from quadriga.experiments.published.read import read
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.runtime.places import SOURCE
+
+CHECKOUT: Final = SOURCE
+FOLDER: Final = CHECKOUT / "deploy" / "experiments"
+# In this order on the page: what was promised, then what explains it, then how far it goes.
+_ORDER: Final = ("paper", "hard", "low-level", "ideas", "central", "beyond", "ten", "sweeps")
+_SUFFIX: Final = ".toml"
+
+
+def names() -> tuple[str, ...]:
+    """The experiments there are, in the order of the page; new ones at its end."""
+    found = sorted(file.stem for file in FOLDER.glob(f"*{_SUFFIX}"))
+    return tuple(sorted(found, key=lambda n: _ORDER.index(n) if n in _ORDER else len(_ORDER)))
+
+
+def load(given: Sequence[str]) -> tuple[list[Experiment], list[str]]:
+    """Every experiment of the page, and the names of those asked for, in the order asked for.
+
+    Args:
+        given: names, or TOML files that are published too; nothing asks for all.
+
+    Raises:
+        ConfigError: there is no such experiment, a file is wrong, or one stands in for another.
+    """
+    known = names()
+    files = {name: FOLDER / f"{name}{_SUFFIX}" for name in known}
+    asked: dict[str, None] = {}
+    for word in given or known:
+        if word.endswith(_SUFFIX):
+            name = Path(word).stem
+            if files.setdefault(name, Path(word)).resolve() != Path(word).resolve():
+                raise ConfigError(
+                    "experiments",
+                    word,
+                    "a file of another name",
+                    f"there is an experiment {name!r}",
+                )
+        elif word in known:
+            name = word
+        else:
+            raise ConfigError(
+                "experiments",
+                repr(word),
+                f"names of {', '.join(known) or 'none'}, or a TOML file",
+                "they stand in deploy/experiments of a checkout",
+            )
+        asked[name] = None
+    if not asked:
+        raise ConfigError(
+            "experiments",
+            "none",
+            f"files in {FOLDER}",
+            "they are part of a checkout, not of an installed package",
+        )
+    return [read(file) for file in files.values()], list(asked)

@@ -1,0 +1,185 @@
+"""Data collection: the team walks under random references and force noise, on both cores."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.modes import DAMPING
+from quadriga.agents.predictor.episode import SIGNALS, Episode, output_base
+from quadriga.agents.predictor.hankel import required_samples
+from quadriga.identification.rollout import Rollout
+from quadriga.shared.config.sections import Config, WorldConfig
+from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.a1 import N_FORCES, Array, robot_names
+from quadriga.shared.wire.messages import Reference
+from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
+from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.workers import each_done
+
+_LEAST = 2000  # samples, whatever the rule says
+_MARGIN = 2  # times what the rule asks for: data far in excess average the noise out
+_LEAST_EPISODE_S = 3.0  # a walk that ended in a fall earlier is not worth keeping
+_BEFORE_FALL = 50  # samples cut off before a fall
+_CLIP = 2.5  # standard deviations of the force noise
+_RAMP_MS = 500  # from one random speed to the next: jumps would drown what the forces do
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Dataset:
+    """What was collected: episodes to fit on, the seed of each, and episodes held out."""
+
+    training: tuple[Episode, ...]
+    held_out: tuple[Episode, ...]
+    seeds: tuple[int, ...]
+
+
+def training_seconds(config: Config) -> float:
+    """World time to collect for the fit: as configured, or what the team's size asks for."""
+    if config.identification.seconds > 0.0:
+        return config.identification.seconds
+    n = config.team.robots
+    rule = required_samples(
+        N_FORCES * n,
+        config.planner.T_ini,
+        config.planner.N,
+        config.identification.order_per_robot * n,
+    )
+    return 1e-3 * SAMPLE_MS * max(_LEAST, _MARGIN * rule)
+
+
+def collection_config(config: Config, seed: int) -> Config:
+    """The same team on flat, empty ground as it is by default, without a planner.
+
+    So what is learnt does not depend on the world that is walked in later, which nobody knows.
+    """
+    planner = replace(config.planner, kind="none")
+    return replace(config, world=WorldConfig(seed=seed), planner=planner)
+
+
+def collect(config: Config, jobs: int, progress: Progress) -> Dataset:
+    """Collect training and held-out episodes, `jobs` at a time, each with a seed of its own.
+
+    Args:
+        config: the team's configuration.
+        jobs: processes to use.
+        progress: called with episodes done and episodes in all.
+
+    Raises:
+        PredictorError: so many walks ended in a fall that too little is left.
+        ProcessError: a worker died.
+    """
+    wanted = training_seconds(config)
+    count = max(2, round(wanted / config.identification.episode))
+    plan = [(k, wanted / count) for k in range(count)]
+    plan.append((count, config.identification.held_out))
+    episodes: dict[int, Episode | None] = {}
+    progress(0, len(plan))
+    with closing(each_done(partial(_planned_episode, config), plan, jobs)) as found:
+        for (k, _), episode in found:
+            episodes[k] = episode
+            progress(len(episodes), len(plan))
+    return kept(config, episodes, wanted)
+
+
+def kept(config: Config, episodes: Mapping[int, Episode | None], wanted: float) -> Dataset:
+    """The data set of all episodes that were not lost; the last is the one held out.
+
+    Args:
+        config: the team's configuration.
+        episodes: by number, None for a walk that was lost to a fall.
+        wanted: seconds for the fit.
+
+    Raises:
+        PredictorError: too little is left.
+    """
+    count = max(episodes)
+    training = {k: e for k in range(count) if (e := episodes[k]) is not None}
+    held_out = episodes[count]
+    samples = sum(episode.samples for episode in training.values())
+    if held_out is None or samples < 0.5 * wanted / (1e-3 * SAMPLE_MS):
+        raise PredictorError(
+            "data collection",
+            f"{samples} samples, held-out episode {'kept' if held_out else 'lost'}",
+            f"at least half of {100 * wanted:.0f} samples and a held-out episode",
+            "the robots fall while collecting: smaller identification.noise, vx, vy or wz",
+        )
+    seeds = tuple(config.identification.seed + k for k in training)
+    return Dataset(tuple(training.values()), (held_out,), seeds)
+
+
+def _planned_episode(config: Config, planned: tuple[int, float]) -> Episode | None:
+    return collect_episode(config, *planned)
+
+
+def collect_episode(config: Config, number: int, seconds: float) -> Episode | None:
+    """One walk of `seconds`; None if the team fell too early for it to be of use."""
+    seed = config.identification.seed + number
+    walk = _RandomWalk(config, seed, round(1e3 * seconds) + config.gait.stand_ms)
+    rollout = Rollout(collection_config(config, seed), None, walk.reference, walk.excitation)
+    names = robot_names(config.team.robots)
+    u, u_nominal, y, y_base = [], [], [], []
+    first = config.gait.stand_ms + SAMPLE_MS
+    limp = False  # an agent that gave up ends the episode as a fall does
+    for tick in rollout.ticks(walk.ticks + 1):
+        limp = any(out.mode == DAMPING for out in tick.outputs.values())
+        if limp:
+            break
+        if tick.tick % SAMPLE_MS or tick.tick < first:
+            continue
+        samples = [tick.outputs[name].measurement for name in names]
+        present = [sample for sample in samples if sample is not None]
+        u.append([sample.u for sample in present])
+        u_nominal.append([nominal_forces(sample.stance > 0.5) for sample in present])
+        y.append([sample.y for sample in present])
+        base = output_base(config.planner.interface, walk.reference_at(tick.tick))
+        y_base.append([base] * len(names))
+    keep = len(u) - _BEFORE_FALL if limp or rollout.world.fallen() else len(u)
+    if keep * SAMPLE_MS < 1e3 * min(_LEAST_EPISODE_S, seconds):
+        return None
+    signals = (np.array(x[:keep]) for x in (u, u_nominal, y, y_base))
+    return Episode(**dict(zip(SIGNALS, signals, strict=True)), first_tick=first)
+
+
+class _RandomWalk:
+    """Random references and force noise of one episode, all drawn beforehand from its seed."""
+
+    def __init__(self, config: Config, seed: int, ticks: int) -> None:
+        ident = config.identification
+        random = np.random.default_rng(seed)
+        self.ticks = ticks
+        self._hold = round(1e3 * ident.hold)
+        draws = ticks // self._hold + 2
+        low, high = np.array([ident.vx, ident.vy, ident.wz]).T
+        self._speeds = random.uniform(low, high, size=(draws, 3))
+        self._speeds[0] = 0.0
+        self._noise_hold = ident.noise_hold_ms
+        shape = (ticks // self._noise_hold + 2, config.team.robots, 4, 3)
+        noise = np.clip(random.normal(size=shape), -_CLIP, _CLIP) * np.array(ident.noise)
+        self._noise = noise.reshape(*shape[:2], N_FORCES)
+        self._index = {name: i for i, name in enumerate(robot_names(config.team.robots))}
+        self._height = config.reference.height
+
+    def reference_at(self, tick: int) -> Reference:
+        """The reference in force at a tick."""
+        start = tick // EPOCH_MS * EPOCH_MS
+        draw, since = divmod(start, self._hold)
+        share = min(1.0, since / _RAMP_MS) if draw else 0.0
+        vx, vy, wz = (1.0 - share) * self._speeds[max(0, draw - 1)] + share * self._speeds[draw]
+        return Reference(tick, tick * 1_000_000, vx, vy, wz, self._height)
+
+    def reference(self, tick: int) -> Reference | None:
+        """The reference as the operator would send it: every 100 ms."""
+        return self.reference_at(tick) if tick % EPOCH_MS == 0 else None
+
+    def excitation(self, robot: str, tick: int) -> Array:
+        """Force noise of a robot at a tick. Shape (12,), N."""
+        noise: Array = self._noise[tick // self._noise_hold, self._index[robot]]
+        return noise

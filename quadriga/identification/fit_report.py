@@ -1,0 +1,149 @@
+"""What a fit came to: its figures against their limits, its error over the horizon, its origin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadriga.agents.planner.gates import GateReport
+from quadriga.agents.predictor.episode import Episode
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.store import Provenance
+from quadriga.agents.time_grid import gait_phase
+from quadriga.shared.errors import PredictorError, QuadrigaError
+from quadriga.shared.robot.a1 import N_OUTPUTS, OUTPUTS, Array
+from quadriga.shared.wire.topics import SAMPLE_MS
+
+
+@dataclass(frozen=True, slots=True)
+class HorizonErrors:
+    """Held-out root mean square errors by sample of the horizon and output, all robots.
+
+    Attributes:
+        rmse: of the predictor, shape (N, 6), m, m/s, m/s, rad, rad, rad/s.
+        persistence: of holding the last measured output, shape (N, 6).
+    """
+
+    rmse: Array
+    persistence: Array
+
+    def to_dict(self) -> dict[str, dict[str, list[float]]]:
+        """By output, a number for each sample."""
+        return {
+            name: dict(zip(OUTPUTS, table.T.tolist(), strict=True))
+            for name, table in (("rmse", self.rmse), ("persistence", self.persistence))
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class FitReport:
+    """A fitted predictor as a researcher sees it.
+
+    Attributes:
+        name: of the predictor.
+        sha256: digest of the predictor (see `quadriga.agents.predictor.store.predictor_sha256`).
+        meta: what it was fitted for, and how.
+        provenance: what it was fitted to, with the figures it was held against its gates with.
+        horizon: errors at each sample.
+        refused: the gate that refused it for the configured planner, with the figure that did;
+            None: it was accepted.
+        fit_seconds: wall-clock time of the fit alone; None: it was fitted earlier.
+    """
+
+    name: str
+    sha256: str
+    meta: PredictorMeta
+    provenance: Provenance
+    horizon: HorizonErrors
+    refused: PredictorError | None
+    fit_seconds: float | None
+
+    @property
+    def gates(self) -> GateReport:
+        """The figures that the gates look at, and their limits."""
+        return self.provenance.gates
+
+    def to_dict(self) -> dict[str, Any]:
+        """A form that JSON can carry."""
+        return {
+            "predictor": self.name,
+            "sha256": self.sha256,
+            "refused": reason(self.refused),
+            "fit_seconds": self.fit_seconds,
+            "meta": self.meta.to_dict(),
+            "provenance": {**asdict(self.provenance), "gates": self.gates.to_dict()},
+            "sample_ms": SAMPLE_MS,
+            "horizon": self.horizon.to_dict(),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Unfit:
+    """A predictor that could not be fitted at all, and why."""
+
+    name: str
+    refused: PredictorError
+
+    def to_dict(self) -> dict[str, Any]:
+        """A form that JSON can carry."""
+        return {"predictor": self.name, "refused": reason(self.refused)}
+
+
+def refusal(gates: GateReport, kind: str) -> PredictorError | None:
+    """The gate that refuses a predictor for a kind of planner, None if all accept it."""
+    try:
+        gates.check(kind)
+    except PredictorError as error:
+        return error
+    return None
+
+
+def reason(refused: QuadrigaError | None) -> str:
+    """Why something was refused, in a few words, or ""."""
+    if refused is None:
+        return ""
+    return f"{refused.name.removeprefix('predictor: ')} {refused.got}, not {refused.expected}"
+
+
+def horizon_errors(predictor: Predictor, held_out: Sequence[Episode]) -> HorizonErrors:
+    """Errors at each sample of the horizon over all windows of the held-out episodes.
+
+    Raises:
+        PredictorError: no held-out episode is long enough for a window.
+    """
+    meta = predictor.meta
+    shape = (meta.robots, meta.N, N_OUTPUTS)
+    squares, naive, count = np.zeros(shape[1:]), np.zeros(shape[1:]), 0
+    for episode in held_out:
+        if episode.samples < meta.T_ini + meta.N:
+            continue
+        z, dy = episode.windows(meta.T_ini, meta.N)
+        phases = _phases(predictor, episode, z.shape[2])
+        for phase in np.unique(phases):
+            now = phases == phase
+            error = predictor.predict(z[:, :, now], int(phase)) - dy[:, :, now]
+            squares += (error.reshape(*shape, -1) ** 2).mean(axis=0).sum(axis=-1)
+        for end in range(meta.T_ini, meta.T_ini + z.shape[2]):
+            held = episode.y[end : end + meta.N] - episode.y[end - 1]
+            naive += (held**2).mean(axis=1)
+        count += z.shape[2]
+    if count == 0:
+        raise PredictorError(
+            "held-out data",
+            "no episode that long",
+            f"at least {meta.T_ini + meta.N} samples",
+            "did every held-out walk end in a fall?",
+        )
+    return HorizonErrors(np.sqrt(squares / count), np.sqrt(naive / count))
+
+
+def _phases(predictor: Predictor, episode: Episode, windows: int) -> NDArray[np.int64]:
+    """Phase of the gait at the end of each window's past. Shape (windows,)."""
+    meta = predictor.meta
+    ends = episode.first_tick + SAMPLE_MS * (meta.T_ini - 1 + np.arange(windows))
+    phases = [gait_phase(int(t), meta.stand_ms, meta.stance_ms, predictor.phases) for t in ends]
+    return np.array(phases, dtype=np.int64)

@@ -1,0 +1,123 @@
+"""The whole team in one process, without a bus: data collection and anything that needs speed.
+
+The same world and the same agents as over the bus, and the same bytes: messages are handed over as
+they are, at the tick after they were sent or when they are due, as the bus does in lock-step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
+from quadriga.agents.planner.team_planner import TeamPlanner
+from quadriga.agents.planning.remote import central_latency
+from quadriga.agents.planning.team import Central, CentralState
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.shared.bus.barrier import PLANNER
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.wire.messages import Event, Measurement, Plan, Reference
+from quadriga.sim_server.world.world import World
+
+Plans = tuple[tuple[str, Plan], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """Everything that happened in one tick, for whoever watches a rollout."""
+
+    tick: int
+    outputs: Mapping[str, Outputs]
+    events: tuple[Event, ...]
+
+
+class Rollout:
+    """A world and its agents, advanced tick by tick.
+
+    Args:
+        config: the team's configuration.
+        predictor: for agents that plan for themselves, or None.
+        references: the reference that starts at a tick, or None.
+        excitation: force deviation (12,) of a robot at a tick, or None; data collection only.
+        planner: the planner of the whole team, if `planner.kind` is one process for all.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        predictor: Predictor | None,
+        references: Callable[[int], Reference | None],
+        excitation: Callable[[str, int], Array] | None = None,
+        planner: TeamPlanner | None = None,
+    ) -> None:
+        one_blas_thread()
+        self.world = World(config)
+        self.agents = {name: Agent(config, name, predictor) for name in self.world.names}
+        self.states: dict[str, AgentState] = {n: a.initial() for n, a in self.agents.items()}
+        self._references = references
+        self._excitation = excitation
+        self._measurements: tuple[tuple[str, Measurement], ...] = ()
+        self._plans: Plans = ()
+        self._by_truth = config.estimator.kind == "truth"
+        self._centre = None if planner is None else _Centre(config, planner)
+
+    def ticks(self, count: int) -> Iterator[Tick]:
+        """Advance by up to `count` ticks; stops early when a robot has fallen."""
+        for _ in range(count):
+            yield self.step()
+            if self.world.fallen():
+                return
+
+    def step(self) -> Tick:
+        """Advance one tick."""
+        tick = self.world.tick
+        sensed = self.world.states()
+        truth = self.world.truth() if self._by_truth else None
+        reference = self._references(tick)
+        heard = () if reference is None else (reference,)
+        central: Mapping[str, Plans] = {}
+        if self._centre is not None:
+            central = self._centre.step(tick, self._measurements, heard)
+        outputs: dict[str, Outputs] = {}
+        for name, agent in self.agents.items():
+            inputs = Inputs(
+                sensed[name],
+                tuple(item for item in self._measurements if item[0] != name),
+                central.get(name) or tuple(item for item in self._plans if item[0] != name),
+                heard,
+                truth=truth,
+                excitation=None if self._excitation is None else self._excitation(name, tick),
+            )
+            self.states[name], outputs[name] = agent.step(self.states[name], inputs)
+        self._measurements = tuple(
+            (name, out.measurement) for name, out in outputs.items() if out.measurement is not None
+        )
+        self._plans = tuple(
+            (name, out.plan) for name, out in outputs.items() if out.plan is not None
+        )
+        events = self.world.step({name: out.command for name, out in outputs.items()})
+        return Tick(tick, outputs, events)
+
+
+class _Centre:
+    """The planner of the whole team; what it makes of the data of t is due its latency later."""
+
+    def __init__(self, config: Config, planner: TeamPlanner) -> None:
+        self._central, self._state = Central(config, planner), CentralState()
+        self._latency = central_latency(config)
+        self._due: dict[int, Plans] = {}
+
+    def step(
+        self,
+        tick: int,
+        measurements: tuple[tuple[str, Measurement], ...],
+        references: tuple[Reference, ...],
+    ) -> dict[str, Plans]:
+        """Take in what was sent at the tick before; the plans that are due now, by robot."""
+        remembered = self._central.remember(self._state, measurements, references)
+        self._state, made = self._central.step(remembered)
+        if made.plans:
+            self._due[made.plans[0][1].tick + self._latency] = made.plans
+        return {name: ((PLANNER, plan),) for name, plan in self._due.pop(tick, ())}

@@ -1,0 +1,104 @@
+"""Frames of a run drawn by MuJoCo without a window.
+
+Run as a process of its own (`python -m quadriga.pictures.mujoco_frames RUN_DIR`): MuJoCo chooses
+its OpenGL from MUJOCO_GL when it is imported, and nothing else should be drawn that way.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+from PIL import Image
+
+from quadriga.pictures.frames import FRAME, clip_ticks, save_clip, save_sheet, sheet_ticks
+from quadriga.pictures.poses import PosedTeam, Poses, read_poses, truth_ticks
+from quadriga.shared.errors import QuadrigaError
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import Array
+
+_AZIMUTH: Final = 145.0  # deg, seen from ahead and the left of a team that walks along x
+_ELEVATION: Final = -24.0  # deg
+_FORCE_SCALE: Final = 0.005  # m per N
+_FORCE_RADIUS: Final = 0.008  # m
+_FORCE_RGBA: Final = np.array([0.95, 0.75, 0.1, 0.9], dtype=np.float32)
+_STREWN: Final = 0.3  # m around the team in which loose stones are drawn
+_COARSE: Final = (10, 6)  # facets around and along a round body
+# Shadow map [texels] and samples per pixel: what a frame's time goes into.
+_SHEET_QUALITY: Final = (1024, 4)
+_CLIP_QUALITY: Final = (512, 0)
+
+
+def draw(run_dir: Path) -> None:
+    """Write contact sheet and clip of the run in `run_dir`.
+
+    Raises:
+        RecordingError: the recording is missing or holds no truth.
+    """
+    recording = Recording(run_dir / "run.mcap")
+    ticks = truth_ticks(recording)
+    for wanted, quality, save in (
+        (sheet_ticks(ticks), _SHEET_QUALITY, save_sheet),
+        (clip_ticks(ticks), _CLIP_QUALITY, save_clip),
+    ):
+        poses = read_poses(recording, wanted)
+        save(run_dir, wanted, list(frames(poses, quality)))
+
+
+def frames(poses: Poses, quality: tuple[int, int]) -> Iterator[Image.Image]:
+    """One picture of the team for each pose, the camera moving along."""
+    team = PosedTeam(poses.config)
+    team.model.vis.quality.shadowsize, team.model.vis.quality.offsamples = quality
+    pebbles = team.team.terrain.pebbles
+    if pebbles is not None:  # thousands of them
+        team.model.vis.quality.numslices, team.model.vis.quality.numstacks = _COARSE
+    _light(team.model, 3.0 + 2.0 * poses.radius())
+    camera = mujoco.MjvCamera()
+    camera.azimuth, camera.elevation = _AZIMUTH, _ELEVATION
+    camera.distance = 0.6 + 1.3 * poses.radius()
+    renderer = mujoco.Renderer(team.model, FRAME[1], FRAME[0])
+    try:
+        for qpos, grf, centre in zip(poses.qpos, poses.grf, poses.centre(), strict=True):
+            team.set(qpos)
+            team.physics.light_xpos[0, :2] = centre[:2]
+            camera.lookat[:] = [*centre[:2], 0.15]
+            renderer.update_scene(team.physics, camera)
+            if pebbles is not None:
+                pebbles.draw(renderer.scene, centre, poses.radius() + _STREWN)
+            _add_forces(renderer.scene, team.feet(), grf)
+            yield Image.fromarray(renderer.render())
+    finally:
+        renderer.close()
+
+
+def _light(model: Any, height: float) -> None:
+    """One wide lamp above the team: shadow maps of a directional light err on far ground."""
+    model.light_type[0] = mujoco.mjtLightType.mjLIGHT_SPOT
+    model.light_pos[0] = [0.0, 0.0, height]
+    model.light_cutoff[0], model.light_exponent[0] = 70.0, 0.0
+    model.light_diffuse[0] = 0.3
+    model.vis.headlight.ambient[:] = 0.45
+    model.vis.headlight.diffuse[:] = 0.4
+    model.vis.map.shadowscale = 0.3
+
+
+def _add_forces(scene: Any, feet: Array, grf: Array) -> None:
+    """Arrows of the ground reaction forces, from each foot upwards."""
+    for foot, force in zip(feet.reshape(-1, 3), grf.reshape(-1, 3), strict=True):
+        if np.linalg.norm(force) < 1.0 or scene.ngeom >= scene.maxgeom:
+            continue
+        geom, kind = scene.geoms[scene.ngeom], mujoco.mjtGeom.mjGEOM_ARROW
+        mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), _FORCE_RGBA)
+        mujoco.mjv_connector(geom, kind, _FORCE_RADIUS, foot, foot + _FORCE_SCALE * force)
+        scene.ngeom += 1
+
+
+if __name__ == "__main__":
+    try:
+        draw(Path(sys.argv[1]))
+    except QuadrigaError as error:
+        sys.exit(str(error))

@@ -1,0 +1,55 @@
+"""Pictures of a finished walk: a contact sheet and a short clip, from the recording alone."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from quadriga.pictures.frames import CLIP, SHEET
+from quadriga.pictures.stick_figures import draw_stick_figures
+
+_TIMEOUT: Final = 120.0  # s
+
+
+def render(run_dir: Path, say: Callable[[str], None] = print) -> tuple[Path, ...]:
+    """Draw the run in `run_dir`; returns the files written.
+
+    MuJoCo draws `walk.png` and `walk.webp` off-screen, in a process of its own that chooses EGL
+    unless MUJOCO_GL says otherwise. Where that fails, `walk.png` shows stick figures and `say`
+    gets one line about it.
+
+    Raises:
+        RecordingError: the recording is missing, empty or holds no truth.
+    """
+    problem = _draw_offscreen(run_dir)
+    if not problem:
+        return run_dir / SHEET, run_dir / CLIP
+    draw_stick_figures(run_dir)
+    say(f"no off-screen OpenGL, so {SHEET} shows stick figures: {problem}")
+    return (run_dir / SHEET,)
+
+
+def _draw_offscreen(run_dir: Path) -> str:
+    """Draw with MuJoCo; the reason why it did not work, or an empty text."""
+    command = [sys.executable, "-m", "quadriga.pictures.mujoco_frames", str(run_dir)]
+    try:
+        done = subprocess.run(
+            command,
+            env={"MUJOCO_GL": "egl"} | os.environ,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            timeout=_TIMEOUT,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return f"nothing drawn after {_TIMEOUT:g} s"
+    if done.returncode == 0:
+        return ""
+    lines = done.stderr.strip().splitlines()
+    return lines[-1] if lines else f"exit status {done.returncode}"

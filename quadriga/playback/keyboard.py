@@ -1,0 +1,77 @@
+"""Single keys from the terminal, if there is one."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+import termios
+import tty
+from typing import Any, Final, Self
+
+from quadriga.shared.runtime.clock import sleep
+
+PAUSE: Final = "pause"
+STEP: Final = "step"
+QUIT: Final = "quit"
+_KEYS: Final = {b"\x1b[C": STEP, b"\x1bOC": STEP, b" ": PAUSE, b"q": QUIT, b"Q": QUIT}
+
+
+class Keyboard:
+    """The keys of `_KEYS`, without echo or return key while the context lasts.
+
+    Without a terminal on stdin, or in the background, no key ever comes.
+
+    Attributes:
+        listens: whether keys can come.
+    """
+
+    def __init__(self) -> None:
+        self._before: list[Any] = []
+        self._unread = b""
+        self.listens = False
+
+    def get(self, timeout: float) -> str:
+        """The next key by its meaning, or "" if none comes within `timeout` seconds."""
+        if not self._unread:
+            if not self.listens:
+                sleep(timeout)
+                return ""
+            if not select.select([self._stdin], [], [], max(timeout, 0.0))[0]:
+                return ""
+            self._unread = self._read()
+        for key, meaning in _KEYS.items():
+            if self._unread.startswith(key):
+                self._unread = self._unread[len(key) :]
+                return meaning
+        self._unread = self._unread[1:]
+        return ""
+
+    def _read(self) -> bytes:
+        try:
+            found = os.read(self._stdin, 64)
+        except OSError:  # how a terminal that was closed answers
+            found = b""
+        self.listens = bool(found)
+        return found
+
+    def __enter__(self) -> Self:
+        if sys.stdin is None:  # started with it closed
+            return self
+        try:
+            self._stdin = sys.stdin.fileno()
+            if os.tcgetpgrp(self._stdin) != os.getpgrp():
+                return self  # of another process: changing it would stop this one
+            self._before = termios.tcgetattr(self._stdin)
+        except (OSError, ValueError, termios.error):
+            return self
+        tty.setcbreak(self._stdin)
+        self.listens = True
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._before:
+            try:
+                termios.tcsetattr(self._stdin, termios.TCSADRAIN, self._before)
+            except termios.error:
+                return  # the terminal is gone

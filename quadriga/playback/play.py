@@ -1,0 +1,177 @@
+"""SHELL of `quadriga play`: a recording back on the bus, at a pace, with pauses and steps."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from math import inf
+from typing import Final
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn
+
+from quadriga.playback.keyboard import PAUSE, QUIT, STEP, Keyboard
+from quadriga.playback.timeline import Timeline
+from quadriga.playback.transport import Transport
+from quadriga.shared.bus.barrier import OPERATOR, PLANNER, SIM
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.config.sections import BusConfig
+from quadriga.shared.errors import BusError, ConfigError
+from quadriga.shared.runtime.clock import monotonic, sleep
+
+PLAYER: Final = "player"
+_SETTLE: Final = 0.6  # s, for listeners that try again to connect, and to see who is there
+_LOOK: Final = 0.1  # s, between looks at keys, status line and presence while messages flow
+_SLACK: Final = 0.2  # s of delay that is made up for; a longer one is left behind
+_MEMBER: Final = re.compile(rf"r\d+|{SIM}|{OPERATOR}|{PLANNER}|{PLAYER}")
+
+
+def play(
+    bus: BusConfig,
+    tape: Timeline,
+    console: Console,
+    *,
+    rate: float,
+    start: float,
+    loop: bool,
+    paused: bool,
+) -> None:
+    """Publish a tape until its end, a `q` or a signal.
+
+    Args:
+        bus: where.
+        tape: what.
+        console: for the status line and the last word.
+        rate: world time per wall time.
+        start: the world time to begin at, s.
+        loop: begin again at the end.
+        paused: begin paused.
+
+    Raises:
+        ConfigError: the rate is not positive, or the start is not on the tape.
+        BusError: the bus cannot be opened, or a live team of that name is on it.
+    """
+    if not 0.0 < rate < inf:
+        raise ConfigError("--rate", f"{rate:g}", "a number above 0")
+    if not 0.0 <= 1000 * start <= tape.last:
+        raise ConfigError(
+            "--start", f"{start:g} s", f"at most {tape.last / 1000:g} s", "the recording ends there"
+        )
+    with Bus.join(bus, tape.team, PLAYER) as joined, Keyboard() as keys:
+        sleep(_SETTLE)
+        _refuse_live(joined, bus.endpoint)
+        joined.declare(HERE)  # only now: a player that came before must not be the one to leave
+        begin = max(1000 * start, tape.first)
+        transport = Transport(rate, begin, monotonic(), paused=paused)
+        with _Status(console, tape, transport, keys.listens) as status:
+            player = _Player(tape, transport, keys, joined, status, bus.endpoint)
+            while player.play(begin) and loop:
+                transport.seek(begin, monotonic())
+        spent = monotonic() - player.begun
+    console.print(
+        f"played {player.sent} messages as team {tape.team!r} in {spent:.1f} s",
+        markup=False,
+        highlight=False,
+    )
+
+
+def _refuse_live(bus: Bus, endpoint: str) -> None:
+    if live := sorted(name for name in bus.present(HERE) if _MEMBER.fullmatch(name)):
+        raise BusError(
+            f"team {bus.team!r} at {endpoint}",
+            f"{', '.join(live)} of a live team of that name",
+            "nobody who publishes for it",
+            f"--remap {bus.team}:ghost gives the recording another",
+        )
+
+
+class _Player:
+    """Publishes cues when they are due, and obeys the keys meanwhile.
+
+    Attributes:
+        sent: messages published.
+        begun: when it began, s of the clock.
+    """
+
+    def __init__(
+        self,
+        tape: Timeline,
+        transport: Transport,
+        keys: Keyboard,
+        bus: Bus,
+        status: _Status,
+        endpoint: str,
+    ) -> None:
+        self._tape, self._transport, self._keys = tape, transport, keys
+        self._bus, self._status, self._endpoint = bus, status, endpoint
+        self._put: dict[str, Callable[[bytes], None]] = {}
+        self._looked = self.begun = monotonic()
+        self.sent = 0
+
+    def play(self, begin: float) -> bool:
+        """Play from `begin` ms to the end; False if told to quit before."""
+        for at, key, payload in self._tape.cues(begin):
+            if not self._wait(at):
+                return False
+            put = self._put.get(key)
+            if put is None:
+                put = self._put[key] = self._bus.publisher(key)
+            put(payload)
+            self.sent += 1
+        return True
+
+    def _wait(self, at: float) -> bool:
+        """Until `at` ms is reached; False if told to quit."""
+        while True:
+            now = monotonic()
+            left = self._transport.until(at, now)
+            late = now - self._looked > _LOOK
+            if left <= 0.0 and not late:
+                return True
+            if late:
+                self._looked = now
+                self._status.show(self._transport.position(now))
+                _refuse_live(self._bus, self._endpoint)
+                self._transport.fall_behind(at, _SLACK, now)
+            key = self._keys.get(min(left, _LOOK))
+            now = monotonic()
+            if key == QUIT:
+                return False
+            if key == PAUSE:
+                self._transport.toggle(now)
+            elif key == STEP:
+                self._transport.step(self._tape.step, now)
+
+
+class _Status:
+    """The line that shows world time and rate, on a terminal."""
+
+    def __init__(self, console: Console, tape: Timeline, transport: Transport, keys: bool) -> None:
+        self._transport, self._last = transport, tape.last
+        self._hint = "  space pauses, → steps, q quits" if keys else ""
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.fields[text]}"),
+            console=console,
+            disable=not console.is_terminal,
+        )
+        self._task: TaskID = self._bar.add_task("", total=tape.last, text="")
+
+    def show(self, position: float) -> None:
+        """Show a position, ms."""
+        shown = min(position, self._last)
+        text = f"{shown / 1000:.2f}/{self._last / 1000:.2f} s  {self._transport.rate:g} ×"
+        self._bar.update(
+            self._task,
+            completed=shown,
+            text=text + self._hint,
+            description="paused " if self._transport.paused else "playing",
+        )
+
+    def __enter__(self) -> _Status:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()

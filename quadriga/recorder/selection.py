@@ -1,0 +1,62 @@
+"""What of a team's traffic is recorded, and how, as a user asks for it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+
+from quadriga.recorder.parts import Limits
+from quadriga.recordings.key_patterns import key_patterns
+from quadriga.shared.recording.reader import MAX_CHANNELS
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What is recorded, and how.
+
+    Attributes:
+        topics: patterns of the keys that are recorded, see `quadriga.recordings.key_patterns`;
+            empty: all.
+        exclude: patterns of keys that are not.
+        limits: when a new file is begun.
+        at_once: begin with whoever is there, without waiting for a team.
+    """
+
+    topics: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    limits: Limits = field(default_factory=Limits)
+    at_once: bool = False
+
+
+def wishes(wanted: Wanted) -> dict[str, str]:
+    """What the metadata say of a recording that is not of everything."""
+    chosen = {"topics": wanted.topics, "exclude": wanted.exclude}
+    return {name: json.dumps(patterns) for name, patterns in chosen.items() if patterns}
+
+
+class Filter:
+    """Which keys are recorded.
+
+    Attributes:
+        expression: what to subscribe to.
+        all: whether nothing is left out.
+    """
+
+    def __init__(self, team: str, wanted: Wanted) -> None:
+        """Raises ConfigError if a pattern cannot be that of a key."""
+        self._topics = key_patterns(wanted.topics, team, "--topics")
+        self._exclude = key_patterns(wanted.exclude, team, "--exclude")
+        alone = self._topics[0].expression if len(self._topics) == 1 else ""
+        self.expression = alone or f"{team}/**"  # two subscriptions would hear a message twice
+        self.all = not (self._topics or self._exclude)
+        self._known: dict[str, bool] = {}
+
+    def __call__(self, key: str) -> bool:
+        """Whether a key is recorded."""
+        known = self._known.get(key)
+        if known is None:
+            known = not self._topics or any(p.matches(key) for p in self._topics)
+            known = known and not any(p.matches(key) for p in self._exclude)
+            if len(self._known) < MAX_CHANNELS:
+                self._known[key] = known
+        return known

@@ -1,0 +1,102 @@
+"""Checks of what is planned and commanded: friction cone, swing legs, torques."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadriga.agents.time_grid import horizon_stance
+from quadriga.recordings.checks.finding import CheckedMessage, Finding
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import JOINT_NAMES, TORQUE_LIMIT, Array, Leg, robot_names
+from quadriga.shared.wire.messages import Command, Plan
+
+TOLERANCE: Final = 1e-6  # N and N·m
+
+
+class Friction:
+    """Every planned force lies in the friction cone, and a swing leg's is zero."""
+
+    def __init__(self, config: Config) -> None:
+        self.finding = Finding("friction", "plans")
+        self._config = config
+        self._indices = {name: i for i, name in enumerate(robot_names(config.team.robots))}
+        self._worst = 0.0
+
+    def look(self, item: CheckedMessage) -> None:
+        """See `Check`."""
+        plan = item.message
+        if not isinstance(plan, Plan) or item.robot not in self._indices:
+            return
+        self.finding.looked += 1
+        N = self._config.planner.N
+        if len(plan.u) != N:
+            self.finding.object(plan.tick, item.key, f"{len(plan.u)} samples", f"{N} samples")
+            return
+        stance = horizon_stance(self._config, self._indices[item.robot], plan.step)
+        excess, limits = _excess(plan.u.reshape(N, 4, 3), stance, self._config)
+        self._worst = max(self._worst, float(excess.max()))
+        if excess.max() > TOLERANCE:
+            sample, leg, axis = np.unravel_index(int(excess.argmax()), excess.shape)
+            force = plan.u.reshape(N, 4, 3)[sample, leg, axis]
+            self.finding.object(
+                plan.tick,
+                item.key,
+                f"f{'xyz'[axis]} {force:.6g} N of {Leg(int(leg)).name} at sample {sample}",
+                limits[int(bool(stance[sample, leg])) * (1 + int(axis == 2))],
+            )
+
+    def finish(self) -> None:
+        """Say how far the worst one is outside."""
+        self.finding.notes.append(f"at most {max(self._worst, 0.0):.1e} N outside")
+
+
+def _excess(
+    forces: Array, stance: NDArray[np.bool_], config: Config
+) -> tuple[Array, tuple[str, str, str]]:
+    """How far each component is outside, N, shape (N, 4, 3); limits of swing, fx and fy, fz."""
+    cone, least = config.planner.mu / math.sqrt(2.0), config.planner.force_min
+    excess = np.abs(forces)
+    standing = excess[..., :2] - cone * forces[..., 2:]
+    excess[..., :2] = np.where(stance[..., None], standing, excess[..., :2])
+    excess[..., 2] = np.where(stance, least - forces[..., 2], excess[..., 2])
+    return excess, ("0 of a swing leg", f"{cone:.4g} · fz", f"at least {least:g} N")
+
+
+class Torques:
+    """No commanded torque exceeds what the motor gives, and no gain adds more than damping."""
+
+    def __init__(self, config: Config) -> None:
+        self.finding = Finding("torques", "commands")
+        self._damping = config.controller.damping
+        self._largest = 0.0
+
+    def look(self, item: CheckedMessage) -> None:
+        """See `Check`."""
+        command = item.message
+        if not isinstance(command, Command):
+            return
+        self.finding.looked += 1
+        largest = float(np.abs(command.tau).max())
+        self._largest = max(self._largest, largest)
+        if largest > TORQUE_LIMIT + TOLERANCE:
+            joint = JOINT_NAMES[int(np.abs(command.tau).argmax())]
+            self.finding.object(
+                command.tick, item.key, f"{largest:.6g} N·m of {joint}", f"{TORQUE_LIMIT:g} N·m"
+            )
+        kp, kd = float(np.abs(command.kp).max()), float(command.kd.max())
+        if kp > 0.0 or kd > self._damping or float(command.kd.min()) < 0.0:
+            self.finding.object(
+                command.tick,
+                item.key,
+                f"gains kp up to {kp:.6g}, kd up to {kd:.6g}",
+                f"no kp, kd from 0 to {self._damping:g}",
+            )
+
+    def finish(self) -> None:
+        """Say how large the largest is."""
+        if self.finding.looked:
+            self.finding.notes.append(f"at most {self._largest:.1f} N·m")

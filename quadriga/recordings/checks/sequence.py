@@ -1,0 +1,156 @@
+"""Checks of each key's messages as a sequence: order, gaps and ages."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from quadriga.recordings.checks.finding import CheckedMessage, Finding
+from quadriga.shared.config.sections import Config
+from quadriga.shared.recording.sequence import TickTrack, max_ages, periods
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.wire.messages import Plan, Status
+from quadriga.shared.wire.topics import (
+    COMMAND,
+    ESTOP,
+    EVENT,
+    MEASUREMENT,
+    REFERENCE,
+    STATE,
+    STATUS,
+    TRUTH,
+)
+
+_MAY_REPEAT: Final = frozenset((STATUS.name, REFERENCE.name, EVENT.name))
+_WORLD: Final = frozenset((STATE.name, TRUTH.name, REFERENCE.name))
+_EVERYONE_S: Final = (STATE, COMMAND, MEASUREMENT)
+_TAIL_MS: Final = 20  # a world that was stopped may end in the middle of a sample
+
+
+class Order:
+    """Ticks of one key rise; those of plans by step, then exchange."""
+
+    def __init__(self) -> None:
+        self.finding = Finding("order", "messages")
+        self._last: dict[str, tuple[int, int]] = {}
+
+    def look(self, item: CheckedMessage) -> None:
+        """See `Check`."""
+        message = item.message
+        place = message.serial if isinstance(message, Plan) else (message.tick, 0)
+        last = self._last.get(item.key, (-1, 0))
+        self.finding.looked += 1
+        if item.topic != ESTOP.name and (
+            place < last or (place == last and item.topic not in _MAY_REPEAT)
+        ):
+            what = "step" if isinstance(message, Plan) else "tick"
+            self.finding.object(
+                message.tick, item.key, f"{what} {place[0]} after {last[0]}", f"a later {what}"
+            )
+        self._last[item.key] = max(place, last)
+
+    def finish(self) -> None:
+        """Nothing is left to see."""
+
+
+class Gaps:
+    """No message is missing between the first and the last tick, and no robot's keys are.
+
+    In real time an agent answers the newest state and passes over older ones, so there only the
+    world's own messages must be without gaps.
+    """
+
+    def __init__(self, config: Config, *, filtered: bool) -> None:
+        self.finding = Finding("gaps", "messages expected")
+        self._config, self._filtered = config, filtered
+        self._periods = periods(config)
+        self._tracks: dict[str, tuple[str, TickTrack]] = {}
+
+    def look(self, item: CheckedMessage) -> None:
+        """See `Check`."""
+        row = self._tracks.get(item.key)
+        if row is None:
+            row = item.topic, TickTrack(self._periods[item.topic])
+            self._tracks[item.key] = row
+        row[1].note(item.message.tick)
+
+    def finish(self) -> None:
+        """Count what is missing."""
+        lockstep = self._config.world.mode == "lockstep"
+        passed_over = 0
+        for key, (topic, track) in sorted(self._tracks.items()):
+            self.finding.looked += track.count + track.lost
+            if lockstep or topic in _WORLD:
+                for before, after in track.gaps:
+                    count = (after - before - 1) // self._periods[topic]
+                    self.finding.object(
+                        after,
+                        key,
+                        f"{count} missing after tick {before}",
+                        f"one every {self._periods[topic]} ms",
+                        count,
+                    )
+            else:
+                passed_over += track.lost
+        if passed_over:
+            self.finding.notes.append(f"{passed_over} passed over by agents in real time")
+        self._look_at_robots()
+
+    def _look_at_robots(self) -> None:
+        team = self._config.team
+        states = [self._tracks.get(STATE.key(team.name, name)) for name in robot_names(team.robots)]
+        seen = [row[1] for row in states if row is not None]
+        begin = min((track.first for track in seen), default=0)
+        end = max((track.last for track in seen), default=0)
+        if begin > 0:
+            self.finding.notes.append(f"begins at tick {begin}")
+        if self._filtered:
+            return
+        for robot in robot_names(team.robots):
+            for topic in _EVERYONE_S:
+                self._look_at_end(topic.key(team.name, robot), topic.name, end)
+
+    def _look_at_end(self, key: str, topic: str, end: int) -> None:
+        row = self._tracks.get(key)
+        if row is None:
+            self.finding.object(-1, key, "no message at all", "messages like the others'")
+        elif row[1].last < end - self._periods[topic] - _TAIL_MS:
+            last = row[1].last
+            self.finding.object(last, key, f"none after tick {last}", f"some until tick {end}")
+
+
+class Ages:
+    """Nothing is older than it may be: between two messages, and by the agents' word."""
+
+    def __init__(self, config: Config) -> None:
+        """Of a recording made with this configuration."""
+        self.finding = Finding("ages", "messages")
+        self._limits = max_ages(config)
+        self._last: dict[str, int] = {}
+        self._oldest: dict[str, float] = {}
+
+    def look(self, item: CheckedMessage) -> None:
+        """See `Check`."""
+        tick, limit = item.message.tick, self._limits[item.topic]
+        self.finding.looked += 1
+        age = tick - self._last.get(item.key, tick)
+        if limit and age > limit:
+            self.finding.object(tick, item.key, f"{age} ms since the one before", f"{limit} ms")
+        self._last[item.key] = tick
+        if isinstance(item.message, Status) and item.message.mode == "walk":
+            self._look_at_status(item, item.message)
+
+    def _look_at_status(self, item: CheckedMessage, status: Status) -> None:
+        for name, age in status.ages_ms.items():
+            topic = name.partition(".")[0]
+            if topic not in self._limits:
+                continue  # the jitter of states in real time
+            limit = self._limits[topic]
+            self._oldest[topic] = max(age, self._oldest.get(topic, 0.0))
+            if limit and age > limit:
+                self.finding.object(status.tick, item.key, f"{name} {age:g} ms old", f"{limit} ms")
+
+    def finish(self) -> None:
+        """Say how old what the agents used was at most."""
+        told = ", ".join(f"{name} {age:g} ms" for name, age in sorted(self._oldest.items()))
+        if told:
+            self.finding.notes.append(f"agents' inputs at most: {told}")

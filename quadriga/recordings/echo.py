@@ -1,0 +1,59 @@
+"""A message as one line that a person can read."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any, Final
+
+import numpy as np
+
+from quadriga.shared.errors import MessageError
+from quadriga.shared.recording.reader import ChunkEntry
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.topics import topic_of
+
+_SHORT: Final = 4  # numbers of an array that are shown
+_BYTES: Final = 24  # of what is no message
+_ENVELOPE: Final = ("tick", "stamp_ns")
+
+
+def line(entry: ChunkEntry, *, full: bool = False) -> str:
+    """World time, key and every field; long arrays are cut unless `full`."""
+    when = f"{entry.tick / 1000:9.3f} s" if entry.tick >= 0 else f"{'–':>9}  "
+    return f"{when}  {entry.key}  {_content(entry, full)}"
+
+
+def _content(entry: ChunkEntry, full: bool) -> str:
+    try:
+        message = decode(entry.payload, topic_of(entry.key)[0].type)
+    except MessageError as error:
+        shown = entry.payload[:_BYTES].hex(" ")
+        more = "" if len(entry.payload) <= _BYTES else " …"
+        return f"{len(entry.payload)} bytes, {error.name} is {error.got}: {shown}{more}"
+    return " ".join(
+        f"{item.name}={_value(getattr(message, item.name), full)}"
+        for item in fields(message)
+        if item.name not in _ENVELOPE
+    )
+
+
+def _value(value: Any, full: bool) -> str:
+    if isinstance(value, np.ndarray):
+        flat = value.ravel()
+        shown = flat if full else flat[:_SHORT]
+        shape = f"{'×'.join(map(str, value.shape))}:" if value.ndim > 1 else ""
+        more = f" … {len(flat)}" if len(shown) < len(flat) else ""
+        return f"[{shape}{' '.join(_number(x) for x in shown)}{more}]"
+    if isinstance(value, float):
+        return _number(value)
+    if isinstance(value, str):
+        return repr(value)
+    if isinstance(value, tuple):
+        return f"[{' '.join(map(str, value))}]"
+    if isinstance(value, int):
+        return str(value)
+    return "{" + " ".join(f"{k}:{_value(v, full)}" for k, v in value.items()) + "}"
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}"

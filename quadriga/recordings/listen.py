@@ -1,0 +1,103 @@
+"""Messages of some keys, live from the bus or from a recording, for whoever wants to look at them.
+
+Who listens is a member of the network that nobody waits for.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Final
+
+from quadriga.recordings.key_patterns import KeyPattern, key_patterns
+from quadriga.recordings.survey import open_any
+from quadriga.shared.bus.zenoh_bus import POLL, Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import RecordingError
+from quadriga.shared.recording.config import recorded_config
+from quadriga.shared.recording.reader import ChunkEntry
+from quadriga.shared.runtime.clock import monotonic, wall_ns
+from quadriga.shared.wire.envelope import envelope
+
+_PATIENCE: Final = 3.0  # s wall without a message after which a listener is told where it listens
+
+
+def from_file(path: Path, keys: Sequence[str]) -> Iterator[ChunkEntry]:
+    """The recorded messages of `keys` (none: all); of a damaged file what is readable.
+
+    Raises:
+        RecordingError: at once if nothing can be read, at the end if the file is damaged or
+            has none of these keys.
+        ConfigError: something is not a key.
+    """
+    source, error = open_any(path)
+    patterns = key_patterns(keys, source.metadata.get("team", Config().team.name), "KEY")
+    chosen: dict[str, bool] = {}
+    for entry in source.entries():
+        if entry.key not in chosen:
+            chosen[entry.key] = _matches(patterns, entry.key)
+        if chosen[entry.key]:
+            yield entry
+    if error is not None:
+        raise error
+    if keys and not any(chosen.values()):
+        known = ", ".join(sorted(chosen)) or "no message at all"
+        raise RecordingError(str(path), f"no key that fits {' '.join(keys)}", f"some of {known}")
+
+
+def config_of(path: Path) -> Config:
+    """The configuration of a recorded walk; the default if the file no longer says.
+
+    Raises:
+        RecordingError: nothing can be read of the file.
+    """
+    source, _ = open_any(path)
+    try:
+        return recorded_config(source)
+    except RecordingError:
+        return Config()
+
+
+def from_bus(
+    config: Config,
+    name: str,
+    keys: Sequence[str],
+    stopped: Callable[[], bool],
+    say: Callable[[str], None],
+) -> Iterator[ChunkEntry | None]:
+    """What is published on `keys` (none: all) until `stopped()`; None whenever nothing is there.
+
+    Raises:
+        BusError: the bus cannot be opened.
+        ConfigError: something is not a key.
+    """
+    team, begun, told = config.team.name, monotonic(), False
+    patterns = key_patterns(keys, team, "KEY")
+    with Bus.open(config.bus, team, f"{name}-{os.getpid()}", stopped) as bus:
+        bus.subscribe(patterns[0].expression if len(patterns) == 1 else f"{team}/**")
+        while not stopped():
+            first = bus.get(POLL)
+            if first is None:
+                if not told and monotonic() - begun > _PATIENCE:
+                    told = True
+                    say(_nothing(bus, config, keys))
+                yield None
+                continue
+            told, now = True, wall_ns()
+            for key, payload in (first, *bus.drain()):
+                if _matches(patterns, key):
+                    found = envelope(payload)
+                    yield ChunkEntry(key, -1 if found is None else found[0], now, payload)
+
+
+def _matches(patterns: Sequence[KeyPattern], key: str) -> bool:
+    return not patterns or any(pattern.matches(key) for pattern in patterns)
+
+
+def _nothing(bus: Bus, config: Config, keys: Sequence[str]) -> str:
+    who = "linked to others" if bus.linked else "linked to nobody"
+    return (
+        f"nothing yet of {', '.join(keys) or 'any key'} of team {config.team.name!r} at "
+        f"{config.bus.endpoint}, {who} (--config RUN/config.toml says where a walk is)"
+    )

@@ -1,0 +1,139 @@
+"""A whole recording made of what is left of a damaged one, and an account of what is not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from quadriga.columns import columns
+from quadriga.recordings.survey import open_any
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import RecordingError
+from quadriga.shared.recording.config import recorded_config
+from quadriga.shared.recording.reader import COUNTS, LOST, PROFILE, Recording, RecordingWriter
+from quadriga.shared.recording.salvage import Damage, Salvage
+from quadriga.shared.recording.sequence import TickTrack, periods
+from quadriga.shared.recording.writer import reason
+from quadriga.shared.runtime.clock import wall_ns
+
+RECOVERED: Final = f"{PROFILE}.recovered"
+_GAPS: Final = 6  # of a key, as many are named
+
+
+@dataclass(frozen=True, slots=True)
+class Recovery:
+    """What came of a recovery.
+
+    Attributes:
+        out: the new file.
+        messages: how many are in it.
+        expected: how many the recorder had written, None if the file no longer says.
+        damages: what could not be read.
+        tracks: ticks by key of what could.
+        never_came: by key, messages that had not reached the recorder, if the file still says.
+        has_metadata: whether an intact copy of the metadata was found.
+        error: why the file was not whole.
+    """
+
+    out: Path
+    messages: int
+    expected: int | None
+    damages: tuple[Damage, ...]
+    tracks: Mapping[str, TickTrack]
+    never_came: Mapping[str, str]
+    has_metadata: bool
+    error: RecordingError
+
+
+def recover(path: Path, out: Path | None) -> Recovery | None:
+    """Write everything readable of `path` to a whole file; None if `path` is whole already.
+
+    Args:
+        path: the damaged file; it stays as it is.
+        out: the new file; by default `NAME.recovered.mcap` beside it.
+
+    Raises:
+        RecordingError: nothing can be read of it, or the new file cannot be written.
+    """
+    source, error = open_any(path)
+    if isinstance(source, Recording) or error is None:
+        return None
+    if not source.metadata and next(source.entries(), None) is None:
+        raise RecordingError(
+            str(path),
+            error.got,
+            "a recording of which something is left",
+            "neither a message nor the configuration can be read",
+        )
+    out = out or path.with_name(f"{path.stem}.recovered{path.suffix}")
+    try:
+        config = recorded_config(source)
+    except RecordingError:
+        config = Config()
+    try:
+        with RecordingWriter(out, source.metadata, periods=periods(config)) as writer:
+            for entry in source.entries():
+                writer.write(entry.key, entry.payload, entry.log_time_ns)
+            writer.note(RECOVERED, _account(source, path))
+    except OSError as failure:
+        raise RecordingError(str(out), reason(failure), "room for the recovered file") from None
+    counts = source.notes.get(COUNTS, {}).get("messages", "")
+    return Recovery(
+        out=out,
+        messages=writer.messages,
+        expected=int(counts) if counts.isdecimal() else None,
+        damages=tuple(source.damages),
+        tracks=writer.tracks,
+        never_came=source.notes.get(LOST, {}),
+        has_metadata=bool(source.metadata),
+        error=error,
+    )
+
+
+def told(done: Recovery) -> list[str]:
+    """What a user is told of it, line by line."""
+    of = f" of {done.expected:,}" if done.expected is not None else ""
+    lines = [f"{done.out}: {done.messages:,}{of} messages recovered"]
+    lines += ["unreadable"] if done.damages else []
+    lines += [f"  {damage}{_when(damage)}" for damage in done.damages]
+    if not done.damages:
+        lines.append("unreadable: nothing but the index or a checksum")
+    if not done.has_metadata:
+        lines.append("lost: configuration and versions, no copy of them is intact")
+    missing = [(key, *_missing(track)) for key, track in sorted(done.tracks.items()) if track.lost]
+    lines += ["missing between the first and the last message"] if missing else []
+    lines += columns(missing, right=(1,))
+    if done.never_came:
+        every = ", ".join(f"{key} {count}" for key, count in done.never_came.items())
+        lines.append(f"of these the recorder had never received: {every}")
+    if done.expected is None:
+        ends = [(key, f"tick {t.last}") for key, t in sorted(done.tracks.items()) if t.first >= 0]
+        lines += ["what came after these is lost, if anything did", *columns(ends)]
+    return lines
+
+
+def _missing(track: TickTrack) -> tuple[str, str]:
+    """How many messages of a key are missing, and between which ticks."""
+    spans = [f"{before}–{after}" for before, after in track.gaps[:_GAPS]]
+    more = len(track.gaps) - _GAPS
+    text = f"between ticks {', '.join(spans)}" + (f" and {more} more" if more > 0 else "")
+    return f"{track.lost:,}", text
+
+
+def _when(damage: Damage) -> str:
+    if damage.log_times is None:
+        return ""
+    first, last = damage.log_times
+    if not 0 < first <= last < first + 10**12:  # the times themselves are damaged
+        return ""
+    return f", {(last - first) / 1e9:.3f} s of wall time"
+
+
+def _account(source: Salvage, path: Path) -> dict[str, str]:
+    return {
+        "from": path.name,
+        "at_ns": str(wall_ns()),
+        **{f"damage.{k}": str(damage) for k, damage in enumerate(source.damages[:100])},
+    }

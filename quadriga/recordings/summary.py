@@ -1,0 +1,250 @@
+"""The figures of merit of a finished run, from its recording alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from math import isnan
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from quadriga.recordings.gaps import end_of_world, missing_ticks, repeated_ticks
+from quadriga.recordings.metadata import recorded_versions
+from quadriga.recordings.traces import (
+    ERRORS,
+    FELT,
+    Traces,
+    estimate_errors,
+    felt_height_errors,
+    in_force,
+    read_traces,
+)
+from quadriga.recordings.truth import distance
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import OUTPUTS, Array
+from quadriga.shared.runtime.histogram import QUANTILES
+from quadriga.shared.wire.messages import Status
+from quadriga.shared.wire.topics import STATE
+from quadriga.table import print_table
+
+__all__ = ["RECORDING", "SUMMARY", "print_table", "steady_from", "summarise", "summary_of"]
+
+RECORDING: Final = "run.mcap"
+SUMMARY: Final = "summary.json"
+SETTLING_MS: Final = 1000  # after the speed ramp's end, until the steady part begins
+FALL_TILT: Final = 1.0  # rad
+FALL_HEIGHT: Final = 0.12  # m above the terrain
+
+
+def summarise(run_dir: Path, traces: Traces | None = None) -> dict[str, Any]:
+    """Compute the figures of the run in `run_dir`, write them to `summary.json`, return them.
+
+    `traces` are those of its recording, if that has been read already.
+
+    Lengths in m, speeds in m/s, angles in rad, world time in s. A figure that the recording does
+    not hold (no planner, a walk too short for a steady part) is None. Tracking errors, mean speeds
+    and estimator errors are over the steady part: from `steady_from`, 1 s after the speed ramp's
+    end, to the end, all robots together.
+
+    Raises:
+        RecordingError: there is no recording, or it is empty or foreign.
+    """
+    summary = summary_of(traces or read_traces(Recording(run_dir / RECORDING)))
+    text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
+    (run_dir / SUMMARY).write_text(text + "\n", encoding="utf-8")
+    return summary
+
+
+def summary_of(traces: Traces) -> dict[str, Any]:
+    """The figures of a run, ready for JSON."""
+    config, metadata = traces.config, traces.metadata
+    return {
+        **_world(traces),
+        **_tracking(traces),
+        **_estimator(traces),
+        **_agents(traces),
+        **_deadlines(traces),
+        **_traffic(traces),
+        "team": config.team.name,
+        "robots": config.team.robots,
+        "seed": config.world.seed,
+        "mode": config.world.mode,
+        "scenario": config.world.scenario,
+        "terrain": config.world.terrain,
+        "planner": config.planner.kind,
+        "estimator": config.estimator.kind,
+        "config_sha256": metadata.get("config_sha256", ""),
+        "predictor_sha256": metadata.get("predictor_sha256", ""),
+        "versions": recorded_versions(metadata),
+    }
+
+
+def steady_from(traces: Traces) -> int:
+    """First tick of the steady part, ms: `SETTLING_MS` after full speed was asked for."""
+    config = traces.config
+    starts, values = traces.references
+    target = [config.reference.vx, config.reference.vy, config.reference.wz]
+    full = starts[np.abs(values[:, :3] - target).max(axis=1, initial=0.0) < 1e-6]
+    ramp_end = config.gait.stand_ms + round(1000 * config.reference.ramp)
+    begin = int(full[0]) if len(full) and not config.reference.trace else ramp_end
+    return max(begin, config.gait.stand_ms) + SETTLING_MS
+
+
+def _world(traces: Traces) -> dict[str, Any]:
+    truth = traces.truth
+    down = (truth.tilt > FALL_TILT) | (truth.y[..., 0] < FALL_HEIGHT)
+    seen = {traces.robots[i] for i in np.flatnonzero(down.any(axis=0))}
+    told = {event.robot for event in traces.events if event.kind == "fall"}
+    if not len(truth.tick):  # then the robots' own word must do
+        told |= {
+            r for r, found in traces.statuses.items() if any(s.reason == "fall" for s in found)
+        }
+    return {
+        "fell": bool(seen | told),
+        "fallen": sorted(seen | told),
+        "distance": distance(truth, 2 * traces.config.gait.stance_ms),
+        "end": next((e.detail for e in reversed(traces.events) if e.kind == "stop"), ""),
+        "yoke_drift_max": float(np.abs(truth.yoke_error).max(initial=0.0)),
+        "events": [
+            {"tick": e.tick, "kind": e.kind, "robot": e.robot, "detail": e.detail}
+            for e in traces.events
+        ],
+    }
+
+
+def _tracking(traces: Traces) -> dict[str, Any]:
+    truth, begin = traces.truth, steady_from(traces)
+    reference = in_force(traces.references, truth.tick)
+    steady = (truth.tick >= begin) & np.isfinite(reference).all(axis=1)
+    wanted = np.zeros((len(truth.tick), len(OUTPUTS)))
+    wanted[:, [1, 2, 5, 0]] = reference
+    y = truth.y[steady]
+    error = y - wanted[steady, None]
+    felt = [_felt_heights(traces, robot, begin) for robot in traces.robots]
+    return {
+        "steady_from": begin / 1000.0,
+        **{f"mean_{name}": _mean(y[..., OUTPUTS.index(name)]) for name in ("vx", "vy", "wz")},
+        "rmse": _with_felt(_rmse(error), _joined(felt)),
+        "rmse_per_robot": {
+            robot: _with_felt(_rmse(error[:, i : i + 1]), felt[i])
+            for i, robot in enumerate(traces.robots)
+        },
+    }
+
+
+def _felt_heights(traces: Traces, robot: str, begin: int) -> Array:
+    tick, error = felt_height_errors(traces, robot)
+    return error[tick >= begin]
+
+
+def _estimator(traces: Traces) -> dict[str, Any]:
+    """Error of the agents' own outputs against truth at the same tick, steady part.
+
+    None of what cannot be compared (`quadriga.recordings.traces.estimate_errors`).
+    """
+    begin, errors = steady_from(traces), []
+    for i in range(len(traces.robots)):
+        tick, error = estimate_errors(traces, i)
+        errors.append(error[tick >= begin])
+    rmse = _rmse(np.concatenate(errors)[:, None])
+    return {"estimator_rmse": {k: None if v is None or isnan(v) else v for k, v in rmse.items()}}
+
+
+def _agents(traces: Traces) -> dict[str, Any]:
+    statuses = traces.statuses
+    last = {robot: found[-1] for robot, found in statuses.items() if found}
+    every = [status for found in statuses.values() for status in found]
+    planner_ms = _joined([status.planner_ms for status in every])
+    tick_us = _joined([status.tick_us for status in every])
+    return {
+        "planner_solves": len(planner_ms),
+        "planner_ms_median": _quantile(planner_ms, 0.5),
+        "planner_ms_p99": _quantile(planner_ms, 0.99),
+        "tick_us_median": _quantile(tick_us, 0.5),
+        "tick_us_p99": _quantile(tick_us, 0.99),
+        "counters": {robot: dict(status.counters) for robot, status in last.items()},
+        "stop_reasons": {robot: status.reason for robot, status in last.items() if status.reason},
+    }
+
+
+def _deadlines(traces: Traces) -> dict[str, Any]:
+    """In real time what came late, by robot and of the world; else None."""
+    if not traces.world:
+        return {"realtime": None}
+    told = traces.world[-1]
+    ticks = told.counters.get("ticks", 0)
+    found: dict[str, Any] = {
+        "world": {"jitter_ms": _spread(told, "jitter"), "overruns": told.counters.get("overruns")}
+    }
+    for robot in traces.robots:
+        own = traces.statuses[robot]
+        late = told.counters.get(f"{robot}.late", 0)
+        found[robot] = {
+            "late": late,
+            "late_share": late / ticks if ticks else None,
+            "held": told.counters.get(f"{robot}.held", 0),
+            "damped": told.counters.get(f"{robot}.damped", 0),
+            "command_age_ms": _spread(told, f"{robot}.command"),
+            "deadlines_missed": own[-1].counters.get("deadlines_missed") if own else None,
+            "jitter_ms": _spread(own[-1], "jitter") if own else {},
+        }
+    return {"realtime": found}
+
+
+def _spread(status: Status, name: str) -> dict[str, float]:
+    return {
+        key: status.ages_ms[f"{name}.{key}"]
+        for key in (*QUANTILES, "max")
+        if f"{name}.{key}" in status.ages_ms
+    }
+
+
+def _traffic(traces: Traces) -> dict[str, Any]:
+    gaps = missing_ticks(traces.config, traces.ticks)
+    team, nothing = traces.config.team.name, np.zeros(0, dtype=np.int64)
+    states = [traces.ticks.get(STATE.key(team, robot), nothing) for robot in traces.robots]
+    ticks = np.concatenate(states)
+    ticks = ticks[ticks <= end_of_world(traces.config)]
+    world = int(np.ptp(ticks)) / 1000.0 if len(ticks) else 0.0
+    first, last = traces.log_times or (0, 0)
+    return {
+        "duration": world,
+        "real_time_factor": world / ((last - first) / 1e9) if last > first else None,
+        "messages": sum(traces.messages.values()),
+        "messages_per_topic": dict(traces.messages),
+        "gaps": sum(gaps.values()),
+        "gaps_per_topic": gaps,
+        "repeated": repeated_ticks(traces.ticks),
+        "invalid": sum(traces.invalid.values()),
+        "invalid_per_topic": dict(traces.invalid),
+        "cut": traces.cut,
+    }
+
+
+def _rmse(error: Array) -> dict[str, float | None]:
+    """Root mean square over samples and robots of errors of shape (T, n, 6), by output."""
+    return {name: _root(_mean(error[..., i] ** 2)) for i, name in enumerate(OUTPUTS)}
+
+
+def _with_felt(rmse: Mapping[str, float | None], felt: Array) -> dict[str, float | None]:
+    """RMSE by name of `ERRORS`, with that of the height over the felt ground."""
+    every = {**rmse, FELT: _root(_mean(felt**2))}
+    return {name: every[name] for name in ERRORS}
+
+
+def _root(value: float | None) -> float | None:
+    return None if value is None else value**0.5
+
+
+def _mean(values: Array) -> float | None:
+    return float(values.mean()) if values.size else None
+
+
+def _quantile(values: Array, q: float) -> float | None:
+    return float(np.quantile(values, q)) if values.size else None
+
+
+def _joined(parts: Sequence[Array]) -> Array:
+    return np.concatenate([np.zeros(0), *parts])

@@ -1,0 +1,147 @@
+"""A recording read once for what it holds: keys, times, gaps, events, the last words of agents."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import MessageError, RecordingError
+from quadriga.shared.recording.config import recorded_config
+from quadriga.shared.recording.mcap_chunk import name_of
+from quadriga.shared.recording.reader import ChunkEntry, Recording
+from quadriga.shared.recording.salvage import Damage, Salvage
+from quadriga.shared.recording.sequence import TickTrack, periods
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Event, Message, Status
+from quadriga.shared.wire.topics import EVENT, STATUS, TABLE, topic_of
+
+_DECODED: dict[str, type[Message]] = {EVENT.name: Event, STATUS.name: Status}
+_TYPES = {topic.name: topic.type.__name__ for topic in TABLE}
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """What a recording holds.
+
+    Attributes:
+        path: the file.
+        size: its bytes.
+        metadata: what the recorder was given.
+        notes: what it noted at the end.
+        config: the team's configuration, None if it cannot be read.
+        tracks: ticks by key, sorted.
+        log_times: of the first and the last message, ns; None without messages.
+        invalid: events and statuses that do not decode.
+        events: in the order of the file.
+        statuses: the last of each agent.
+        error: why the file is not whole, None if it is.
+        damages: which parts of it cannot be read.
+    """
+
+    path: Path
+    size: int
+    metadata: Mapping[str, str]
+    notes: Mapping[str, Mapping[str, str]]
+    config: Config | None
+    tracks: Mapping[str, TickTrack]
+    log_times: tuple[int, int] | None
+    invalid: int
+    events: tuple[Event, ...]
+    statuses: Mapping[str, Status]
+    error: RecordingError | None
+    damages: tuple[Damage, ...]
+
+    @property
+    def world_ms(self) -> int:
+        """World time from the first to the last tick of those that are not ahead of it, ms."""
+        tracks = [t for key, t in self.tracks.items() if name_of(key) in ("state", "sim/truth")]
+        tracks = [t for t in tracks or list(self.tracks.values()) if t.first >= 0]
+        if not tracks:
+            return 0
+        return max(t.last for t in tracks) - min(t.first for t in tracks)
+
+
+def survey(path: Path) -> Survey:
+    """Read a recording, a damaged one as far as it can be read.
+
+    Raises:
+        RecordingError: no such file, an empty, a foreign one, or one of a newer version.
+    """
+    source, error = open_any(path)
+    try:
+        config: Config | None = recorded_config(source)
+    except RecordingError as wrong:
+        config, error = None, error or wrong
+    found = _read(source.entries(), periods(config or Config()))
+    notes = source.notes() if isinstance(source, Recording) else source.notes
+    damages = () if isinstance(source, Recording) else tuple(source.damages)
+    return Survey(
+        path=path,
+        size=path.stat().st_size,
+        metadata=source.metadata,
+        notes=notes,
+        config=config,
+        error=error,
+        damages=damages,
+        **found,
+    )
+
+
+def open_any(path: Path) -> tuple[Recording | Salvage, RecordingError | None]:
+    """A whole recording, or what is left of a damaged one and the error that says so.
+
+    Raises:
+        RecordingError: nothing of it can be read.
+    """
+    try:
+        recording = Recording(path)
+        recording.require_whole()
+    except RecordingError as error:
+        salvage = Salvage(path)
+        next(salvage.entries(), None)  # raises if a newer version wrote them
+        return salvage, error
+    next(recording.entries(), None)
+    return recording, None
+
+
+def type_of(key: str) -> str:
+    """Name of the message type of a key, "–" if the table has none."""
+    return _TYPES.get(name_of(key), "–")
+
+
+def _read(entries: Iterator[ChunkEntry], every: Mapping[str, int]) -> dict[str, Any]:
+    tracks: dict[str, TickTrack] = {}
+    kinds: dict[str, type[Message] | None] = {}
+    first = last = invalid = 0
+    events: list[Event] = []
+    statuses: dict[str, Status] = {}
+    for key, tick, log_time, payload in entries:
+        track = tracks.get(key)
+        if track is None:
+            track = tracks[key] = TickTrack(every.get(name_of(key), 0))
+            kinds[key] = _DECODED.get(name_of(key))
+        track.note(tick)
+        first = min(first, log_time) if first else log_time
+        last = max(last, log_time)
+        kind = kinds[key]
+        if kind is None:
+            continue
+        try:
+            message: Message = decode(payload, kind)
+        except MessageError:
+            invalid += 1
+            continue
+        if isinstance(message, Event):
+            events.append(message)
+        elif isinstance(message, Status):
+            statuses[topic_of(key)[1]] = message
+    return {
+        "tracks": dict(sorted(tracks.items())),
+        "log_times": (first, last) if tracks else None,
+        "invalid": invalid,
+        "events": tuple(events),
+        "statuses": dict(sorted(statuses.items())),
+    }

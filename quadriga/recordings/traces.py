@@ -1,0 +1,214 @@
+"""A recording as arrays over world time: what summary and figures are computed from."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from quadriga.recordings.truth import Ticks, TruthTrace, build_truth_trace, stack, ticks_of
+from quadriga.shared.bus.barrier import PLANNER, SIM
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.yokes import yoke_pairs
+from quadriga.shared.errors import MessageError, RecordingError
+from quadriga.shared.recording.config import recorded_config
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import OUTPUTS, Array, robot_names
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import (
+    Event,
+    Measurement,
+    Message,
+    Plan,
+    Reference,
+    Status,
+    Truth,
+)
+from quadriga.shared.wire.topics import COMMAND, INPUTS, STATE, topic_of
+
+# Up to 1 kHz each: only their ticks are read.
+_TIMED_ONLY: Final = (STATE.name, COMMAND.name, INPUTS.name)
+# What a walk is judged by: the outputs by the world's truth, the height over the terrain under the
+# hips, and the height over the ground that the robot's feet feel, by its own word: what it is asked
+# to keep. Where a hip passes the edge of a block the former jumps, whatever the robot does.
+FELT: Final = "z-felt"
+ERRORS: Final = (OUTPUTS[0], FELT, *OUTPUTS[1:])
+
+
+@dataclass(frozen=True, slots=True)
+class MeasurementTrace:
+    """What one agent measured: ticks (M,), outputs (M, 6)."""
+
+    tick: Ticks
+    y: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Traces:
+    """Everything a recording tells, by world time.
+
+    Attributes:
+        config: the configuration of the run.
+        metadata: the recording's metadata.
+        robots: names r1 … rn.
+        cut: where the recording was cut; empty if it is whole.
+        messages: number of messages by key.
+        invalid: number of messages by key that do not decode; of 1 kHz topics only the
+            tick is looked at.
+        ticks: ticks by key, in the order of the recording.
+        log_times: log times of the first and the last state, ns, and None without states.
+        references: ticks (R,) and values vx, vy, wz, height (R, 4), sorted.
+        world: what the world of a walk in real time says of itself (`quadriga.plant.deadlines`).
+    """
+
+    config: Config
+    metadata: Mapping[str, str]
+    robots: tuple[str, ...]
+    cut: str
+    messages: Mapping[str, int]
+    invalid: Mapping[str, int]
+    ticks: Mapping[str, Ticks]
+    log_times: tuple[int, int] | None
+    truth: TruthTrace
+    references: tuple[Ticks, Array]
+    measurements: Mapping[str, MeasurementTrace]
+    plans: Mapping[str, tuple[Plan, ...]]
+    statuses: Mapping[str, tuple[Status, ...]]
+    events: tuple[Event, ...]
+    world: tuple[Status, ...] = ()
+
+
+def read_traces(recording: Recording, names: Container[str] | None = None) -> Traces:
+    """Read a recording once.
+
+    Args:
+        recording: what to read.
+        names: topics to look at, None for all.
+
+    Raises:
+        RecordingError: the recording holds no message.
+    """
+    config = recorded_config(recording)
+    robots = robot_names(config.team.robots)
+    counts: Counter[str] = Counter()
+    invalid: Counter[str] = Counter()
+    ticks: defaultdict[str, list[int]] = defaultdict(list)
+    decoded: defaultdict[tuple[type[Message], str], list[Any]] = defaultdict(list)
+    rows: dict[str, Any] = {}
+    log_times: tuple[int, int] | None = None
+    for key, tick, log_time, payload in recording.entries(names):
+        counts[key] += 1
+        row = rows.get(key)
+        if row is None:
+            row = rows[key] = _row(key)
+        topic, robot = row
+        if topic is None or tick < 0:
+            invalid[key] += 1
+            continue
+        if topic.name not in _TIMED_ONLY:
+            try:
+                message = decode(payload, topic.type)
+            except MessageError:
+                invalid[key] += 1
+                continue
+            if isinstance(message, Truth) and not _fits(message, config):
+                invalid[key] += 1
+                continue
+            decoded[topic.type, robot].append(message)
+        elif topic is STATE:
+            log_times = (log_time if log_times is None else log_times[0], log_time)
+        ticks[key].append(tick)
+    if not counts:
+        raise RecordingError(
+            str(recording.path), "a recording without messages", "a walk", recording.cut
+        )
+    return Traces(
+        config=config,
+        metadata=recording.metadata,
+        robots=robots,
+        cut=recording.cut,
+        messages=dict(sorted(counts.items())),
+        invalid=dict(sorted(invalid.items())),
+        ticks={key: np.array(found, dtype=np.int64) for key, found in sorted(ticks.items())},
+        log_times=log_times,
+        truth=build_truth_trace(decoded[Truth, ""], config),
+        references=_references(decoded[Reference, ""]),
+        measurements={robot: _measurements(decoded[Measurement, robot]) for robot in robots},
+        plans={robot: tuple(decoded[Plan, robot]) for robot in robots},
+        statuses={name: tuple(decoded[Status, name]) for name in (*robots, PLANNER)},
+        events=tuple(decoded[Event, ""]),
+        world=tuple(decoded[Status, SIM]),
+    )
+
+
+def in_force(references: tuple[Ticks, Array], tick: Ticks) -> Array:
+    """The reference in force at each tick: the newest that starts no later.
+
+    Returns:
+        vx, vy, wz, height; shape (len(tick), 4), NaN where none was in force yet.
+    """
+    starts, values = references
+    found = np.searchsorted(starts, tick, side="right") - 1
+    padded = np.vstack([values.reshape(-1, 4), np.full((1, 4), np.nan)])
+    return padded[found]
+
+
+def _row(key: str) -> tuple[Any, str]:
+    try:
+        return topic_of(key)
+    except MessageError:
+        return None, ""
+
+
+def estimate_errors(traces: Traces, index: int) -> tuple[Ticks, Array]:
+    """What the agent at `index` estimated, less the truth at the same ticks.
+
+    Returns:
+        Ticks (K,) and errors (K, 6); that of the roll is the shorter way round, that of z NaN on
+        uneven ground, where the one is a height over what the feet feel, the other over the
+        terrain under the hips.
+    """
+    own, truth = traces.measurements[traces.robots[index]], traces.truth
+    tick, mine, true = np.intersect1d(own.tick, truth.tick, return_indices=True)
+    error = own.y[mine] - truth.y[true, index]
+    roll = OUTPUTS.index("roll")
+    error[:, roll] = (error[:, roll] + np.pi) % (2 * np.pi) - np.pi
+    if traces.config.world.uneven:
+        error[:, OUTPUTS.index("z")] = np.nan
+    return tick, error
+
+
+def felt_height_errors(traces: Traces, robot: str) -> tuple[Ticks, Array]:
+    """A robot's height over the ground that its feet feel, by its own word, less the one asked for.
+
+    Returns:
+        Ticks (K,) at which one was asked for, and errors (K,), m.
+    """
+    own = traces.measurements[robot]
+    error = own.y[:, OUTPUTS.index("z")] - in_force(traces.references, own.tick)[:, 3]
+    asked = np.isfinite(error)
+    return own.tick[asked], error[asked]
+
+
+def _fits(truth: Truth, config: Config) -> bool:
+    """Whether a truth message is about the team of the configuration."""
+    team = config.team
+    return (
+        truth.robots == robot_names(team.robots)
+        and len(truth.base_pos) == team.robots
+        and len(truth.yoke_error) == len(yoke_pairs(team.robots, team.yokes))
+    )
+
+
+def _references(messages: Sequence[Reference]) -> tuple[Ticks, Array]:
+    latest = {message.tick: message for message in messages}
+    ordered = [latest[tick] for tick in sorted(latest)]
+    values = [[r.vx, r.vy, r.wz, r.height] for r in ordered]
+    return ticks_of(ordered), np.array(values, dtype=np.float64).reshape(-1, 4)
+
+
+def _measurements(messages: Sequence[Measurement]) -> MeasurementTrace:
+    return MeasurementTrace(ticks_of(messages), stack(messages, "y", 6))

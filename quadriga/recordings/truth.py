@@ -1,0 +1,107 @@
+"""The simulator's word on the team as arrays, with the outputs the planner is judged by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.messages import Truth
+from quadriga.sim_server.terrain.terrain import build_terrain
+from quadriga.sim_server.world.team_model import formation
+
+Ticks = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class TruthTrace:
+    """The simulator's word on the trunks, T samples of n robots and k yokes.
+
+    Attributes:
+        tick: shape (T,), ms.
+        base_pos, base_vel: world frame, shape (T, n, 3), m and m/s.
+        base_quat_wxyz: trunk to world, shape (T, n, 4).
+        grf: ground on foot, world frame, shape (T, n, 4, 3), N.
+        yoke_error: shape (T, k), m.
+        yoke_force: shape (T, k), N, positive when the yoke pushes its robots apart.
+        y: the planner's outputs z, vx, vy, roll, pitch, wz, shape (T, n, 6); z is the trunk's
+            height above the mean terrain under its feet's places, velocities are in the yaw frame.
+        tilt: angle between the trunk's z axis and the vertical, shape (T, n), rad.
+    """
+
+    tick: Ticks
+    base_pos: Array
+    base_vel: Array
+    base_quat_wxyz: Array
+    grf: Array
+    yoke_error: Array
+    yoke_force: Array
+    y: Array
+    tilt: Array
+
+
+def build_truth_trace(messages: Sequence[Truth], config: Config) -> TruthTrace:
+    """Stack the truth messages of a run of `config`."""
+    n = config.team.robots
+    pos, vel = stack(messages, "base_pos", n, 3), stack(messages, "base_vel", n, 3)
+    quat = stack(messages, "base_quat_wxyz", n, 4)
+    w, x, y, z = np.moveaxis(quat, -1, 0)
+    yaw = yaw_of(quat)
+    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    terrain = build_terrain(config, formation(n, config.team.spacing))
+    outputs = [
+        pos[..., 2] - terrain.under(pos[..., 0], pos[..., 1], yaw),
+        cos * vel[..., 0] + sin * vel[..., 1],
+        cos * vel[..., 1] - sin * vel[..., 0],
+        roll, pitch, stack(messages, "base_omega", n, 3)[..., 2],
+    ]  # fmt: skip
+    return TruthTrace(
+        tick=ticks_of(messages),
+        base_pos=pos,
+        base_vel=vel,
+        base_quat_wxyz=quat,
+        grf=stack(messages, "grf", n, 4, 3),
+        yoke_error=stack(messages, "yoke_error", 0),
+        yoke_force=stack(messages, "yoke_force", 0),
+        y=np.stack(outputs, axis=-1),
+        tilt=np.arccos(np.clip(np.cos(roll) * np.cos(pitch), -1.0, 1.0)),
+    )
+
+
+def distance(truth: TruthTrace, stride_ms: int, before: int | None = None) -> float | None:
+    """Length of the trunks' ways, mean over the robots, m; None without a sample.
+
+    Sampled once a stride, so that sway within it does not count; up to the tick `before`, if any.
+    """
+    count = len(truth.tick) if before is None else int(np.searchsorted(truth.tick, before))
+    tick, pos = truth.tick[:count], truth.base_pos[:count]
+    if not count:
+        return None
+    way = np.concatenate([pos[tick % stride_ms == 0], pos[-1:]])[..., :2]
+    return float(np.linalg.norm(np.diff(way, axis=0), axis=-1).sum(axis=0).mean())
+
+
+def yaw_of(quat_wxyz: Array) -> Array:
+    """Yaw of R = R_z(yaw) R_y(pitch) R_x(roll). Shape (...,), rad."""
+    w, x, y, z = np.moveaxis(quat_wxyz, -1, 0)
+    yaw: Array = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return yaw
+
+
+def stack(messages: Sequence[Any], field: str, *shape: int) -> Array:
+    """A field of messages along a new first axis; `shape` is that of one, for no message."""
+    if not messages:
+        return np.zeros((0, *shape))
+    return np.stack([getattr(message, field) for message in messages])
+
+
+def ticks_of(messages: Sequence[Any]) -> Ticks:
+    """Ticks of messages. Shape (len(messages),), ms."""
+    return np.array([message.tick for message in messages], dtype=np.int64)

@@ -1,0 +1,62 @@
+"""SHELL of `quadriga resim`: a bar while the world is recomputed, then the verdict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from quadriga.recorder.process import versions
+from quadriga.replay.world import Resim, other_versions, resim
+from quadriga.shared.recording.config import recorded_config
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.clock import monotonic
+
+_SHOWN: Final = 100  # ticks between looks at the bar
+
+
+def run(path: Path, console: Console) -> bool:
+    """Recompute a recorded world; whether all of it came out equal.
+
+    Raises:
+        RecordingError: no recording, not of a lock-step world, or with commands missing.
+    """
+    recording = Recording(path)
+    seconds = recorded_config(recording).world.seconds
+    begun = monotonic()
+    last = Resim(0, 0)
+    bar = Progress(
+        TextColumn("re-simulating"),
+        BarColumn(),
+        TextColumn("{task.completed:.1f}/{task.total:g} s"),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
+    with bar:
+        task = bar.add_task("", total=seconds)
+        for last in resim(recording):
+            if last.tick % _SHOWN == 0:
+                bar.update(task, completed=last.tick / 1000)
+    spent = monotonic() - begun
+    _say(last, recording, spent, console)
+    return last.difference is None
+
+
+def _say(last: Resim, recording: Recording, spent: float, console: Console) -> None:
+    world = last.tick / 1000
+    pace = f"{world:.2f} s of world time in {spent:.1f} s, {world / spent:.1f} × real time"
+    if last.difference is None:
+        lines = [f"equal to the byte: {last.compared} states and truths, {pace}"]
+        lines += [f"compared up to there only: {last.note}"] if last.note else []
+    else:
+        lines = [
+            f"first difference: {last.difference}",
+            f"{last.compared} messages before it are equal; {pace}",
+        ]
+        if others := other_versions(recording, versions()):
+            lines.append(f"recorded with other versions, which may be why: {others}")
+    for line in lines:
+        console.print(line, markup=False, highlight=False, soft_wrap=True)

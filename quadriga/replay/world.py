@@ -1,0 +1,188 @@
+"""The world once more, from a recorded configuration and the recorded commands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final
+
+from quadriga.plant.lockstep import ANSWERS
+from quadriga.recordings.by_tick import by_tick
+from quadriga.recordings.metadata import recorded_versions
+from quadriga.replay.difference import Difference, difference
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import MessageError, RecordingError
+from quadriga.shared.recording.config import recorded_config
+from quadriga.shared.recording.reader import ChunkEntry, Recording
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Command, Event, Message
+from quadriga.shared.wire.topics import COMMAND, EVENT, STATE, TRUTH, topic_of
+from quadriga.sim_server.world.motors import WEAKENED
+from quadriga.sim_server.world.world import World
+
+_NAMES: Final = frozenset(topic.name for topic in (STATE, COMMAND, TRUTH, EVENT))
+
+
+@dataclass(frozen=True, slots=True)
+class Resim:
+    """How far the world has been recomputed, and whether it still is the recorded one.
+
+    Attributes:
+        tick: ticks compared so far, ms.
+        compared: messages found equal to the byte.
+        note: why the comparison ends here although the recording goes on, or empty.
+        difference: the first message that is not equal, or None.
+    """
+
+    tick: int
+    compared: int
+    note: str = ""
+    difference: Difference | None = None
+
+
+def resim(recording: Recording) -> Iterator[Resim]:
+    """Recompute the world tick by tick; the last value tells what came of it.
+
+    A robot that the world had given up on at a tick, as the recorded events tell, is silent at
+    that tick again, even if its late command was recorded.
+
+    Raises:
+        RecordingError: not of a lock-step world, or with commands missing from the file.
+    """
+    config = recorded_config(recording)
+    if config.world.mode != "lockstep":
+        raise RecordingError(
+            str(recording.path),
+            "a walk in real time",
+            "one in lock-step",
+            "which command moved the motors in which tick is not recorded in real time",
+        )
+    world, silent = World(config), _Silent(config.team.name)
+    keys = {
+        name: (STATE.key(config.team.name, name), COMMAND.key(config.team.name, name))
+        for name in world.names
+    }
+    compared, lost = 0, ""
+    for tick, entries in by_tick(recording, _NAMES):
+        if lost:
+            if not any(_published(entry) for entry in entries):
+                continue  # nothing of the world's came after
+            if not recording.cut:
+                raise RecordingError(
+                    str(recording.path),
+                    lost,
+                    "a command of each robot at every tick",
+                    "recorded by somebody who came later or left topics out, or lost under way",
+                )
+            yield Resim(tick - 1, compared, f"{lost}: {recording.cut}")
+            return
+        found = _compare(world, config, entries)
+        if isinstance(found, Difference):
+            yield Resim(tick, compared, difference=found)
+            return
+        compared += found
+        silent.hear(entries)
+        commands = _commands(keys, entries, silent.robots)
+        absent = [name for name in world.names if name not in {*commands, *silent.robots}]
+        if absent:
+            lost = f"no command of {', '.join(absent)} at tick {tick}"
+        else:
+            world.step(commands)
+        yield Resim(tick + 1, compared)
+    if compared and recording.cut:
+        yield Resim(tick + 1, compared, recording.cut)
+    if not compared:
+        raise RecordingError(
+            str(recording.path),
+            "nothing that a world published from tick 0 on",
+            "states or sim/truth of a whole walk",
+        )
+
+
+def other_versions(recording: Recording, here: Mapping[str, str]) -> str:
+    """Packages that had another version when recorded, for a difference they may explain."""
+    then = recorded_versions(recording.metadata)
+    return ", ".join(
+        f"{name} {version} (here {here.get(name, 'absent')})"
+        for name, version in then.items()
+        if here.get(name) != version
+    )
+
+
+def _published(entry: ChunkEntry) -> bool:
+    return topic_of(entry.key)[0] in (STATE, TRUTH)
+
+
+class _Silent:
+    """The robots that the world does not wait for, as its events tell."""
+
+    def __init__(self, team: str) -> None:
+        self._key = EVENT.key(team)
+        self.robots: set[str] = set()
+
+    def hear(self, entries: Iterable[ChunkEntry]) -> None:
+        for event in _valid(self._key, entries):
+            if event.kind != "fault" or not event.robot or event.detail.endswith(WEAKENED):
+                continue
+            if event.detail.endswith(ANSWERS):
+                self.robots.discard(event.robot)
+            else:
+                self.robots.add(event.robot)
+
+
+def _valid(key: str, entries: Iterable[ChunkEntry]) -> Iterator[Event]:
+    for entry in entries:
+        if entry.key == key:
+            with suppress(MessageError):  # of a foreign publisher: the world's own are valid
+                yield decode(entry.payload, Event)
+
+
+def _compare(world: World, config: Config, entries: Iterable[ChunkEntry]) -> int | Difference:
+    """Number of the tick's messages that are equal to the world's, or the first that is not.
+
+    Anybody may publish on the world's keys: of several messages the world's must be one.
+    """
+    team, count = config.team.name, 0
+    recorded: dict[str, list[bytes]] = {}
+    for key, _, _, payload in entries:
+        recorded.setdefault(key, []).append(payload)
+    expected: dict[str, Message] = {
+        STATE.key(team, name): state for name, state in world.states().items()
+    }
+    if TRUTH.key(team) in recorded:
+        expected[TRUTH.key(team)] = world.truth()
+    for key, message in expected.items():
+        if key in recorded and encode(message) not in recorded[key]:
+            return difference(world.tick, key, recorded[key][0], message)
+        count += key in recorded
+    return count
+
+
+def _commands(
+    keys: Mapping[str, tuple[str, str]], entries: Sequence[ChunkEntry], silent: set[str]
+) -> dict[str, Command]:
+    """What each robot that was not silent commanded in a tick, by robot in the team's order."""
+    found = {}
+    for name, (state, command) in keys.items():
+        valid = [] if name in silent else list(_valid_commands(command, entries))
+        if valid:
+            asked = [entry.log_time_ns for entry in entries if entry.key == state]
+            found[name] = _taken(valid, min(asked, default=0))
+    return found
+
+
+def _valid_commands(key: str, entries: Iterable[ChunkEntry]) -> Iterator[tuple[int, Command]]:
+    for entry in entries:
+        if entry.key == key:
+            with suppress(MessageError):  # the world dropped it, too
+                yield entry.log_time_ns, decode(entry.payload, Command)
+
+
+def _taken(commands: Sequence[tuple[int, Command]], asked: int) -> Command:
+    """Which of a robot's commands of one tick the world took, as it refuses early and stale ones.
+
+    The one that was recorded closest to the state it answers; links differ in speed, so that it
+    may stand before it.
+    """
+    return min(commands, key=lambda command: abs(command[0] - asked))[1]

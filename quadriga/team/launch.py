@@ -1,0 +1,171 @@
+"""The table of processes: started together, watched, stopped in order."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Self
+
+from quadriga.shared.bus.barrier import OPERATOR, PLANNER, RECORDER, SIM
+from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.errors import ProcessError
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.runtime.clock import monotonic, sleep
+
+_ONE_THREAD: Final = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+)
+QUADRIGA: Final = (sys.executable, "-m", "quadriga")
+_LAST_WORDS: Final = 12  # lines of a failed process's log that are shown
+_LOOK: Final = 0.05  # s
+_EARLY: Final = 4.0  # s, by which others may leave before the sim server: it closes politely
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessSpec:
+    """One process of the team.
+
+    Attributes:
+        name: its name on the bus and of its log file.
+        command: its command line; `--parent PID` is added.
+        grace: how long it may take to leave once the walk is over or it is told to, s.
+    """
+
+    name: str
+    command: tuple[str, ...]
+    grace: float
+
+
+def table(
+    config: Config, run_dir: Path, predictor: Path | None, sha256: str
+) -> tuple[ProcessSpec, ...]:
+    """The processes of a walk, in the order in which they are stopped."""
+    config_file = ("--config", str(run_dir / "config.toml"))
+    fitted = () if predictor is None else ("--predictor", str(predictor))
+    rows = [ProcessSpec(SIM, (*QUADRIGA, "sim", *config_file), 5.0)]
+    rows += [
+        ProcessSpec(name, (*QUADRIGA, "agent", "--robot", name, *fitted, *config_file), 5.0)
+        for name in robot_names(config.team.robots)
+    ]
+    if config.planner.kind in CENTRAL:
+        rows.append(ProcessSpec(PLANNER, (*QUADRIGA, "plan", *fitted, *config_file), 5.0))
+    rows.append(ProcessSpec(OPERATOR, (*QUADRIGA, "operate", *config_file), 5.0))
+    if config.recorder.enabled:
+        to = ("-o", str(run_dir / "run.mcap"), "--predictor-sha256", sha256)
+        rows.append(ProcessSpec(RECORDER, (*QUADRIGA, "record", *to, *config_file), 20.0))
+    return tuple(rows)
+
+
+class Launch:
+    """Running processes. Leaving the context stops whatever still runs."""
+
+    def __init__(self, rows: Sequence[ProcessSpec], logs: Path) -> None:
+        """Start one process per row, each in a session of its own, its output in `logs`."""
+        self._logs = logs
+        self._running: dict[str, subprocess.Popen[bytes]] = {}
+        self._rows = {row.name: row for row in rows}
+        logs.mkdir(parents=True, exist_ok=True)
+        environment = {**os.environ, **dict.fromkeys(_ONE_THREAD, "1")}
+        for row in rows:
+            with (logs / f"{row.name}.log").open("wb") as log:
+                self._running[row.name] = subprocess.Popen(
+                    [*row.command, "--parent", str(os.getpid())],
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    env=environment,
+                    start_new_session=True,
+                )
+
+    @property
+    def pids(self) -> dict[str, int]:
+        """Process id of each that still runs, by name."""
+        return {name: process.pid for name, process in self._running.items()}
+
+    def watch(self, look: Callable[[], bool]) -> None:
+        """Wait until the sim server has ended the walk, then until the others have left.
+
+        Args:
+            look: called all the time; returns whether to stop the walk now.
+
+        Raises:
+            ProcessError: a process failed, left while the walk went on, or stays after it; it
+                names the process, how it ended and its last words.
+        """
+        left, early = 0.0, ""
+        while SIM in self._running:
+            for name in list(self._running):
+                if self._reap(name) and name != SIM:
+                    left, early = left or monotonic(), early or name
+            if left and monotonic() - left > _EARLY:
+                raise self._error(early, "an end while the team walked", "to walk until the end")
+            if look():
+                self.stop()
+                return
+            sleep(_LOOK)
+        for name in list(self._running):
+            self._await(name)
+
+    def _await(self, name: str) -> None:
+        """Wait for a process that is about to leave by itself."""
+        deadline = monotonic() + self._rows[name].grace
+        while not self._reap(name):
+            if monotonic() > deadline:
+                raise self._error(name, "no end after the walk", "to leave by itself")
+            sleep(_LOOK)
+
+    def _reap(self, name: str) -> bool:
+        """Whether a process has ended; an error if it failed."""
+        status = self._running[name].poll()
+        if status is None:
+            return False
+        del self._running[name]
+        if status:
+            how = f"signal {-status}" if status < 0 else f"exit status {status}"
+            raise self._error(name, how, "exit status 0")
+        return True
+
+    def _error(self, name: str, got: str, expected: str) -> ProcessError:
+        last = f"last words in {self._logs / name}.log:\n{self._last_words(name)}"
+        return ProcessError(f"process {name}", got, expected, last)
+
+    def _last_words(self, name: str) -> str:
+        with (self._logs / f"{name}.log").open(encoding="utf-8", errors="replace") as log:
+            lines = deque(log, maxlen=_LAST_WORDS)
+        return "".join(f"  {line}" for line in lines).rstrip() or "  (none)"
+
+    def stop(self) -> None:
+        """Stop what still runs: SIGTERM, the recorder last, and SIGKILL after a grace period.
+
+        The sim server then tells the others that the walk is over, and the recorder hears it.
+        """
+        last = [RECORDER] if RECORDER in self._running else []
+        self._terminate([name for name in self._running if name != RECORDER])
+        self._terminate(last)
+        self._running.clear()
+
+    def _terminate(self, names: Collection[str]) -> None:
+        begun = monotonic()
+        for name in names:
+            self._running[name].terminate()
+        for name in names:
+            process, deadline = self._running[name], begun + self._rows[name].grace
+            try:
+                process.wait(max(deadline - monotonic(), 0.0))
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()

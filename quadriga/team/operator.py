@@ -1,0 +1,123 @@
+"""SHELL of the operator: the team's velocity reference ahead of time, and the emergency stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from quadriga.shared.bus.barrier import OPERATOR, SIM, meet
+from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
+from quadriga.shared.config.reference_trace import trace_of
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import BusError, MessageError
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.runtime.signals import stop_on_signals
+from quadriga.shared.wire.codec import decode, encode, sendable
+from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.messages import EStop, Event, Reference, Truth
+from quadriga.shared.wire.topics import ESTOP, EVENT, REFERENCE, TRUTH
+from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
+
+_AHEAD: Final = 4  # epochs; agents in lock-step wait for the one in force
+_ESTOP_WAIT: Final = 5.0  # s, longest search for the team
+_LONGEST_REASON: Final = 200  # characters; it becomes part of every agent's status
+
+
+def reference_at(config: Config, tick: int) -> Reference:
+    """The reference for `tick`: nothing while the team stands, then a linear ramp to full speed.
+
+    Full speed is the configured one, or what the configured trace asks for at that time.
+
+    Raises:
+        ConfigError: the trace cannot be read, or is none.
+    """
+    asked, trace = config.reference, trace_of(config)
+    walked = tick - config.gait.stand_ms
+    ramp_ms = 1000 * asked.ramp
+    factor = min(1.0, max(0, walked) / ramp_ms) if ramp_ms else float(walked >= 0)
+    vx, vy, wz = asked.vx, asked.vy, asked.wz
+    if trace is not None:
+        vx, vy, wz = trace.at(1e-3 * max(0, walked))
+    return Reference(tick, tick * 1_000_000, factor * vx, factor * vy, factor * wz, asked.height)
+
+
+def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
+    """Publish the reference, following the world's time, until the walk ends or it is stopped.
+
+    Args:
+        config: the team's configuration.
+        stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
+
+    Raises:
+        BusError: the bus cannot be opened, or the team is not complete in time.
+    """
+    stopped = stopped or stop_on_signals()
+    team = config.team.name
+    with Bus.open(config.bus, team, OPERATOR, stopped) as bus:
+        bus.subscribe(TRUTH.key(team))
+        bus.subscribe(EVENT.key(team))
+        put = bus.publisher(REFERENCE.key(team))
+        if not meet(bus, config, stopped):
+            return
+        tick, epoch, over = 0, 0, False
+        while True:
+            while EPOCH_MS * epoch <= tick + EPOCH_MS * _AHEAD:
+                put(encode(reference_at(config, EPOCH_MS * epoch)))
+                epoch += 1
+            if over or stopped():
+                return
+            bus.declare(READY)
+            tick, over = _next_tick(bus, tick)
+
+
+def _next_tick(bus: Bus, tick: int) -> tuple[int, bool]:
+    """The world's time as far as it has come, and whether the walk is over.
+
+    A walk ends at the same tick for an operator who is behind: equal walks have equal references.
+    """
+    packet = bus.get(POLL)
+    if packet is None:
+        return tick, SIM not in bus.present(HERE)
+    for key, payload in (packet, *bus.drain()):
+        try:
+            if key == TRUTH.key(bus.team):
+                tick = max(tick, decode(payload, Truth).tick)
+            elif (event := decode(payload, Event)).kind == "stop":
+                return max(tick, event.tick - 1), True
+        except MessageError:
+            continue  # not for the operator to count: the recorder keeps it
+    return tick, False
+
+
+def stop_team(config: Config, reason: str) -> None:
+    """Send one emergency stop to every robot of the team.
+
+    Whatever the reason's text is and whoever else tells the time, agents can read it.
+
+    Raises:
+        BusError: the bus cannot be opened, or some robots were not reached.
+    """
+    team, names = config.team.name, robot_names(config.team.robots)
+    reason = sendable(reason, _LONGEST_REASON)
+    with Bus.open(config.bus, team, "estop") as bus:
+        put = bus.publisher(ESTOP.key(team))
+        bus.subscribe(TRUTH.key(team))
+        reached: frozenset[str] = frozenset()
+        tick, stamp_ns, deadline = 0, 0, monotonic() + _ESTOP_WAIT
+        while reached < frozenset(names) and monotonic() < deadline:
+            truth = bus.get(POLL)
+            tick, stamp_ns = (truth and envelope(truth[1])) or (tick, stamp_ns)
+            there = frozenset(names) & bus.present(HERE)
+            if there > reached:  # at once, whoever is still absent: to hear it twice is no harm
+                put(encode(EStop(tick, stamp_ns, reason)))
+                reached = there
+        if absent := [name for name in names if name not in reached]:
+            put(encode(EStop(tick, stamp_ns, reason)))  # one who is there but does not say so hears
+            others = ", ".join(sorted(reached)) or "nobody"
+            raise BusError(
+                f"emergency stop of team {team!r}",
+                f"no {', '.join(absent)} on the bus after {_ESTOP_WAIT:g} s",
+                f"all of {', '.join(names)}",
+                f"{others} heard it at once; another bus.endpoint, team.name or team.robots?",
+            )

@@ -1,0 +1,86 @@
+"""The line a user watches while the team walks, from what is on the bus."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import MessageError
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Event, Truth
+from quadriga.shared.wire.topics import EVENT, TRUTH
+
+NAME = "launcher"
+
+
+class WalkProgress:
+    """Follows the walk on the bus and shows it; a context that must be entered.
+
+    Attributes:
+        fallen: robots that have fallen so far.
+    """
+
+    def __init__(self, config: Config, console: Console) -> None:
+        self._config, self._console = config, console
+        self._bus = Bus.open(config.bus, config.team.name, NAME)
+        self._bus.subscribe(TRUTH.key(config.team.name))
+        self._bus.subscribe(EVENT.key(config.team.name))
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.fields[text]}"),
+            console=console,
+        )
+        self._task = self._bar.add_task("starting", total=config.world.seconds, text="")
+        self._begun = 0.0
+        self.fallen: list[str] = []
+
+    def update(self) -> None:
+        """Show what has arrived since the last call."""
+        truth = None
+        for key, payload in self._bus.drain():
+            try:
+                if key == TRUTH.key(self._bus.team):
+                    truth = decode(payload, Truth)
+                else:
+                    self._note(decode(payload, Event))
+            except MessageError:
+                continue  # the recorder keeps it
+        if truth is not None:
+            self._show(truth)
+
+    def _note(self, event: Event) -> None:
+        if event.kind == "fall":
+            self.fallen.append(event.robot)
+        if event.kind in ("fall", "fault", "push"):
+            self._bar.console.print(
+                f"{event.tick / 1000:.2f} s: {event.kind} {event.robot} {event.detail}",
+                markup=False,
+            )
+
+    def _show(self, truth: Truth) -> None:
+        now, seconds = monotonic(), truth.tick / 1000
+        self._begun = self._begun or now - seconds
+        speed = float(np.linalg.norm(truth.base_vel.mean(axis=0)[:2]))
+        pace = seconds / max(now - self._begun, 1e-3)
+        self._bar.update(
+            self._task,
+            description="walking",
+            completed=seconds,
+            text=f"{seconds:.1f}/{self._config.world.seconds:g} s  {speed:.2f} m/s  "
+            f"{pace:.2f} × real time",
+        )
+
+    def __enter__(self) -> Self:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+        self._bus.close()

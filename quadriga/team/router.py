@@ -1,0 +1,38 @@
+"""SHELL of the router: the processes of a team in client mode reach each other through it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Final
+
+from quadriga.shared.bus.barrier import SIM
+from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.runtime.clock import sleep
+from quadriga.shared.runtime.signals import stop_on_signals
+
+_STAGES: Final = 3  # waits of the barrier: for the router, for everyone's presence, for readiness
+
+
+def run(
+    config: Config, listen: str, *, once: bool, stopped: Callable[[], bool] | None = None
+) -> None:
+    """Route until SIGINT or SIGTERM, or until one walk is over.
+
+    Args:
+        config: the team's configuration.
+        listen: the endpoint the others connect to.
+        once: leave when the team of the configuration has walked and everyone has left.
+        stopped: asked often whether to stop; by default a flag that the two signals raise.
+
+    Raises:
+        BusError: the endpoint cannot be opened; or, with `once`, the team did not assemble.
+    """
+    stopped = stopped or stop_on_signals()
+    with Bus.route(listen, config.team.name) as bus:
+        print(f"routing at {listen}", file=sys.stderr, flush=True)
+        if once:
+            bus.wait_for(READY, [SIM], _STAGES * config.bus.barrier_timeout, stopped)
+        while not stopped() and (bus.linked or not once):
+            sleep(POLL)

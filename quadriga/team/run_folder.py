@@ -1,0 +1,140 @@
+"""The run folder: made before the walk, filled with figures and pictures after it."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+
+from rich.console import Console
+
+from quadriga.pictures.figures import draw
+from quadriga.pictures.render import render
+from quadriga.recordings.summary import RECORDING, print_table, summarise
+from quadriga.recordings.traces import read_traces
+from quadriga.report.about import absent
+from quadriga.report.page import PAGE, write_page
+from quadriga.report.run import build_run, read_run
+from quadriga.shared.errors import ConfigError, ProcessError
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.clock import wall_ns
+
+RUNS: Final = Path("runs")
+CONFIG: Final = "config.toml"  # the configuration in force, in a run folder
+
+
+def make_run_dir(out: Path | None) -> Path:
+    """A new run folder, or an existing one without a recording.
+
+    Args:
+        out: the folder; None takes `runs/<date>-<time>`, with a number if there is one already.
+
+    Raises:
+        ConfigError: it holds a recording already, or cannot be made.
+    """
+    if out is not None and (out / RECORDING).exists():
+        raise ConfigError(f"--out {out}", "a folder with a recording", "a new folder")
+    try:
+        if out is None:
+            return _folder_of_its_own()
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ConfigError(f"--out {out or RUNS}", reason, "a folder that can be made") from None
+    return out
+
+
+def check_own_config(given: Path | None, out: Path | None) -> None:
+    """Refuse to write the configuration in force over the file that a user wrote.
+
+    Args:
+        given: the file of `--config`.
+        out: the folder asked for.
+
+    Raises:
+        ConfigError: it is `config.toml` in that folder.
+    """
+    if given is not None and out is not None and given.resolve() == (out / CONFIG).resolve():
+        raise ConfigError(
+            f"--out {out}",
+            f"the folder of --config {given}",
+            "another folder",
+            f"the configuration in force is written to its {CONFIG}",
+        )
+
+
+def _folder_of_its_own() -> Path:
+    """`runs/<date>-<time>`, with a number where another walk began in the same second."""
+    now = datetime.fromtimestamp(1e-9 * wall_ns(), UTC).astimezone()
+    name, number = f"{now:%Y%m%d-%H%M%S}", 1
+    while True:
+        run_dir = RUNS / (f"{name}-{number}" if number > 1 else name)
+        try:
+            run_dir.mkdir(parents=True)
+        except FileExistsError:
+            number += 1
+        else:
+            return run_dir
+
+
+def report(run_dir: Path, *, pictures: bool, console: Console) -> dict[str, Any]:
+    """Sum up the recording in `run_dir`, draw its figures, write its page, show its table.
+
+    Returns:
+        The summary.
+
+    Raises:
+        RecordingError: there is no recording, it is empty or foreign, or a file cannot be written.
+        ProcessError: the walk did not come to its end.
+    """
+    recording = Recording(run_dir / RECORDING)
+    traces = read_traces(recording)
+    summary = summarise(run_dir, traces)
+    draw(run_dir, traces)
+    write_page(build_run(recording, traces, summary), run_dir / PAGE)
+    if pictures:
+        with console.status("rendering"):
+            render(run_dir)
+    print_table(summary, console)
+    console.print(f"run folder: {run_dir}", markup=False, highlight=False)
+    _check_end(summary)
+    return summary
+
+
+def report_file(path: Path, page: Path | None, *, console: Console) -> dict[str, Any]:
+    """Write the page of a recording that may have come from elsewhere, show its table.
+
+    Args:
+        path: the recording.
+        page: the file to write; by default beside the recording, with its name.
+        console: where to show the table.
+
+    Returns:
+        The summary.
+
+    Raises:
+        RecordingError: the recording is empty or foreign, or the page cannot be written.
+    """
+    run = read_run(path)
+    written = write_page(run, page or path.with_suffix(".html"))
+    print_table(dict(run.summary), console)
+    for said in absent(run):
+        console.print(said, style="yellow", markup=False, highlight=False)
+    console.print(f"page: {written}", markup=False, highlight=False)
+    return dict(run.summary)
+
+
+def went_wrong(summary: dict[str, Any]) -> bool:
+    """Whether a robot fell, or stopped for a reason of its own before the end."""
+    return bool(summary["fell"] or summary["stop_reasons"])
+
+
+def _check_end(summary: dict[str, Any]) -> None:
+    end = summary["end"]
+    if not end or end.startswith("signal"):
+        raise ProcessError(
+            "the walk",
+            f"an end at {summary['duration']:.1f} s",
+            "world.seconds or a fall",
+            "the sim server was told to stop" if end else "the sim server or its link failed",
+        )

@@ -1,0 +1,63 @@
+"""The named scenarios: configuration files of `deploy/scenarios`, the paper's and beyond."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from quadriga.shared.config.reference_trace import scenario_folder
+from quadriga.shared.errors import ConfigError
+
+LABEL: Final = "world.scenario"  # the key that carries a scenario's name
+_SUFFIX: Final = ".toml"
+
+
+def names() -> tuple[str, ...]:
+    """The scenarios there are, sorted."""
+    return tuple(sorted(file.stem for file in scenario_folder().glob(f"*{_SUFFIX}")))
+
+
+def path(name: str) -> Path:
+    """The file of a scenario.
+
+    Args:
+        name: one of `names`, or the path of any configuration file (`….toml`).
+
+    Raises:
+        ConfigError: there is no such scenario.
+    """
+    if name.endswith(_SUFFIX):
+        return Path(name)  # whoever reads it says if it is not there
+    if name not in names():
+        raise ConfigError(
+            "--scenario",
+            repr(name),
+            f"one of {', '.join(names())}, or a TOML file",
+            "`quadriga scenarios` describes them",
+        )
+    return scenario_folder() / f"{name}{_SUFFIX}"
+
+
+def label(name: str) -> str:
+    """What a walk of the scenario is labelled with: its name, or that of its file."""
+    return Path(name).stem if name.endswith(_SUFFIX) else name
+
+
+def description(name: str) -> str:
+    """What a scenario is: the comment at the top of its file, in one line; "" if there is none.
+
+    Raises:
+        ConfigError: there is no such scenario, or its file cannot be read.
+    """
+    file = path(name)
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "bytes that are not UTF-8"
+        raise ConfigError(str(file), reason, "a readable TOML file") from None
+    said = []
+    for line in lines:
+        if not line.startswith("#"):
+            break
+        said.append(line.removeprefix("#").strip())
+    return " ".join(said)

@@ -1,0 +1,85 @@
+"""The main job: a predictor, all processes, a walk, and what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from rich.console import Console
+
+from quadriga.agents.predictor.store import load, predictor_sha256
+from quadriga.identification.identify import ensure_predictor
+from quadriga.replay.recorded_predictor import keep
+from quadriga.shared.config.reference_trace import trace_of
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.runtime.signals import stop_flag
+from quadriga.sim_server.world.payload import loads
+from quadriga.sim_server.world.scenario import build_scenario
+from quadriga.team.launch import Launch, ProcessSpec, table
+from quadriga.team.progress import WalkProgress
+from quadriga.team.run_folder import CONFIG, make_run_dir, report, went_wrong
+from quadriga.warm_up import warm_up
+
+OK: Final = 0
+FELL: Final = 1
+INTERRUPTED: Final = 130
+
+
+def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) -> int:
+    """Walk the team once; 0 if all walked to the end, 1 if one fell or stopped, 130 if interrupted.
+
+    Args:
+        config: the team's configuration.
+        out: the run folder; by default `runs/<date>-<time>`.
+        pictures: whether to render the walk.
+        console: where to show it.
+
+    Raises:
+        ProcessError: a process failed or left too early, or the walk did not come to its end.
+        QuadrigaError: anything a user can put right before the walk begins.
+    """
+    build_scenario(config, loads(config))
+    trace_of(config)
+    run_dir = make_run_dir(out)
+    warm_up(config, console)
+    predictor, sha256 = None, ""
+    if config.planner.kind != "none":
+        predictor = ensure_predictor(config, console)
+        sha256 = predictor_sha256(load(predictor, config)[0])
+        keep(predictor, run_dir)
+    (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
+    rows = table(config, run_dir, predictor, sha256)
+    with stop_flag() as stopped:
+        fallen = follow(config, rows, run_dir, stopped, console)
+        if stopped():
+            console.print(f"interrupted; what was recorded is in {run_dir}", markup=False)
+            return INTERRUPTED
+    if not config.recorder.enabled:
+        return FELL if fallen else OK
+    summary = report(run_dir, pictures=pictures, console=console)
+    return FELL if fallen or went_wrong(summary) else OK
+
+
+def follow(
+    config: Config,
+    rows: tuple[ProcessSpec, ...],
+    run_dir: Path,
+    stopped: Callable[[], bool],
+    console: Console,
+) -> list[str]:
+    """Run the processes until the walk is over; the robots that fell.
+
+    Raises:
+        ProcessError: a process failed or left too early.
+    """
+    with Launch(rows, run_dir / "logs") as launch, WalkProgress(config, console) as progress:
+
+        def look() -> bool:
+            progress.update()
+            return stopped()
+
+        launch.watch(look)
+        progress.update()
+        return progress.fallen

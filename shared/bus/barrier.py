@@ -1,0 +1,70 @@
+"""The start-up barrier: nobody walks before everybody is there, linked and warmed up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
+from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.errors import BusError
+from quadriga.shared.robot.a1 import robot_names
+
+SIM: Final = "sim"
+OPERATOR: Final = "operator"
+RECORDER: Final = "recorder"
+PLANNER: Final = "planner"  # plans for all robots, if one process does
+
+
+def members(config: Config) -> frozenset[str]:
+    """Names of all processes of a team."""
+    names = {SIM, OPERATOR, *robot_names(config.team.robots)}
+    names |= {RECORDER} if config.recorder.enabled else set()
+    names |= {PLANNER} if config.planner.kind in CENTRAL else set()
+    return frozenset(names)
+
+
+def meet(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
+    """Announce this process, whose subscribers are declared, and wait until all others are here.
+
+    A token is seen over the link its process uses for everything else, behind its subscriptions:
+    whoever is seen will receive what is published from now on. False if `stopped()` came first.
+
+    Raises:
+        BusError: some did not come in time, the team walks already, or has such a member already.
+    """
+    bus.declare(HERE)
+    present = bus.wait_for(HERE, members(config), config.bus.barrier_timeout, stopped)
+    if present and SIM in bus.present(READY):
+        raise BusError(
+            f"team {bus.team!r} at {config.bus.endpoint}",
+            "a team that walks already",
+            "a network without this team",
+            "another team.name or bus.endpoint is needed",
+        )
+    _check_single(bus, config)
+    return present
+
+
+def start_together(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
+    """The sim server's wait until all others are ready. False if `stopped()` came first.
+
+    Raises:
+        BusError: some were not ready in time, or two carry one name.
+    """
+    others = members(config) - {SIM}
+    if not bus.wait_for(READY, others, config.bus.barrier_timeout, stopped):
+        return False
+    _check_single(bus, config)
+    bus.declare(READY)
+    return True
+
+
+def _check_single(bus: Bus, config: Config) -> None:
+    if doubles := bus.doubles(HERE):
+        raise BusError(
+            f"team {bus.team!r} at {config.bus.endpoint}",
+            f"two processes named {', '.join(sorted(doubles))}",
+            "one of each name",
+            "a second team with this team.name, or a process started twice",
+        )

@@ -1,0 +1,292 @@
+"""The bus: publishers, one inbox and presence tokens over Zenoh. The only import of zenoh."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from queue import Empty, SimpleQueue
+from typing import Any, Final, Self
+
+import zenoh
+
+from quadriga.shared.bus.zenoh_settings import at_fault, member_settings, router_settings
+from quadriga.shared.config.sections import BusConfig
+from quadriga.shared.errors import BusError
+from quadriga.shared.runtime.clock import monotonic, sleep
+
+Packet = tuple[str, bytes]  # key, payload as received
+
+HERE: Final = "here"  # a process has declared its subscribers
+READY: Final = "ready"  # it has also warmed up: the world may start
+ROUTER: Final = "router"
+POLL: Final = 0.1  # s, longest wait before a loop looks at its stop flag
+_ACK: Final = "received"  # key of the question whether everything before it has arrived
+_ACK_TIMEOUT: Final = 2.0  # s
+_LINK_TIMEOUT: Final = 5.0  # s
+_NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
+
+
+class Bus:
+    """One process's connection to its team.
+
+    Every subscription feeds one inbox, so a process waits in one place. Presence is a liveliness
+    token `<team>/<name>/<stage>/<session>`: it vanishes within milliseconds when its process dies,
+    and the session in it tells two processes of the same name apart.
+
+    A process's last packets may arrive after its token has vanished.
+    """
+
+    def __init__(self, session: zenoh.Session, team: str, name: str) -> None:
+        """Use `Bus.open`."""
+        self.team, self.name = team, name
+        self._session = session
+        self._me = str(session.info.zid())
+        self._inbox: SimpleQueue[zenoh.Sample] = SimpleQueue()
+        self._tokens: set[tuple[str, str, str]] = set()  # name, stage, session of the others
+        self._declared: dict[str, zenoh.LivelinessToken] = {}
+        self._closed = False
+        self._kept: list[Any] = []  # Zenoh drops publishers and subscribers nobody refers to
+        self._kept.append(
+            session.liveliness().declare_subscriber(
+                f"{team}/*/*/*", _direct(self._note_token), history=True
+            )
+        )
+        ack = f"{team}/{name}/{_ACK}"
+        self._kept.append(
+            session.declare_queryable(ack, _direct(lambda query: query.reply(ack, b"")))
+        )
+
+    @classmethod
+    def open(
+        cls, bus: BusConfig, team: str, name: str, stopped: Callable[[], bool] | None = None
+    ) -> Self:
+        """Join the network as process `name` of `team`.
+
+        In peer mode the process named `sim` listens on `bus.endpoint`; all others connect to it,
+        now or when it appears, and learn of each other through it, so that links are direct.
+        In client mode the router must be there, or appear within `bus.barrier_timeout` if
+        `stopped` is given.
+
+        Raises:
+            BusError: the endpoint is malformed, cannot be bound, or is already in use; or there
+                is no router.
+            KeyboardInterrupt: `stopped()` came before the router.
+        """
+        settings = member_settings(bus, name)
+        deadline = monotonic() + (bus.barrier_timeout if stopped else 0.0)
+        while True:
+            try:
+                return cls(_open(settings, name), team, name)
+            except BusError as error:
+                if _NO_LINK not in error.got or monotonic() > deadline:
+                    raise
+            if stopped and stopped():
+                raise KeyboardInterrupt
+            sleep(POLL)
+
+    @classmethod
+    def join(cls, bus: BusConfig, team: str, name: str) -> Self:
+        """Join the network at `bus.endpoint`; in peer mode be who listens there if nobody does.
+
+        For a process that must be found although no sim server runs. If somebody listens there,
+        this waits for the link to them.
+
+        Raises:
+            BusError: the endpoint is malformed, or in client mode there is no router.
+        """
+        if bus.mode == "peer":
+            with suppress(BusError):  # somebody listens there, or it is another machine's
+                settings = member_settings(bus, name, hub=True)
+                return cls(_open(settings, name), team, name)
+        joined = cls.open(bus, team, name)
+        deadline = monotonic() + _LINK_TIMEOUT
+        while not joined.linked and monotonic() < deadline:
+            sleep(0.005)
+        return joined
+
+    @classmethod
+    def route(cls, listen: str, team: str) -> Self:
+        """Be the router through which the processes in client mode reach each other.
+
+        It passes on what any team sends, and sees the presence of `team`.
+
+        Args:
+            listen: the endpoint they connect to; `tcp/0.0.0.0:PORT` accepts other machines.
+            team: the team to look at.
+
+        Raises:
+            BusError: the endpoint is malformed, cannot be bound, or is already in use.
+        """
+        return cls(_open(router_settings(listen), ROUTER), team, ROUTER)
+
+    @property
+    def linked(self) -> bool:
+        """Whether anyone is linked to this process at the moment."""
+        return bool(self._session.info.links())
+
+    def publisher(self, key: str, *, droppable: bool = False) -> Callable[[bytes], None]:
+        """A function that sends a payload on `key`.
+
+        Args:
+            key: the full key, `<team>/…`.
+            droppable: when a receiver is slow, drop (real time) instead of waiting for it.
+        """
+        control = zenoh.CongestionControl.DROP if droppable else zenoh.CongestionControl.BLOCK
+        publisher = self._session.declare_publisher(key, express=True, congestion_control=control)
+        self._kept.append(publisher)
+        put: Callable[[bytes], None] = publisher.put
+        return put
+
+    def subscribe(self, key: str) -> None:
+        """Feed what others publish on `key` (may hold `*` and `**`) into the inbox."""
+        self._kept.append(
+            self._session.declare_subscriber(
+                key, _direct(self._inbox.put), allowed_origin=zenoh.Locality.REMOTE
+            )
+        )
+
+    def get(self, timeout: float) -> Packet | None:
+        """The oldest packet of the inbox, waiting at most `timeout` seconds for one."""
+        try:
+            sample = self._inbox.get(timeout=timeout)
+        except Empty:
+            return None
+        return str(sample.key_expr), sample.payload.to_bytes()
+
+    def drain(self) -> list[Packet]:
+        """Everything in the inbox, oldest first, without waiting."""
+        packets = []
+        while not self._inbox.empty():
+            sample = self._inbox.get_nowait()
+            packets.append((str(sample.key_expr), sample.payload.to_bytes()))
+        return packets
+
+    def declare(self, stage: str) -> None:
+        """Tell everyone that this process has reached `stage`; again has no effect."""
+        if stage in self._declared:
+            return
+        key = f"{self.team}/{self.name}/{stage}/{self._me}"
+        self._declared[stage] = self._session.liveliness().declare_token(key)
+
+    def withdraw(self) -> None:
+        """Take back all of this process's tokens: it is about to leave."""
+        while self._declared:
+            self._declared.popitem()[1].undeclare()  # type: ignore[no-untyped-call]
+
+    def present(self, stage: str) -> frozenset[str]:
+        """Names of the other processes that are at `stage` now."""
+        return frozenset(name for name, at, _ in self._tokens.copy() if at == stage)
+
+    def doubles(self, stage: str) -> frozenset[str]:
+        """Names that two processes of the team carry at `stage`, this one's included."""
+        sessions = [name for name, at, _ in self._tokens.copy() if at == stage]
+        sessions += [self.name] if stage in self._declared else []
+        return frozenset(name for name in sessions if sessions.count(name) > 1)
+
+    def wait_for(
+        self, stage: str, names: Iterable[str], timeout: float, stopped: Callable[[], bool]
+    ) -> bool:
+        """Wait until all `names` are at `stage`; False if `stopped()` came first.
+
+        Raises:
+            BusError: some were still absent after `timeout` seconds; the message names them.
+        """
+        wanted = frozenset(names) - {self.name}
+        deadline = monotonic() + timeout
+        while absent := wanted - self.present(stage):
+            if stopped():
+                return False
+            if monotonic() > deadline:
+                raise BusError(
+                    f"barrier of team {self.team!r}, seen by {self.name}",
+                    f"no {', '.join(sorted(absent))} at stage {stage!r} after {timeout:g} s",
+                    f"{', '.join(sorted(wanted))}",
+                    "not started, failed to start, or another bus.endpoint or team.name"
+                    if self.linked
+                    else "no link to anyone: is bus.endpoint right and reachable?",
+                )
+            sleep(0.005)
+        return True
+
+    def close(self) -> None:
+        """Leave the network once the others have received what this process published.
+
+        Zenoh takes ten seconds to close a session from which a frozen process has yet to read, and
+        then fails. Such a session hears nothing any more, and ends with the process: it closes one
+        that nobody refers to, even when the interpreter ends, so a reference is left for good.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        self.withdraw()
+        if self._flush():
+            self._session.close()  # type: ignore[no-untyped-call]
+            return
+        for declared in self._kept:
+            declared.undeclare()
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._session))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _flush(self) -> bool:
+        """Wait until all others have received what was published so far; whether they have.
+
+        Zenoh's close drops what a busy receiver or router has not yet taken. A query travels
+        behind the publications on each link, so its answers say that they have arrived.
+        """
+        asked = self._session.get(
+            f"{self.team}/*/{_ACK}",
+            target=zenoh.QueryTarget.ALL,
+            timeout=_ACK_TIMEOUT,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            express=True,
+        )
+        return all(reply.ok is not None for reply in asked)
+
+    def _note_token(self, sample: zenoh.Sample) -> None:
+        _, name, stage, session = str(sample.key_expr).split("/")
+        if session == self._me:
+            return
+        if sample.kind == zenoh.SampleKind.PUT:
+            self._tokens.add((name, stage, session))
+        else:
+            self._tokens.discard((name, stage, session))
+
+
+def _direct(call: Callable[[Any], None]) -> Any:
+    """A Zenoh callback in the receiving thread: a queue's `put` needs no thread of its own."""
+    return zenoh.handlers.Callback(call, indirect=False)
+
+
+def _open(settings: dict[str, Any], name: str) -> zenoh.Session:
+    config, at = zenoh.Config(), ""
+    try:
+        for at, value in settings.items():
+            config.insert_json5(at, json.dumps(value))
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        raise _cannot_open(*at_fault(settings, at, str(error)), name, str(error)) from None
+
+
+def _cannot_open(key: str, endpoint: str, name: str, error: str) -> BusError:
+    if "in use" in error:
+        cause = "another team or program listens there; choose another port"
+    elif _NO_LINK in error:
+        cause = "no router there (`quadriga router`), or a name that does not resolve"
+    elif "assign" in error:
+        cause = "no interface of this machine has that address"
+    else:
+        cause = "a name that does not resolve, or not of the form tcp/HOST:PORT"
+    where = "sim server" if name == "sim" else name
+    return BusError(
+        f"{key} {endpoint!r} of {where}",
+        error.split(" at /")[0],
+        "an endpoint that can be opened",
+        cause,
+    )

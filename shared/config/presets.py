@@ -1,0 +1,51 @@
+"""Named settings of a section, the choices of its key `preset`: each replaces some defaults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+# The plain setting of the paper: scheduled contacts, flat ground, a leashed position reference,
+# moderate gains. Walks on flat ground; see `robust` for what keeps a team up elsewhere.
+_PAPER: Final = MappingProxyType(
+    {
+        "ki_z": 0.0, "kp_xy": 100.0, "kd_xy": 20.0, "ki_xy": 0.0, "position_error_limit": 0.05,
+        "kp_tilt": 400.0, "kd_tilt": 40.0, "contact_detection": False, "swing_height": 0.07,
+        "load_time": 0.0, "reject_side_contacts": False, "liftoff_hold_ms": 0, "reflex_ms": 0,
+        "swing_delay": 0.0,
+        "track_sinking_trunk": False, "flight": False, "slip_speed": 0.0,
+        "swing_acceleration": 1e4, "contact_force": 8.0, "force_min": 2.0,
+        "descent_speed": 0.5, "tilt_length": 1.0, "swing_weight": 1.0,
+    }
+)  # fmt: skip
+
+# Soft enough for planned forces to reach the robot through f_des, and for data that show it.
+_SOFT: Final = MappingProxyType(
+    {
+        "gamma_defect": 1e5, "kp_z": 100.0, "kd_z": 20.0, "ki_z": 0.0, "kp_tilt": 400.0,
+        "kd_tilt": 40.0, "kp_yaw": 50.0, "kd_yaw": 10.0,
+    }
+)  # fmt: skip
+
+# Replans every 10 ms, and weighs more what feed-forward can still correct on a stiff low level.
+# Peers' plans are held, and what was learned is kept, as long as with the usual rate.
+_FAST: Final = MappingProxyType(
+    {
+        "applied": 1, "latency_ms": 1, "Q": (1.2e7, 1e5, 6e5, 2.4e6, 2e6, 3e3),
+        "max_peer_age": 12, "hold_steps": 20, "forgetting": 0.99875,
+    }
+)  # fmt: skip
+
+_USUAL: Final = MappingProxyType[str, Any]({})
+PRESETS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = MappingProxyType(
+    {
+        "controller": MappingProxyType({"robust": _USUAL, "soft": _SOFT, "paper": _PAPER}),
+        "planner": MappingProxyType({"usual": _USUAL, "fast": _FAST}),
+    }
+)
+
+
+def preset_keys(section: str) -> frozenset[str]:
+    """Keys of a section that its presets set; a preset given later replaces them."""
+    return frozenset(key for preset in PRESETS[section].values() for key in preset)

@@ -1,0 +1,157 @@
+"""A recorded course of the velocity reference: a CSV file, replayed over and over."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import sys
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from quadriga.shared.config.sections import Config, ReferenceConfig
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.runtime.places import SOURCE
+
+COLUMNS: Final = ("t", "vx", "vy", "wz")
+ROW_END: Final = ";"  # where a trace stands in a configuration, in one line
+_STREAM: Final = 6  # of the seed
+_SOURCE: Final = SOURCE / "deploy" / "scenarios"
+_INSTALLED: Final = Path(sys.prefix) / "share" / "quadriga" / "scenarios"
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """Samples of a velocity reference, linear in between.
+
+    Attributes:
+        t: times from 0 to the trace's length, shape (m,), s.
+        v: vx, vy, wz, shape (m, 3), m/s and rad/s.
+        begin: time of the trace at which a walk begins, s.
+    """
+
+    t: Array
+    v: Array
+    begin: float = 0.0
+
+    def at(self, seconds: float) -> tuple[float, float, float]:
+        """The vx, vy, wz to walk with `seconds` after the first step."""
+        t = (self.begin + seconds) % float(self.t[-1])
+        vx, vy, wz = (float(np.interp(t, self.t, column)) for column in self.v.T)
+        return vx, vy, wz
+
+
+def scenario_folder() -> Path:
+    """Where scenarios and traces are kept: beside the source, or where it has been installed."""
+    return _SOURCE if _SOURCE.is_dir() else _INSTALLED
+
+
+def trace_of(config: Config) -> Trace | None:
+    """The trace of a configuration, None if it has none.
+
+    Raises:
+        ConfigError: the file cannot be read, or is no trace.
+    """
+    asked = config.reference
+    if not asked.trace:
+        return None
+    path = _path(config)
+    begin = np.random.default_rng((config.world.seed, _STREAM)).uniform(0.0, asked.trace_shift)
+    return _read(path, asked.trace if path is None else "", begin)
+
+
+def trace_sha256(config: Config) -> str:
+    """Digest of the trace's file, empty where the configuration holds more than its name.
+
+    Raises:
+        ConfigError: the file cannot be read.
+    """
+    path = _path(config)
+    try:
+        return "" if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise ConfigError(
+            f"reference.trace {path}", error.strerror or str(error), "a file that can be read"
+        ) from None
+
+
+def inlined(path: Path) -> str:
+    """A trace's file as one line, as `reference.trace` holds it: nothing then depends on the file.
+
+    Raises:
+        ConfigError: the file cannot be read, or is no trace.
+    """
+    rows = _rows(_text(path))
+    _values(f"reference.trace {path}", rows)
+    return ROW_END.join(",".join(row) for row in rows)
+
+
+def _path(config: Config) -> Path | None:
+    """The file of a trace that comes with the project; None of one that is given itself."""
+    name = config.reference.trace
+    if not name or ROW_END in name:
+        return None
+    if "/" in name:  # of a recording from elsewhere: what it names here is something else
+        raise ConfigError(
+            "reference.trace",
+            repr(name),
+            "the trace itself, or the name of one beside the scenarios",
+            "recorded before traces were kept",
+        )
+    return scenario_folder() / name
+
+
+@lru_cache(maxsize=8)
+def _read(path: Path | None, given: str, begin: float) -> Trace:
+    text = given.replace(ROW_END, "\n") if path is None else _text(path)
+    values = _values(f"reference.trace{f' {path}' if path else ''}", _rows(text))
+    values.setflags(write=False)
+    return Trace(values[:, 0], values[:, 1:], begin)
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "bytes that are not UTF-8"
+        raise ConfigError(f"reference.trace {path}", reason, "a file that can be read") from None
+
+
+def _rows(text: str) -> list[list[str]]:
+    lines = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
+    return [[word.strip() for word in row] for row in csv.reader(lines)]
+
+
+def _values(name: str, rows: list[list[str]]) -> Array:
+    """Checked lines t, vx, vy, wz."""
+    if not rows or tuple(rows[0]) != COLUMNS:
+        raise ConfigError(name, ",".join(rows[0]) if rows else "nothing", ",".join(COLUMNS))
+    try:
+        values = np.array([[float(word) for word in row] for row in rows[1:]])
+    except ValueError as error:
+        raise ConfigError(name, str(error), "four numbers a line") from None
+    if values.ndim != 2 or values.shape[1] != len(COLUMNS) or len(values) < 2:
+        raise ConfigError(name, f"numbers of shape {values.shape}", "at least two lines of four")
+    _check(name, values)
+    return values
+
+
+def _check(name: str, values: Array) -> None:
+    t = values[:, 0]
+    if not np.isfinite(values).all() or t[0] != 0.0 or (np.diff(t) <= 0.0).any():
+        raise ConfigError(
+            name, f"times from {t[0]:g} to {t[-1]:g}", "finite numbers, t rising from 0"
+        )
+    for column, key in enumerate(COLUMNS[1:], start=1):
+        limits = ReferenceConfig.__dataclass_fields__[key].metadata
+        low, high = values[:, column].min(), values[:, column].max()
+        if low < limits["low"] or high > limits["high"]:
+            raise ConfigError(
+                name,
+                f"{key} of {low:g} … {high:g}",
+                f"{limits['low']:g} … {limits['high']:g} {limits['unit']}",
+            )

@@ -1,0 +1,45 @@
+"""The configuration of a recorded run, from the recording's metadata."""
+
+from __future__ import annotations
+
+import json
+
+from quadriga.shared.config.load import build
+from quadriga.shared.config.renamed import with_current_names
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError, RecordingError
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.salvage import Salvage
+
+
+def recorded_config(recording: Recording | Salvage) -> Config:
+    """The configuration of a recorded run.
+
+    Raises:
+        RecordingError: the recording holds none, or one with keys or values that this version
+            does not know.
+    """
+    try:
+        sections = json.loads(recording.metadata.get("config_json", ""))
+    except (ValueError, RecursionError):  # the latter for what nests too deeply
+        sections = None
+    if not isinstance(sections, dict):
+        raise RecordingError(
+            str(recording.path), "metadata without a configuration", "config_json in the metadata"
+        )
+    try:
+        return build(with_current_names(sections))
+    except ConfigError as error:
+        raise RecordingError(
+            f"configuration of {recording.path}",
+            f"{error.name} = {error.got}",
+            error.expected,
+            "recorded by another version of quadriga: use that one",
+        ) from None
+    except RecursionError:  # in the words about a value that nests as deeply as JSON permits
+        raise RecordingError(
+            f"configuration of {recording.path}",
+            "values nested in values",
+            "sections of keys",
+            "recorded by something else than quadriga",
+        ) from None

@@ -1,0 +1,50 @@
+"""A recording's metadata as stored: with the version of the format and a checksum."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Mapping
+from typing import Final
+
+from quadriga.shared.errors import RecordingError
+
+FORMAT: Final = 1  # of the recordings that this version writes
+_FORMAT_KEY: Final = "format"
+_CRC_KEY: Final = "crc32"
+
+
+def seal(values: Mapping[str, str]) -> dict[str, str]:
+    """`values` as they are stored."""
+    stored = {**values, _FORMAT_KEY: str(FORMAT)}
+    return {**stored, _CRC_KEY: _crc(stored)}
+
+
+def unseal(stored: Mapping[str, str], name: str) -> dict[str, str]:
+    """What `seal` was given; metadata without a trace of a seal are taken as they are.
+
+    Raises:
+        RecordingError: a newer format, or damaged; `name` is the file's.
+    """
+    values = dict(stored)
+    sealed = any(mark in repr(stored) for mark in (f"'{_FORMAT_KEY}'", _CRC_KEY))
+    if sealed and values.pop(_CRC_KEY, "") != _crc(values):
+        raise RecordingError(
+            name,
+            "metadata that fail their checksum",
+            "metadata as they were written",
+            "a damaged file: `quadriga recover` writes what is readable",
+        )
+    version = values.pop(_FORMAT_KEY, "1")
+    if version != str(FORMAT):
+        raise newer(name, f"a recording of format {version[:20]}", f"format {FORMAT}")
+    return values
+
+
+def newer(name: str, got: str, expected: str) -> RecordingError:
+    """The error of a file that only a later version of this project can read."""
+    return RecordingError(name, got, expected, "recorded by a newer quadriga: update this one")
+
+
+def _crc(values: Mapping[str, str]) -> str:
+    return f"{zlib.crc32(json.dumps(dict(values), sort_keys=True).encode()):08x}"

@@ -1,0 +1,227 @@
+"""Wire types: one frozen dataclass per message, shape, unit and frame stated per field.
+
+Arrays are float64; a shape entry that is a string is a length shared by all fields of one
+message that use the same letter (`N` horizon samples, `n` robots, `k` yokes).
+Every message carries `tick` (1 ms of world time) and `stamp_ns` (the world's time of that tick).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import partial
+from itertools import accumulate
+from typing import Any, ClassVar, Self, TypeVar, dataclass_transform
+
+import numpy as np
+
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.runtime.record import record
+
+Dim = int | str
+F = TypeVar("F", bound="Flat")
+
+
+def array(*shape: Dim, unit: str, frame: str = "-") -> Any:
+    """Declare an array field of the wire: its shape, unit and frame."""
+    return field(metadata={"shape": shape, "unit": unit, "frame": frame})
+
+
+def plain(kind: type, doc: str) -> Any:
+    """Declare a scalar, text, list or map field of the wire."""
+    return field(metadata={"kind": kind, "doc": doc})
+
+
+@record
+class Message:
+    """Base of all wire messages."""
+
+    SCHEMA: ClassVar[int] = 1
+    tick: int = plain(int, "world time of the content [ms]")
+    stamp_ns: int = plain(int, "world time of the content [ns]")
+
+
+class Flat(Message):
+    """A message whose arrays all have fixed sizes: they are read-only views of one `row`.
+
+    Made of arrays like any other, or with `of` of a row, in the order of its fields.
+
+    Attributes:
+        row: all numbers, float64; not to be changed.
+    """
+
+    __slots__ = ("row",)
+    CUTS: ClassVar[dict[str, slice]] = {}
+    row: Array
+
+    def __init__(self, tick: int, stamp_ns: int, *arrays: Array, **named: Array) -> None:
+        rest = list(self.CUTS)[len(arrays) :]
+        if named.keys() != {*rest}:
+            raise TypeError(f"{type(self).__name__}: got {sorted(named)}, expected {rest}")
+        super().__init__(tick, stamp_ns)
+        parts = dict(zip(self.CUTS, (*arrays, *(named[name] for name in rest)), strict=True))
+        for name, cut in self.CUTS.items():
+            if np.shape(parts[name]) != (cut.stop - cut.start,):
+                got = f"{type(self).__name__}.{name}: got shape {np.shape(parts[name])}"
+                raise ValueError(f"{got}, expected {(cut.stop - cut.start,)}")
+        self.row = np.concatenate([*parts.values()], dtype=float)
+
+    @classmethod
+    def of(cls, tick: int, stamp_ns: int, row: Array) -> Self:
+        """The message of a row, which is kept, not copied."""
+        made = cls.__new__(cls)
+        Message.__init__(made, tick, stamp_ns)
+        made.row = row
+        return made
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+def flat_record(cls: type[F]) -> type[F]:
+    """A record that is `Flat`."""
+    made: Any = dataclass(init=False, eq=False)(cls)
+    made.CUTS = cuts_of(
+        {f.name: f.metadata["shape"][0] for f in fields(made) if "shape" in f.metadata}
+    )
+    for name, cut in made.CUTS.items():
+        setattr(made, name, property(partial(_view, cut)))
+    return made  # type: ignore[no-any-return]
+
+
+def cuts_of(sizes: Mapping[str, int]) -> dict[str, slice]:
+    """Where arrays of these sizes are in a row, one behind the other."""
+    stops = accumulate(sizes.values())
+    return {
+        name: slice(stop - size, stop)
+        for (name, size), stop in zip(sizes.items(), stops, strict=True)
+    }
+
+
+def _view(cut: slice, message: Flat) -> Array:
+    view = message.row[cut]
+    view.setflags(write=False)
+    return view
+
+
+@flat_record
+class State(Flat):
+    """What one real robot measures at `tick`; nothing else may enter here."""
+
+    __slots__ = ()
+    q_joint: Array = array(12, unit="rad", frame="joint")
+    v_joint: Array = array(12, unit="rad/s", frame="joint")
+    tau_joint: Array = array(12, unit="N·m", frame="joint")
+    imu_quat_wxyz: Array = array(4, unit="1", frame="trunk to world")
+    imu_gyro: Array = array(3, unit="rad/s", frame="trunk")
+    imu_accel: Array = array(3, unit="m/s²", frame="trunk (specific force)")
+    foot_force: Array = array(4, unit="N", frame="ground normal")
+
+
+@flat_record
+class Command(Flat):
+    """Motor command; the motor applies `tau + kp (q_des − q) + kd (v_des − v)`, limited."""
+
+    __slots__ = ()
+    tau: Array = array(12, unit="N·m", frame="joint")
+    q_des: Array = array(12, unit="rad", frame="joint")
+    v_des: Array = array(12, unit="rad/s", frame="joint")
+    kp: Array = array(12, unit="N·m/rad", frame="joint")
+    kd: Array = array(12, unit="N·m·s/rad", frame="joint")
+
+
+@record
+class Measurement(Message):
+    """One 100 Hz sample: mean planned forces over the 10 ms that end at `tick`, outputs at `tick`.
+
+    Forces are those that predictors are made for: nominal ones of the scheduled feet with what a
+    plan adds; not what the whole-body controller made of them.
+    """
+
+    u: Array = array(12, unit="N", frame="yaw frame, legs FL FR RL RR")
+    y: Array = array(6, unit="m, m/s, m/s, rad, rad, rad/s", frame="yaw frame")
+    stance: Array = array(4, unit="1 stance, 0 swing", frame="legs FL FR RL RR")
+
+
+@record
+class Plan(Message):
+    """The planner's solution of planning step `step`: N samples of 10 ms from `tick` on."""
+
+    step: int = plain(int, "planning step, tick / (10 · applied samples)")
+    u: Array = array("N", 12, unit="N", frame="yaw frame, legs FL FR RL RR")
+    y: Array = array("N", 6, unit="m, m/s, m/s, rad, rad, rad/s", frame="yaw frame")
+    status: str = plain(str, "solved, or the name of the fallback in force")
+    used: Mapping[str, int] = plain(dict, "for each peer the step of the plan consumed")
+    exchange: int = plain(int, "0: made with peers' plans of the step before; k: k-th answer since")
+
+    @property
+    def serial(self) -> tuple[int, int]:
+        """Order of the plans of one robot: by step, then by exchange."""
+        return self.step, self.exchange
+
+
+@record
+class Status(Message):
+    """An agent's account of itself; wall-clock figures live here and nowhere else."""
+
+    mode: str = plain(str, "stand, walk, stopping, damping or estop")
+    reason: str = plain(str, "why the mode is not walk; empty while walking")
+    estimator: str = plain(str, "kalman or truth")
+    ages_ms: Mapping[str, float] = plain(dict, "age of each input [ms of world time]")
+    counters: Mapping[str, int] = plain(dict, "events counted since the start, by name")
+    planner_ms: Array = array("P", unit="ms wall clock per planner step since the last status")
+    tick_us: Array = array("K", unit="µs wall clock per control tick since the last status")
+
+
+@record
+class Consumed(Message):
+    """What an agent took in at the step of `tick`, all of it: sent where no rule tells it.
+
+    In real time that is every step that took in more than the state after the last one, in
+    lock-step only one at which something was owed, late or passed over (see
+    `agents.inbox.intake_log`). Messages are referred to as `topic:sender:serial`; the serial is
+    the tick, of a plan its step and exchange: `measurement:r1:480`, `plan:r1:12.0`.
+    """
+
+    number: int = plain(int, "how many of these the agent has sent before")
+    passed: int = plain(int, "ticks between the last step and this one, whose states were lost")
+    taken: tuple[str, ...] = plain(list, "the messages taken in, the state of `tick` aside")
+    owed: tuple[str, ...] = plain(list, "in lock-step: topic/sender of what was not waited for")
+
+
+@record
+class Reference(Message):
+    """What the operator asks of the team; in force from `tick` on."""
+
+    vx: float = plain(float, "forward speed in the robot's yaw frame [m/s]")
+    vy: float = plain(float, "leftward speed in the robot's yaw frame [m/s]")
+    wz: float = plain(float, "yaw rate [rad/s]")
+    height: float = plain(float, "trunk height above the ground [m]")
+
+
+@record
+class EStop(Message):
+    """Latched stop for everyone who hears it."""
+
+    reason: str = plain(str, "who stopped the team and why")
+
+
+@record
+class Truth(Message):
+    """The world as the simulator knows it; no agent may use it outside `--estimator truth`."""
+
+    robots: tuple[str, ...] = plain(list, "robot names, the order of the first axis")
+    base_pos: Array = array("n", 3, unit="m", frame="world")
+    base_quat_wxyz: Array = array("n", 4, unit="1", frame="trunk to world")
+    base_vel: Array = array("n", 3, unit="m/s", frame="world")
+    base_omega: Array = array("n", 3, unit="rad/s", frame="world")
+    grf: Array = array("n", 4, 3, unit="N", frame="world")
+    yoke_error: Array = array("k", unit="m")
+    yoke_force: Array = array("k", unit="N")
+
+
+@record
+class Event(Message):
+    """Something happened in the world."""
+
+    kind: str = plain(str, "push, payload, terrain, fault, fall, start or stop")
+    robot: str = plain(str, "the robot concerned, or empty")
+    detail: str = plain(str, "free text")

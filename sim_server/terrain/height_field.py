@@ -1,0 +1,186 @@
+"""Ground given by its height over a grid: hills, ramps, or gravel of stones that lie fixed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import product
+from typing import Final
+
+import mujoco
+import numpy as np
+from scipy import ndimage
+
+from quadriga.shared.robot.a1 import Array
+from quadriga.sim_server.terrain.course import Course, Rectangle
+
+_SUNK: Final = 0.01  # m, how far below the ground plane the field starts: no double contacts there
+_BASE: Final = 0.05  # m, thickness below the lowest point
+
+_SMOOTH_CELL: Final = 0.05  # m, grid of the smooth field
+_SMOOTH_LENGTH: Final = 0.35  # m, distance at which its heights' correlation falls to 1/e
+
+_RAMP_CELL: Final = 0.04  # m, grid of the ramps
+_LEAST_CREST: Final = 0.5  # of the highest
+_RAMP_TURN: Final = math.radians(20.0)  # greatest angle between x and the way the ramps face
+_ROUNDED: Final = 0.08  # m, deviation of the filter that takes the edge off each crest
+_FILTER: Final = 3.0  # deviations that it reaches
+
+_GRAVEL_CELL: Final = 0.015  # m, grid of the gravel
+_STONE_CELL: Final = 0.035  # m, one stone per square of this size
+_STONE_RADIUS: Final = (0.015, 0.03)  # m
+_STONE_HEIGHT: Final = 0.015  # m, how far the largest stone stands out of its bed
+_BED_LENGTH: Final = 0.15  # m, correlation length of the bed that the stones lie on
+
+
+@dataclass(frozen=True, slots=True)
+class HeightField:
+    """Heights over a regular grid, each cell two triangles; the plane z = 0 shows where higher.
+
+    Attributes:
+        extent: the ground covered.
+        z: heights, row r along y and column c along x, shape (rows, columns), m.
+    """
+
+    extent: Rectangle
+    z: Array
+
+    @property
+    def top(self) -> float:
+        """Height of the highest point, m."""
+        return max(0.0, float(self.z.max()))
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Height of the surface that feet touch, at positions of any equal shape, m."""
+        rows, columns = self.z.shape
+        box = self.extent
+        c = (np.asarray(x) - box.x_low) / (box.x_high - box.x_low) * (columns - 1)
+        r = (np.asarray(y) - box.y_low) / (box.y_high - box.y_low) * (rows - 1)
+        inside = (c >= 0.0) & (c <= columns - 1) & (r >= 0.0) & (r <= rows - 1)
+        c0 = np.clip(np.floor(np.where(inside, c, 0.0)).astype(int), 0, columns - 2)
+        r0 = np.clip(np.floor(np.where(inside, r, 0.0)).astype(int), 0, rows - 2)
+        u, v = c - c0, r - r0
+        z00, z01 = self.z[r0, c0], self.z[r0, c0 + 1]
+        z10, z11 = self.z[r0 + 1, c0], self.z[r0 + 1, c0 + 1]
+        # MuJoCo splits each cell along the diagonal from (r, c) to (r + 1, c + 1).
+        below = z00 + u * (z01 - z00) + v * (z11 - z01)
+        above = z00 + u * (z11 - z10) + v * (z10 - z00)
+        surface = np.where(u >= v, below, above)
+        return np.where(inside, np.maximum(surface, 0.0), 0.0)
+
+    def add_to(self, spec: mujoco.MjSpec, contact: dict[str, int], material: str) -> None:
+        """Add the field as one geom of the world body."""
+        rows, columns = self.z.shape
+        box = self.extent
+        half_x, half_y = (box.x_high - box.x_low) / 2.0, (box.y_high - box.y_low) / 2.0
+        low, high = float(self.z.min()), float(self.z.max())
+        spec.add_hfield(
+            name="terrain",
+            nrow=rows,
+            ncol=columns,
+            userdata=self.z.ravel(),
+            size=[half_x, half_y, high - low, _BASE],
+        )
+        spec.worldbody.add_geom(
+            name="terrain",
+            type=mujoco.mjtGeom.mjGEOM_HFIELD,
+            hfieldname="terrain",
+            pos=[box.x_low + half_x, box.y_low + half_y, low],
+            material=material,
+            **contact,
+        )
+
+
+def build_smooth_field(course: Course, height: float, random: np.random.Generator) -> HeightField:
+    """Gaussian hills between 0 and `height`, m."""
+    x, y = _grid(course.extent, _SMOOTH_CELL)
+    hills = _hills(x.shape, _SMOOTH_LENGTH / _SMOOTH_CELL, random)
+    return _field(course, x, y, hills, height)
+
+
+def build_gravel(course: Course, height: float, random: np.random.Generator) -> HeightField:
+    """Stones of 3 to 6 cm on an uneven bed, between 0 and `height`, m.
+
+    The stones are part of the ground: they do not move, roll or sink.
+    """
+    x, y = _grid(course.extent, _GRAVEL_CELL)
+    stand_out = min(_STONE_HEIGHT, height)
+    bed = _hills(x.shape, _BED_LENGTH / _GRAVEL_CELL, random)
+    z = (height - stand_out) * bed + stand_out * _stones(course.extent, x, y, random)
+    return _field(course, x, y, z, height)
+
+
+def build_ramps(
+    course: Course, height: float, random: np.random.Generator, *, slope: float
+) -> HeightField:
+    """Ramps up and down again, one after the other, as wide as the ground.
+
+    Args:
+        course: where the team starts and walks.
+        height: of the highest crest, m; the others are drawn, down to half of it.
+        random: the terrain's random stream.
+        slope: grade of every ramp, rad.
+    """
+    x, y = _grid(course.extent, _RAMP_CELL)
+    heading = random.uniform(-_RAMP_TURN, _RAMP_TURN)
+    way = np.array([np.cos(heading), np.sin(heading)])
+    corners = np.array(list(product(*course.flat.sides)))
+    along, grade = way[0] * x + way[1] * y, np.tan(slope)
+    profile = np.zeros_like(along)
+    for side in (1.0, -1.0):  # ramps at both ends: a team may walk backwards
+        foot = float((side * corners @ way).max()) + _FILTER * _ROUNDED
+        while foot < float((side * along).max()):
+            crest = _SUNK + height * random.uniform(_LEAST_CREST, 1.0)
+            half = crest / grade
+            profile = np.maximum(profile, crest - grade * np.abs(side * along - foot - half))
+            foot += 2.0 * half
+    z = ndimage.gaussian_filter(profile, _ROUNDED / _RAMP_CELL, mode="nearest", truncate=_FILTER)
+    return HeightField(course.extent, course.edge(x, y) * z - _SUNK)
+
+
+def _stones(extent: Rectangle, x: Array, y: Array, random: np.random.Generator) -> Array:
+    """Height of the highest of many random ellipsoids at each grid point, in [0, 1]."""
+    cx, cy = _grid(extent, _STONE_CELL)
+    cx, cy = (a.ravel() + random.uniform(0.0, _STONE_CELL, a.size) for a in (cx, cy))
+    radius = random.uniform(*_STONE_RADIUS, cx.size)
+    tall = radius / _STONE_RADIUS[1]
+    dx, dy = x[0, 1] - x[0, 0], y[1, 0] - y[0, 0]
+    c0 = np.rint((cx - x[0, 0]) / dx).astype(int)
+    r0 = np.rint((cy - y[0, 0]) / dy).astype(int)
+    reach = int(np.ceil(_STONE_RADIUS[1] / min(dx, dy)))
+    z = np.zeros(x.shape)
+    for row in range(-reach, reach + 1):
+        for column in range(-reach, reach + 1):
+            r = np.clip(r0 + row, 0, x.shape[0] - 1)
+            c = np.clip(c0 + column, 0, x.shape[1] - 1)
+            away = ((x[r, c] - cx) ** 2 + (y[r, c] - cy) ** 2) / radius**2
+            np.maximum.at(z, (r, c), tall * np.sqrt(np.clip(1.0 - away, 0.0, None)))
+    return z
+
+
+def _hills(shape: tuple[int, ...], length: float, random: np.random.Generator) -> Array:
+    """Smooth random heights from 0 to 1 whose correlation falls to 1/e over `length` cells.
+
+    White noise filtered by a Gaussian of deviation s has the correlation exp(−r² / 4 s²).
+    """
+    z = ndimage.gaussian_filter(random.standard_normal(shape), length / 2.0, mode="reflect")
+    hills: Array = (z - z.min()) / (z.max() - z.min())
+    return hills
+
+
+def _grid(extent: Rectangle, cell: float) -> tuple[Array, Array]:
+    """Positions of grid points at most `cell` apart, two arrays of shape (rows, columns), m."""
+    columns = int(np.ceil((extent.x_high - extent.x_low) / cell)) + 1
+    rows = int(np.ceil((extent.y_high - extent.y_low) / cell)) + 1
+    x, y = np.meshgrid(
+        np.linspace(extent.x_low, extent.x_high, columns),
+        np.linspace(extent.y_low, extent.y_high, rows),
+    )
+    return x, y
+
+
+def _field(course: Course, x: Array, y: Array, z: Array, height: float) -> HeightField:
+    """The field whose highest point off the flat place is `height`; it rises from below ground."""
+    rise = course.rise(x, y)
+    z = z * (height / (rise * z).max())
+    return HeightField(course.extent, rise * (z + _SUNK) - _SUNK)

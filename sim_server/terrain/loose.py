@@ -1,0 +1,118 @@
+"""Loose stones near feet are bodies of the world; all others lie still and cost nothing.
+
+Thousands of free bodies would take longer than the robots. So the world has a few, and lends one to
+every stone that a low foot comes near; it goes back when the stone lies still and alone again.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any, Final
+
+import numpy as np
+
+from quadriga.shared.robot.a1 import FOOT_RADIUS, Array
+from quadriga.sim_server.terrain.pebbles import SIZES, Pebbles
+
+PERIOD: Final = 4  # ms between two looks
+_MARGIN: Final = 0.01  # m around foot and stone: what a foot covers until the next look, and more
+_LOW: Final = 0.03  # m from the top of the largest stone to a foot that comes near
+_LEAVE: Final = 0.02  # m farther away than where it woke, a stone may fall asleep
+_STILL: Final = (0.02, 1.0)  # m/s, rad/s
+_NOBODY: Final = -1
+
+
+class LooseStones:
+    """Which stone has which body, and where all others lie.
+
+    Attributes:
+        pose: of every stone, as of when it last lay still, shape (s, 7), m, world.
+        stone_of: the stone that each body is lent to, −1 for none, shape (p,).
+        without: how often a stone near a foot found no body. It then is not there for that foot:
+            to appear inside a foot would throw it away.
+    """
+
+    def __init__(self, pebbles: Pebbles, model: Any, physics: Any, robots: int) -> None:
+        """Take over the bodies that `Pebbles.add_to` has added last."""
+        self._parked = pebbles.parked(robots)
+        count = len(self._parked)
+        self._q = physics.qpos[-7 * count :].reshape(count, 7)
+        self._v = physics.qvel[-6 * count :].reshape(count, 6)
+        self._warm = physics.qacc_warmstart[-6 * count :].reshape(count, 6)
+        self._weightless = model.body_gravcomp[-count:]
+        self._size, self._of_size = pebbles.size, np.arange(count) * len(SIZES) // count
+        self._touching = FOOT_RADIUS + pebbles.reach
+        self._near = self._touching + _MARGIN
+        self._on_top = 2.0 * float(pebbles.half[:, 2].max()) + FOOT_RADIUS
+        self.pose = pebbles.pose.copy()
+        self.stone_of = np.full(count, _NOBODY)
+        self.without = 0
+        self._cells: defaultdict[tuple[int, int], set[int]] = defaultdict(set)
+        for stone in range(len(self.pose)):
+            self._cells[self._cell(self.pose[stone])].add(stone)
+
+    def follow(self, feet: Array) -> None:
+        """Lend bodies to stones near low feet, take them from stones that lie still.
+
+        To be called between the integration of a tick and the evaluation of the next.
+
+        Args:
+            feet: centres of all feet, shape (f, 3), m, world.
+        """
+        low = feet[feet[:, 2] < self._on_top + _LOW]
+        self._put_to_rest(low[:, :2])
+        for stone in self._asleep_near(low):
+            self._wake(stone)
+
+    def _cell(self, place: Array) -> tuple[int, int]:
+        return int(place[0] // self._near), int(place[1] // self._near)
+
+    def _asleep_near(self, feet: Array) -> list[int]:
+        """Stones without a body that a foot is near to and cannot be inside of, in order."""
+        found: set[int] = set()
+        for x, y, z in feet.tolist():
+            i, j = self._cell(np.array((x, y)))
+            around = [
+                s
+                for a in (-1, 0, 1)
+                for b in (-1, 0, 1)
+                for s in self._cells.get((i + a, j + b), ())
+            ]
+            if around:
+                places = self.pose[around, :2]
+                square = (places[:, 0] - x) ** 2 + (places[:, 1] - y) ** 2
+                close = square < self._near**2
+                if z < self._on_top:
+                    close &= square > self._touching**2
+                found.update(np.array(around)[close].tolist())
+        return sorted(found)
+
+    def _wake(self, stone: int) -> None:
+        free = np.flatnonzero((self._of_size == self._size[stone]) & (self.stone_of == _NOBODY))
+        if not len(free):
+            self.without += 1
+            return
+        body = int(free[0])
+        self._cells[self._cell(self.pose[stone])].discard(stone)
+        self._set(body, stone, self.pose[stone], weightless=0.0)
+
+    def _put_to_rest(self, feet: Array) -> None:
+        awake = np.flatnonzero(self.stone_of != _NOBODY)
+        if not len(awake):
+            return
+        v = self._v[awake]
+        still = np.linalg.norm(v[:, :3], axis=1) < _STILL[0]
+        still &= np.linalg.norm(v[:, 3:], axis=1) < _STILL[1]
+        if len(feet):
+            away = self._q[awake, None, :2] - feet
+            still &= np.linalg.norm(away, axis=-1).min(axis=1) > self._near + _LEAVE
+        for body in awake[still].tolist():
+            stone = int(self.stone_of[body])
+            self.pose[stone] = self._q[body]
+            self._cells[self._cell(self.pose[stone])].add(stone)
+            self._set(body, _NOBODY, self._parked[body], weightless=1.0)
+
+    def _set(self, body: int, stone: int, pose: Array, *, weightless: float) -> None:
+        self.stone_of[body] = stone
+        self._q[body], self._v[body], self._warm[body] = pose, 0.0, 0.0
+        self._weightless[body] = weightless

@@ -1,0 +1,138 @@
+"""A layer of loose stones on flat ground: where each lies, and the few that can move at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from quadriga.shared.robot.a1 import N_LEGS, Array
+from quadriga.sim_server.terrain.course import Course, Rectangle
+
+SIZES: Final = (0.5, 0.67, 0.83, 1.0)  # of the largest
+_AXES: Final = (1.3, 1.1, 1.0)  # half axes of a stone over half its height
+_CELL: Final = 2.1  # half lengths of the largest stone; one stone per square of this size
+_DENSITY: Final = 2600.0  # kg/m³
+_ROLLING: Final = 0.004  # m, rolling friction: a real stone has edges
+_PER_LEG: Final = 10  # stones that can move, of all sizes
+# Hard: a light stone between foot and ground must not be pressed into either.
+_SOLREF: Final = (0.004, 1.0)  # s, damping ratio
+_SOLIMP: Final = (0.99, 0.999, 0.001, 0.5, 2.0)
+# Stones touch the ground, feet and each other: beside the bit of all terrain, one of their own.
+GROUND_CONTACT: Final = {"contype": 3, "conaffinity": 0}
+_CONTACT: Final = {"contype": 3, "conaffinity": 2}
+_PARKED: Final = 500.0  # m, height of those not in use
+_RGBA: Final = (
+    (0.52, 0.50, 0.47, 1.0), (0.60, 0.56, 0.50, 1.0), (0.44, 0.43, 0.42, 1.0),
+    (0.56, 0.49, 0.42, 1.0),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Pebbles:
+    """Stones as they lie before anybody has walked over them.
+
+    Attributes:
+        pose: centre and attitude wxyz of each stone, shape (s, 7), m, world.
+        size: index of each stone's size in `SIZES`, shape (s,).
+        half: half axes of the stones of each size, shape (4, 3), m.
+    """
+
+    pose: Array
+    size: NDArray[np.int64]
+    half: Array
+
+    @property
+    def reach(self) -> float:
+        """From the centre of the largest stone to its end, m."""
+        return float(self.half.max())
+
+    def parked(self, robots: int) -> Array:
+        """Where the stones that can move wait; those of one size after the other. Shape (p, 7)."""
+        count = len(SIZES) * -(-_PER_LEG * N_LEGS * robots // len(SIZES))
+        parked = np.zeros((count, 7))
+        parked[:, 0] = 4.0 * self.reach * np.arange(count)
+        parked[:, 2], parked[:, 3] = _PARKED, 1.0
+        return parked
+
+    def add_to(self, spec: mujoco.MjSpec, robots: int, friction: float) -> None:
+        """Add the bodies of stones that can move, after everything else: parked, without weight."""
+        parked = self.parked(robots)
+        for k, pose in enumerate(parked.tolist()):
+            i = k * len(SIZES) // len(parked)
+            body = spec.worldbody.add_body(name=f"pebble{k}", pos=pose[:3], gravcomp=1.0)
+            body.add_freejoint()
+            body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+                size=self.half[i],
+                density=_DENSITY,
+                priority=2,
+                condim=6,
+                friction=[friction, 0.005, _ROLLING],
+                solref=_SOLREF,
+                solimp=_SOLIMP,
+                rgba=_RGBA[i],
+                **_CONTACT,
+            )
+
+    def draw(self, scene: mujoco.MjvScene, centre: Array, reach: float) -> None:
+        """Add the stones around a place to a picture, as they lay at the start."""
+        away = np.linalg.norm(self.pose[:, :2] - centre[:2], axis=1)
+        nearest = np.argsort(away, kind="stable")[: scene.maxgeom - scene.ngeom]
+        for k in nearest[away[nearest] <= reach].tolist():
+            turn = np.zeros(9)
+            mujoco.mju_quat2Mat(turn, self.pose[k, 3:])
+            mujoco.mjv_initGeom(
+                scene.geoms[scene.ngeom],
+                mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+                self.half[self.size[k]],
+                self.pose[k, :3],
+                turn,
+                np.array(_RGBA[k % len(_RGBA)], dtype=np.float32),
+            )
+            scene.ngeom += 1
+
+
+def build_pebbles(course: Course, height: float, random: np.random.Generator) -> Pebbles:
+    """Stones side by side wherever the team's way needs them, none on the flat place.
+
+    Args:
+        course: where the team starts and walks.
+        height: of the largest stones, m.
+        random: the terrain's random stream.
+    """
+    half = 0.5 * height * np.outer(SIZES, _AXES)
+    longest = float(half.max())
+    centre = _lattice(course.extent, _CELL * longest, random)
+    free = (0.5 * _CELL - 1.0) * longest
+    size = random.integers(len(SIZES), size=len(centre))
+    # In its square; what a stone is smaller than the largest, it may lie farther off the middle.
+    turn, away = random.uniform(0.0, 2.0 * np.pi, len(centre)), random.uniform(size=len(centre))
+    away *= free + longest - half[size, 0]
+    centre += np.stack([away * np.cos(turn), away * np.sin(turn)], axis=1)
+    yaw = random.uniform(0.0, np.pi, len(centre))
+    keep = -course.flat.depth(centre[:, 0], centre[:, 1]) > longest
+    keep &= course.needs(centre[:, 0], centre[:, 1])
+    pose = np.zeros((len(centre), 7))
+    pose[:, :2], pose[:, 2] = centre, half[size, 2]
+    pose[:, 3], pose[:, 6] = np.cos(yaw / 2.0), np.sin(yaw / 2.0)
+    return Pebbles(pose=pose[keep], size=size[keep], half=half)
+
+
+def _lattice(extent: Rectangle, cell: float, random: np.random.Generator) -> Array:
+    """Middles of squares that fill a rectangle. Shape (s, 2), m, world.
+
+    The rows are turned and shifted against each other by chance, so that nobody walks along them.
+    """
+    (x_low, x_high), (y_low, y_high) = extent.sides
+    reach = 0.5 * float(np.hypot(x_high - x_low, y_high - y_low))
+    u, v = np.meshgrid(np.arange(-reach, reach, cell), np.arange(-reach, reach, cell))
+    u = u + random.uniform(0.0, cell, (len(u), 1))
+    heading = random.uniform(0.0, np.pi)
+    x = 0.5 * (x_low + x_high) + (u * np.cos(heading) - v * np.sin(heading)).ravel()
+    y = 0.5 * (y_low + y_high) + (u * np.sin(heading) + v * np.cos(heading)).ravel()
+    inside = extent.depth(x, y) > 0.0
+    return np.stack([x[inside], y[inside]], axis=1)

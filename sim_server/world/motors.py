@@ -1,0 +1,108 @@
+"""Motors: what they do with a command, and which of them weaken."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.robot.a1 import JOINT_NAMES, TORQUE_LIMIT, Array, robot_names
+from quadriga.shared.runtime.jit import compiled
+
+WEAKENED: Final = "of its torque"  # how the event of a weak motor ends; a re-simulation reads it
+_KEY: Final = "world.weak_motor"
+_GRAMMAR: Final = "'robot:joint:start[s]', commas between motors"
+_ANY: Final = "any"
+_JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
+_LATEST: Final = 3600.0  # s
+
+
+@dataclass(frozen=True, slots=True)
+class WeakMotor:
+    """A motor that gives only `share` of its torque from tick `start` on.
+
+    Attributes:
+        robot: its index.
+        joint: its index in `JOINT_NAMES`.
+        start: tick, ms.
+        share: of the torque it would give if it were sound.
+    """
+
+    robot: int
+    joint: int
+    start: int
+    share: float
+
+    @property
+    def detail(self) -> str:
+        """What is announced when it weakens."""
+        return f"{_JOINTS[self.joint]} gives {100 * self.share:g} % {WEAKENED}"
+
+
+@compiled
+def drive(commands: Array, q: Array, v: Array, strength: Array, tau: Array) -> None:
+    """Fill `tau`, (n, 12), with what the motors give: tau + kp (q_des − q) + kd (v_des − v).
+
+    Args:
+        commands: rows of the robots' `Command`s, (n, 60).
+        q: coordinates of each robot, its joints behind the trunk's seven, (n, 19).
+        v: velocities, its joints behind the trunk's six, (n, 18).
+        strength: the share of its limited torque that each motor gives, (n, 12).
+        tau: N·m.
+    """
+    for i in range(len(commands)):
+        row = commands[i]
+        for k in range(12):
+            torque = row[36 + k] * (row[12 + k] - q[i, 7 + k])
+            torque += row[48 + k] * (row[24 + k] - v[i, 6 + k])
+            torque += row[k]
+            torque = min(max(torque, -TORQUE_LIMIT), TORQUE_LIMIT)
+            tau[i, k] = strength[i, k] * torque
+
+
+def weak_motors(config: Config, random: np.random.Generator) -> tuple[WeakMotor, ...]:
+    """The motors that `world.weak_motor` describes, in the order written.
+
+    Raises:
+        ConfigError: the text does not follow the grammar, or names no such robot or joint.
+    """
+    text, names = config.world.weak_motor, robot_names(config.team.robots)
+    if not text:
+        return ()
+    share = config.world.weak_share
+    return tuple(_parse(part.strip(), names, share, random) for part in text.split(","))
+
+
+def _parse(
+    part: str, names: tuple[str, ...], share: float, random: np.random.Generator
+) -> WeakMotor:
+    fields = [word.strip() for word in part.split(":")]
+    if len(fields) != 3:
+        raise ConfigError(_KEY, repr(part), _GRAMMAR)
+    robots = [i for i, name in enumerate(names) if fields[0] in (name, _ANY)]
+    joints = [i for i, name in enumerate(_JOINTS) if fields[1] in (name, *name.split("_"), _ANY)]
+    if not robots:
+        raise ConfigError(_KEY, f"robot {fields[0]!r}", f"'any' or one of {', '.join(names)}")
+    if not joints:
+        raise ConfigError(
+            _KEY,
+            f"joint {fields[1]!r}",
+            f"'any', a part, a leg or {_JOINTS[0]}",
+            "parts are hip, thigh, calf; legs are FL, FR, RL, RR",
+        )
+    try:
+        start = float(fields[2])
+    except ValueError:
+        start = math.nan
+    if not 0.0 <= start <= _LATEST:
+        raise ConfigError(_KEY, f"start {fields[2]!r} in {part!r}", f"0 … {_LATEST:g} s")
+    return WeakMotor(
+        robot=int(random.choice(robots)),
+        joint=int(random.choice(joints)),
+        start=round(1000 * start),
+        share=share,
+    )

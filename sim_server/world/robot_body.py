@@ -1,0 +1,180 @@
+"""One A1 as MuJoCo bodies, parsed from the same URDF that Pinocchio reads."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.robot.a1 import (
+    FOOT_FRAMES,
+    FOOT_RADIUS,
+    TRUNK_BOX,
+    TRUNK_LINK,
+    TRUNK_MASS,
+    a1_urdf,
+)
+
+# Robots collide with the terrain and with nothing else, not even with each other.
+TERRAIN_CONTACT: Final = {"contype": 1, "conaffinity": 0}
+ROBOT_CONTACT: Final = {"contype": 0, "conaffinity": 1}
+NO_CONTACT: Final = {"contype": 0, "conaffinity": 0}
+
+VISUAL_GROUP: Final = 1
+FOOT_SOLREF: Final = (0.01, 1.0)  # s, damping ratio
+_FOOT_TOUCH_RADIUS: Final = 1.5 * FOOT_RADIUS  # every contact of the foot lies inside
+_LIMB_RGBA: Final = (0.25, 0.26, 0.28, 1.0)
+_FOOT_RGBA: Final = (0.1, 0.1, 0.1, 1.0)
+_LIMB_RADIUS: Final = {"hip": 0.03, "thigh": 0.016, "calf": 0.01}
+
+
+class RobotBody:
+    """The URDF's tree of links, ready to be added to a world any number of times.
+
+    Children are added in the order of their joints' names, which is Pinocchio's joint order, so
+    joint vectors need no permutation between the two. Links on fixed joints become welded bodies.
+
+    Raises:
+        ConfigError: the URDF is not installed or uses something this parser does not know.
+    """
+
+    def __init__(self) -> None:
+        root = ET.parse(a1_urdf()).getroot()
+        self._links = {str(link.get("name")): link for link in root.iter("link")}
+        self._joints: dict[str, list[ET.Element]] = {name: [] for name in self._links}
+        for joint in sorted(root.iter("joint"), key=lambda item: str(item.get("name"))):
+            self._joints[_child(joint, "parent").get("link", "")].append(joint)
+
+    def add_to(
+        self,
+        spec: mujoco.MjSpec,
+        prefix: str,
+        pos: tuple[float, float, float],
+        friction: float,
+        rgba: tuple[float, float, float, float],
+    ) -> mujoco.MjsBody:
+        """Add one robot on a free joint and return its trunk body.
+
+        Args:
+            spec: the world under construction.
+            prefix: put before every name of the robot, e.g. `r1/`.
+            pos: spawn position of the trunk's origin, world, m; the trunk is level, yaw zero.
+            friction: sliding friction of feet and trunk on the terrain.
+            rgba: colour of the trunk.
+        """
+        trunk = spec.worldbody.add_body(name=prefix + TRUNK_LINK, pos=pos)
+        trunk.add_freejoint(name=prefix + "free")
+        trunk.add_site(name=prefix + "imu", group=4)
+        trunk.add_geom(
+            name=prefix + TRUNK_LINK,
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[length / 2 for length in TRUNK_BOX],
+            rgba=rgba,
+            mass=0.0,
+            priority=1,
+            friction=[friction, 0.005, 0.0001],
+            **ROBOT_CONTACT,
+        )
+        self._fill(trunk, TRUNK_LINK, prefix, friction)
+        return trunk
+
+    def _fill(self, body: mujoco.MjsBody, link: str, prefix: str, friction: float) -> None:
+        _set_inertia(body, self._links[link], TRUNK_MASS if link == TRUNK_LINK else None)
+        if link in FOOT_FRAMES:
+            _add_foot(body, prefix + link, friction)
+        for joint in self._joints[link]:
+            name = _child(joint, "child").get("link", "")
+            kind = joint.get("type")
+            if kind == "fixed" and not _mass(self._links[name]):
+                continue  # a frame only: neither MuJoCo nor the controller needs it
+            pos = _origin(joint)
+            child = body.add_body(name=prefix + name, pos=pos)
+            if kind == "revolute":
+                _add_joint(child, joint, prefix)
+            elif kind != "fixed":
+                raise ConfigError("A1 URDF", f"a joint of type {kind!r}", "fixed or revolute")
+            _add_limb(body, link, pos)
+            self._fill(child, name, prefix, friction)
+
+
+def _add_joint(body: mujoco.MjsBody, joint: ET.Element, prefix: str) -> None:
+    limit = _child(joint, "limit")
+    body.add_joint(
+        name=prefix + str(joint.get("name")),
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=_numbers(_child(joint, "axis").get("xyz", "")),
+        limited=1,
+        range=[float(limit.get("lower", "")), float(limit.get("upper", ""))],
+    )
+
+
+def _add_foot(body: mujoco.MjsBody, name: str, friction: float) -> None:
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[FOOT_RADIUS, 0.0, 0.0],
+        mass=0.0,
+        rgba=_FOOT_RGBA,
+        solref=FOOT_SOLREF,
+        priority=1,
+        friction=[friction, 0.005, 0.0001],
+        **ROBOT_CONTACT,
+    )
+    body.add_site(
+        name=name, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_FOOT_TOUCH_RADIUS, 0.0, 0.0], group=4
+    )
+
+
+def _add_limb(body: mujoco.MjsBody, link: str, end: list[float]) -> None:
+    """A capsule to look at, from the link's origin to its child's; without mass or contact."""
+    radius = _LIMB_RADIUS.get(link.partition("_")[2])
+    if radius is not None:
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            fromto=[0.0, 0.0, 0.0, *end],
+            size=[radius, 0.0, 0.0],
+            mass=0.0,
+            rgba=_LIMB_RGBA,
+            group=VISUAL_GROUP,
+            **NO_CONTACT,
+        )
+
+
+def _set_inertia(body: mujoco.MjsBody, link: ET.Element, mass: float | None) -> None:
+    """Inertia of a link; `mass` replaces the URDF's mass and leaves its rotational inertia."""
+    inertial = _child(link, "inertial")
+    tensor: Mapping[str, str] = _child(inertial, "inertia").attrib
+    body.explicitinertial = True
+    body.mass = _mass(link) if mass is None else mass
+    body.ipos = _origin(inertial)
+    body.fullinertia = [float(tensor[k]) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")]
+
+
+def _mass(link: ET.Element) -> float:
+    mass = link.find("inertial/mass")
+    return 0.0 if mass is None else float(mass.get("value", ""))
+
+
+def _origin(element: ET.Element) -> list[float]:
+    """Translation of an element's origin, m."""
+    origin = element.find("origin")
+    if origin is None:
+        return [0.0, 0.0, 0.0]
+    if np.any(_numbers(origin.get("rpy", "0 0 0"))):
+        raise ConfigError("A1 URDF", f"rpy={origin.get('rpy')!r} of {element.tag}", "zero rotation")
+    return _numbers(origin.get("xyz", "0 0 0"))
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(word) for word in text.split()]
+
+
+def _child(element: ET.Element, tag: str) -> ET.Element:
+    found = element.find(tag)
+    if found is None:
+        raise ConfigError("A1 URDF", f"<{element.tag}> without <{tag}>", f"a <{tag}>")
+    return found

@@ -1,0 +1,99 @@
+"""What happens to the team, and when: pushes, loads, weak motors; and the events that tell."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import N_JOINTS, Array, robot_names
+from quadriga.shared.wire.messages import Event
+from quadriga.sim_server.world.motors import WeakMotor, weak_motors
+from quadriga.sim_server.world.payload import Load
+from quadriga.sim_server.world.pushes import Push, all_pushes
+
+_PUSHES: Final = 3  # streams of the seed, each for itself: a new push draws no other motor
+_MOTORS: Final = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """The disturbances of a run and its announcements, by tick."""
+
+    n: int
+    pushes: tuple[Push, ...]
+    weak: tuple[WeakMotor, ...]
+    events: tuple[Event, ...]
+
+    def changes(self) -> frozenset[int]:
+        """Ticks at which the pushing forces change."""
+        return frozenset(t for push in self.pushes for t in (push.start, push.stop))
+
+    def forces(self, tick: int) -> Array:
+        """Sum of the pushes on each robot during `tick`. Shape (n, 3), N, world frame."""
+        total = np.zeros((self.n, 3))
+        for push in self.pushes:
+            if push.start <= tick < push.stop:
+                vector = [math.cos(push.direction), math.sin(push.direction), 0.0]
+                total[list(push.robots)] += push.force * np.array(vector)
+        return total
+
+    def weakenings(self) -> frozenset[int]:
+        """Ticks at which a motor weakens."""
+        return frozenset(motor.start for motor in self.weak)
+
+    def strength(self, tick: int) -> Array:
+        """Share of its torque that each motor gives during `tick`. Shape (n, 12)."""
+        strength = np.ones((self.n, N_JOINTS))
+        for motor in self.weak:
+            if motor.start <= tick:
+                place = motor.robot, motor.joint
+                strength[place] = min(strength[place], motor.share)
+        return strength
+
+
+def build_scenario(config: Config, loads: Sequence[Load]) -> Scenario:
+    """The scenario of a configuration.
+
+    Args:
+        config: the configuration.
+        loads: on each robot.
+
+    Raises:
+        ConfigError: `world.push` or `world.weak_motor` does not parse or names an unknown robot.
+    """
+    names, world = robot_names(config.team.robots), config.world
+    pushes = all_pushes(config, np.random.default_rng((world.seed, _PUSHES)))
+    weak = weak_motors(config, np.random.default_rng((world.seed, _MOTORS)))
+    events = [event(0, "start", "", f"{len(names)} robots, {config.team.yokes} yokes")]
+    events.append(event(0, "terrain", "", _ground(config)))
+    events += [
+        event(0, "payload", name, load.detail)
+        for name, load in zip(names, loads, strict=True)
+        if load.mass > 0.0
+    ]
+    events += [event(m.start, "fault", names[m.robot], m.detail) for m in weak]
+    for push in sorted(pushes, key=lambda item: item.start):
+        detail = (
+            f"{push.force:g} N towards {math.degrees(push.direction):g} deg"
+            f" for {(push.stop - push.start) / 1000:g} s"
+        )
+        events += [event(push.start, "push", names[i], detail) for i in push.robots]
+    return Scenario(n=len(names), pushes=pushes, weak=weak, events=tuple(events))
+
+
+def _ground(config: Config) -> str:
+    world = config.world
+    if world.terrain == "flat":
+        return "flat"
+    grade = f" of {world.slope:g} deg" if world.terrain == "slope" else ""
+    return f"{world.terrain}{grade} up to {world.terrain_height:g} m, seed {world.seed}"
+
+
+def event(tick: int, kind: str, robot: str, detail: str) -> Event:
+    """The announcement of something that happened at `tick`."""
+    return Event(tick=tick, stamp_ns=tick * 1_000_000, kind=kind, robot=robot, detail=detail)

@@ -1,0 +1,125 @@
+"""What a robot's sensors make of the true state: noise, bias, and nothing a real one lacks."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from quadriga.shared.config.sections import SensorsConfig
+from quadriga.shared.robot.a1 import N_JOINTS, N_LEGS, Array
+from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.wire.messages import State
+
+_STREAM: Final = 2  # of the seed: the terrain draws from another one
+# Columns of a robot's noise: those of its joints, its gyro, its accelerometer and its feet, in the
+# order of the fields of `State`, then its attitude's, which is a rotation and not a sum.
+_Q = slice(0, N_JOINTS)
+_V = slice(_Q.stop, _Q.stop + N_JOINTS)
+_TAU = slice(_V.stop, _V.stop + N_JOINTS)
+_GYRO = slice(_TAU.stop, _TAU.stop + 3)
+_ACCEL = slice(_GYRO.stop, _GYRO.stop + 3)
+_FOOT = slice(_ACCEL.stop, _ACCEL.stop + N_LEGS)
+_SUMS: Final = _FOOT.stop
+_TURN = slice(_FOOT.stop, _FOOT.stop + 3)
+
+_ROW: Final = _SUMS + 4  # numbers of a `State`
+_BLOCK: Final = 64  # ticks of noise drawn at once, because many small draws cost more
+
+# Q(p) with q ⊗ p = Q(p) q is _SIGN[a, b] · p[_INDEX[a, b]], quaternions wxyz.
+_INDEX: Final = np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
+_SIGN: Final = np.array([[1, -1, -1, -1], [1, 1, 1, -1], [1, -1, 1, 1], [1, 1, -1, 1]], dtype=float)
+
+
+class Sensors:
+    """The sensors of all robots; each robot's noise has its own stream of (seed, robot index).
+
+    So a robot's noise depends neither on how many others there are nor on what they do.
+    """
+
+    def __init__(self, config: SensorsConfig, seed: int, names: tuple[str, ...]) -> None:
+        self._names = names
+        self._streams = [np.random.default_rng((seed, _STREAM, i)) for i in range(len(names))]
+        self._sigma = np.empty(_TURN.stop)
+        for channel, sigma in (
+            (_Q, config.joint_position),
+            (_V, config.joint_velocity),
+            (_TAU, config.joint_torque),
+            (_GYRO, config.gyro),
+            (_ACCEL, config.accel),
+            (_FOOT, config.foot_force),
+            (_TURN, config.orientation),
+        ):
+            self._sigma[channel] = sigma
+        self._bias = np.zeros((len(names), _SUMS))
+        for row, stream in zip(self._bias, self._streams, strict=True):
+            row[_GYRO] = config.gyro_bias * stream.standard_normal(3)
+            row[_ACCEL] = config.accel_bias * stream.standard_normal(3)
+
+        self._next = _BLOCK  # row of the block that the next measurement takes
+        self._block, self._turns = np.empty(0), np.empty(0)
+
+    def measure(self, tick: int, q: Array, v: Array, tau: Array, sensed: Array) -> dict[str, State]:
+        """The messages of one tick; every call draws fresh noise.
+
+        Args:
+            tick: the messages' tick, ms.
+            q: true coordinates of each robot, trunk position and attitude first, (n, 19).
+            v: true velocities, (n, 18): of the trunk, its rate in its own frame, of the joints.
+            tau: true joint torques, (n, 12), N·m.
+            sensed: true specific force and normal foot forces, units and frames as in `State`, in
+                its columns 3 … 9; shape (n, ≥ 10).
+        """
+        if self._next == _BLOCK:
+            self._draw()
+        rows = np.empty((len(q), _ROW))
+        _observe(q, v, tau, sensed, self._block[self._next], self._turns[self._next], rows)
+        self._next += 1
+        stamp_ns = tick * 1_000_000
+        return {name: State.of(tick, stamp_ns, rows[i]) for i, name in enumerate(self._names)}
+
+    def _draw(self) -> None:
+        """Draw the next block: noise plus bias (_BLOCK, n, 46), and turns (_BLOCK, n, 4, 4)."""
+        draws = [stream.standard_normal((_BLOCK, _TURN.stop)) for stream in self._streams]
+        noise = np.stack(draws, axis=1) * self._sigma
+        self._block = noise[:, :, :_SUMS] + self._bias
+        self._turns = turn_matrices(noise[:, :, _TURN])
+        self._next = 0
+
+
+@compiled
+def _observe(
+    q: Array, v: Array, tau: Array, sensed: Array, noise: Array, turns: Array, rows: Array
+) -> None:
+    """Fill the rows of all robots' states."""
+    for i in range(len(rows)):
+        row, extra = rows[i], noise[i]
+        row[0:12] = extra[0:12] + q[i, 7:19]
+        row[12:24] = extra[12:24] + v[i, 6:18]
+        row[24:36] = extra[24:36] + tau[i]
+        for a in range(4):
+            row[36 + a] = 0.0
+            for b in range(4):
+                row[36 + a] += turns[i, a, b] * q[i, 3 + b]
+        row[40:43] = extra[36:39] + v[i, 3:6]
+        row[43:46] = extra[39:42] + sensed[i, 3:6]
+        for foot in range(4):
+            # A foot sensor cannot pull.
+            row[46 + foot] = max(0.0, extra[42 + foot] + sensed[i, 6 + foot])
+
+
+def turn_matrices(rotation: Array) -> Array:
+    """Matrices Q with Q q = q ⊗ p for the small rotations p by `rotation` in the trunk's frame.
+
+    p = (1, r/2), normalised: exact to third order in the angle.
+
+    Args:
+        rotation: rotation vectors, shape (..., 3), rad.
+
+    Returns:
+        Shape (..., 4, 4), for quaternions wxyz.
+    """
+    p = np.concatenate([np.ones((*rotation.shape[:-1], 1)), 0.5 * rotation], axis=-1)
+    p /= np.linalg.norm(p, axis=-1, keepdims=True)
+    matrices: Array = _SIGN * p[..., _INDEX]
+    return matrices

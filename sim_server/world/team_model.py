@@ -1,0 +1,214 @@
+"""The MuJoCo model of a team: n robots in formation, yokes, payloads, terrain, sensors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.yokes import yoke_pairs
+from quadriga.shared.robot.a1 import FOOT_FRAMES, GRAVITY, STAND_HEIGHT, Array, q_stand, robot_names
+from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
+from quadriga.sim_server.world.payload import Load, loads
+from quadriga.sim_server.world.robot_body import NO_CONTACT, VISUAL_GROUP, RobotBody
+
+TIMESTEP: Final = 1e-3  # s, one tick
+NQ: Final = 19  # positions of one robot: trunk xyz, trunk quaternion wxyz, 12 joints
+NV: Final = 18  # velocities: trunk linear (world), trunk angular (trunk frame), 12 joints
+N_SENSORS: Final = 22  # of one robot: gyro (3), specific force (3), touch (4), contact force (4, 3)
+
+_STREAM: Final = 7  # of the seed
+_ANCHOR: Final = (0.0, 0.0, 0.08)  # m, of the yokes' ball joints and of the payload, trunk frame
+_YOKE_SOLREF: Final = (0.02, 1.0)  # s, damping ratio
+_YOKE_SOLIMP: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
+_YOKE_RGBA: Final = (0.85, 0.65, 0.13, 1.0)
+_PAYLOAD_BOX: Final = (0.2, 0.15, 0.04)  # m, full lengths; its base lies near the trunk's top
+_PAYLOAD_RGBA: Final = (0.55, 0.36, 0.2, 1.0)
+_TRUNK_RGBA: Final = (
+    (0.84, 0.15, 0.16, 1.0), (0.12, 0.47, 0.71, 1.0), (0.17, 0.63, 0.17, 1.0),
+    (1.00, 0.50, 0.05, 1.0), (0.58, 0.40, 0.74, 1.0), (0.55, 0.34, 0.29, 1.0),
+    (0.89, 0.47, 0.76, 1.0), (0.50, 0.50, 0.50, 1.0), (0.74, 0.74, 0.13, 1.0),
+    (0.09, 0.75, 0.81, 1.0),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class TeamModel:
+    """A compiled team and what is needed to read its arrays.
+
+    Robot i owns `qpos[19 i : 19 (i + 1)]`, `qvel[18 i : 18 (i + 1)]` and
+    `sensordata[22 i : 22 (i + 1)]`; yoke k is tendon k and equality row k.
+
+    Attributes:
+        model: the MuJoCo model.
+        terrain: the ground, for its height.
+        trunks: body id of each trunk, shape (n,).
+        yokes: the pairs of robot indices that are yoked.
+        rest_length: length of each yoke at the spawn, shape (k,), m.
+        payload: load on each robot.
+        q_spawn: positions at the spawn, shape (19 n,); loose stones follow after the robots.
+    """
+
+    model: mujoco.MjModel
+    terrain: Terrain
+    trunks: np.ndarray[tuple[int], np.dtype[np.intp]]
+    yokes: tuple[tuple[int, int], ...]
+    rest_length: Array
+    payload: tuple[Load, ...]
+    q_spawn: Array
+
+
+def formation(n: int, spacing: float) -> Array:
+    """Spawn positions of the trunks, two columns heading along x. Shape (n, 2), m, world.
+
+    Robot i stands at x = −spacing · ⌊i/2⌋, left if i is even and right if odd; the last of an odd
+    number, and a single robot, stand on the centre line.
+    """
+    index = np.arange(n)
+    side = np.where(index % 2 == 0, 0.5, -0.5)
+    if n % 2:
+        side[-1] = 0.0
+    return np.stack([-spacing * (index // 2), spacing * side], axis=1)
+
+
+def scattered(config: Config) -> Array:
+    """Spawn positions off the formation by up to `world.scatter`. Shape (n, 2), m, world.
+
+    Each robot's draw is the same however many others there are.
+    """
+    places, reach = formation(config.team.robots, config.team.spacing), config.world.scatter
+    random = np.random.default_rng((config.world.seed, _STREAM))
+    return places + random.uniform(-reach, reach, places.shape)
+
+
+def build_team_model(config: Config) -> TeamModel:
+    """Build and compile the world of a configuration; equal configurations give equal models.
+
+    Raises:
+        ConfigError: the payload names no robot, the reference's trace is no trace, or the robot's
+            URDF is missing.
+    """
+    names = robot_names(config.team.robots)
+    places, payload = scattered(config), loads(config)
+    # Where it is flat must not depend on where exactly the robots stand.
+    terrain = build_terrain(config, formation(len(names), config.team.spacing))
+    spec = mujoco.MjSpec()
+    _set_physics(spec)
+    _set_visuals(spec)
+    terrain.add_to(spec)
+    a1 = RobotBody()
+    for i, (name, (x, y)) in enumerate(zip(names, places.tolist(), strict=True)):
+        colour = _TRUNK_RGBA[i % len(_TRUNK_RGBA)]
+        trunk = a1.add_to(spec, f"{name}/", (x, y, STAND_HEIGHT), config.world.friction, colour)
+        if i == 0:
+            _add_sun(trunk)
+        trunk.add_site(name=f"{name}/yoke", pos=_ANCHOR, group=4)
+        if payload[i].mass > 0.0:
+            _add_payload(trunk, f"{name}/payload", payload[i])
+        _add_sensors(spec, f"{name}/")
+    pairs = yoke_pairs(len(names), config.team.yokes)
+    for i, j in pairs:
+        _add_yoke(spec, names[i], names[j])
+    if terrain.pebbles is not None:
+        terrain.pebbles.add_to(spec, len(names), config.world.friction)
+    model = spec.compile()
+    q_spawn = model.qpos0.copy()
+    q_spawn[: len(names) * NQ].reshape(len(names), NQ)[:, 7:] = q_stand()
+    return TeamModel(
+        model=model,
+        terrain=terrain,
+        trunks=np.array([model.body(f"{name}/trunk").id for name in names]),
+        yokes=pairs,
+        rest_length=model.tendon_length0.copy(),
+        payload=payload,
+        q_spawn=q_spawn,
+    )
+
+
+def _set_physics(spec: mujoco.MjSpec) -> None:
+    spec.option.timestep = TIMESTEP
+    spec.option.gravity = [0.0, 0.0, -GRAVITY]
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = 10.0
+    # A world that has become unstable must show as a fall, not start again from the spawn.
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    spec.compiler.degree = False
+
+
+def _set_visuals(spec: mujoco.MjSpec) -> None:
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
+    spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
+    spec.visual.headlight.diffuse = [0.4, 0.4, 0.4]
+    spec.visual.quality.shadowsize = 4096
+    spec.visual.map.shadowclip = 1.0
+    spec.stat.extent = 3.0  # m; shadows and clipping must not depend on how far the terrain goes
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        width=128,
+        height=768,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.55, 0.70, 0.90],
+        rgb2=[0.93, 0.95, 0.97],
+    )
+
+
+def _add_sun(trunk: mujoco.MjsBody) -> None:
+    """A light that follows a trunk, so that shadows stay sharp wherever the team walks."""
+    trunk.add_light(
+        mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACK,
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        pos=[0.0, 0.0, 4.0],
+        dir=[0.0, 0.0, -1.0],
+        diffuse=[0.5, 0.5, 0.5],
+        castshadow=1,
+    )
+
+
+def _add_payload(trunk: mujoco.MjsBody, name: str, load: Load) -> None:
+    """A homogeneous box welded on top of the trunk."""
+    x, y = load.offset
+    body = trunk.add_body(name=name, pos=(_ANCHOR[0] + x, _ANCHOR[1] + y, _ANCHOR[2]))
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[length / 2 for length in _PAYLOAD_BOX],
+        mass=load.mass,
+        rgba=_PAYLOAD_RGBA,
+        group=VISUAL_GROUP,
+        **NO_CONTACT,
+    )
+
+
+def _add_yoke(spec: mujoco.MjSpec, first: str, second: str) -> None:
+    """A rod between two ball joints: the distance of their anchors is held at its spawn value."""
+    name = f"{first}-{second}"
+    rod = spec.add_tendon(name=name, width=0.008, rgba=_YOKE_RGBA)
+    rod.wrap_site(f"{first}/yoke")
+    rod.wrap_site(f"{second}/yoke")
+    spec.add_equality(
+        type=mujoco.mjtEq.mjEQ_TENDON,
+        objtype=mujoco.mjtObj.mjOBJ_TENDON,
+        name1=name,
+        solref=_YOKE_SOLREF,
+        solimp=_YOKE_SOLIMP,
+        data=[0.0] * 12,
+    )
+
+
+def _add_sensors(spec: mujoco.MjSpec, prefix: str) -> None:
+    """The robot's block of `sensordata`, in the order of `N_SENSORS`."""
+    site, geom = mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_GEOM
+    kind = mujoco.mjtSensor
+    spec.add_sensor(type=kind.mjSENS_GYRO, objtype=site, objname=prefix + "imu")
+    spec.add_sensor(type=kind.mjSENS_ACCELEROMETER, objtype=site, objname=prefix + "imu")
+    for foot in FOOT_FRAMES:
+        spec.add_sensor(type=kind.mjSENS_TOUCH, objtype=site, objname=prefix + foot)
+    for foot in FOOT_FRAMES:
+        # intprm: which fields (bit 1: force), how contacts are reduced (3: net force), how many.
+        spec.add_sensor(
+            type=kind.mjSENS_CONTACT, objtype=geom, objname=prefix + foot, intprm=[2, 3, 1]
+        )

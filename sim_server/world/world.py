@@ -1,0 +1,177 @@
+"""The simulated world of a team: motors, physics, sensors, truth; one tick is 1 ms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import FOOT_FRAMES, N_JOINTS, N_LEGS, Array, robot_names
+from quadriga.shared.wire.messages import Command, Event, State, Truth
+from quadriga.sim_server.terrain.loose import PERIOD, LooseStones
+from quadriga.sim_server.world.motors import drive
+from quadriga.sim_server.world.scenario import build_scenario, event
+from quadriga.sim_server.world.sensors import Sensors
+from quadriga.sim_server.world.team_model import N_SENSORS, NQ, NV, build_team_model
+
+MOTOR_DAMPING: Final = 2.0  # N·m·s/rad, what a motor does without a command
+_FALL_COSINE: Final = math.cos(1.0)  # of the angle between the trunk's z axis and the vertical
+_FALL_HEIGHT: Final = 0.12  # m, trunk origin above the mean terrain under the hips
+_ZERO: Final = np.zeros(N_JOINTS)
+_DAMPED: Final = Command(
+    tick=0,
+    stamp_ns=0,
+    tau=_ZERO,
+    q_des=_ZERO,
+    v_des=_ZERO,
+    kp=_ZERO,
+    kd=np.full(N_JOINTS, MOTOR_DAMPING),
+)
+
+
+class World:
+    """One MuJoCo world with the whole team; equal configurations and commands give equal bytes.
+
+    A tick is split at the point where commands enter: `mj_step2` takes the commands of tick t to
+    positions and velocities at t + 1, then `mj_step1` evaluates everything that depends on those
+    alone. So what is published for t + 1 has positions and rates at t + 1, while specific force,
+    contact forces and yoke forces are those that acted from t to t + 1, as a sensor would have it:
+    the forces of t + 1 itself depend on a command not yet given. This costs what `mj_step` costs,
+    and no sensor waits for `mj_step1`: it has time until the commands come.
+    The forces of tick 0 are those of motors without torque.
+
+    Raises:
+        ConfigError: the payload, a push or a weak motor names no robot or does not parse, the
+            reference's trace is no trace, or the robot's URDF is missing.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self.names = robot_names(config.team.robots)
+        self.tick = 0
+        self.team = build_team_model(config)
+        self.physics = mujoco.MjData(self.team.model)
+        self._scenario = build_scenario(config, self.team.payload)
+        self._push_changes = self._scenario.changes()
+        self._weakenings = self._scenario.weakenings()
+        self._events = {
+            tick: tuple(event for event in self._scenario.events if event.tick == tick)
+            for tick in {event.tick for event in self._scenario.events}
+        }
+        n = len(self.names)
+        # Views of MuJoCo's own memory; behind the robots come the loose stones.
+        self._q = self.physics.qpos[: n * NQ].reshape(n, NQ)
+        self._v = self.physics.qvel[: n * NV].reshape(n, NV)
+        self._motor = self.physics.qfrc_applied[: n * NV].reshape(n, NV)[:, 6:]
+        self._sensed = self.physics.sensordata.reshape(n, N_SENSORS)
+        self._commanded = np.zeros((n, len(_DAMPED.row)))
+        self._tau = np.zeros((n, N_JOINTS))
+        self._strength = np.ones((n, N_JOINTS))
+        self._fallen = [False] * n
+        self._surely_up = _FALL_HEIGHT + self.team.terrain.top
+        # What is compiled is compiled, or loaded, now and not in the first tick.
+        drive(self._commanded, self._q, self._v, self._strength, np.empty_like(self._tau))
+        self._sensors = Sensors(config.sensors, config.world.seed, self.names)
+
+        self.physics.qpos[:] = self.team.q_spawn
+        mujoco.mj_forward(self.team.model, self.physics)
+        pebbles, model = self.team.terrain.pebbles, self.team.model
+        feet = (f"{name}/{foot}" for name in self.names for foot in FOOT_FRAMES)
+        self._feet = [model.geom(foot).id for foot in feet]
+        self._stones = None if pebbles is None else LooseStones(pebbles, model, self.physics, n)
+        self._settled = True
+        self._yoke_force = self._read_yoke_force()
+        self._states = self._measure()
+
+    def states(self) -> dict[str, State]:
+        """Every robot's sensor message of this tick; the same bytes however often it is asked."""
+        return dict(self._states)
+
+    def step(self, commands: Mapping[str, Command]) -> tuple[Event, ...]:
+        """Advance by one tick under the motors' torques and return what happened.
+
+        Each motor applies tau + kp (q_des − q) + kd (v_des − v), limited to ±`TORQUE_LIMIT`, and
+        a weak one its share of that; those of a robot without a command damp their joints with
+        `MOTOR_DAMPING`.
+        """
+        events = list(self._events.get(self.tick, ()))
+        if self.tick in self._push_changes:
+            self.physics.xfrc_applied[self.team.trunks, :3] = self._scenario.forces(self.tick)
+        if self.tick in self._weakenings:
+            self._strength = self._scenario.strength(self.tick)
+        rows = [commands.get(name, _DAMPED).row for name in self.names]
+        np.concatenate(rows, out=self._commanded.reshape(-1))
+        drive(self._commanded, self._q, self._v, self._strength, self._tau)
+        self._motor[:] = self._tau
+        self.settle()
+        mujoco.mj_step2(self.team.model, self.physics)
+        self._settled = False
+        self._yoke_force = self._read_yoke_force()
+        self.tick += 1
+        self._states = self._measure()
+        return (*events, *self._falls())
+
+    def settle(self) -> None:
+        """Evaluate what depends on this tick's positions and velocities; again has no effect.
+
+        The next step does it if nobody has; while the robots answer there is time for it.
+        """
+        if self._settled:
+            return
+        if self._stones is not None and (self.tick - 1) % PERIOD == 0:
+            self._stones.follow(self.physics.geom_xpos[self._feet])
+        mujoco.mj_step1(self.team.model, self.physics)
+        self._settled = True
+
+    def truth(self) -> Truth:
+        """The true state of this tick."""
+        self.settle()
+        rotation = self.physics.xmat[self.team.trunks].reshape(-1, 3, 3)
+        return Truth(
+            tick=self.tick,
+            stamp_ns=self.tick * 1_000_000,
+            robots=self.names,
+            base_pos=self._q[:, :3].copy(),
+            base_quat_wxyz=self._q[:, 3:7].copy(),
+            base_vel=self._v[:, :3].copy(),
+            base_omega=(rotation @ self._v[:, 3:6, None])[:, :, 0],
+            # MuJoCo reports the force of the foot on the ground.
+            grf=-self._sensed[:, 10:].reshape(-1, N_LEGS, 3),
+            yoke_error=self.physics.ten_length - self.team.rest_length,
+            yoke_force=self._yoke_force,
+        )
+
+    def fallen(self) -> tuple[str, ...]:
+        """Robots that have fallen so far."""
+        return tuple(name for name, down in zip(self.names, self._fallen, strict=True) if down)
+
+    def _measure(self) -> dict[str, State]:
+        return self._sensors.measure(self.tick, self._q, self._v, self._tau, self._sensed)
+
+    def _read_yoke_force(self) -> Array:
+        """Force of each yoke on its two robots, positive when it pushes them apart, N. Shape (k,).
+
+        Equality constraints come first among the constraint rows, in the order of the model.
+        """
+        forces: Array = self.physics.efc_force[: len(self.team.yokes)].copy()
+        return forces
+
+    def _falls(self) -> list[Event]:
+        """An event for each robot that fell in this tick."""
+        events = []
+        for i, (x, y, z, qw, qx, qy, qz) in enumerate(self._q[:, :7].tolist()):
+            cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
+            # Asked this way round, a state that is not a number counts as a fall too.
+            if (cosine >= _FALL_COSINE and z >= self._surely_up) or self._fallen[i]:
+                continue
+            yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+            # Not the ground under the trunk alone: a robot may stand astride of a block.
+            above = z - float(self.team.terrain.under(np.array(x), np.array(y), np.array(yaw)))
+            if not (cosine >= _FALL_COSINE and above >= _FALL_HEIGHT):
+                self._fallen[i] = True
+                detail = f"tilt {math.acos(max(-1.0, cosine)):.2f} rad, height {above:.3f} m"
+                events.append(event(self.tick, "fall", self.names[i], detail))
+        return events

@@ -1,0 +1,78 @@
+"""A robot that walks exactly as commanded beside a peer that does nothing, with changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.planner.neighbours import PeerData, Selection
+from quadriga.agents.planner.peer_terms import PeerTerms
+from quadriga.agents.planner.planner import Planner, PlannerInputs, PlanResult
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
+
+Team = Callable[..., Any]
+BASE = np.array([0.26, 0.4, 0.0, 0.0, 0.0, 0.1])
+STEP = 20
+NOTHING = PeerTerms()
+
+
+def peer(config: Config, **changes: Any) -> PeerData:
+    """A peer that did and plans nothing, with changes."""
+    quiet = PeerData(
+        robot="r2",
+        index=1,
+        status="fresh",
+        step=STEP - 1,
+        age=0,
+        known=np.ones(config.planner.T_ini, dtype=np.bool_),
+        du_ini=np.zeros((config.planner.T_ini, 12)),
+        y_ini=np.tile(BASE, (config.planner.T_ini, 1)),
+        du=np.zeros((config.planner.N, 12)),
+    )
+    return replace(quiet, **changes)
+
+
+def inputs_of(config: Config, step: int = STEP, **changes: Any) -> PlannerInputs:
+    """A robot that walks exactly as commanded, with changes."""
+    planner = config.planner
+    stance = np.ones((planner.T_ini, 4), dtype=np.bool_)
+    calm = PlannerInputs(
+        step=step,
+        u_ini=nominal_forces(stance),
+        y_ini=np.tile(BASE, (planner.T_ini, 1)),
+        stance_ini=stance,
+        y_base_ini=np.tile(BASE, (planner.T_ini, 1)),
+        y_base=np.tile(BASE, (planner.N, 1)),
+        y_des=np.tile(BASE, (planner.N, 1)),
+    )
+    return replace(calm, **changes)
+
+
+def terms_of(
+    config: Config,
+    planner: Planner,
+    *peers: PeerData,
+    before: PeerTerms = NOTHING,
+    base: Array | None = None,
+) -> PeerTerms:
+    """Terms of the peers given, by default of one that did and plans nothing."""
+    y_base = np.tile(BASE, (config.planner.T_ini, 1)) if base is None else base
+    return planner.peer_terms(before, Selection(peers or (peer(config),)), STEP, y_base)
+
+
+def plan(
+    config: Config,
+    predictor: Predictor,
+    inputs: PlannerInputs,
+    *peers: PeerData,
+    base: Array | None = None,
+) -> PlanResult:
+    planner = Planner(config, 0, predictor)
+    terms = terms_of(config, planner, *peers, base=base)
+    return planner.step(planner.initial(), inputs, terms)[1]

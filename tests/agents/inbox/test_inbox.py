@@ -1,0 +1,316 @@
+"""Between bus and agent: dropped and counted, held until due, sorted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+import pytest
+
+from quadriga.agents.inbox.inbox import Inbox
+from quadriga.agents.planning.interface import Expected
+from quadriga.agents.rehearsal import standing
+from quadriga.shared.config.load import load
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import EStop, Event, Measurement, Message, Plan, Reference, Truth
+from quadriga.shared.wire.topics import ESTOP, TABLE, Topic
+
+NOTHING = Expected()
+
+
+def arrivals(
+    mode: str = "lockstep", estimator: str = "kalman", planner: str = "distributed"
+) -> Inbox:
+    config = load(
+        None,
+        {
+            "team.robots": 3,
+            "world.mode": mode,
+            "estimator.kind": estimator,
+            "planner.kind": planner,
+        },
+    )
+    return Inbox(config, "r2", ("r1", "r3") if planner == "distributed" else ())
+
+
+def measurement(tick: int) -> Measurement:
+    return Measurement(tick, tick, np.zeros(12), np.zeros(6), np.ones(4))
+
+
+def plan(step: int) -> Plan:
+    return Plan(40 * step, 0, step, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 0)
+
+
+def reference(tick: int) -> Reference:
+    return Reference(tick, tick, 0.5, 0.0, 0.0, 0.26)
+
+
+def feed(box: Inbox, *messages: tuple[str, Message]) -> None:
+    for key, message in messages:
+        box.take(f"team/{key}", encode(message))
+
+
+def test_subscribes_to_what_it_needs_and_no_more() -> None:
+    alone = {"team/r2/state", "team/reference", "team/estop", "team/sim/event"}
+    peers = {f"team/{r}/{t}" for r in ("r1", "r3") for t in ("plan", "measurement")}
+    assert {*arrivals(planner="none").keys} == alone
+    assert {*arrivals(planner="centralised").keys} == alone | {"team/r2/plan"}
+    assert {*arrivals().keys} == alone | peers
+    assert {*arrivals(estimator="truth").keys} == alone | peers | {"team/sim/truth"}
+
+
+@pytest.mark.parametrize("topic", TABLE, ids=lambda topic: topic.name)
+@pytest.mark.parametrize("payload", [b"", b"\x81\xa1x\x01", bytes(2_000_000)], ids=len)
+def test_malformed_messages_on_any_key_are_dropped_and_counted(
+    topic: Topic, payload: bytes
+) -> None:
+    box = arrivals(estimator="truth")
+    for robot in ("r1", "r2", "r3") if topic.per_robot else ("",):
+        box.take(topic.key("team", robot), payload)
+    refused = 3 if topic.per_robot else topic is not ESTOP  # which whoever sends there wants
+    assert sum(box.counters.values()) == refused
+    assert all(name in (f"dropped_{topic.name}", "dropped_foreign") for name in box.counters)
+    assert box.state() is None
+    inputs = box.inputs(standing(0), Expected((0, 0), 0, 0, True))
+    assert (inputs.plans, inputs.measurements, inputs.references) == ((), (), ())
+    assert inputs.estop == (EStop(0, 0, "unreadable") if topic is ESTOP else None)
+    assert inputs.truth is None
+
+
+def test_the_newest_state_counts_and_the_others_are_counted() -> None:
+    box = arrivals()
+    feed(box, *(("r2/state", standing(tick)) for tick in (1, 2, 3)))
+    state = box.state()
+    assert state is not None
+    assert state.tick == 3
+    assert box.counters["states_passed_over"] == 2
+    assert box.state() is None
+
+
+def test_of_states_in_any_order_the_newest_counts_and_none_before_it() -> None:
+    for order in permutations((4, 5, 6)):
+        box = arrivals()
+        feed(box, *(("r2/state", standing(tick)) for tick in order))
+        state = box.state()
+        assert state is not None
+        assert state.tick == 6
+        assert box.counters["states_passed_over"] == 2
+        feed(box, ("r2/state", standing(5)), ("r2/state", standing(6)))
+        assert box.state() is None
+        assert box.misfits == 2 + (order[-1] != 6) + (order[0] == 6)
+
+
+def test_a_state_of_years_ahead_does_not_make_the_real_ones_late() -> None:
+    box = arrivals()
+    for tick, wrong in ((7, 1 << 41), (8, 8 + 5001)):
+        feed(box, ("r2/state", standing(tick)), ("r2/state", standing(wrong)))
+        state = box.state()
+        assert state is not None
+        assert state.tick == tick
+        assert box.misfits == 1
+    assert box.counters["ahead_state"] == 2
+    feed(box, ("r2/state", standing(8 + 5000)))
+    assert box.state() is not None, "a process may have been stopped for so long"
+    assert box.misfits == 0
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+@pytest.mark.parametrize("lead", [1001, 10_000, (1 << 42) - 3000])
+def test_what_is_of_a_time_far_ahead_is_refused_and_nobody_is_taken_to_have_spoken(
+    mode: str, lead: int
+) -> None:
+    box, step = arrivals(mode, estimator="truth"), -(-(2000 + lead) // 40)
+    feed(box, ("r2/state", standing(2000)))
+    early: list[tuple[str, Message]] = [
+        ("r1/plan", plan(step)), ("r1/plan", replace(plan(step), tick=2000)),
+        ("r3/measurement", measurement(2000 + lead)), ("reference", reference(2000 + lead)),
+        ("sim/truth", replace(truth(("r1", "r2", "r3"), 3), tick=2000 + lead)),
+    ]  # fmt: skip
+    for _ in range(400):
+        feed(box, *early)
+    named = {"plan": 800, "measurement": 400, "reference": 400, "sim/truth": 400}
+    assert box.counters == {f"ahead_{name}": count for name, count in named.items()}
+    assert box.refused
+    assert not box.heard["plan", "r1"]
+    awaited = Expected((50, 0), 2000, 2000, True)
+    assert len(box.owing(2000, awaited)) == 6
+    feed(
+        box,
+        ("r1/plan", plan(50)),
+        ("r3/measurement", measurement(2000)),
+        ("reference", reference(2000)),
+        ("reference", reference(3000)),
+    )
+    inputs = box.inputs(standing(2000), awaited)
+    assert [found.step for _, found in inputs.plans] == [50]
+    assert [sample.tick for _, sample in inputs.measurements] == [2000]
+    due = [2000] if mode == "lockstep" else [2000, 3000]
+    assert [found.tick for found in inputs.references] == due
+
+
+def test_the_order_of_arrival_does_not_matter() -> None:
+    messages: list[tuple[str, Message]] = [
+        ("r1/measurement", measurement(10)), ("r3/measurement", measurement(10)),
+        ("r3/plan", plan(1)), ("r1/plan", plan(1)),
+    ]  # fmt: skip
+    seen = []
+    for order in permutations(messages):
+        box = arrivals()
+        feed(box, *order, ("r1/measurement", measurement(20)))
+        inputs = box.inputs(standing(80), Expected(plan=(1, 0), measurement_tick=40))
+        seen.append([(name, message.tick) for name, message in inputs.measurements])
+        assert [name for name, _ in inputs.plans] == ["r1", "r3"]
+    assert seen == [[("r1", 10), ("r1", 20), ("r3", 10)]] * len(seen)
+
+
+def test_lock_step_hands_over_at_the_tick_that_awaits_and_never_earlier() -> None:
+    box = arrivals()
+    feed(
+        box,
+        ("r1/plan", plan(1)),
+        ("r1/plan", plan(2)),
+        ("r1/measurement", measurement(80)),
+        ("reference", reference(0)),
+        ("reference", reference(100)),
+    )
+    assert box.inputs(standing(41), NOTHING).plans == ()
+    inputs = box.inputs(standing(80), Expected((1, 0), 40, 0))
+    assert [p.step for _, p in inputs.plans] == [1]
+    assert inputs.measurements == ()
+    assert [r.tick for r in inputs.references] == [0]
+    inputs = box.inputs(standing(120), Expected((2, 0), 80, 100))
+    assert [p.step for _, p in inputs.plans] == [2]
+    assert [m.tick for _, m in inputs.measurements] == [80]
+    assert [r.tick for r in inputs.references] == [100]
+
+
+def test_real_time_hands_over_all_that_has_come_once() -> None:
+    box = arrivals("realtime")
+    feed(box, ("r1/plan", plan(9)), ("r3/measurement", measurement(990)))
+    inputs = box.inputs(standing(7), NOTHING)
+    assert (len(inputs.plans), len(inputs.measurements)) == (1, 1)
+    assert box.inputs(standing(8), NOTHING).plans == ()
+
+
+def test_who_owes_what() -> None:
+    box = arrivals(estimator="truth")
+    awaited = Expected(plan=(1, 0), measurement_tick=40, reference_tick=0, truth=True)
+    everyone = {
+        ("plan", "r1"),
+        ("plan", "r3"),
+        ("measurement", "r1"),
+        ("measurement", "r3"),
+        ("reference", "operator"),
+        ("sim/truth", "sim"),
+    }
+    assert box.owing(80, awaited) == everyone
+    assert box.owing(80, NOTHING) == frozenset()
+    feed(
+        box,
+        ("r1/plan", plan(1)),
+        ("r3/plan", plan(0)),
+        ("r1/measurement", measurement(40)),
+        ("r3/measurement", measurement(30)),
+        ("reference", reference(0)),
+    )
+    assert box.owing(80, awaited) == {("plan", "r3"), ("measurement", "r3"), ("sim/truth", "sim")}
+
+
+def test_an_emergency_stop_and_the_end_are_never_held_back() -> None:
+    box = arrivals()
+    feed(box, ("estop", EStop(5, 5, "tripped")), ("sim/event", Event(5, 5, "push", "r1", "")))
+    assert not box.ended
+    estop = box.inputs(standing(6), NOTHING).estop
+    assert estop is not None
+    assert estop.reason == "tripped"
+    feed(
+        box, ("sim/event", Event(7, 7, "stop", "", "")), ("sim/event", Event(8, 8, "fall", "", ""))
+    )
+    assert box.ended
+
+
+def test_a_flood_is_bounded_and_counted() -> None:
+    box = arrivals()
+    feed(box, ("r2/state", standing(20_000)))
+    feed(box, *(("r1/measurement", measurement(10 * k)) for k in range(1000)))
+    most = 256 + 300 // 10  # what is measured while the team stands belongs to no flood
+    assert box.counters["flooded_measurement"] == 1000 - most
+    feed(box, ("r3/measurement", measurement(0)))
+    assert box.heard["measurement", "r3"] == 1
+    assert box.counters["flooded_measurement"] == 1000 - most, "nobody pays for another's flood"
+    taken = box.inputs(standing(5000), Expected(measurement_tick=10**6))
+    assert len(taken.measurements) == most + 1
+    feed(box, *(("r1/measurement", measurement(10 * k)) for k in range(1000, 1000 + most)))
+    assert box.counters["flooded_measurement"] == 1000 - most, "there is room again"
+
+
+@pytest.mark.parametrize(("robots", "stand_ms"), [(10, 300), (3, 10_000)])
+def test_nothing_that_is_measured_during_the_stand_is_refused(robots: int, stand_ms: int) -> None:
+    """In lock-step nobody asks for it before the first planning step."""
+    config = load(None, {"team.robots": robots, "gait.stand_ms": stand_ms})
+    peers = [f"r{k}" for k in range(2, robots + 1)]
+    box, last = Inbox(config, "r1", peers), stand_ms + 10
+    feed(box, ("r1/state", standing(last)))
+    for peer in peers:
+        feed(box, *((f"{peer}/measurement", measurement(t)) for t in range(10, last + 1, 10)))
+    assert not box.refused
+    assert not box.owing(last, Expected(measurement_tick=last))
+
+
+@pytest.mark.parametrize(
+    "change", [{"vx": 50.0}, {"vy": -0.6}, {"wz": 1.01}, {"height": 5.0}, {"height": 0.0}]
+)
+def test_a_reference_that_nobody_may_configure_is_dropped(change: dict[str, Any]) -> None:
+    box = arrivals()
+    feed(box, ("reference", replace(reference(0), **change)))
+    assert box.counters["dropped_reference"] == 1
+    feed(box, ("reference", replace(reference(0), vx=1.2, vy=0.5, wz=-1.0, height=0.32)))
+    assert box.counters["dropped_reference"] == 1
+    assert len(box.inputs(standing(0), Expected(reference_tick=0)).references) == 1
+
+
+def truth(robots: tuple[str, ...], rows: int, quat: float = 0.5) -> Truth:
+    zero = np.zeros((rows, 3))
+    return Truth(
+        0,
+        0,
+        robots,
+        zero,
+        np.full((rows, 4), quat),
+        zero,
+        zero,
+        np.zeros((rows, 4, 3)),
+        np.zeros(0),
+        np.zeros(0),
+    )
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        truth(("r1",), 1),
+        truth(("r1", "r2", "r3"), 1),
+        truth((), 3),
+        truth(("r1", "r3", "r4"), 3),
+        truth(("r1", "r2", "r3"), 3, 0.0),
+        truth(("r1", "r2", "r3"), 3, 1e3),
+    ],
+)
+def test_a_truth_that_says_nothing_of_the_robot_is_dropped(wrong: Truth) -> None:
+    box, awaited = arrivals(estimator="truth"), Expected(truth=True)
+    feed(box, ("sim/truth", wrong))
+    assert box.counters["dropped_sim/truth"] == 1
+    assert box.inputs(standing(0), awaited).truth is None
+    feed(box, ("sim/truth", truth(("r1", "r2", "r3"), 3)))
+    assert box.inputs(standing(0), awaited).truth is not None
+
+
+@pytest.mark.parametrize("quat", [np.zeros(4), np.full(4, 1e-3), np.full(4, 10.0)])
+def test_a_state_with_an_orientation_that_is_none_is_dropped(quat: Array) -> None:
+    box = arrivals()
+    feed(box, ("r2/state", replace(standing(5), imu_quat_wxyz=quat)))
+    assert box.state() is None
+    assert box.counters["dropped_state"] == 1

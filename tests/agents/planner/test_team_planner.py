@@ -1,0 +1,165 @@
+"""The team's planner: against eq. 7 solved otherwise, and against agents that plan alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import optimize
+
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.planner.peer_terms import PeerTerms
+from quadriga.agents.planner.planner import Planner, PlannerInputs
+from quadriga.agents.planner.team_planner import centralised
+from quadriga.agents.predictor.fits import fit_ridge
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.time_grid import horizon_stance
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.a1 import Array
+
+BASE = np.array([0.26, 0.4, 0.0, 0.0, 0.0, 0.1])
+STEP = 20
+
+
+@pytest.fixture(scope="module")
+def predictor(small: Config, linear_team: Callable[..., Any]) -> Predictor:
+    meta = replace(PredictorMeta.of(small), ridge=1e-10, block_weight=1.0)
+    return fit_ridge([linear_team(2).episode(1500, 1)], meta)
+
+
+def disturbed(config: Config, seed: int, size: float = 1.0) -> list[PlannerInputs]:
+    """Both robots off their course in ways of their own."""
+    rng, planner = np.random.default_rng(seed), config.planner
+    stance = np.ones((planner.T_ini, 4), dtype=np.bool_)
+    scale = size * np.array([0.004, 0.1, 0.1, 0.02, 0.02, 0.1])
+    return [
+        PlannerInputs(
+            step=STEP,
+            u_ini=nominal_forces(stance) + 5.0 * size * rng.normal(size=(planner.T_ini, 12)),
+            y_ini=BASE + scale * rng.normal(size=(planner.T_ini, 6)),
+            stance_ini=stance,
+            y_base_ini=np.tile(BASE, (planner.T_ini, 1)),
+            y_base=np.tile(BASE, (planner.N, 1)),
+            y_des=np.tile(BASE + 0.2 * scale * rng.normal(size=6), (planner.N, 1)),
+        )
+        for _ in range(config.team.robots)
+    ]
+
+
+def cost(config: Config, predictor: Predictor, inputs: list[PlannerInputs], du: Array) -> float:
+    """Eq. 7 written out: tracking of all robots and effort. du of shape (n, N, 12)."""
+    z = np.stack([np.concatenate([r.past(), f.ravel()]) for r, f in zip(inputs, du, strict=True)])
+    y = predictor.predict(z).reshape(len(inputs), -1, 6)
+    total = 0.0
+    for robot, predicted, forces in zip(inputs, y, du, strict=True):
+        error = robot.y_base + predicted - robot.y_des
+        total += float((error**2 @ config.planner.Q).sum())
+        total += float((forces.reshape(-1, 4, 3) ** 2 @ config.planner.R).sum())
+    return total
+
+
+@pytest.mark.parametrize(("seed", "size"), [(0, 0.2), (1, 1.0), (2, 3.0)])
+def test_no_feasible_change_of_the_forces_is_better(
+    small: Config, predictor: Predictor, seed: int, size: float
+) -> None:
+    """Projected steps down the numerical slope of eq. 7 lead nowhere."""
+    inputs = disturbed(small, seed, size)
+    result = centralised(small, predictor).step(inputs)
+    assert result.status == "solved"
+    stance = np.stack([horizon_stance(small, i, STEP) for i in range(2)])
+    du = result.u - nominal_forces(stance)
+    rng = np.random.default_rng(seed)
+    best, c = cost(small, predictor, inputs, du), small.planner.mu / np.sqrt(2.0)
+    mask = np.repeat(stance, 3, axis=2)
+    tried = 0
+    for _ in range(300):
+        other = du + mask * rng.normal(size=du.shape) * rng.choice([0.01, 0.1, 1.0])
+        forces = (nominal_forces(stance) + other).reshape(*stance.shape, 3)
+        fx, fy, fz = forces[stance].T
+        within = np.abs(other.reshape(-1, 3)) <= small.planner.deviation_max
+        if within.all() and (np.maximum(abs(fx), abs(fy)) <= c * fz).all() and (fz >= 0).all():
+            tried += 1
+            assert cost(small, predictor, inputs, other) >= best * (1.0 - 1e-12)
+    assert tried > 10 or size > 2.0
+
+
+def test_without_active_limits_it_is_the_least_squares_solution(
+    small: Config, predictor: Predictor
+) -> None:
+    inputs = disturbed(small, 3, 0.05)
+    result = centralised(small, predictor).step(inputs)
+    stance = np.stack([horizon_stance(small, i, STEP) for i in range(2)])
+    columns = np.flatnonzero(np.repeat(stance, 3, axis=2))
+    du = np.zeros(stance.shape[0] * stance.shape[1] * 12)
+
+    def residual(v: Array) -> Array:
+        forces = du.copy()
+        forces[columns] = v
+        forces = forces.reshape(2, -1, 12)
+        z = np.stack(
+            [np.concatenate([r.past(), f.ravel()]) for r, f in zip(inputs, forces, strict=True)]
+        )
+        y = predictor.predict(z).reshape(2, -1, 6)
+        error = np.stack([r.y_base - r.y_des for r in inputs]) + y
+        weighted = forces.reshape(-1, 4, 3) * np.sqrt(small.planner.R)
+        return np.concatenate([(error * np.sqrt(small.planner.Q)).ravel(), weighted.ravel()])
+
+    found = optimize.least_squares(residual, np.zeros(len(columns)), method="trf", xtol=1e-15)
+    np.testing.assert_allclose(
+        (result.u - nominal_forces(stance)).ravel()[columns], found.x, atol=1e-6
+    )
+
+
+def test_robots_that_do_not_influence_each_other_plan_as_if_alone(
+    small: Config, predictor: Predictor
+) -> None:
+    apart = predictor.G.copy()
+    apart[:, 0, 1] = apart[:, 1, 0] = 0.0
+    uncoupled = Predictor(predictor.meta, apart)
+    inputs = disturbed(small, 4)
+    together = centralised(small, uncoupled).step(inputs)
+    for i, own in enumerate(inputs):
+        planner = Planner(small, i, uncoupled)
+        alone = planner.step(planner.initial(), own, PeerTerms())[1]
+        np.testing.assert_allclose(together.u[i], alone.u, atol=1e-6)
+        np.testing.assert_allclose(together.y[i], alone.y, atol=1e-6)
+
+
+def test_the_plan_is_what_the_team_will_do(
+    small: Config, predictor: Predictor, linear_team: Callable[..., Any]
+) -> None:
+    team, rng = linear_team(2), np.random.default_rng(5)
+    T_ini = small.planner.T_ini
+    past = 10.0 * rng.normal(size=(40, 2, 12))
+    y = BASE + team.respond(past)
+    stance = np.ones((T_ini, 4), dtype=np.bool_)
+    inputs = [
+        replace(own, u_ini=nominal_forces(stance) + past[-T_ini:, i], y_ini=y[-T_ini:, i])
+        for i, own in enumerate(disturbed(small, 6))
+    ]
+    result = centralised(small, predictor).step(inputs)
+    planned = np.stack([horizon_stance(small, i, STEP) for i in range(2)])
+    du = (result.u - nominal_forces(planned)).transpose(1, 0, 2)
+    happened = BASE + team.respond(np.concatenate([past, du]))[40:]
+    np.testing.assert_allclose(result.y, happened.transpose(1, 0, 2), atol=1e-6)
+
+
+def test_a_broken_measurement_gives_nominal_forces_for_all(
+    small: Config, predictor: Predictor
+) -> None:
+    inputs = disturbed(small, 7)
+    broken = inputs[1].y_ini.copy()
+    broken[0, 0] = np.nan
+    result = centralised(small, predictor).step([inputs[0], replace(inputs[1], y_ini=broken)])
+    assert result.status == "nominal:not-finite"
+    for i in range(2):
+        np.testing.assert_array_equal(result.u[i], nominal_forces(horizon_stance(small, i, STEP)))
+
+
+def test_a_predictor_of_another_team_is_refused(small: Config, predictor: Predictor) -> None:
+    with pytest.raises(PredictorError, match=r"got \(robots, N, T_ini\)"):
+        centralised(replace(small, team=replace(small.team, robots=3)), predictor)

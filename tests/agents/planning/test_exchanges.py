@@ -1,0 +1,104 @@
+"""Agents that answer each other's plans within a planning step."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from quadriga.agents.planning.active_plan import ActivePlan, launched, present
+from quadriga.agents.planning.interface import Expected
+from quadriga.agents.planning.local import LocalPlanning
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.identification.rollout import Rollout
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
+from tests.agents.duet import CONFIG, FIRST_PLAN, every_100_ms, record, simple_predictor
+
+ANSWERS = 2
+ANSWERING = replace(CONFIG, planner=replace(CONFIG.planner, exchanges=ANSWERS))
+GAP = 10  # ms: a quarter of the step for K = 2
+
+
+def coupled(config: Config, strength: float = 0.3) -> Predictor:
+    """What a robot does to itself it does to its peer as well, more weakly."""
+    alone = simple_predictor(config)
+    G = alone.G.copy()
+    past = alone.meta.past
+    for i in range(2):
+        G[:, i, 1 - i, :, past:] = strength * G[:, i, i, :, past:]
+    return Predictor(alone.meta, G)
+
+
+def test_every_step_has_its_plan_and_its_answers_each_with_what_it_used() -> None:
+    steps = record(Rollout(ANSWERING, coupled(ANSWERING), every_100_ms), 700)
+    for name, peer in (("r1", "r2"), ("r2", "r1")):
+        made = [
+            (step.inputs.state.tick, step.outputs.plan)
+            for step in steps[name]
+            if step.outputs.plan is not None
+        ]
+        expected = [
+            (40 * k + GAP * e, k, e)
+            for k in range(FIRST_PLAN // 40, 700 // 40 + 1)
+            for e in range(ANSWERS + 1)
+            if 40 * k + GAP * e < 700
+        ]
+        assert [(tick, plan.step, plan.exchange) for tick, plan in made] == expected
+        for _, plan in made:
+            assert plan.tick == 40 * plan.step
+            asked = plan.step if plan.exchange else plan.step - 1
+            assert plan.used == ({} if plan.serial == (8, 0) else {peer: asked})
+
+
+def test_awaited_are_the_peer_s_answers_in_turn() -> None:
+    pilot = LocalPlanning(ANSWERING, 0, coupled(ANSWERING), lambda: 0)
+    due = {tick: pilot.awaited(tick) for tick in range(360, 400)}
+    assert {tick: item for tick, item in due.items() if item != Expected()} == {
+        370: Expected((9, 0), 360),
+        380: Expected((9, 1), 360),
+        390: Expected((9, 2), 360),
+    }
+
+
+def test_a_late_answer_is_skipped_and_not_waited_for() -> None:
+    """r2 falls silent for one answer: r1 goes on with what it has, and answers the next one."""
+    rollout = Rollout(ANSWERING, coupled(ANSWERING), every_100_ms)
+    made: list[tuple[int, int]] = []
+    for tick in rollout.ticks(560):
+        plan = tick.outputs["r1"].plan
+        if plan is not None:
+            made.append(plan.serial)
+        if tick.tick == 440:  # r2's plan of step 11 is lost on its way
+            rollout._plans = tuple(item for item in rollout._plans if item[0] != "r2")
+    assert (11, 0) in made
+    assert (11, 1) not in made
+    assert {(10, 1), (10, 2), (12, 0), (12, 1), (12, 2)} <= set(made)
+
+
+def flight(start: int, plan_tick: int, value: float, samples: int = 25) -> ActivePlan:
+    deviation: Array = np.full((samples, 12), value) + np.arange(samples)[:, None] * 0.01
+    return ActivePlan(start, plan_tick, deviation, np.full((samples, 6), value))
+
+
+def test_a_plan_with_latency_takes_over_from_the_one_before_and_stays_aligned() -> None:
+    flights: tuple[ActivePlan, ...] = ()
+    seen: dict[int, float] = {}
+    for tick in range(320, 480):
+        if tick % 40 == 0:
+            flights = launched(flights, flight(tick + 16, tick, float(tick // 40)))
+        seen[tick] = float(present(flights, tick).deviation[0])
+    assert seen[335] == 0.0
+    assert seen[336] == pytest.approx(8.01)  # its second sample: the first is over
+    assert seen[375] == pytest.approx(8.05)
+    assert seen[376] == pytest.approx(9.01)
+    assert len(flights) <= 3
+
+
+def test_planned_speeds_are_handed_on_from_the_present_sample_on() -> None:
+    outputs = np.arange(150.0).reshape(25, 6)
+    flights = (ActivePlan(320, 320, np.zeros((25, 12)), outputs),)
+    np.testing.assert_array_equal(present(flights, 339).v_ref, outputs[1:, 1:3])
+    np.testing.assert_array_equal(present(flights, 569).v_ref, outputs[24:, 1:3])
+    assert present(flights, 570).v_ref is None

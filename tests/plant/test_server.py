@@ -1,0 +1,74 @@
+"""What the world says on the bus can be read by whoever hears it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import msgpack
+import pytest
+
+from quadriga.plant.server import PlantServer
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.wire.codec import MAX_TEXT, decode
+from quadriga.shared.wire.messages import Event
+from quadriga.shared.wire.topics import COMMAND, EVENT, STATE, TRUTH
+from quadriga.sim_server.world.world import World
+from tests.sim_server.standing import configured
+
+
+class Listener:
+    """A bus that keeps what is published: key, whether it may be dropped, payload."""
+
+    def __init__(self) -> None:
+        self.packets: list[tuple[str, bool, bytes]] = []
+
+    def publisher(self, key: str, *, droppable: bool = False) -> Callable[[bytes], None]:
+        return lambda payload: self.packets.append((key, droppable, payload))
+
+    def events(self) -> list[Event]:
+        return [
+            decode(payload, Event) for key, _, payload in self.packets if key == "team/sim/event"
+        ]
+
+
+def staged(**world: Any) -> tuple[PlantServer, Listener]:
+    config, heard = configured(**world), Listener()
+    return PlantServer(config, World(config), cast("Bus", heard)), heard
+
+
+@pytest.mark.parametrize(
+    "body",
+    [{"schema": "x" * 900_000}, {"schema": 1} | {f"key {i}": 0 for i in range(50_000)}],
+    ids=["text", "keys"],
+)
+def test_a_malformed_command_is_reported_in_few_words(body: dict[str, object]) -> None:
+    stage, heard = staged()
+    stage.commands.take(COMMAND.key("team", "r1"), msgpack.packb(body), tick=0, oldest=0)
+    stage.step({})
+    event = next(event for event in heard.events() if event.kind == "fault")
+    assert event.detail.startswith("1 commands dropped: command: got ")
+    assert len(event.detail) < 300
+
+
+def test_a_detail_is_cut_to_what_an_event_may_hold() -> None:
+    stage, heard = staged()
+    stage.announce("fault", "r1", "x" * (MAX_TEXT + 1))
+    assert heard.events()[0].detail == "x" * (MAX_TEXT - 1) + "…"
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_in_real_time_nothing_but_the_end_waits_for_who_does_not_listen(mode: str) -> None:
+    stage, heard = staged(mode=mode)
+    stage.publish()
+    for kind in ("push", "fault", "fall", "stop"):
+        stage.announce(kind, "", "")
+    droppable = {key: drop for key, drop, _ in heard.packets[:2]}
+    assert droppable == {
+        STATE.key("team", "r1"): mode == "realtime",
+        TRUTH.key("team"): mode == "realtime",
+    }
+    assert [drop for key, drop, _ in heard.packets if key == EVENT.key("team")] == [
+        *[mode == "realtime"] * 3,
+        False,
+    ]

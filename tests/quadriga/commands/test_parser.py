@@ -1,0 +1,121 @@
+"""A user's mistake costs one line on stderr and exit status 2, never a traceback."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from quadriga.commands.parser import KEYS, main
+from quadriga.shared.config.load import load
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    status = main(arguments)
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["walk", "--robots", "11"], "team.robots: got 11, expected an integer in [1, 10]"),
+        (["walk", "--terrain", "boxs"], "did you mean 'boxes'?"),
+        (["walk", "--push", "r9:1:1:1:1"], "world.push: got a push on 'r9'"),
+        (["walk", "--push", "r1:nonsense"], "world.push"),
+        (["walk", "--vx", "9"], "reference.vx: got 9.0"),
+        (["walk", "--set", "world.weak_motor=r9:calf:0"], "world.weak_motor: got robot 'r9'"),
+        (["walk", "--set", "reference.trace=./no.csv"], "reference.trace no.csv: got No such file"),
+        (["sim", "--set", "world.sed=1"], "did you mean 'world.seed'?"),
+        (["sim", "--set", "nonsense"], "expected section.key=value"),
+        (["sim", "--config", "/nowhere/team.toml"], "/nowhere/team.toml: got No such file"),
+        (["agent", "--robot", "r4"], "--robot: got 'r4', expected one of r1, r2, r3"),
+        (["agent", "--robot", "r1", "--predictor", "/nowhere/p.npz"], "/nowhere/p.npz"),
+        (
+            ["agent", "--robot", "r1", "--wait", "0.1", "--predictor", "/nowhere/p.npz"],
+            "predictor /nowhere/p.npz: got no such file after 0.1 s",
+        ),
+        (
+            ["record", "--report", "-o", "walk.mcap"],
+            "--output: got walk.mcap, expected DIR/run.mcap",
+        ),
+        (["report", "/nowhere"], "/nowhere/run.mcap: got No such file"),
+        (["router", "--listen", "pigeon/roof"], "bus.endpoint 'pigeon/roof' of router"),
+        (["operate", "--endpoint", "pigeon/roof"], "bus.endpoint 'pigeon/roof'"),
+        (["record", "-o", "/proc/run.mcap"], "/proc/run.mcap"),
+    ],
+)
+def test_mistakes(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    arguments: list[str],
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, out, err = run(capsys, *arguments)
+    assert (status, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("arguments", [[], ["wlak"], ["walk", "--robots", "three"], ["agent"]])
+def test_a_wrong_command_line_shows_the_usage(
+    capsys: pytest.CaptureFixture[str], arguments: list[str]
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(arguments)
+    assert "usage: quadriga" in capsys.readouterr().err
+
+
+def test_the_configuration_in_force_can_be_printed_and_read_back(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    options = ["--robots", "5", "--preset", "paper", "--set", "planner.R=[1,2,3]"]
+    status, out, _ = run(capsys, "config", *options)
+    assert status == 0
+    path = tmp_path / "team.toml"
+    path.write_text(out, encoding="utf-8")
+    config = load(path)
+    assert (config.team.robots, config.controller.preset) == (5, "paper")
+    assert config.planner.R == (1.0, 2.0, 3.0)
+    assert run(capsys, "config", "--config", str(path)) == (0, out, "")
+
+
+def test_options_win_over_the_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "team.toml"
+    path.write_text("[world]\nseed = 3\nseconds = 9.0\n", encoding="utf-8")
+    _, out, _ = run(capsys, "config", "--config", str(path), "--seed", "4", "--vx", "-0.2")
+    assert "seed = 4\n" in out
+    assert "seconds = 9.0\n" in out
+    assert "vx = -0.2\n" in out
+
+
+def test_every_option_names_a_key() -> None:
+    config = load()
+    for name in KEYS.values():
+        section, _, key = name.partition(".")
+        assert hasattr(getattr(config, section), key)
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = run(capsys, "version")
+    assert status == 0
+    assert out.startswith("quadriga")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_among_the_first_imports_ends_a_process_quietly(number: signal.Signals) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "quadriga", "sim"], stderr=subprocess.PIPE, text=True
+    )
+    held = 1 << (number - 1)
+    status = Path(f"/proc/{process.pid}/status")
+    while not int(status.read_text().partition("SigBlk:")[2].split()[0], 16) & held:
+        assert process.poll() is None, "signals are never held"
+    process.send_signal(number)
+    _, said = process.communicate(timeout=30.0)
+    assert (process.returncode, said) == (130, "quadriga: interrupted\n")

@@ -1,0 +1,102 @@
+"""The page of a campaign from its folder alone."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from quadriga.commands.parser import main
+from quadriga.experiments.campaign.ledger import Ledger
+from quadriga.experiments.campaign.manifest import Manifest
+from quadriga.experiments.campaign.outcome import TrialOutcome
+from quadriga.experiments.campaign.report import span, spanned
+from tests.quadriga.experiments.campaign.rows import manifest, row
+from tests.quadriga.report.outline import Outline
+
+Said = pytest.CaptureFixture[str]
+
+
+def write(folder: Path, mine: Manifest, rows: list[TrialOutcome]) -> Path:
+    with Ledger(folder, mine) as ledger:
+        for one in rows:
+            ledger.append(one)
+    return folder
+
+
+def report(folder: Path, *options: str) -> Outline:
+    assert main(["campaign", "--report", str(folder), *options]) == 0
+    return Outline((folder / "report.html").read_text(encoding="utf-8"))
+
+
+def test_the_page_says_what_the_rows_say(capsys: Said, tmp_path: Path) -> None:
+    rows = [row("none", seed, fell=2.5 if seed < 4 else None) for seed in range(10)]
+    rows += [row("<b>", seed) for seed in range(7)]
+    found = report(write(tmp_path / "c", manifest("none", "<b>"), rows))
+    assert found.sections == ["success", "falls", "errors", "tracking", "worst", "walked"]
+    assert {link[1:] for link in found.links} <= found.anchors
+    assert "17 walks: 2 variants, 1 world, 10 seeds (0 … 9), paired" in found.text
+    assert "3 are still to be walked" in found.text
+    assert "success by variant" in found.figures
+    assert "r2 fell at 2.50 s" in found.text
+    assert "Did not fall where the baseline did: seeds 0 … 3." in found.text
+    assert "c/configs/steps-none.toml --seed 0 --out" in found.text
+    told = capsys.readouterr()
+    assert "steps: falls against none" in told.out
+    tables = (tmp_path / "c" / "report.md").read_text(encoding="utf-8")
+    assert "| none | 10 | 60.0 % |" in tables
+    assert "quadriga campaign steps" in tables
+    other = report(tmp_path / "c", "--baseline", "<b>")
+    assert "Fell where the baseline did not: seeds 0 … 3." in other.text
+
+
+def test_success_is_drawn_against_what_was_swept(tmp_path: Path) -> None:
+    swept = (("80", "0"), ("120", "0"), ("80", "9"), ("120", "9"))
+    mine = manifest("none", "damped", sweeps=("world.push", "world.payload"), swept=swept)
+    rows = [row(v, seed, swept=s) for v in ("none", "damped") for s in swept for seed in range(3)]
+    found = report(write(tmp_path / "c", mine, rows))
+    assert found.figures == ["success against world.push", "success against world.payload"]
+    assert {
+        "steps · 0: walked to the end [%]",
+        "steps · 9: walked to the end [%]",
+        "steps · 80: walked to the end [%]",
+    } <= set(found.titles)
+
+
+def test_what_is_no_campaign_costs_one_line(capsys: Said, tmp_path: Path) -> None:
+    empty = write(tmp_path / "empty", manifest("none"), [])
+    for options, message in (
+        (["--report", str(tmp_path)], "campaign.json"),
+        (["--report", str(empty)], "got no trial"),
+        (["--report", str(empty), "--baseline", "x"], "--baseline: got 'x'"),
+        (["flat.toml", "--report", str(empty)], "got scenarios flat.toml, expected none: it walks"),
+        (["--report", str(empty), "--seeds", "0:3"], "--report: got --seeds 0:3"),
+        (["--report", str(empty), "--out", "x"], "--report: got --out x"),
+        (["--report", str(empty), "--sweep", "a=1", "--vx", "1"], "--report: got --sweep a=1"),
+        (["--report", str(empty), "--vx", "0.2"], "--report: got reference.vx 0.2"),
+        (["--report", str(empty), "--record-worst", "-1"], "--record-worst: got -1"),
+        ([], "scenarios: got none"),
+        (["x.toml", "--dask", "y.toml"], "--dask: got 'y.toml'"),
+    ):
+        assert main(["campaign", *options]) == 2
+        told = capsys.readouterr().err
+        assert message in told
+        assert told.count("\n") == 1
+
+
+def test_spans_of_seeds_are_short() -> None:
+    assert span([3, 0, 1, 2, 7, 9, 10]) == "0 … 3, 7, 9, 10"
+    assert span([]) == ""
+
+
+@given(st.sets(st.integers(0, 50)) | st.sets(st.integers(0, 10**6)))
+def test_a_span_says_which_seeds_it_is_of(seeds: set[int]) -> None:
+    assert spanned(span(sorted(seeds))) == seeds
+
+
+def test_a_manifest_survives_json(tmp_path: Path) -> None:
+    mine = manifest("none", sweeps=("world.payload",), swept=(("9",),))
+    assert Manifest.from_dict({**asdict(mine)}) == mine

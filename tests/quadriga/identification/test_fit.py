@@ -1,0 +1,157 @@
+"""What `quadriga fit` tells: figures that agree with each other, files, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quadriga.agents.planner.gates import held_out_error
+from quadriga.agents.predictor.fits import FITS
+from quadriga.agents.predictor.fits import fit as fit_predictor
+from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.store import read
+from quadriga.commands.parser import main
+from quadriga.identification.cache import predictor_path
+from quadriga.identification.fit import fitted
+from quadriga.identification.fit_report import FitReport, Unfit, horizon_errors
+from quadriga.identification.fit_sheets import comparison, report_sheets
+from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.a1 import OUTPUTS
+from tests.quadriga.linear_data import arguments, config_of, dataset, put_data
+
+Said = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A cache folder of this module's own with the linear team's data."""
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        put_data(folder, patch)
+        yield folder
+
+
+@pytest.mark.parametrize("kind", ["ridge", "phase"])
+def test_errors_over_the_horizon_make_up_the_error_of_the_gates(kind: str) -> None:
+    data, config = dataset(), config_of(identification__predictor=kind)
+    predictor = fit_predictor(data.training, PredictorMeta.of(config))
+    found = horizon_errors(predictor, data.held_out)
+    _, rmse, persistence, _ = held_out_error(predictor, data.held_out)
+    assert found.rmse.shape == found.persistence.shape == (8, 6)
+    np.testing.assert_allclose(np.sqrt((found.rmse**2).mean(axis=0)), rmse, rtol=1e-12)
+    np.testing.assert_allclose(np.sqrt((found.persistence**2).mean(axis=0)), persistence)
+
+
+def test_persistence_is_the_change_since_the_last_sample() -> None:
+    """Against the definition written out for one sample of the horizon."""
+    data = dataset()
+    predictor = fit_predictor(data.training, PredictorMeta.of(config_of()))
+    y = data.held_out[0].y
+    last, third = y[3 : len(y) - 8], y[3 + 3 : len(y) - 8 + 3]
+    expected = np.sqrt(((third - last) ** 2).mean(axis=(0, 1)))
+    np.testing.assert_allclose(horizon_errors(predictor, data.held_out).persistence[2], expected)
+
+
+def test_held_out_data_that_are_too_short_are_an_error() -> None:
+    data = dataset()
+    predictor = fit_predictor(data.training, PredictorMeta.of(config_of()))
+    with pytest.raises(PredictorError, match="at least 12 samples"):
+        horizon_errors(predictor, dataset(11).held_out)
+
+
+def test_the_report_is_printed_and_kept_beside_the_predictor(capsys: Said) -> None:
+    assert main(["fit", *arguments()]) == 0
+    out = capsys.readouterr().out
+    path = predictor_path(config_of())
+    assert out.splitlines()[-1] == str(path)
+    for told in ("best-response radius", "persistence", "Coupling", "digest", "seeds 5–6"):
+        assert told in out
+    kept = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+    predictor, provenance = read(path)
+    assert kept["refused"] == ""
+    assert kept["fit_seconds"] > 0.0
+    assert kept["provenance"]["gates"] == json.loads(json.dumps(provenance.gates.to_dict()))
+    assert kept["sha256"][:16] in out
+    assert {name: len(found) for name, found in kept["horizon"]["rmse"].items()} == dict.fromkeys(
+        OUTPUTS, predictor.meta.N
+    )
+    page = path.with_suffix(".md").read_text(encoding="utf-8")
+    assert page.count(" ms |") == predictor.meta.N
+    assert f"({path.stem}.png)" in page
+    assert path.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_predictor_that_is_there_is_reported_as_it_was(capsys: Said) -> None:
+    assert main(["fit", *arguments()]) == 0
+    before = predictor_path(config_of()).stat().st_mtime_ns
+    first = capsys.readouterr().out
+    assert main(["fit", *arguments()]) == 0
+    assert capsys.readouterr().out == first
+    assert predictor_path(config_of()).stat().st_mtime_ns == before
+
+
+def test_a_refused_predictor_is_shown_with_the_figure_that_refused_it(capsys: Said) -> None:
+    limits = {"identification__max_radius": 0.01}
+    assert main(["fit", *arguments(**limits)]) == 2
+    out, err = capsys.readouterr()
+    path = predictor_path(config_of(**limits))
+    kept = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+    radius = kept["provenance"]["gates"]["radius"]
+    assert f"refused: radius of the best-response map {radius:.3f}, not below 0.01" in out
+    assert f"got {radius:.3f}, expected below 0.01" in err
+    assert err.count("\n") == 1
+    assert not path.exists()
+
+
+def test_every_predictor_is_compared_and_the_refused_ones_are_not_hidden(capsys: Said) -> None:
+    """Between the radii of two fits of the same data lies a limit that refuses one of them."""
+    weight = {"identification__block_weight": 1000.0}
+    weighted, plain = (
+        fitted(config_of(**weight, identification__predictor=kind), dataset(), kind)
+        for kind in ("ridge", "pinv")
+    )
+    assert isinstance(weighted, FitReport)
+    assert isinstance(plain, FitReport)
+    limit = (weighted.gates.radius + plain.gates.radius) / 2
+    limits = weight | {"identification__max_radius": limit}
+    config = config_of(**limits)
+    status = main(["fit", "--all", *arguments(**limits)])
+    out, err = capsys.readouterr()
+    assert status == 0, err
+    path = predictor_path(config)
+    assert out.splitlines()[-1] == str(path)
+    kept = json.loads(path.with_name(f"{path.stem}-all.json").read_text(encoding="utf-8"))
+    by_name = {report["predictor"]: report for report in kept}
+    assert list(by_name) == list(FITS)
+    assert by_name["ridge"]["refused"] == ""
+    assert "radius" in by_name["pinv"]["refused"]
+    for name, report in by_name.items():
+        assert f"{name}: refused: {report['refused']}."[:60] in out or not report["refused"]
+        ident = replace(config.identification, predictor=name)
+        file = predictor_path(replace(config, identification=ident))
+        assert file.exists() == (not report["refused"])
+    assert path.with_name(f"{path.stem}-all.png").exists()
+
+
+def test_what_cannot_be_fitted_at_all_is_a_row_with_the_reason() -> None:
+    report = fitted(config_of(), dataset(), "ridge")
+    assert isinstance(report, FitReport)
+    singular = Unfit("arx", PredictorError("normal equations", "a pivot of 0", "positive"))
+    table = comparison([report, singular])
+    assert all(len(row) == len(table.columns) for row in table.rows)
+    assert (table.rows[1][0], table.rows[1][-1]) == ("arx", "no fit")
+    assert "arx: refused: normal equations a pivot of 0, not positive." in table.notes
+    for sheet in report_sheets(report, whole=True):
+        assert all(len(row) == len(sheet.columns) for row in sheet.rows)
+
+
+def test_data_that_do_not_excite_are_an_error_not_a_report() -> None:
+    data = dataset()
+    still = tuple(replace(episode, u=episode.u_nominal.copy()) for episode in data.training)
+    with pytest.raises(PredictorError, match="persistently exciting"):
+        fitted(config_of(identification__ridge=2e-6), replace(data, training=still), "ridge")

@@ -1,0 +1,102 @@
+"""Poses come back from the recording; the pictures show them with and without OpenGL."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from quadriga.pictures.frames import clip_ticks, sheet_ticks
+from quadriga.pictures.poses import PosedTeam, read_poses, truth_ticks
+from quadriga.pictures.render import render
+from quadriga.shared.errors import RecordingError
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import FOOT_RADIUS, q_stand
+from quadriga.shared.wire import messages as msg
+from quadriga.sim_server.world.team_model import NQ
+from tests.quadriga.conftest import SPEED, WriteRun, run_config
+
+
+def test_poses_are_truth_and_joint_angles(known_run: Path) -> None:
+    recording = Recording(known_run / "run.mcap")
+    ticks = truth_ticks(recording)
+    np.testing.assert_array_equal(ticks, np.arange(0, 6001, 10))
+    poses = read_poses(recording, ticks[[0, 300]])
+    robots = poses.qpos.reshape(2, 2, NQ)
+    np.testing.assert_allclose(robots[:, :, 7:], np.broadcast_to(q_stand(), (2, 2, 12)))
+    moved = robots[1, :, :2] - robots[0, :, :2]
+    np.testing.assert_allclose(np.linalg.norm(moved, axis=1), 3 * SPEED)
+    assert poses.radius() == pytest.approx(0.45 + 0.4, abs=0.01)
+
+
+def test_feet_of_a_standing_team_are_on_the_ground(write_run: WriteRun) -> None:
+    run = write_run(run_config(3, 0.5), yaw=0.0)
+    recording = Recording(run / "run.mcap")
+    poses = read_poses(recording, np.array([0]))
+    team = PosedTeam(poses.config)
+    team.set(poses.qpos[0])
+    feet, legs = team.feet(), team.legs()
+    assert feet.shape == (3, 4, 3)
+    np.testing.assert_allclose(legs[:, :, 3], feet)
+    assert np.abs(feet[0, :, 2] - FOOT_RADIUS).max() < 0.01  # rolled by 0.03 rad
+    assert feet[0, 0, 1] > feet[0, 1, 1]  # FL is left of FR
+    assert feet[0, 0, 0] > feet[0, 2, 0]  # and ahead of RL
+
+
+def test_instants_cover_the_run_and_its_end() -> None:
+    ticks = np.arange(0, 20_001, 10)
+    sheet, clip = sheet_ticks(ticks), clip_ticks(ticks)
+    assert (sheet[0], sheet[-1], len(sheet)) == (0, 20_000, 8)
+    assert clip[0] == 15_000
+    assert set(np.diff(clip)) == {80}
+    for few in (ticks[:1], ticks[:3]):
+        assert set(sheet_ticks(few)) == set(few)
+        assert set(clip_ticks(few)) <= set(few)
+
+
+def test_renders_sheet_and_clip(write_run: WriteRun) -> None:
+    said: list[str] = []
+    run = write_run(run_config(2, 0.5))
+    paths = render(run, said.append)
+    with Image.open(paths[0]) as sheet:
+        pixels = np.asarray(sheet.convert("RGB")).astype(int)
+    assert pixels.shape == (4 * 360 + 3 * 6, 2 * 640 + 6, 3)
+    if said:
+        pytest.skip(said[0])
+    red = (pixels[..., 0] > 90) & (pixels[..., 1:].max(axis=2) < 60)
+    assert red.mean() > 0.002  # robot 1's trunk
+    with Image.open(paths[1]) as clip:
+        assert clip.size == (640, 360)
+        assert getattr(clip, "n_frames", 1) == 7
+
+
+def test_without_opengl_stick_figures_and_one_line(
+    write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "disable")
+    said: list[str] = []
+    run = write_run(run_config(2, 0.5))
+    assert render(run, said.append) == (run / "walk.png",)
+    assert len(said) == 1
+    assert "\n" not in said[0]
+    assert "stick figures" in said[0]
+    with Image.open(run / "walk.png") as sheet:
+        assert sheet.width == 2 * 640 + 6
+        assert len(np.unique(np.asarray(sheet.convert("L")))) > 50
+
+
+def test_a_recording_without_truth_cannot_be_drawn(write_run: WriteRun) -> None:
+    run = write_run(run_config(1, 0.5), change=lambda _, m: None if isinstance(m, msg.Truth) else m)
+    with pytest.raises(RecordingError, match="sim/truth"):
+        render(run)
+
+
+def test_a_lost_state_is_shown_standing(write_run: WriteRun) -> None:
+    run = write_run(
+        run_config(1, 0.5),
+        change=lambda _, m: None if isinstance(m, msg.State) and m.tick == 100 else m,
+    )
+    poses = read_poses(Recording(run / "run.mcap"), np.array([100]))
+    np.testing.assert_allclose(poses.qpos[0, 7:], q_stand())

@@ -1,0 +1,227 @@
+"""Whatever an agent had taken in when, the recording hands it over at the same steps."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from quadriga.agents.agent import Agent
+from quadriga.agents.inbox.inbox import Inbox, Order, Source, order_of
+from quadriga.agents.inbox.intake_log import Intake, reference_to, taken_in
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.rehearsal import standing
+from quadriga.replay.agent_log import AgentLog
+from quadriga.replay.intake import Fed, Feed
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Measurement, Message, Plan, Reference
+
+TICKS, STEP_MS, PATIENCE = 420, 40, 30
+Taken = list[tuple[int, list[tuple[Source, Order]]]]
+
+
+def agent_of(mode: str) -> tuple[Config, Agent]:
+    """Robot r2 of three, with a predictor that predicts nothing."""
+    config = load(None, {"team.robots": 3, "world.mode": mode, "gait.stand_ms": 100})
+    meta = PredictorMeta.of(config)
+    nothing = Predictor(meta, np.zeros((1, 3, 3, 6 * meta.N, meta.width)))
+    return config, Agent(config, "r2", nothing)
+
+
+AGENTS = {mode: agent_of(mode) for mode in ("lockstep", "realtime")}
+
+
+def sent(config: Config) -> list[tuple[int, str, Source, Message]]:
+    """What others send: tick, key, source, message."""
+    found: list[tuple[int, str, Source, Message]] = []
+    for tick in range(0, TICKS, 10):
+        for peer in ("r1", "r3"):
+            if tick:
+                sample = Measurement(tick, tick, np.zeros(12), np.zeros(6), np.ones(4))
+                found.append((tick, f"team/{peer}/measurement", ("measurement", peer), sample))
+            if tick % STEP_MS == 0 and tick >= 160:
+                plan = Plan(
+                    tick,
+                    tick,
+                    tick // STEP_MS,
+                    np.zeros((25, 12)),
+                    np.zeros((25, 6)),
+                    "solved",
+                    {},
+                    0,
+                )
+                found.append((tick, f"team/{peer}/plan", ("plan", peer), plan))
+        if tick % 100 == 0:
+            reference = Reference(tick, tick, 0.1, 0.0, 0.0, 0.26)
+            found.append((tick, "team/reference", ("reference", "operator"), reference))
+    return found
+
+
+def forged(of: int) -> list[tuple[str, Source, Message]]:
+    """Key, source, message of what nobody sends by rule, of a time."""
+    sample = Measurement(of, of, np.zeros(12), np.zeros(6), np.zeros(4))
+    horizon = np.zeros((25, 12)), np.zeros((25, 6))
+    return [
+        ("team/reference", ("reference", "operator"), Reference(of, of, 0.2, 0.0, 0.0, 0.26)),
+        ("team/r1/measurement", ("measurement", "r1"), sample),
+        ("team/r3/plan", ("plan", "r3"), Plan(of, of, of // STEP_MS, *horizon, "", {}, 1)),
+    ]
+
+
+def lived(
+    mode: str,
+    seed: int,
+    late: float,
+    skipped: float,
+    second: Sequence[tuple[int, int]] = (),
+    early: Sequence[tuple[int, int]] = (),
+) -> tuple[AgentLog, Taken]:
+    """A walk in which messages come late or never and states are passed over; its recording.
+
+    Args:
+        mode: lockstep or realtime.
+        seed: of the delays.
+        late: share of messages that come late or never.
+        skipped: share of states passed over.
+        second: tick and delay of references that a second operator sends beside the first.
+        early: when somebody sends messages of all kinds, and how far ahead of it, ms.
+    """
+    rng = np.random.default_rng(seed)
+    config, agent = AGENTS[mode]
+    arrivals, tape = Inbox(config, "r2", agent.peers), AgentLog()
+    intake = Intake(config, arrivals)
+    pending: list[tuple[int, str, Source, Message]] = []
+
+    def delay() -> int:
+        return 1 + (int(rng.integers(200)) if rng.random() < late else 0)
+
+    comes: Counter[Source] = Counter()
+    for tick, key, source, message in sent(config):
+        comes[source] = max(comes[source], tick + delay())  # a key keeps its order
+        pending.append((comes[source], key, source, message))
+        tape.heard[source][order_of(message)].append((key, encode(message)))
+    for tick, after in second:
+        source, message = ("reference", "operator"), Reference(tick, tick, 0.2, 0.0, 0.0, 0.26)
+        pending.append((tick + after, "team/reference", source, message))
+        tape.heard[source][order_of(message)].append(("team/reference", encode(message)))
+    for comes_at, lead in early:
+        for key, source, message in forged(comes_at + lead):
+            pending.append((comes_at, key, source, message))
+            tape.heard[source][order_of(message)].append((key, encode(message)))
+    taken: Taken = []
+    last = -1
+    for tick in range(TICKS):
+        tape.states[tick].append(encode(standing(tick)))
+        if rng.random() < skipped:
+            continue
+        awaited = agent.awaited(tick)
+        arrivals.take("team/r2/state", tape.states[tick][0])
+
+        def take(until: int, of: frozenset[Source] | None = None) -> None:
+            for item in sorted(pending, key=lambda item: item[0]):
+                if item[0] <= until and (of is None or item[2] in of):
+                    arrivals.take(item[1], encode(item[3]))
+                    pending.remove(item)
+
+        take(tick)
+        if mode == "lockstep":
+            take(tick + PATIENCE, arrivals.owing(tick, awaited))
+        state = arrivals.state()
+        assert state is not None
+        inputs = arrivals.inputs(state, awaited)
+        record = intake.record(last, inputs, awaited)
+        if record is not None:
+            tape.records[tick] = record
+        last = tape.last = tick
+        taken.append((tick, taken_in(inputs)))
+    for peer in agent.peers:
+        tape.peers_awake[peer].update(range(0, TICKS, 10))
+    return tape, taken
+
+
+def fed(mode: str, tape: AgentLog) -> list[Fed]:
+    """What a replay hands over."""
+    config, agent = AGENTS[mode]
+    return list(Feed(config, agent, Inbox(config, "r2", agent.peers), tape).steps())
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+@settings(max_examples=40)
+@given(
+    seed=st.integers(0, 1 << 32),
+    late=st.sampled_from([0.0, 0.05, 0.5]),
+    skipped=st.sampled_from([0.0, 0.02, 0.5]),
+    held=st.sampled_from([256, 20, 7]),
+    second=st.lists(
+        st.tuples(st.sampled_from([55, 145, 235, 325]), st.integers(1, 300)),
+        max_size=4,
+        unique_by=lambda sent: sent[0],
+    ),
+    early=st.lists(
+        st.tuples(st.sampled_from([5, 55, 155, 205, 265]), st.sampled_from([90, 100, 120, 10**6])),
+        max_size=4,
+        unique_by=sum,
+    ),
+)
+def test_a_replay_takes_in_what_the_agent_took_in(
+    mode: str,
+    seed: int,
+    late: float,
+    skipped: float,
+    held: int,
+    second: list[tuple[int, int]],
+    early: list[tuple[int, int]],
+) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("quadriga.agents.inbox.inbox._HELD", held)
+        patch.setattr("quadriga.agents.inbox.inbox.AHEAD_MS", 100)
+        tape, taken = lived(mode, seed, late, skipped, second, early)
+        patch.undo()
+        patch.setattr("quadriga.agents.inbox.inbox.AHEAD_MS", 100)
+        steps = fed(mode, tape)
+    assert not [step.missing for step in steps if step.missing]
+    again = [(step.tick, taken_in(step.inputs)) for step in steps if step.inputs is not None]
+    assert again == taken
+
+
+def test_lock_step_without_trouble_needs_no_record_at_all() -> None:
+    tape, taken = lived("lockstep", 1, 0.0, 0.0)
+    assert not tape.records
+    assert sum(len(found) for _, found in taken) > 50
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+@pytest.mark.parametrize(
+    ("source", "order"),
+    [
+        (("measurement", "r1"), (130, 0)),
+        (("measurement", "r3"), (200, 0)),
+        (("plan", "r3"), (5, 0)),
+        (("reference", "operator"), (200, 0)),
+    ],
+)
+def test_what_the_recorder_lost_is_named_at_the_step_that_took_it_in(
+    mode: str, source: Source, order: Order
+) -> None:
+    tape, taken = lived(mode, 2, 0.0, 0.0)
+    step = next(tick for tick, found in taken if (source, order) in found)
+    del tape.heard[source][order]
+    missing = [(step.tick, step.missing) for step in fed(mode, tape) if step.missing]
+    assert missing == [(step, (reference_to(source, order),))]
+
+
+def test_a_lost_state_and_a_lost_record_are_named() -> None:
+    tape, _ = lived("realtime", 3, 0.0, 0.0)
+    lost = tape.records.pop(sorted(tape.records)[7])
+    before = sorted(tape.records)[6]
+    del tape.states[400]
+    missing = [(step.tick, step.missing) for step in fed("realtime", tape) if step.missing]
+    assert missing[0][0] == before + 1 <= lost.tick
+    assert "1 of inputs of r2 between ticks" in missing[0][1][0]
+    assert (400, ("state of r2 at tick 400",)) in missing

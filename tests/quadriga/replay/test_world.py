@@ -1,0 +1,166 @@
+"""A recorded world comes out the same to the byte, and any planted change is found where it is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from quadriga.commands.parser import main
+from quadriga.recordings.by_tick import by_tick
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Command, State, Truth
+from tests.quadriga.lockstep_run import LATE, TICKS, Change, config, write_lockstep
+from tests.quadriga.replay.rewritten import rewritten
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_lockstep(tmp_path_factory.mktemp("whole") / "run.mcap", config())
+
+
+def resim(capsys: pytest.CaptureFixture[str], path: Path) -> tuple[int, str]:
+    status = main(["resim", str(path)])
+    out, err = capsys.readouterr()
+    assert "Traceback" not in err
+    return status, out + err
+
+
+def test_a_world_with_pushes_payload_blocks_and_a_silent_robot_comes_out_equal(
+    capsys: pytest.CaptureFixture[str], whole: Path
+) -> None:
+    ticks = {entry.tick for entry in Recording(whole).entries({"command"}) if "r2" in entry.key}
+    assert set(LATE) <= ticks, "commands that the world never used are in the file"
+    status, said = resim(capsys, whole)
+    assert status == 0, said
+    assert f"equal to the byte: {2 * TICKS + TICKS // 10} states and truths" in said
+    assert "× real time" in said
+
+
+def test_loose_stones_and_weak_motors_come_out_equal(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """A weak motor is a fault, but not that of a robot that has fallen silent."""
+    scene = config(
+        world__terrain="pebbles",
+        world__weak_motor="r1:any:0.05,r2:calf:0",
+        world__push_force=60.0,
+        world__push_every=0.1,
+    )
+    status, said = resim(capsys, write_lockstep(tmp_path / "run.mcap", scene))
+    assert status == 0, said
+    assert f"equal to the byte: {2 * TICKS + TICKS // 10} states and truths" in said
+
+
+def flipped(
+    kind: type[State] | type[Truth] | type[Command], at: int, name: str, place: int, bit: int = 0
+) -> Change:
+    """One bit of one number of one message, flipped; 0 is the last of its mantissa."""
+
+    def change(tick: int, key: str, payload: bytes) -> bytes:
+        topic = {State: "r2/state", Truth: "sim/truth", Command: "r1/command"}[kind]
+        if tick != at or not key.endswith(topic):
+            return payload
+        message = decode(payload, kind)
+        values = np.array(getattr(message, name))
+        values.reshape(-1).view(np.int64)[place] ^= 1 << bit
+        changed: dict[str, Any] = {name: values}
+        return encode(replace(message, **changed))
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "tick", "found"),
+    [
+        (flipped(State, 177, "imu_gyro", 2), 177, "team/r2/state.imu_gyro[2]"),
+        (flipped(Truth, 210, "base_pos", 4), 210, "team/sim/truth.base_pos[1, 1]"),
+        # The last bit of a gain may be lost as torques are summed.
+        (flipped(Command, 200, "kp", 0, bit=20), 201, "team/r1/state"),
+    ],
+)
+def test_one_flipped_bit_is_found_at_its_tick(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, change: Change, tick: int, found: str
+) -> None:
+    status, said = resim(capsys, write_lockstep(tmp_path / "run.mcap", config(), change))
+    assert status == 1
+    assert f"first difference: tick {tick}, " in said
+    assert found in said
+    recorded, recomputed = said.partition("recorded ")[2].split(", recomputed ")
+    assert recorded != recomputed.split(" (")[0]
+
+
+def test_a_difference_names_the_versions_that_may_explain_it(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    path = write_lockstep(tmp_path / "run.mcap", config(), flipped(Truth, 0, "grf", 0))
+    versions = json.loads(Recording(path).metadata["versions"]) | {"mujoco": "3.1.4"}
+    elsewhere = rewritten(
+        path, tmp_path / "elsewhere.mcap", metadata={"versions": json.dumps(versions)}
+    )
+    _, said = resim(capsys, elsewhere)
+    assert "other versions, which may be why: mujoco 3.1.4 (here " in said
+
+
+@pytest.mark.parametrize(
+    ("lose", "message"),
+    [
+        (lambda tick, key: tick == 77 and "r1/c" in key, "no command of r1 at tick 77"),
+        (lambda tick, key: key.endswith("command"), "no command of r1, r2 at tick 0"),
+        (lambda tick, key: tick < 50, "no command of r1, r2 at tick 0"),
+        (lambda tick, key: key.endswith(("event", "command")) and tick > 40, "r1, r2 at tick 41"),
+        (lambda tick, key: not key.endswith("command"), "nothing that a world published"),
+    ],
+)
+def test_a_recording_with_gaps_is_one_clear_error(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    lose: Callable[[int, str], bool],
+    message: str,
+) -> None:
+    path = write_lockstep(
+        tmp_path / "run.mcap", config(), lambda t, key, payload: None if lose(t, key) else payload
+    )
+    status, said = resim(capsys, path)
+    assert status == 2
+    assert message in said
+    assert said.count("\n") == 1
+
+
+def test_a_cut_recording_is_compared_up_to_the_cut(
+    capsys: pytest.CaptureFixture[str], whole: Path, tmp_path: Path
+) -> None:
+    content = whole.read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(content[: len(content) // 2])
+    status, said = resim(capsys, tmp_path / "cut.mcap")
+    assert status == 2
+    assert "equal to the byte: " in said
+    assert "compared up to there only: " in said
+    assert "the file ends at byte" in said
+    assert "got a file that is cut after" in said
+
+
+def test_what_is_not_lockstep_or_not_used_is_refused(
+    capsys: pytest.CaptureFixture[str], whole: Path, tmp_path: Path
+) -> None:
+    path = write_lockstep(tmp_path / "run.mcap", config(world__mode="realtime"))
+    status, said = resim(capsys, path)
+    assert (status, said.count("\n")) == (2, 1)
+    assert "got a walk in real time, expected one in lock-step" in said
+    assert main(["resim", str(whole), "--seed", "4"]) == 2
+    assert "got world.seed" in capsys.readouterr().err
+    assert main(["resim", str(tmp_path / "none.mcap")]) == 2
+
+
+def test_ticks_come_in_order_with_all_their_entries(whole: Path) -> None:
+    found = list(by_tick(Recording(whole), {"state", "command"}))
+    assert [tick for tick, _ in found] == list(range(TICKS))
+    assert all({entry.tick for entry in entries} == {tick} for tick, entries in found)
+    count = sum(len(entries) for _, entries in found)
+    assert count == sum(1 for _ in Recording(whole).entries({"state", "command"}))

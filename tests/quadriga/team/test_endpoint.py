@@ -1,0 +1,31 @@
+"""Every team finds a place of its own."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+
+import pytest
+
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.config.sections import BusConfig
+from quadriga.team.endpoint import free_endpoint
+
+WAIT = 10.0  # s
+
+
+def test_a_team_meets_at_an_address_of_its_own() -> None:
+    first, second = free_endpoint(), free_endpoint()
+    assert first.rpartition(":")[0] != second.rpartition(":")[0]
+    config = BusConfig(endpoint=first)
+    with Bus.open(config, "team", "sim") as sim, Bus.open(config, "team", "r1") as r1:
+        r1.declare(HERE)
+        assert sim.wait_for(HERE, {"r1"}, WAIT, lambda: False)
+
+
+def test_where_the_address_cannot_be_had_a_port_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(secrets, "token_bytes", lambda count: bytes([7] * count))
+    with socket.socket() as other:
+        other.bind(("127.7.7.2", 7447))
+        assert free_endpoint().startswith("tcp/127.0.0.1:")
+    assert free_endpoint() == "tcp/127.7.7.2:7447"

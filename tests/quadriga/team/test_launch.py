@@ -1,0 +1,109 @@
+"""Processes are started together, watched, and stopped, whatever they do."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from quadriga.shared.config.load import load
+from quadriga.shared.errors import ProcessError
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.team import launch
+from quadriga.team.launch import Launch, ProcessSpec, table
+
+LAST = "import time; time.sleep(60)"
+STUBBORN = "import signal, time; signal.signal(15, signal.SIG_IGN); print('up'); time.sleep(60)"
+
+
+def row(name: str, code: str, grace: float = 5.0) -> ProcessSpec:
+    return ProcessSpec(name, (sys.executable, "-u", "-c", code), grace)
+
+
+def never() -> bool:
+    return False
+
+
+def gone(pid: int) -> bool:
+    return not os.path.exists(f"/proc/{pid}")
+
+
+def test_a_walk_that_ends_well(tmp_path: Path) -> None:
+    rows = [row("sim", "print('tick')"), row("r1", "import time; time.sleep(0.2)")]
+    with Launch(rows, tmp_path / "logs") as running:
+        running.watch(never)
+        assert running.pids == {}
+    assert (tmp_path / "logs" / "sim.log").read_text() == "tick\n"
+
+
+def test_each_process_knows_its_parent_and_has_a_session_of_its_own(tmp_path: Path) -> None:
+    code = "import os, sys; print(sys.argv[1:], os.getsid(0) == os.getpid())"
+    with Launch([row("sim", code)], tmp_path) as running:
+        running.watch(never)
+    assert (tmp_path / "sim.log").read_text() == f"['--parent', '{os.getpid()}'] True\n"
+
+
+@pytest.mark.parametrize("name", ["sim", "r1", "recorder"])
+def test_a_crash_is_named_with_its_last_words_and_stops_the_others(
+    tmp_path: Path, name: str
+) -> None:
+    rows = [row(other, LAST) for other in ("sim", "r1", "recorder") if other != name]
+    rows.append(row(name, "raise SystemExit('the dog ate the torque')"))
+    with Launch(rows, tmp_path) as running:
+        pids = running.pids
+        with pytest.raises(ProcessError) as caught:
+            running.watch(never)
+    assert f"process {name}: got exit status 1" in str(caught.value)
+    assert "the dog ate the torque" in str(caught.value)
+    assert all(gone(pid) for pid in pids.values())
+
+
+def test_kill_9_of_one_is_named(tmp_path: Path) -> None:
+    rows = [row("sim", LAST), row("r1", LAST)]
+    with Launch(rows, tmp_path) as running:
+        os.kill(running.pids["r1"], signal.SIGKILL)
+        with pytest.raises(ProcessError, match="process r1: got signal 9"):
+            running.watch(never)
+
+
+def test_who_leaves_while_the_team_walks_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(launch, "_EARLY", 0.2)
+    rows = [row("sim", LAST), row("r1", "pass"), row("r2", LAST)]
+    match = "process r1: got an end while the team walked"
+    with Launch(rows, tmp_path) as running, pytest.raises(ProcessError, match=match):
+        running.watch(never)
+
+
+def test_who_stays_after_the_walk_is_named(tmp_path: Path) -> None:
+    rows = [row("sim", "pass"), row("r1", LAST, grace=0.3)]
+    match = "process r1: got no end after the walk"
+    with Launch(rows, tmp_path) as running, pytest.raises(ProcessError, match=match):
+        running.watch(never)
+
+
+def test_stopping_kills_who_does_not_obey_in_his_time(tmp_path: Path) -> None:
+    with Launch([row("sim", STUBBORN, 0.5), row("recorder", LAST, 20.0)], tmp_path) as running:
+        pids = running.pids
+        deadline = monotonic() + 10.0
+        while not (tmp_path / "sim.log").read_text() and monotonic() < deadline:
+            sleep(0.01)
+        begun = monotonic()
+        running.watch(lambda: True)
+    assert 0.5 < monotonic() - begun < 5.0
+    assert all(gone(pid) for pid in pids.values())
+
+
+def test_the_table_starts_everyone_once_and_stops_the_recorder_last() -> None:
+    rows = table(load(None, {"team.robots": 2}), Path("run"), Path("fitted.npz"), "abc")
+    assert [row.name for row in rows] == ["sim", "r1", "r2", "operator", "recorder"]
+    assert "--predictor fitted.npz" in " ".join(rows[1].command)
+    assert "--predictor-sha256 abc" in " ".join(rows[-1].command)
+    assert all("--config run/config.toml" in " ".join(row.command) for row in rows)
+    alone = table(load(None, {"recorder.enabled": False}), Path("run"), None, "")
+    assert "recorder" not in [row.name for row in alone]
+    assert "--predictor" not in alone[1].command

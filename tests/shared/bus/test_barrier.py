@@ -1,0 +1,91 @@
+"""Who belongs to a team, and who may not join one that is complete or walks."""
+
+from __future__ import annotations
+
+from threading import Thread
+
+import pytest
+
+from quadriga.shared.bus.barrier import meet, members, start_together
+from quadriga.shared.bus.zenoh_bus import READY, Bus
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import BusError
+from quadriga.team.endpoint import free_endpoint
+
+
+def team(**more: object) -> Config:
+    keys = {
+        "team.robots": 1,
+        "bus.endpoint": free_endpoint(),
+        "recorder.enabled": False,
+        "bus.barrier_timeout": 10.0,
+    }
+    return load(None, {**keys, **more})
+
+
+def never() -> bool:
+    return False
+
+
+def test_members() -> None:
+    assert members(team()) == {"sim", "operator", "r1"}
+    three = load(None, {"team.robots": 3})
+    assert members(three) == {"sim", "operator", "recorder", "r1", "r2", "r3"}
+
+
+def join(config: Config, name: str) -> Bus:
+    return Bus.open(config.bus, config.team.name, name)
+
+
+def all_meet(config: Config, *buses: Bus) -> None:
+    threads = [Thread(target=meet, args=(bus, config, never)) for bus in buses]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+
+def test_the_world_starts_when_all_are_ready_and_nobody_joins_later() -> None:
+    config = team()
+    with join(config, "sim") as sim, join(config, "r1") as r1, join(config, "operator") as operator:
+        all_meet(config, sim, r1, operator)
+        r1.declare(READY)
+        operator.declare(READY)
+        assert start_together(sim, config, never)
+        with (
+            join(config, "r1") as late,
+            pytest.raises(BusError, match="a team that walks already, expected a network without"),
+        ):
+            meet(late, config, never)
+
+
+def test_a_team_does_not_start_with_two_of_one_name() -> None:
+    config = team()
+    with (
+        join(config, "sim") as sim,
+        join(config, "r1") as r1,
+        join(config, "operator") as operator,
+        join(config, "r1") as double,
+    ):
+        all_meet(config, sim, r1, operator)
+        for bus in (r1, operator, double):
+            bus.declare(READY)
+        double.declare("here")
+        double.wait_for("here", {"sim", "operator"}, 10.0, never)
+        sim.wait_for(READY, {"r1", "operator"}, 10.0, never)
+        deadline = 100
+        while not sim.doubles("here") and deadline:
+            sim.get(0.05)
+            deadline -= 1
+        with pytest.raises(BusError, match=r"two processes named r1, expected one of each name"):
+            start_together(sim, config, never)
+
+
+def test_the_sim_server_names_who_is_not_ready() -> None:
+    config = team(**{"bus.barrier_timeout": 1.0})
+    with join(config, "sim") as sim, join(config, "r1") as r1, join(config, "operator") as operator:
+        all_meet(config, sim, r1, operator)
+        operator.declare(READY)
+        with pytest.raises(BusError, match="no r1 at stage 'ready'"):
+            start_together(sim, config, never)

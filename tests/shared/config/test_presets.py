@@ -1,0 +1,65 @@
+"""Named settings of a section: permitted values of known keys, below what a user says."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, fields, replace
+
+import pytest
+
+from quadriga.shared.config.load import build, load
+from quadriga.shared.config.presets import PRESETS
+from quadriga.shared.config.sections import Config
+
+NAMED = [(section, name) for section, presets in PRESETS.items() for name in presets]
+
+
+@pytest.mark.parametrize("section", PRESETS)
+def test_presets_are_those_that_can_be_chosen(section: str) -> None:
+    keys = {item.name: item for item in fields(getattr(Config(), section))}
+    assert set(PRESETS[section]) == set(keys["preset"].metadata["choices"])
+    assert not PRESETS[section][str(keys["preset"].default)]
+
+
+@pytest.mark.parametrize(("section", "name"), NAMED)
+def test_a_preset_sets_its_keys_and_leaves_the_others(section: str, name: str) -> None:
+    """Going through the same checks as a user's values: names, types and ranges."""
+    preset = PRESETS[section][name]
+    usual = getattr(Config(), section)
+    found = load(None, {f"{section}.preset": name})
+    expected = asdict(usual) | dict(preset) | {"preset": name}
+    assert asdict(found) == asdict(Config()) | {section: expected}
+    assert getattr(build({section: dict(preset)}), section) == replace(usual, **preset)
+    assert "preset" not in preset
+
+
+def test_an_explicit_key_wins_over_the_preset() -> None:
+    found = load(None, {"controller.preset": "paper", "controller.kp_tilt": 123.0}).controller
+    assert found.kp_tilt == 123.0
+    assert found.kd_tilt == PRESETS["controller"]["paper"]["kd_tilt"]
+
+
+def test_the_papers_setting_is_the_plain_one() -> None:
+    """Scheduled contacts, no integrators, and the paper's weights of the QP."""
+    paper = load(None, {"controller.preset": "paper"}).controller
+    assert not paper.contact_detection
+    assert paper.ki_z == paper.ki_xy == 0.0
+    assert not any((paper.reject_side_contacts, paper.track_sinking_trunk, paper.flight))
+    assert paper.tilt_length == paper.swing_weight == 1.0
+    assert paper.liftoff_hold_ms == paper.reflex_ms == 0
+    assert paper.swing_delay == paper.slip_speed == 0.0
+    assert (paper.gamma_tau, paper.gamma_force, paper.gamma_defect) == (1e2, 1e3, 1e6)
+
+
+def test_a_fast_planner_holds_peers_plans_as_long_as_the_usual_one() -> None:
+    usual, fast = Config().planner, load(None, {"planner.preset": "fast"}).planner
+    assert fast.applied < usual.applied
+    assert fast.latency_ms <= 10 * fast.applied
+    for name in ("max_peer_age", "hold_steps"):
+        assert getattr(fast, name) * fast.applied == getattr(usual, name) * usual.applied
+    kept = fast.forgetting ** (usual.applied / fast.applied)
+    assert kept == pytest.approx(usual.forgetting, abs=1e-5)
+
+
+def test_presets_cannot_be_changed() -> None:
+    with pytest.raises(TypeError):
+        PRESETS["controller"]["paper"]["kp_z"] = 1.0  # type: ignore[index]

@@ -1,0 +1,120 @@
+"""A trace is replayed as it stands in its file, over and over, from where the seed says."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quadriga.shared.config.load import build, load
+from quadriga.shared.config.reference_trace import Trace, scenario_folder, trace_of, trace_sha256
+from quadriga.shared.config.sections import Config, ReferenceConfig
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.errors import ConfigError
+
+GOOD = "# a comment\nt,vx,vy,wz\n0,0,0,0\n1.0,0.4,0.1,-0.2\n2.0,0.4,0.0,0.0\n4.0,0,0,0\n"
+
+
+def config(path: Path | str, **keys: float) -> Config:
+    given = {name.replace("__", "."): value for name, value in keys.items()}
+    return load(None, {"reference.trace": str(path)} | given)
+
+
+def traced(path: Path | str, **keys: float) -> Trace:
+    found = trace_of(config(path, **keys))
+    assert found is not None
+    return found
+
+
+@pytest.fixture
+def good(tmp_path: Path) -> Path:
+    path = tmp_path / "trace.csv"
+    path.write_text(GOOD, encoding="utf-8")
+    return path
+
+
+def test_samples_are_joined_by_lines_and_begin_again_at_the_end(good: Path) -> None:
+    trace = traced(good)
+    assert trace.at(0.5) == pytest.approx((0.2, 0.05, -0.1))
+    assert trace.at(1.0) == pytest.approx((0.4, 0.1, -0.2))
+    assert trace.at(3.0) == pytest.approx((0.2, 0.0, 0.0))
+    assert trace.at(4.5) == pytest.approx(trace.at(0.5))
+
+
+def test_the_seed_says_where_it_begins_if_asked_to(good: Path) -> None:
+    assert traced(good, world__seed=3).begin == 0.0
+    begins = [traced(good, world__seed=s, reference__trace_shift=4.0).begin for s in range(30)]
+    assert 0.0 <= min(begins) < 0.8
+    assert 3.2 < max(begins) <= 4.0
+    assert len(set(begins)) == 30
+    again = traced(good, world__seed=2, reference__trace_shift=4.0)
+    assert again.begin == begins[2]
+    assert again.at(1.0) == pytest.approx(traced(good).at(1.0 + begins[2]))
+
+
+def test_without_a_trace_there_is_none() -> None:
+    assert trace_of(Config()) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "nothing"),
+        ("0,0,0,0\n1,0,0,0\n", "t,vx,vy,wz"),
+        ("t,vx,vy,wz\n0,0,0,0\n", "at least two"),
+        ("t,vx,vy,wz\n0,0,0\n1,0,0\n", "lines of four"),
+        ("t,vx,vy,wz\n0,0,0,0\n1,0,0\n", "four numbers"),
+        ("t,vx,vy,wz\n0,0,0,0\n1,fast,0,0\n", "four numbers"),
+        ("t,vx,vy,wz\n0,0,0,0\n0,0,0,0\n", "t rising"),
+        ("t,vx,vy,wz\n1,0,0,0\n2,0,0,0\n", "t rising"),
+        ("t,vx,vy,wz\n0,0,0,0\n1,nan,0,0\n", "finite"),
+        ("t,vx,vy,wz\n0,0,0,0\n1,0,0.9,0\n", "vy of 0 … 0.9"),
+    ],
+)
+def test_what_is_no_trace_is_one_clear_error(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "trace.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError, match=said) as caught:
+        traced(path)
+    assert caught.value.name == f"reference.trace {path}"
+
+
+def test_a_file_that_is_not_there_is_named() -> None:
+    with pytest.raises(ConfigError, match=r"nowhere\.csv: got No such file"):
+        traced("nowhere.csv")
+
+
+def test_the_joystick_of_the_scenarios_is_smooth_and_moderate() -> None:
+    trace = traced("joystick.csv")
+    assert (scenario_folder() / "joystick.csv").is_file()
+    assert trace.t[-1] >= 20.0
+    assert (np.abs(trace.v).max(axis=0) <= [0.5, 0.2, 0.3]).all()
+    assert (trace.v.std(axis=0) > [0.1, 0.05, 0.08]).all()
+    rate = np.diff(trace.v, axis=0) / np.diff(trace.t)[:, None]
+    assert np.abs(rate).max() < 0.5  # m/s² and rad/s²
+    np.testing.assert_array_equal(trace.v[[0, -1]], 0.0)
+
+
+def test_a_configuration_holds_what_the_file_says_and_needs_it_no_more(good: Path) -> None:
+    found = config(good)
+    before = trace_of(found)
+    good.unlink()
+    assert found.reference.trace == (
+        "t,vx,vy,wz;0,0,0,0;1.0,0.4,0.1,-0.2;2.0,0.4,0.0,0.0;4.0,0,0,0"
+    )
+    assert trace_sha256(found) == ""
+    again = build(tomllib.loads(to_toml(found)))
+    assert again == found
+    after = trace_of(again)
+    assert before is not None
+    assert after is not None
+    np.testing.assert_array_equal(after.t, before.t)
+    np.testing.assert_array_equal(after.v, before.v)
+
+
+def test_a_path_in_a_configuration_from_elsewhere_is_not_opened(good: Path) -> None:
+    foreign = Config(reference=ReferenceConfig(trace=str(good)))
+    with pytest.raises(ConfigError, match="the trace itself, or the name of one"):
+        trace_of(foreign)

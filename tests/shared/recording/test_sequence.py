@@ -1,0 +1,75 @@
+"""Ticks of one key: what is missing between them."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from quadriga.shared.config.sections import Config, EstimatorConfig, PlannerConfig, WorldConfig
+from quadriga.shared.recording.sequence import TickTrack, periods
+
+
+@given(
+    period=st.integers(1, 50), start=st.integers(0, 1000), count=st.integers(2, 60), data=st.data()
+)
+def test_every_missing_message_is_counted(
+    period: int, start: int, count: int, data: st.DataObject
+) -> None:
+    every = [start + period * k for k in range(count)]
+    gone = data.draw(st.sets(st.sampled_from(every[1:-1]))) if count > 2 else set()
+    track = TickTrack(period)
+    for tick in every:
+        if tick not in gone:
+            track.note(tick)
+    assert track.lost == len(gone)
+    assert (track.first, track.last, track.count) == (every[0], every[-1], count - len(gone))
+    missing = sum((after - before) // period - 1 for before, after in track.gaps)
+    assert missing == len(gone)
+
+
+def test_what_is_no_gap() -> None:
+    track = TickTrack(10)
+    for tick in (-1, 50, 50, 60, 63, -1, 70, 9_000_000_000, 0, 10):
+        track.note(tick)
+    assert (track.lost, track.gaps, track.count, track.first) == (0, [], 10, 50)
+    unknown = TickTrack(0)
+    for tick in (5, 500):
+        unknown.note(tick)
+    assert unknown.lost == 0
+
+
+@pytest.mark.parametrize("odd", [0, 400, 1099, 100_000, 5_000_000])
+def test_one_message_out_of_order_is_no_gap(odd: int) -> None:
+    track = TickTrack(1)
+    for tick in (*range(1100), odd, *range(1100, 1200), *range(1240, 1300)):
+        track.note(tick)
+    assert (track.lost, track.gaps, track.last) == (40, [(1199, 1240)], 1299)
+
+
+def test_a_long_loss_and_another_clock_are_told_apart() -> None:
+    track = TickTrack(10)
+    for tick in (*range(0, 1000, 10), *range(60_000, 60_100, 10)):
+        track.note(tick)
+    assert (track.lost, track.gaps) == (5900, [(990, 60_000)])
+    for tick in (*range(500, 600, 10), *range(9_000_000, 9_000_100, 10)):
+        track.note(tick)
+    assert (track.lost, track.last) == (5900, 9_000_090)
+
+
+def test_a_file_goes_on_where_the_one_before_ended() -> None:
+    track = TickTrack(10, before=90)
+    track.note(120)
+    assert (track.lost, track.gaps, track.first) == (2, [(90, 120)], 120)
+
+
+def test_periods_follow_the_configuration() -> None:
+    assert periods(Config())["plan"] == 40
+    assert periods(Config())["sim/truth"] == 10
+    other = Config(
+        planner=PlannerConfig(applied=2),
+        estimator=EstimatorConfig(kind="truth"),
+        world=WorldConfig(mode="realtime"),
+    )
+    assert (periods(other)["plan"], periods(other)["sim/truth"]) == (20, 1)
+    assert periods(other)["status"] == 0

@@ -1,0 +1,53 @@
+"""Priority over ordinary processes, for all threads, where the system permits it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+_SCRIPT = """
+import os, sys, threading
+from dataclasses import replace
+from quadriga.shared.config.sections import Config, RuntimeConfig
+from quadriga.shared.runtime.scheduling import take_priority
+if sys.argv[2] == "deny":
+    os.setuid(65534)
+threading.Thread(target=threading.Event().wait, daemon=True).start()
+taken = take_priority(Config(runtime=RuntimeConfig(sys.argv[1])))
+policies = {os.sched_getscheduler(int(task)) for task in os.listdir("/proc/self/task")}
+print(taken, policies == {os.SCHED_RR}, policies == {os.SCHED_OTHER})
+"""
+
+
+def answer(priority: str, permission: str) -> tuple[list[str], str]:
+    done = subprocess.run(
+        [sys.executable, "-c", _SCRIPT, priority, permission],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    return done.stdout.split(), done.stderr
+
+
+def permitted() -> bool:
+    probe = "import os; os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))"
+    return not subprocess.run([sys.executable, "-c", probe], capture_output=True).returncode
+
+
+@pytest.mark.skipif(not permitted(), reason="this user may not schedule in real time")
+def test_all_threads_are_scheduled_in_real_time() -> None:
+    assert answer("realtime", "") == (["True", "True", "False"], "")
+
+
+def test_ordinary_is_ordinary() -> None:
+    assert answer("ordinary", "") == (["False", "False", "True"], "")
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become a user without the right")
+def test_without_the_right_it_runs_all_the_same() -> None:
+    found, said = answer("realtime", "deny")
+    assert found == ["False", "False", "True"]
+    assert said.startswith("no real-time scheduling (Operation not permitted)")

@@ -1,0 +1,93 @@
+"""A stop is a flag, and no process outlives its parent."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.signals import interrupts_held, stop_flag
+
+CHILD = """
+import os, sys
+from quadriga.shared.runtime.signals import die_with_parent
+from quadriga.shared.runtime.clock import sleep
+die_with_parent(int(sys.argv[1]))
+print(os.getpid(), flush=True)
+sleep(60)
+"""
+PARENT = """
+import os, subprocess, sys
+subprocess.Popen([sys.executable, "-c", sys.argv[1], str(os.getpid())])
+input()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_raise_the_flag_for_a_while(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
+    with stop_flag() as stopped:
+        assert not stopped()
+        os.kill(os.getpid(), number)
+        assert stopped()
+    assert signal.getsignal(number) is before
+
+
+def alive(pid: int) -> bool:
+    try:
+        with open(f"/proc/{pid}/stat") as stat:
+            return stat.read().split()[2] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_kill_9_of_the_parent_ends_the_child() -> None:
+    parent = subprocess.Popen(
+        [sys.executable, "-c", PARENT, CHILD], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert parent.stdout
+    child = int(parent.stdout.readline())
+    assert alive(child)
+    parent.kill()
+    parent.communicate()
+    deadline = monotonic() + 60.0
+    while alive(child) and monotonic() < deadline:
+        sleep(0.01)
+    assert not alive(child)
+
+
+def test_a_child_whose_parent_is_gone_already_ends_itself() -> None:
+    orphan = subprocess.run([sys.executable, "-c", CHILD, "1"], capture_output=True, check=False)
+    assert orphan.returncode == -signal.SIGTERM
+    assert orphan.stdout == b""
+
+
+def interrupted_while_held(from_a_thread: bool, done: list[bool]) -> None:
+    with interrupts_held():
+        if from_a_thread:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+            thread = threading.Thread(target=signal.raise_signal, args=(signal.SIGINT,))
+            thread.start()
+            thread.join()
+        else:
+            signal.raise_signal(signal.SIGINT)
+        done.append(True)
+
+
+@pytest.mark.parametrize("from_a_thread", [False, True])
+def test_an_interrupt_comes_after_the_block(from_a_thread: bool) -> None:
+    """Whichever thread the kernel gives it to."""
+    done: list[bool] = []
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            interrupted_while_held(from_a_thread, done)
+        assert done == [True]
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)

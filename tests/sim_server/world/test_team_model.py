@@ -1,0 +1,149 @@
+from itertools import combinations
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from quadriga.shared.config.yokes import yoke_pairs
+from quadriga.shared.robot.a1 import (
+    FOOT_FRAMES,
+    JOINT_NAMES,
+    N_JOINTS,
+    TORQUE_LIMIT,
+    TOTAL_MASS,
+    TRUNK_MASS,
+)
+from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
+from quadriga.sim_server.world.team_model import NQ, build_team_model, formation, scattered
+from tests.sim_server.standing import configured
+
+GRAPHS = ("complete", "chain", "ring")
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_equals_pinocchio_in_mass_matrix_bias_and_foot_jacobians(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    team = build_team_model(configured())
+    m, d = team.model, mujoco.MjData(team.model)
+    model = build_pinocchio_model()
+    quat = random.standard_normal(4)
+    quat /= np.linalg.norm(quat)
+    joints = random.uniform(-1.5, 1.5, N_JOINTS)
+    position = random.standard_normal(3)
+    v_pin = random.standard_normal(18) * 3.0
+    rotation = pin.Quaternion(*quat).toRotationMatrix()
+    # v_mujoco = T v_pin: Pinocchio has the trunk's linear velocity in the trunk's frame.
+    T = np.eye(18)
+    T[:3, :3] = rotation
+    T_dot_v = np.zeros(18)
+    T_dot_v[:3] = rotation @ np.cross(v_pin[3:6], v_pin[:3])
+
+    d.qpos[:] = np.concatenate([position, quat, joints])
+    d.qvel[:] = T @ v_pin
+    mujoco.mj_forward(m, d)
+    M = np.zeros((18, 18))
+    mujoco.mj_fullM(m, d, M)
+    q_pin = np.concatenate([position, quat[[1, 2, 3, 0]], joints])
+    data = model.createData()
+
+    M_pin = pin.crba(model, data, q_pin)
+    M_pin = np.triu(M_pin) + np.triu(M_pin, 1).T
+    np.testing.assert_allclose(T.T @ M @ T, M_pin, atol=1e-9)
+    bias = T.T @ (M @ T_dot_v + d.qfrc_bias)
+    np.testing.assert_allclose(bias, pin.nonLinearEffects(model, data, q_pin, v_pin), atol=1e-9)
+    pin.computeJointJacobians(model, data, q_pin)
+    pin.updateFramePlacements(model, data)
+    for foot in FOOT_FRAMES:
+        J = np.zeros((3, 18))
+        mujoco.mj_jacBody(m, d, J, None, m.body(f"r1/{foot}").id)
+        frame = model.getFrameId(foot)
+        J_pin = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
+        np.testing.assert_allclose(J @ T, J_pin, atol=1e-9)
+        np.testing.assert_allclose(
+            d.body(f"r1/{foot}").xpos, data.oMf[frame].translation, atol=1e-9
+        )
+
+
+def test_every_robot_has_pinocchios_joint_order_and_the_agreed_mass() -> None:
+    model = build_team_model(configured(3)).model
+    assert tuple(build_pinocchio_model().names)[2:] == JOINT_NAMES
+    for robot in ("r1", "r2", "r3"):
+        first = model.joint(f"{robot}/{JOINT_NAMES[0]}").id
+        names = [model.joint(first + k).name for k in range(N_JOINTS)]
+        assert names == [f"{robot}/{name}" for name in JOINT_NAMES]
+        assert model.body(f"{robot}/trunk").mass == pytest.approx(TRUNK_MASS)
+        assert model.body(f"{robot}/trunk").subtreemass == pytest.approx(TOTAL_MASS)
+    assert pin.computeTotalMass(build_pinocchio_model()) == pytest.approx(TOTAL_MASS)
+    assert pin.buildModelFromUrdf  # the limit below is the URDF's
+    np.testing.assert_allclose(build_pinocchio_model().effortLimit[6:], TORQUE_LIMIT)
+
+
+@given(n=st.integers(1, 10), graph=st.sampled_from(GRAPHS))
+def test_yoke_graphs_connect_the_team(n: int, graph: str) -> None:
+    pairs = yoke_pairs(n, graph)
+    assert len(set(pairs)) == len(pairs)
+    assert set(pairs) <= set(combinations(range(n), 2))
+    ring = n if n > 2 else n - 1
+    assert len(pairs) == {"complete": n * (n - 1) // 2, "chain": n - 1, "ring": ring}[graph]
+    reached = {0}
+    for _ in range(n):
+        reached |= {k for pair in pairs if reached & set(pair) for k in pair}
+    assert reached == set(range(n))
+
+
+@pytest.mark.parametrize("graph", GRAPHS)
+def test_yokes_are_as_long_as_the_distance_of_the_spawned_trunks(graph: str) -> None:
+    team = build_team_model(configured(5, yokes=graph))
+    places = team.q_spawn.reshape(5, NQ)[:, :2]
+    gaps = [np.linalg.norm(places[i] - places[j]) for i, j in team.yokes]
+    np.testing.assert_allclose(team.rest_length, gaps)
+    assert team.model.ntendon == team.model.neq == len(gaps)
+
+
+@given(n=st.integers(1, 10), spacing=st.floats(0.6, 3.0))
+def test_robots_start_at_least_their_spacing_apart_along_the_columns(
+    n: int, spacing: float
+) -> None:
+    places = formation(n, spacing)
+    assert places.shape == (n, 2)
+    for i, j in combinations(range(n), 2):
+        assert np.linalg.norm(places[i] - places[j]) >= spacing - 1e-9
+    if n % 2:
+        assert places[-1, 1] == 0.0
+    if n == 1:
+        assert not places.any()
+
+
+def test_robots_are_scattered_around_their_places_by_the_seed() -> None:
+    places = np.array([scattered(configured(3, scatter=0.05, seed=s)) for s in range(40)])
+    off = places - formation(3, 0.9)
+    assert np.abs(off).max() <= 0.05
+    assert off.std(axis=0).min() > 0.02
+    np.testing.assert_array_equal(scattered(configured(3, seed=5)), formation(3, 0.9))
+    team = build_team_model(configured(3, scatter=0.05, seed=7))
+    np.testing.assert_allclose(team.q_spawn.reshape(3, NQ)[:, :2], places[7])
+    assert len(set(team.rest_length.round(6))) == 3
+
+
+def test_payload_adds_its_mass_above_the_trunk() -> None:
+    bare = build_team_model(configured(2)).model
+    laden = build_team_model(configured(2, payload=9.0, payload_on="r2")).model
+    for name, extra in (("r1", 0.0), ("r2", 9.0)):
+        more = laden.body(f"{name}/trunk").subtreemass - bare.body(f"{name}/trunk").subtreemass
+        assert more == pytest.approx([extra])
+    assert 0.06 <= laden.body("r2/payload").pos[2] <= 0.12
+
+
+def test_robots_touch_the_ground_only() -> None:
+    team = build_team_model(configured(2))
+    d = mujoco.MjData(team.model)
+    d.qpos[:] = team.q_spawn
+    d.qpos.reshape(2, NQ)[:, :3] = [0.0, 0.0, 0.15]  # both robots in one place, feet in the ground
+    d.qpos.reshape(2, NQ)[:, 7:] = 0.0
+    mujoco.mj_forward(team.model, d)
+    ground = team.model.geom("ground").id
+    assert d.ncon >= 8
+    assert all(ground in pair for pair in d.contact.geom)

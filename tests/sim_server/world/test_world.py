@@ -1,0 +1,310 @@
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.robot.a1 import GRAVITY, N_JOINTS, TORQUE_LIMIT, TOTAL_MASS, q_stand
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Event, State, Truth
+from quadriga.sim_server.world.world import MOTOR_DAMPING, World
+from tests.sim_server.standing import STAND, command, configured, momentum, shift, stand
+
+TERRAINS = ("flat", "boxes", "gravel", "heightfield", "slope")
+
+
+@pytest.mark.parametrize("n", [1, 2, 5])
+def test_standing_team_stays_up_and_the_ground_carries_its_weight(n: int) -> None:
+    world = World(configured(n, payload=10.0))
+    stand(world, 800)
+    truth = world.truth()
+    assert world.fallen() == ()
+    weight = (n * TOTAL_MASS + 10.0) * GRAVITY
+    assert truth.grf[:, :, 2].sum() == pytest.approx(weight, rel=5e-3)
+    assert np.abs(truth.yoke_error).max(initial=0.0) < 1e-4
+    assert truth.yoke_error.shape == truth.yoke_force.shape == (n * (n - 1) // 2,)
+
+
+@pytest.mark.parametrize("terrain", TERRAINS)
+def test_team_stands_on_every_terrain(terrain: str) -> None:
+    world = World(configured(3, terrain=terrain, terrain_height=0.04, seconds=8.0))
+    shift(world, dx=3.0, dz=0.03)
+    stand(world, 800)
+    assert world.fallen() == ()
+    truth = world.truth()
+    assert truth.grf[:, :, 2].sum() == pytest.approx(3 * TOTAL_MASS * GRAVITY, rel=0.02)
+    assert np.abs(truth.yoke_error).max() < 1e-3
+
+
+def test_yoke_force_is_negative_when_the_yoke_pulls() -> None:
+    world = World(configured(2, push="r1:30:90:0:1,r2:30:-90:0:1"))  # apart, along the yoke
+    stand(world, 700)
+    truth = world.truth()
+    assert truth.yoke_force[0] < -10.0
+    assert 0.0 < truth.yoke_error[0] < 1e-3
+
+
+def test_equal_configurations_and_commands_give_equal_bytes() -> None:
+    config = configured(
+        3, noise=True, terrain="boxes", push="r1:60:90:0.1:0.1", payload=4.5, seed=3
+    )
+    first, second = World(config), World(config)
+    for tick in range(300):
+        commands = {"r1": STAND, "r2": STAND} if tick % 2 else {"r2": STAND, "r1": STAND}
+        assert first.step(commands) == second.step(commands)
+        for name in first.names:
+            assert encode(first.states()[name]) == encode(second.states()[name])
+    assert encode(first.truth()) == encode(second.truth())
+    other = World(replace(config, world=replace(config.world, seed=4)))
+    assert encode(other.states()["r1"]) != encode(World(config).states()["r1"])
+
+
+def test_states_of_a_tick_do_not_change_however_often_they_are_asked() -> None:
+    world = World(configured(2, noise=True))
+    for _ in range(3):
+        first, again = world.states(), world.states()
+        assert {k: encode(v) for k, v in first.items()} == {k: encode(v) for k, v in again.items()}
+        assert all(state.tick == world.tick for state in first.values())
+        world.step({})
+
+
+def test_messages_pass_the_codec() -> None:
+    for n in (1, 3):
+        world = World(configured(n, noise=True))
+        stand(world, 5)
+        assert tuple(decode(encode(world.truth()), Truth).robots) == world.names
+        for state in world.states().values():
+            assert decode(encode(state), State).tick == 5
+
+
+def test_a_push_changes_the_momentum_by_its_impulse() -> None:
+    world = World(configured(2, push="r2:80:90:0.01:0.05"))
+    shift(world, dz=10.0)  # in the air nothing else acts sideways
+    events: list[Event] = []
+    for _ in range(100):
+        events += world.step({})
+    np.testing.assert_allclose(momentum(world)[:2], [0.0, 80.0 * 0.05], atol=0.02)
+    assert momentum(world)[2] == pytest.approx(-2 * TOTAL_MASS * GRAVITY * 0.1, rel=1e-3)
+    assert [(e.tick, e.robot) for e in events if e.kind == "push"] == [(10, "r2")]
+    assert not world.physics.xfrc_applied.any()
+
+
+def test_published_forces_are_those_that_led_to_the_published_velocity() -> None:
+    world = World(configured(1))
+    stand(world, 20)  # the feet still settle, so forces change from tick to tick
+    for _ in range(50):
+        before = momentum(world)
+        world.step({"r1": STAND})
+        force = world.truth().grf[0].sum(axis=0) - [0.0, 0.0, TOTAL_MASS * GRAVITY]
+        np.testing.assert_allclose(momentum(world) - before, 1e-3 * force, atol=2e-4)
+
+
+def test_sensors_belong_to_the_tick_they_are_published_for() -> None:
+    world = World(configured(2))
+    for _ in range(60):
+        v_before = world.physics.qvel.reshape(2, 18)[:, :6].copy()
+        world.step({"r1": STAND})
+        truth = world.truth()
+        for i, state in enumerate(world.states().values()):
+            q, v = world.physics.qpos.reshape(2, 19)[i], world.physics.qvel.reshape(2, 18)[i]
+            np.testing.assert_array_equal(state.q_joint, q[7:])
+            np.testing.assert_array_equal(state.v_joint, v[6:])
+            np.testing.assert_allclose(state.imu_gyro, v[3:6], atol=1e-12)
+            np.testing.assert_allclose(state.imu_quat_wxyz, q[3:7], atol=1e-12)
+            # On the plane the contact normal is the vertical.
+            np.testing.assert_allclose(state.foot_force, truth.grf[i, :, 2], atol=1e-9)
+            rotation = world.physics.body(f"r{i + 1}/trunk").xmat.reshape(3, 3)
+            np.testing.assert_allclose(truth.base_omega[i], rotation @ v[3:6], atol=1e-12)
+            specific = rotation @ state.imu_accel - [0.0, 0.0, GRAVITY]
+            np.testing.assert_allclose(
+                truth.base_vel[i] - v_before[i, :3], 1e-3 * specific, atol=2e-4
+            )
+
+
+def test_accelerometer_reads_gravity_at_rest_and_nothing_in_free_fall() -> None:
+    world = World(configured(1))
+    stand(world, 1000)
+    np.testing.assert_allclose(world.states()["r1"].imu_accel, [0, 0, GRAVITY], atol=0.1)
+    assert world.states()["r1"].foot_force.sum() == pytest.approx(TOTAL_MASS * GRAVITY, rel=1e-3)
+    shift(world, dz=5.0)
+    stand(world, 300)
+    np.testing.assert_allclose(world.states()["r1"].imu_accel, 0.0, atol=0.05)
+    assert not world.states()["r1"].foot_force.any()
+
+
+def test_motor_law_is_followed_and_limited() -> None:
+    world = World(configured(1))
+    stand(world, 10)
+    random = np.random.default_rng(0)
+    values = {
+        name: random.uniform(low, high, N_JOINTS)
+        for name, low, high in (
+            ("tau", -40, 40),
+            ("q_des", -2, 2),
+            ("v_des", -3, 3),
+            ("kp", 0, 20),
+            ("kd", 0, 2),
+        )
+    }
+    before = world.states()["r1"]
+    world.step({"r1": command(**values)})
+    wanted = (
+        values["tau"]
+        + values["kp"] * (values["q_des"] - before.q_joint)
+        + values["kd"] * (values["v_des"] - before.v_joint)
+    )
+    assert (np.abs(wanted) > TORQUE_LIMIT).any()
+    expected = np.clip(wanted, -TORQUE_LIMIT, TORQUE_LIMIT)
+    np.testing.assert_allclose(world.states()["r1"].tau_joint, expected, atol=1e-12)
+    np.testing.assert_allclose(world.physics.qfrc_applied[6:], expected, atol=1e-12)
+
+
+def test_a_weak_motor_gives_its_share_of_the_torque_from_its_time_on() -> None:
+    config = configured(2, weak_motor="r2:RL_calf:0.01", weak_share=0.4)
+    world, sound = World(config), World(configured(2))
+    asked = command(tau=np.linspace(-40.0, 40.0, N_JOINTS))
+    for tick in range(12):
+        events = world.step({"r1": asked, "r2": asked})
+        sound.step({"r1": asked, "r2": asked})
+        tau = {name: state.tau_joint for name, state in world.states().items()}
+        limited = np.clip(asked.tau, -TORQUE_LIMIT, TORQUE_LIMIT)
+        np.testing.assert_array_equal(tau["r1"], limited)
+        limited[8] *= 0.4 if tick >= 10 else 1.0
+        np.testing.assert_array_equal(tau["r2"], limited)
+        faults = [(e.kind, e.robot, e.detail) for e in events if e.kind == "fault"]
+        told = [("fault", "r2", "RL_calf gives 40 % of its torque")] if tick == 10 else []
+        assert faults == told
+        assert (encode(world.truth()) == encode(sound.truth())) == (tick < 10)
+
+
+def test_a_robot_without_a_command_is_damped_and_the_others_go_on() -> None:
+    world = World(configured(2))
+    stand(world, 50)
+    for _ in range(50):
+        before = world.states()
+        world.step({"r1": STAND, "r9": STAND})
+        np.testing.assert_allclose(
+            world.states()["r2"].tau_joint, -MOTOR_DAMPING * before["r2"].v_joint, atol=1e-12
+        )
+        pd = 200.0 * (q_stand() - before["r1"].q_joint) - 4.0 * before["r1"].v_joint
+        np.testing.assert_allclose(world.states()["r1"].tau_joint, pd, atol=1e-9)
+
+
+def test_a_fall_is_announced_once_per_robot() -> None:
+    world = World(configured(2, yokes="chain"))
+    events: list[Event] = []
+    for _ in range(1500):
+        events += world.step({})
+    falls = [event for event in events if event.kind == "fall"]
+    assert sorted(event.robot for event in falls) == ["r1", "r2"] == list(world.fallen())
+    assert all(0 < event.tick <= 1500 for event in falls)
+    assert [event.kind for event in events[:2]] == ["start", "terrain"]
+
+
+def test_a_robot_on_its_side_has_fallen_at_any_height() -> None:
+    world = World(configured(1))
+    world.physics.qpos[2] = 1.0
+    world.physics.qpos[3:7] = [np.cos(0.55), np.sin(0.55), 0.0, 0.0]
+    mujoco.mj_forward(world.team.model, world.physics)
+    events = world.step({"r1": STAND})
+    assert [event.robot for event in events if event.kind == "fall"] == ["r1"]
+
+
+def test_trunk_height_counts_from_the_terrain_under_the_hips() -> None:
+    world = World(configured(1, terrain="heightfield", terrain_height=0.3, seconds=8.0))
+    x = np.linspace(2.0, 5.0, 3000)
+    under = world.team.terrain.under(x, np.zeros_like(x), np.zeros_like(x))
+    world.physics.qpos[0] = x[under.argmax()]
+    for above, fallen in ((0.125, ()), (0.115, ("r1",))):
+        world.physics.qpos[2] = under.max() + above
+        world.physics.qpos[7:] = np.tile([0.0, 2.6, -2.6], 4)  # feet folded away from the ground
+        mujoco.mj_forward(world.team.model, world.physics)
+        world.physics.qvel[:] = 0.0
+        world.step({})
+        assert world.fallen() == fallen
+
+
+def test_who_stands_astride_of_a_block_has_not_fallen() -> None:
+    """The block is under the trunk and nobody touches it; the feet stand on the ground."""
+    world = World(configured(1, terrain="boxes", terrain_height=0.15, seconds=8.0))
+    terrain = world.team.terrain
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(1.5, 5, 0.02), np.arange(-1, 1, 0.02)))
+    astride = terrain.height(x, y) - terrain.under(x, y, np.zeros_like(x))
+    place = astride.argmax()
+    assert astride[place] > 0.145, "no such place"
+    world.physics.qpos[:3] = x[place], y[place], 0.26
+    world.physics.qpos[7:] = q_stand()
+    mujoco.mj_forward(world.team.model, world.physics)
+    world.step({"r1": STAND})
+    assert world.fallen() == ()
+
+
+def test_an_unstable_world_shows_as_a_fall_and_does_not_start_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # MuJoCo leaves its log where it runs
+    world = World(configured(1))
+    stand(world, 100)
+    world.physics.qvel[0] = np.nan
+    mujoco.mj_forward(world.team.model, world.physics)
+    events = world.step({"r1": STAND})
+    assert [event.kind for event in events] == ["fall"]
+    assert np.isnan(world.truth().base_pos).any()
+
+
+@pytest.mark.parametrize("terrain", TERRAINS)
+def test_feet_have_the_configured_friction_on_every_terrain(terrain: str) -> None:
+    world = World(configured(1, terrain=terrain, friction=0.35, terrain_height=0.04, seconds=8.0))
+    shift(world, dx=3.0, dz=0.03)
+    stand(world, 300)
+    assert world.physics.ncon >= 2
+    np.testing.assert_allclose(world.physics.contact.friction[:, 0], 0.35)
+    np.testing.assert_allclose(world.physics.contact.solref, [[0.01, 1.0]] * world.physics.ncon)
+
+
+def test_a_series_of_pushes_moves_who_it_is_said_to_push() -> None:
+    config = configured(
+        3, yokes="chain", push_force=60.0, push_every=0.1, push_duration=0.02, seconds=0.2
+    )
+    world = World(config)
+    shift(world, dz=10.0)  # in the air nothing else acts sideways
+    events = [event for _ in range(600) for event in world.step({}) if event.kind == "push"]
+    assert len(events) == 1
+    left = 1.0 if "towards 90 deg" in events[0].detail else -1.0
+    np.testing.assert_allclose(momentum(world)[:2], [0.0, left * 60.0 * 0.02], atol=0.02)
+    pushed = np.abs(world.truth().base_vel[:, 1]).argmax()
+    assert world.names[pushed] == events[0].robot
+
+
+def test_feet_slide_when_pushed_harder_than_friction_holds() -> None:
+    for push, slides in ((30.0, False), (60.0, True)):  # friction holds 0.35 · 122 N = 43 N
+        world = World(configured(1, friction=0.35, push=f"r1:{push}:90:0.5:0.3"))
+        stand(world, 500)
+        before = world.physics.body("r1/FL_foot").xpos.copy()
+        stand(world, 300)
+        moved = world.physics.body("r1/FL_foot").xpos[1] - before[1]
+        assert (moved > 0.02) == slides
+
+
+@pytest.mark.parametrize(
+    ("key", "wrong"),
+    [("push", configured(2, push="r3:1:0:0:1")), ("payload_on", configured(2, payload_on="x"))],
+)
+def test_a_wrong_scenario_is_refused(key: str, wrong: Config) -> None:
+    with pytest.raises(ConfigError, match=rf"^world\.{key}: "):
+        World(wrong)
+
+
+def test_when_a_tick_is_settled_changes_nothing() -> None:
+    early, late = World(configured(2)), World(configured(2))
+    for _ in range(60):
+        early.settle()
+        early.settle()
+        for world in (early, late):
+            world.step({"r1": STAND, "r2": STAND})
+    assert early.physics.qpos.tobytes() == late.physics.qpos.tobytes()
+    assert encode(early.truth()) == encode(late.truth())
+    assert encode(early.states()["r2"]) == encode(late.states()["r2"])
