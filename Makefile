@@ -66,7 +66,7 @@ acceptance: $(STAMP)
 # What everything costs, on one page, in runs/bench.json and runs/bench.png; some three minutes, and
 # as many more for each team that has not walked here before (ten robots: much more).
 bench: $(STAMP)
-	$(BIN)/python -m benchmarks.bench $(ARGS)
+	$(BIN)/python -m benchmarks $(ARGS)
 
 # What a plan costs, as the paper writes it and as it is solved here; about ten minutes, and five
 # more for a team of five that has not walked here before.

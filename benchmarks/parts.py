@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from benchmarks.bench_options import Options
+from benchmarks.options import Options
 
 if TYPE_CHECKING:
     from quadriga.agents.predictor.predictor import Predictor
@@ -20,7 +20,7 @@ Part = dict[str, Any]
 
 
 def planner(options: Options, console: Console, tell: Tell) -> Part:
-    """What a plan costs, ours and as written; `planner.py` alone does it at length."""
+    """What a plan costs, ours and as written; `python -m benchmarks.planner` does it at length."""
     from benchmarks.planner import measure, walked
     from benchmarks.planner_contenders import Local, Team
 
@@ -82,7 +82,7 @@ def recorder(options: Options, _console: Console, _tell: Tell) -> Part:
 
 
 def fit(options: Options, _console: Console, _tell: Tell) -> Part:
-    """The predictor's fit for a small team; `fit.py` alone does the large ones."""
+    """The predictor's fit for a small team; `python -m benchmarks.fit` does the large ones."""
     from dataclasses import asdict
 
     from benchmarks.children import result_of

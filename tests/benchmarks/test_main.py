@@ -19,7 +19,7 @@ NO_TSID = "raise ImportError('not installed')\n"
 
 
 def command(out: Path, *words: str) -> list[str]:
-    return [sys.executable, "-m", "benchmarks.bench", *words, "--quick", "--out", str(out)]
+    return [sys.executable, "-m", "benchmarks", *words, "--quick", "--out", str(out)]
 
 
 def run(out: Path, *words: str) -> tuple[str, dict[str, Any]]:

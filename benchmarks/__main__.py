@@ -1,6 +1,6 @@
 """What everything costs, on one page: planner, low level, messages, world, recorder, fit, walks.
 
-Run: python -m benchmarks.bench [PART ...] [--robots 1 2 3 5 10] [--seconds 4] [--out FILE]
+Run: python -m benchmarks [PART ...] [--robots 1 2 3 5 10] [--seconds 4] [--out FILE]
 
 Prints a page, writes FILE (JSON) and beside it a picture. Each part is measured by real processes
 and real walks of this machine; what else runs on it is in the figures, so let nothing. A team
@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import blas_threads
-from benchmarks.bench_options import Options
+from benchmarks.options import Options
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.runtime.clock import monotonic, wall_ns
 from quadriga.shared.runtime.signals import interrupt_on_sigterm
@@ -35,22 +35,22 @@ def main() -> int:
     """Measure, print, write and draw; 0 if every part could be measured."""
     interrupt_on_sigterm()
     try:
-        return bench(arguments())
+        return run_parts(parse_options())
     except KeyboardInterrupt:
         print("\ninterrupted; nothing was written", file=sys.stderr)
         return INTERRUPTED
 
 
-def bench(options: Options) -> int:
+def run_parts(options: Options) -> int:
     """Every part in turn, then the page."""
     from rich.console import Console
 
-    from benchmarks.bench_figure import draw
-    from benchmarks.bench_page import headline, section, targets
-    from benchmarks.bench_parts import PARTS, prefixed
+    from benchmarks.figure import draw
+    from benchmarks.page import headline, section, targets
+    from benchmarks.parts import PARTS, prefixed
 
     console = Console(width=120, highlight=False)
-    result: dict[str, Any] = {"machine": machine(), "quick": options.quick}
+    result: dict[str, Any] = {"machine": describe_machine(), "quick": options.quick}
     begun, parts, failed = monotonic(), {}, {}
     console.print(section("machine", result["machine"]))
     for name in options.parts:
@@ -73,7 +73,7 @@ def bench(options: Options) -> int:
     return int(bool(failed))
 
 
-def machine() -> dict[str, Any]:
+def describe_machine() -> dict[str, Any]:
     """What the figures depend on beside the code."""
     from benchmarks.children import result_of
     from quadriga.shared.config.sections import Config
@@ -94,11 +94,13 @@ def machine() -> dict[str, Any]:
     }
 
 
-def arguments(words: Sequence[str] | None = None) -> Options:
+def parse_options(words: Sequence[str] | None = None) -> Options:
     """The command line."""
-    from benchmarks.bench_parts import PARTS
+    from benchmarks.parts import PARTS
 
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (all)")
     parser.add_argument(
         "--robots",
