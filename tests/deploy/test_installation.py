@@ -28,7 +28,7 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # The libraries that the project needs are those that it is tested with.
     libraries = f"import site; site.addsitedir({sysconfig.get_path('purelib')!r})\n"
     (packages / "libraries.pth").write_text(libraries, encoding="utf-8")
-    install = [
+    install: list[str | Path] = [
         sys.executable, "-m", "pip", "--python", environment / "bin" / "python", "install",
         "--quiet", "--no-deps", "--no-build-isolation", "--ignore-installed",
     ]  # fmt: skip
