@@ -141,7 +141,7 @@ def team(
     options: Options, robots: int, seconds: float, console: Console
 ) -> tuple[Config, Path | None, Predictor | None]:
     """A team that walks on flat ground, its predictor's file and the predictor."""
-    from quadriga.identification.identify import ensure_predictor, load_predictor
+    from quadriga.identification.predictors import ensure_predictor, load_predictor
     from quadriga.shared.config.load import load
 
     config = load(

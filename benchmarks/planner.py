@@ -31,7 +31,7 @@ from benchmarks.planner_peer import AVAILABLE, CvxpyDeepc
 from benchmarks.planner_ticks import PlanningTick, record
 from quadriga.agents.planner.planner_qp import PlannerProblem
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.identification.identify import ensure_data, ensure_predictor, load_predictor
+from quadriga.identification.predictors import ensure_data, ensure_predictor, load_predictor
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array

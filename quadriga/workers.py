@@ -18,7 +18,7 @@ A = TypeVar("A")
 B = TypeVar("B")
 
 
-def each_done(
+def run_each(
     call: Callable[[A], B], arguments: Sequence[A], jobs: int
 ) -> Generator[tuple[A, B], None, None]:
     """Arguments with what `call` made of them, in the order in which they are done.

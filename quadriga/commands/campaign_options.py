@@ -7,11 +7,11 @@ import os
 from pathlib import Path
 
 from quadriga.commands import campaign as verb
-from quadriga.commands.recording_options import Add
+from quadriga.commands.command import AddCommand
 from quadriga.shared.errors import ConfigError
 
 
-def add_campaign(add: Add) -> None:
+def add_campaign(add: AddCommand) -> None:
     """The command itself."""
     command = add("campaign", verb.campaign, "walk variants in the same worlds, and report on them")
     option = command.add_argument

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from quadriga.commands import experiments as verb
 from quadriga.commands.campaign_options import add_where
-from quadriga.commands.recording_options import Add
+from quadriga.commands.command import AddCommand
 
 
-def add_experiments(add: Add) -> None:
+def add_experiments(add: AddCommand) -> None:
     """The command itself."""
     command = add(
         "experiments",

@@ -20,11 +20,11 @@ from quadriga.experiments.trial.trial_walk import over_the_bus
 from quadriga.experiments.trial.trials import Choice, Trial, config_of, trials
 from quadriga.experiments.trial.variants import PREDICTORS, with_keys
 from quadriga.identification.cache import predictor_path
-from quadriga.identification.collect import Dataset
-from quadriga.identification.fit import fitted, write_json
+from quadriga.identification.dataset import Dataset
+from quadriga.identification.fit import report_fit, write_json
 from quadriga.identification.fit_report import FitReport, Unfit, reason, refusal
 from quadriga.identification.fit_sheets import comparison as predictor_sheet
-from quadriga.identification.identify import ensure_data
+from quadriga.identification.predictors import ensure_data
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.config.write import config_sha256, to_toml
 from quadriga.shared.errors import (
@@ -37,7 +37,7 @@ from quadriga.shared.errors import (
 from quadriga.sheet import Sheet, show
 from quadriga.team.run_folder import CONFIG
 from quadriga.warm_up import warm_up
-from quadriga.workers import each_done
+from quadriga.workers import run_each
 
 Reports = dict[str, FitReport | Unfit]
 
@@ -107,7 +107,7 @@ def run(
 def _fitted(config: Config, dataset: Dataset, name: str) -> FitReport | Unfit:
     """The report of a predictor, which is kept if any planner may use it."""
     mine = with_keys(config, PREDICTORS[name])
-    report = fitted(with_keys(mine, {"planner.kind": CENTRAL[0]}), dataset, name)
+    report = report_fit(with_keys(mine, {"planner.kind": CENTRAL[0]}), dataset, name)
     if isinstance(report, Unfit):
         return report
     return replace(report, refused=refusal(report.gates, DISTRIBUTED))
@@ -149,7 +149,7 @@ def _split(
 
 
 def _side_by_side(todo: Sequence[ComparisonJob], jobs: int) -> Generator[TrialResult, None, None]:
-    for _, row in each_done(walk_alone, todo, jobs):
+    for _, row in run_each(walk_alone, todo, jobs):
         yield row
 
 

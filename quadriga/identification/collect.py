@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -13,6 +13,7 @@ from quadriga.agents.gait import nominal_forces
 from quadriga.agents.modes import DAMPING
 from quadriga.agents.predictor.episode import SIGNALS, Episode, output_base
 from quadriga.agents.predictor.hankel import required_samples
+from quadriga.identification.dataset import Dataset
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config, WorldConfig
 from quadriga.shared.errors import PredictorError
@@ -20,7 +21,7 @@ from quadriga.shared.robot.a1 import N_FORCES, Array, robot_names
 from quadriga.shared.wire.messages import Reference
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 from quadriga.shared.wire.topics import SAMPLE_MS
-from quadriga.workers import each_done
+from quadriga.workers import run_each
 
 _LEAST = 2000  # samples, whatever the rule says
 _MARGIN = 2  # times what the rule asks for: data far in excess average the noise out
@@ -30,15 +31,6 @@ _CLIP = 2.5  # standard deviations of the force noise
 _RAMP_MS = 500  # from one random speed to the next: jumps would drown what the forces do
 
 Progress = Callable[[int, int], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Dataset:
-    """What was collected: episodes to fit on, the seed of each, and episodes held out."""
-
-    training: tuple[Episode, ...]
-    held_out: tuple[Episode, ...]
-    seeds: tuple[int, ...]
 
 
 def training_seconds(config: Config) -> float:
@@ -82,14 +74,14 @@ def collect(config: Config, jobs: int, progress: Progress) -> Dataset:
     plan.append((count, config.identification.held_out))
     episodes: dict[int, Episode | None] = {}
     progress(0, len(plan))
-    with closing(each_done(partial(_planned_episode, config), plan, jobs)) as found:
-        for (k, _), episode in found:
+    with closing(run_each(partial(_collect_planned, config), plan, jobs)) as results:
+        for (k, _), episode in results:
             episodes[k] = episode
             progress(len(episodes), len(plan))
-    return kept(config, episodes, wanted)
+    return build_dataset(config, episodes, wanted)
 
 
-def kept(config: Config, episodes: Mapping[int, Episode | None], wanted: float) -> Dataset:
+def build_dataset(config: Config, episodes: Mapping[int, Episode | None], wanted: float) -> Dataset:
     """The data set of all episodes that were not lost; the last is the one held out.
 
     Args:
@@ -101,7 +93,7 @@ def kept(config: Config, episodes: Mapping[int, Episode | None], wanted: float) 
         PredictorError: too little is left.
     """
     count = max(episodes)
-    training = {k: e for k in range(count) if (e := episodes[k]) is not None}
+    training = {k: e for k, e in sorted(episodes.items()) if k < count and e is not None}
     held_out = episodes[count]
     samples = sum(episode.samples for episode in training.values())
     if held_out is None or samples < 0.5 * wanted / (1e-3 * SAMPLE_MS):
@@ -115,7 +107,7 @@ def kept(config: Config, episodes: Mapping[int, Episode | None], wanted: float) 
     return Dataset(tuple(training.values()), (held_out,), seeds)
 
 
-def _planned_episode(config: Config, planned: tuple[int, float]) -> Episode | None:
+def _collect_planned(config: Config, planned: tuple[int, float]) -> Episode | None:
     return collect_episode(config, *planned)
 
 
@@ -127,21 +119,21 @@ def collect_episode(config: Config, number: int, seconds: float) -> Episode | No
     names = robot_names(config.team.robots)
     u, u_nominal, y, y_base = [], [], [], []
     first = config.gait.stand_ms + SAMPLE_MS
-    limp = False  # an agent that gave up ends the episode as a fall does
+    gave_up = False  # an agent that gave up ends the episode as a fall does
     for tick in rollout.ticks(walk.ticks + 1):
-        limp = any(out.mode == DAMPING for out in tick.outputs.values())
-        if limp:
+        gave_up = any(out.mode == DAMPING for out in tick.outputs.values())
+        if gave_up:
             break
         if tick.tick % SAMPLE_MS or tick.tick < first:
             continue
-        samples = [tick.outputs[name].measurement for name in names]
-        present = [sample for sample in samples if sample is not None]
-        u.append([sample.u for sample in present])
-        u_nominal.append([nominal_forces(sample.stance > 0.5) for sample in present])
-        y.append([sample.y for sample in present])
+        measurements = [tick.outputs[name].measurement for name in names]
+        samples = [sample for sample in measurements if sample is not None]
+        u.append([sample.u for sample in samples])
+        u_nominal.append([nominal_forces(sample.stance > 0.5) for sample in samples])
+        y.append([sample.y for sample in samples])
         base = output_base(config.planner.interface, walk.reference_at(tick.tick))
         y_base.append([base] * len(names))
-    keep = len(u) - _BEFORE_FALL if limp or rollout.world.fallen() else len(u)
+    keep = len(u) - _BEFORE_FALL if gave_up or rollout.world.fallen() else len(u)
     if keep * SAMPLE_MS < 1e3 * min(_LEAST_EPISODE_S, seconds):
         return None
     signals = (np.array(x[:keep]) for x in (u, u_nominal, y, y_base))

@@ -1,4 +1,4 @@
-"""The command `fit`: predictors, what they came to, and the files that say so."""
+"""Fit predictors, and keep reports on them as tables, figures and JSON."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from quadriga.agents.predictor.fits import fit as fit_predictor
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.predictor.store import predictor_sha256, read, save
 from quadriga.identification.cache import predictor_path
-from quadriga.identification.collect import Dataset
+from quadriga.identification.dataset import Dataset, check_excitation
 from quadriga.identification.fit_figure import draw
 from quadriga.identification.fit_report import FitReport, Unfit, horizon_errors, refusal
 from quadriga.identification.fit_sheets import comparison, report_sheets
-from quadriga.identification.identify import check_excitation, ensure_data, provenance
+from quadriga.identification.predictors import build_provenance, ensure_data
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.runtime.blas import one_blas_thread
@@ -28,7 +28,7 @@ from quadriga.shared.runtime.clock import monotonic
 from quadriga.sheet import Sheet, show
 
 
-def run(config: Config, console: Console, *, every: bool) -> Path:
+def fit_and_report(config: Config, console: Console, *, every: bool) -> Path:
     """Fit the configured predictor unless there is one, show and keep its report.
 
     Args:
@@ -49,7 +49,7 @@ def run(config: Config, console: Console, *, every: bool) -> Path:
     for kind in kinds:
         chosen = replace(config.identification, predictor=kind)
         with console.status(f"fitting the predictor {kind}"):
-            reports.append(fitted(replace(config, identification=chosen), dataset, kind))
+            reports.append(report_fit(replace(config, identification=chosen), dataset, kind))
     mine = reports[kinds.index(config.identification.predictor)]
     if every:
         sheets = whole = [comparison(reports)]
@@ -64,7 +64,7 @@ def run(config: Config, console: Console, *, every: bool) -> Path:
     return path
 
 
-def fitted(config: Config, dataset: Dataset, name: str) -> FitReport | Unfit:
+def report_fit(config: Config, dataset: Dataset, name: str) -> FitReport | Unfit:
     """The report of the predictor of `config`, fitted now unless it is kept already.
 
     An accepted one is kept where walks look for it. Its figures are written beside it, and where
@@ -76,7 +76,7 @@ def fitted(config: Config, dataset: Dataset, name: str) -> FitReport | Unfit:
     path, kind = predictor_path(config), config.planner.kind
     if path.is_file():
         predictor, origin = read(path)  # whose limits are those of `config`: they name the file
-        seconds = _seconds_told(path, predictor_sha256(predictor))
+        seconds = _read_fit_seconds(path, predictor_sha256(predictor))
     else:
         one_blas_thread()
         check_excitation(config, dataset.training)
@@ -86,7 +86,7 @@ def fitted(config: Config, dataset: Dataset, name: str) -> FitReport | Unfit:
         except PredictorError as error:
             return Unfit(name, error)
         seconds = monotonic() - begun
-        origin = provenance(config, dataset, run_gates(config, predictor, dataset.held_out))
+        origin = build_provenance(config, dataset, run_gates(config, predictor, dataset.held_out))
         if refusal(origin.gates, kind) is None:
             save(path, predictor, origin)
     errors, digest = horizon_errors(predictor, dataset.held_out), predictor_sha256(predictor)
@@ -117,10 +117,10 @@ def _sheets(report: FitReport | Unfit, whole: bool = False) -> list[Sheet]:
     return report_sheets(report, whole=whole) if isinstance(report, FitReport) else []
 
 
-def _seconds_told(path: Path, digest: str) -> float | None:
+def _read_fit_seconds(path: Path, digest: str) -> float | None:
     """How long the fit of a predictor that is kept took, as its report says."""
     try:
-        told = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
-        return float(told["fit_seconds"]) if told["sha256"] == digest else None
+        report = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+        return float(report["fit_seconds"]) if report["sha256"] == digest else None
     except (OSError, ValueError, KeyError, TypeError):
         return None  # fitted by a walk, which keeps no report

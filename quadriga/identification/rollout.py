@@ -61,7 +61,7 @@ class Rollout:
         self._measurements: tuple[tuple[str, Measurement], ...] = ()
         self._plans: Plans = ()
         self._by_truth = config.estimator.kind == "truth"
-        self._centre = None if planner is None else _Centre(config, planner)
+        self._central = None if planner is None else _CentralPlanner(config, planner)
 
     def ticks(self, count: int) -> Iterator[Tick]:
         """Advance by up to `count` ticks; stops early when a robot has fallen."""
@@ -73,20 +73,20 @@ class Rollout:
     def step(self) -> Tick:
         """Advance one tick."""
         tick = self.world.tick
-        sensed = self.world.states()
+        states = self.world.states()
         truth = self.world.truth() if self._by_truth else None
         reference = self._references(tick)
-        heard = () if reference is None else (reference,)
+        references = () if reference is None else (reference,)
         central: Mapping[str, Plans] = {}
-        if self._centre is not None:
-            central = self._centre.step(tick, self._measurements, heard)
+        if self._central is not None:
+            central = self._central.step(tick, self._measurements, references)
         outputs: dict[str, Outputs] = {}
         for name, agent in self.agents.items():
             inputs = Inputs(
-                sensed[name],
+                states[name],
                 tuple(item for item in self._measurements if item[0] != name),
                 central.get(name) or tuple(item for item in self._plans if item[0] != name),
-                heard,
+                references,
                 truth=truth,
                 excitation=None if self._excitation is None else self._excitation(name, tick),
             )
@@ -101,11 +101,11 @@ class Rollout:
         return Tick(tick, outputs, events)
 
 
-class _Centre:
+class _CentralPlanner:
     """The planner of the whole team; what it makes of the data of t is due its latency later."""
 
     def __init__(self, config: Config, planner: TeamPlanner) -> None:
-        self._central, self._state = Central(config, planner), CentralState()
+        self._planning, self._state = Central(config, planner), CentralState()
         self._latency = central_latency(config)
         self._due: dict[int, Plans] = {}
 
@@ -116,8 +116,8 @@ class _Centre:
         references: tuple[Reference, ...],
     ) -> dict[str, Plans]:
         """Take in what was sent at the tick before; the plans that are due now, by robot."""
-        remembered = self._central.remember(self._state, measurements, references)
-        self._state, made = self._central.step(remembered)
-        if made.plans:
-            self._due[made.plans[0][1].tick + self._latency] = made.plans
+        remembered = self._planning.remember(self._state, measurements, references)
+        self._state, outputs = self._planning.step(remembered)
+        if outputs.plans:
+            self._due[outputs.plans[0][1].tick + self._latency] = outputs.plans
         return {name: ((PLANNER, plan),) for name, plan in self._due.pop(tick, ())}

@@ -62,20 +62,20 @@ class Parts:
         self._first: dict[str, int] = {}
         self._begun, self._messages = now(), 0
         self._last: dict[str, int] = {}  # tick of the newest message of each key in earlier files
-        self._writer = self._next({})
+        self._writer = self._create({})
 
     def write(self, key: str, payload: bytes, log_time_ns: int) -> None:
         """Append one message as sent."""
         size = self._limits.size
         if size and self._writer.messages and self._writer.size + len(payload) + _RECORD > size:
-            self._turn()
+            self._begin_next()
         self._writer.write(key, payload, log_time_ns)
 
     def flush(self) -> None:
         """Let what was written so far survive a kill; begin a new file if it is time to."""
         seconds = self._limits.seconds
         if seconds and self._now() - self._begun >= seconds:
-            self._turn()
+            self._begin_next()
         else:
             self._writer.flush()
 
@@ -88,13 +88,13 @@ class Parts:
         """How many were written to all files."""
         return self._messages + self._writer.messages
 
-    def all_lost(self) -> dict[str, int]:
+    def count_lost(self) -> dict[str, int]:
         """By key, messages that did not come, of all files."""
         return dict(sorted((self._lost + Counter(lost_by_key(self._writer.tracks))).items()))
 
-    def since(self) -> dict[str, int]:
+    def first_ticks(self) -> dict[str, int]:
         """Tick of the first message of each key."""
-        return self._firsts() | self._first
+        return self._first_of_part() | self._first
 
     def __enter__(self) -> Self:
         return self
@@ -102,21 +102,21 @@ class Parts:
     def __exit__(self, *_: object) -> None:
         self.finish()
 
-    def _firsts(self) -> dict[str, int]:
+    def _first_of_part(self) -> dict[str, int]:
         return {key: track.first for key, track in self._writer.tracks.items()}
 
-    def _turn(self) -> None:
+    def _begin_next(self) -> None:
         before = self._writer
-        self._first = self._firsts() | self._first
+        self._first = self._first_of_part() | self._first
         before.finish()
         self._messages += before.messages
         self._lost += Counter(lost_by_key(before.tracks))
         self._begun = self._now()
         # Also of a key that was silent for a whole part: what it then misses was lost.
         self._last |= {key: track.last for key, track in before.tracks.items()}
-        self._writer = self._next(self._last)
+        self._writer = self._create(self._last)
 
-    def _next(self, after: Mapping[str, int]) -> RecordingWriter:
+    def _create(self, after: Mapping[str, int]) -> RecordingWriter:
         number = len(self.paths)
         stem = f"{self._path.stem}-{number}" if number else self._path.stem
         path = self._path.with_name(stem + self._path.suffix)

@@ -11,7 +11,7 @@ from quadriga.shared.recording.reader import MAX_CHANNELS
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class Selection:
     """What is recorded, and how.
 
     Attributes:
@@ -27,14 +27,13 @@ class Wanted:
     limits: Limits = field(default_factory=Limits)
     at_once: bool = False
 
+    def metadata(self) -> dict[str, str]:
+        """What the metadata say of a recording that is not of everything."""
+        patterns = {"topics": self.topics, "exclude": self.exclude}
+        return {name: json.dumps(texts) for name, texts in patterns.items() if texts}
 
-def wishes(wanted: Wanted) -> dict[str, str]:
-    """What the metadata say of a recording that is not of everything."""
-    chosen = {"topics": wanted.topics, "exclude": wanted.exclude}
-    return {name: json.dumps(patterns) for name, patterns in chosen.items() if patterns}
 
-
-class Filter:
+class KeyFilter:
     """Which keys are recorded.
 
     Attributes:
@@ -42,10 +41,10 @@ class Filter:
         all: whether nothing is left out.
     """
 
-    def __init__(self, team: str, wanted: Wanted) -> None:
+    def __init__(self, team: str, selection: Selection) -> None:
         """Raises ConfigError if a pattern cannot be that of a key."""
-        self._topics = key_patterns(wanted.topics, team, "--topics")
-        self._exclude = key_patterns(wanted.exclude, team, "--exclude")
+        self._topics = key_patterns(selection.topics, team, "--topics")
+        self._exclude = key_patterns(selection.exclude, team, "--exclude")
         alone = self._topics[0].expression if len(self._topics) == 1 else ""
         self.expression = alone or f"{team}/**"  # two subscriptions would hear a message twice
         self.all = not (self._topics or self._exclude)

@@ -10,7 +10,7 @@ from quadriga.recordings.checks.delay import Delay
 from quadriga.recordings.checks.finding import Check, CheckedMessage, Finding
 from quadriga.recordings.checks.limits import Friction, Torques
 from quadriga.recordings.checks.sequence import Ages, Gaps, Order
-from quadriga.recordings.survey import open_any
+from quadriga.recordings.readable import open_readable
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import COUNTS, ChunkEntry, Recording
@@ -27,49 +27,55 @@ def check(path: Path) -> list[Finding]:
     Raises:
         RecordingError: nothing of it can be read, or not with which configuration the team walked.
     """
-    source, error = open_any(path)
+    source, error = open_readable(path)
     config = recorded_config(source)
     filtered = "topics" in source.metadata or "exclude" in source.metadata
     schema = Finding("schema", "messages")
     checks: tuple[Check, ...] = (
-        Order(), Gaps(config, filtered=filtered), Delay(config, whole=error is None),
-        Friction(config), Torques(config), Ages(config),
-    )  # fmt: skip
+        Order(),
+        Gaps(config, filtered=filtered),
+        Delay(config, whole=error is None),
+        Friction(config),
+        Torques(config),
+        Ages(config),
+    )
     times = Finding("log times", "messages")
-    for item in _items(source.entries(), schema, times):
+    for item in _decode_valid(source.entries(), schema, times):
         for each in checks:
             each.look(item)
     for each in checks:
         each.finish()
-    whole = _wholeness(source, error, times.looked)
+    whole = _check_whole(source, error, times.looked)
     return [whole, schema, times, *(each.finding for each in checks)]
 
 
-def told(findings: list[Finding]) -> list[str]:
+def format_findings(findings: list[Finding]) -> list[str]:
     """One line for each check, and below it the first messages that break its rule."""
     rows = [("ok" if f.passed else "FAIL", f.name, f.text, "; ".join(f.notes)) for f in findings]
     lines = []
     for line, finding in zip(columns(rows, indent=""), findings, strict=True):
         lines.append(line)
-        for o in finding.first:
-            where = f"tick {o.tick} {o.key}: " if o.key else ""
-            lines.append(f"      {where}got {o.got}, expected {o.limit}")
+        for first in finding.first:
+            where = f"tick {first.tick} {first.key}: " if first.key else ""
+            lines.append(f"      {where}got {first.got}, expected {first.limit}")
     return lines
 
 
-def _items(
+def _decode_valid(
     entries: Iterator[ChunkEntry], schema: Finding, times: Finding
 ) -> Iterator[CheckedMessage]:
-    """The messages that are valid, while `schema` and `times` are found."""
+    """The valid messages; what breaks a rule goes to the findings `schema` and `times`."""
     rows: dict[str, tuple[Topic, str] | None] = {}
     last = foreign = 0
     for key, tick, log_time, payload in entries:
         times.looked += 1
         if log_time < last:
-            times.object(tick, key, f"{(last - log_time) / 1e6:.3f} ms before", "a later log time")
+            times.add_objection(
+                tick, key, f"{(last - log_time) / 1e6:.3f} ms before", "a later log time"
+            )
         last = log_time
         if key not in rows:
-            rows[key] = _row(key)
+            rows[key] = _find_row(key)
         row = rows[key]
         if row is None:
             foreign += 1
@@ -79,21 +85,23 @@ def _items(
             message = decode(payload, row[0].type)
         except MessageError as error:
             got = f"{error.name} {error.got}"
-            schema.object(tick, key, got[:_WIDE], error.expected[:_WIDE])
+            schema.add_objection(tick, key, got[:_WIDE], error.expected[:_WIDE])
             continue
         yield CheckedMessage(key, row[1], row[0].name, message)
     if foreign:
         schema.notes.append(f"{foreign} of keys outside the table, not looked at")
 
 
-def _row(key: str) -> tuple[Topic, str] | None:
+def _find_row(key: str) -> tuple[Topic, str] | None:
     try:
         return topic_of(key)
     except MessageError:
         return None
 
 
-def _wholeness(source: Recording | Salvage, error: RecordingError | None, messages: int) -> Finding:
+def _check_whole(
+    source: Recording | Salvage, error: RecordingError | None, messages: int
+) -> Finding:
     """Whether the file is as it was written."""
     whole = Finding("whole", "messages", messages)
     notes = source.notes() if isinstance(source, Recording) else source.notes
@@ -101,9 +109,9 @@ def _wholeness(source: Recording | Salvage, error: RecordingError | None, messag
     missing = max(int(written) - messages, 0) if written.isdecimal() else 0
     whole.looked += missing
     for damage in source.damages if isinstance(source, Salvage) else ():
-        whole.object(-1, "", str(damage), "a readable file", 0)
+        whole.add_objection(-1, "", str(damage), "a readable file", 0)
     if error is not None:
-        whole.object(-1, "", error.got, error.expected, 0)
+        whole.add_objection(-1, "", error.got, error.expected, 0)
     if whole.first or missing:
         whole.objections = max(missing, 1)
         unknown = "" if COUNTS in notes else ", what came after them is not known"

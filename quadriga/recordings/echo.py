@@ -17,13 +17,13 @@ _BYTES: Final = 24  # of what is no message
 _ENVELOPE: Final = ("tick", "stamp_ns")
 
 
-def line(entry: ChunkEntry, *, full: bool = False) -> str:
+def format_entry(entry: ChunkEntry, *, full: bool = False) -> str:
     """World time, key and every field; long arrays are cut unless `full`."""
     when = f"{entry.tick / 1000:9.3f} s" if entry.tick >= 0 else f"{'–':>9}  "
-    return f"{when}  {entry.key}  {_content(entry, full)}"
+    return f"{when}  {entry.key}  {_format_content(entry, full)}"
 
 
-def _content(entry: ChunkEntry, full: bool) -> str:
+def _format_content(entry: ChunkEntry, full: bool) -> str:
     try:
         message = decode(entry.payload, topic_of(entry.key)[0].type)
     except MessageError as error:
@@ -31,29 +31,29 @@ def _content(entry: ChunkEntry, full: bool) -> str:
         more = "" if len(entry.payload) <= _BYTES else " …"
         return f"{len(entry.payload)} bytes, {error.name} is {error.got}: {shown}{more}"
     return " ".join(
-        f"{item.name}={_value(getattr(message, item.name), full)}"
+        f"{item.name}={_format_value(getattr(message, item.name), full)}"
         for item in fields(message)
         if item.name not in _ENVELOPE
     )
 
 
-def _value(value: Any, full: bool) -> str:
+def _format_value(value: Any, full: bool) -> str:
     if isinstance(value, np.ndarray):
         flat = value.ravel()
         shown = flat if full else flat[:_SHORT]
         shape = f"{'×'.join(map(str, value.shape))}:" if value.ndim > 1 else ""
         more = f" … {len(flat)}" if len(shown) < len(flat) else ""
-        return f"[{shape}{' '.join(_number(x) for x in shown)}{more}]"
+        return f"[{shape}{' '.join(_format_number(x) for x in shown)}{more}]"
     if isinstance(value, float):
-        return _number(value)
+        return _format_number(value)
     if isinstance(value, str):
         return repr(value)
     if isinstance(value, tuple):
         return f"[{' '.join(map(str, value))}]"
     if isinstance(value, int):
         return str(value)
-    return "{" + " ".join(f"{k}:{_value(v, full)}" for k, v in value.items()) + "}"
+    return "{" + " ".join(f"{k}:{_format_value(v, full)}" for k, v in value.items()) + "}"
 
 
-def _number(value: float) -> str:
+def _format_number(value: float) -> str:
     return f"{value:.4g}"

@@ -15,7 +15,7 @@ from quadriga.shared.recording.sequence import TickTrack
 _EVENTS = 40  # as many are shown
 
 
-def info(survey: Survey) -> list[str]:
+def format_survey(survey: Survey) -> list[str]:
     """Everything a user wants to know of a recording before looking into it, line by line."""
     heads = ("key", "type", "messages", "per s", "from tick", "to tick", "lost")
     blocks = {

@@ -60,10 +60,10 @@ def key_patterns(texts: Iterable[str], team: str, option: str) -> tuple[KeyPatte
 
 
 def _regex(globs: Iterable[str]) -> re.Pattern[str]:
-    return re.compile("|".join(f"(?:{_translated(glob)})" for glob in globs))
+    return re.compile("|".join(f"(?:{_translate(glob)})" for glob in globs))
 
 
-def _translated(glob: str) -> str:
+def _translate(glob: str) -> str:
     parts = []
     chunks = glob.split("/")
     for last, chunk in zip([False] * (len(chunks) - 1) + [True], chunks, strict=True):

@@ -6,16 +6,15 @@ Who listens is a member of the network that nobody waits for.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 from typing import Final
 
 from quadriga.recordings.key_patterns import KeyPattern, key_patterns
-from quadriga.recordings.survey import open_any
+from quadriga.recordings.readable import config_or_default, open_readable
 from quadriga.shared.bus.zenoh_bus import POLL, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
-from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import ChunkEntry
 from quadriga.shared.runtime.clock import monotonic, wall_ns
 from quadriga.shared.wire.envelope import envelope
@@ -23,7 +22,7 @@ from quadriga.shared.wire.envelope import envelope
 _PATIENCE: Final = 3.0  # s wall without a message after which a listener is told where it listens
 
 
-def from_file(path: Path, keys: Sequence[str]) -> Iterator[ChunkEntry]:
+def entries_from_file(path: Path, keys: Sequence[str]) -> Generator[ChunkEntry]:
     """The recorded messages of `keys` (none: all); of a damaged file what is readable.
 
     Raises:
@@ -31,7 +30,7 @@ def from_file(path: Path, keys: Sequence[str]) -> Iterator[ChunkEntry]:
             has none of these keys.
         ConfigError: something is not a key.
     """
-    source, error = open_any(path)
+    source, error = open_readable(path)
     patterns = key_patterns(keys, source.metadata.get("team", Config().team.name), "KEY")
     chosen: dict[str, bool] = {}
     for entry in source.entries():
@@ -52,50 +51,48 @@ def config_of(path: Path) -> Config:
     Raises:
         RecordingError: nothing can be read of the file.
     """
-    source, _ = open_any(path)
-    try:
-        return recorded_config(source)
-    except RecordingError:
-        return Config()
+    source, _ = open_readable(path)
+    return config_or_default(source)
 
 
-def from_bus(
+def entries_from_bus(
     config: Config,
     name: str,
     keys: Sequence[str],
     stopped: Callable[[], bool],
     say: Callable[[str], None],
-) -> Iterator[ChunkEntry | None]:
+) -> Generator[ChunkEntry | None]:
     """What is published on `keys` (none: all) until `stopped()`; None whenever nothing is there.
 
     Raises:
         BusError: the bus cannot be opened.
         ConfigError: something is not a key.
     """
-    team, begun, told = config.team.name, monotonic(), False
+    team, begun = config.team.name, monotonic()
+    silent = True
     patterns = key_patterns(keys, team, "KEY")
     with Bus.open(config.bus, team, f"{name}-{os.getpid()}", stopped) as bus:
         bus.subscribe(patterns[0].expression if len(patterns) == 1 else f"{team}/**")
         while not stopped():
             first = bus.get(POLL)
             if first is None:
-                if not told and monotonic() - begun > _PATIENCE:
-                    told = True
-                    say(_nothing(bus, config, keys))
+                if silent and monotonic() - begun > _PATIENCE:
+                    silent = False
+                    say(_format_silence(bus, config, keys))
                 yield None
                 continue
-            told, now = True, wall_ns()
+            silent, now = False, wall_ns()
             for key, payload in (first, *bus.drain()):
                 if _matches(patterns, key):
-                    found = envelope(payload)
-                    yield ChunkEntry(key, -1 if found is None else found[0], now, payload)
+                    head = envelope(payload)
+                    yield ChunkEntry(key, -1 if head is None else head[0], now, payload)
 
 
 def _matches(patterns: Sequence[KeyPattern], key: str) -> bool:
     return not patterns or any(pattern.matches(key) for pattern in patterns)
 
 
-def _nothing(bus: Bus, config: Config, keys: Sequence[str]) -> str:
+def _format_silence(bus: Bus, config: Config, keys: Sequence[str]) -> str:
     who = "linked to others" if bus.linked else "linked to nobody"
     return (
         f"nothing yet of {', '.join(keys) or 'any key'} of team {config.team.name!r} at "

@@ -1,25 +1,79 @@
-"""What a recording's metadata say beside its configuration; they may come from anybody."""
+"""What a recording says of itself beside its messages: configuration, predictor, versions.
+
+A recording may come from anybody, so whoever reads it takes nothing of this for granted.
+"""
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
+import platform
 from collections.abc import Mapping
-from typing import Any
+from contextlib import suppress
+from dataclasses import asdict
+from typing import Any, Final
+
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import config_sha256
+
+# What a run's figures depend on.
+_PACKAGES: Final = (
+    "quadriga",
+    "eclipse-zenoh",
+    "mujoco",
+    "pin",
+    "numpy",
+    "daqp",
+    "osqp",
+    "numba",
+    "msgpack",
+)
+
+
+def build_metadata(config: Config, predictor_sha256: str) -> dict[str, str]:
+    """The metadata of a recording made now; `Recording.metadata` hands them back."""
+    return {
+        "team": config.team.name,
+        "scenario": config.world.scenario,
+        "config_json": json.dumps(asdict(config), sort_keys=True),
+        "config_sha256": config_sha256(config),
+        "predictor_sha256": predictor_sha256,
+        "versions": json.dumps(installed_versions()),
+    }
+
+
+def installed_versions() -> dict[str, str]:
+    """Versions of what a run's figures depend on, by the name of the package."""
+    versions = {"python": platform.python_version(), "machine": platform.machine()}
+    for package in _PACKAGES:
+        with suppress(importlib.metadata.PackageNotFoundError):
+            versions[package] = importlib.metadata.version(package)
+    return versions
 
 
 def recorded_versions(metadata: Mapping[str, str]) -> dict[str, str]:
-    """Versions of packages by name; none where they are told otherwise than by a recorder."""
-    found = _json(metadata, "versions")
-    return {str(k): str(v) for k, v in found.items()} if isinstance(found, dict) else {}
+    """Versions of packages by name; none where the metadata are not a recorder's."""
+    versions = _parse_json(metadata, "versions")
+    return {str(k): str(v) for k, v in versions.items()} if isinstance(versions, dict) else {}
+
+
+def differing_versions(metadata: Mapping[str, str]) -> str:
+    """Packages that had another version when recorded, as text; "" if there are none."""
+    here = installed_versions()
+    return ", ".join(
+        f"{name} {version} (here {here.get(name, 'absent')})"
+        for name, version in recorded_versions(metadata).items()
+        if here.get(name) != version
+    )
 
 
 def recorded_patterns(metadata: Mapping[str, str], name: str) -> list[str]:
     """Key patterns that a recorder was given as `--topics` or `--exclude`."""
-    found = _json(metadata, name)
-    return [str(pattern) for pattern in found] if isinstance(found, list) else []
+    patterns = _parse_json(metadata, name)
+    return [str(pattern) for pattern in patterns] if isinstance(patterns, list) else []
 
 
-def _json(metadata: Mapping[str, str], name: str) -> Any:
+def _parse_json(metadata: Mapping[str, str], name: str) -> Any:
     try:
         return json.loads(metadata.get(name, "null"))
     except (ValueError, RecursionError):  # the latter for what nests too deeply

@@ -14,8 +14,8 @@ _HEADS = ("key", "messages", "per world s", "world ms", "per wall s", "wall ms",
 
 
 @dataclass(slots=True)
-class Pace:
-    """Intervals of one key since the last look.
+class KeyRate:
+    """Messages of one key and the intervals between them, since the last restart.
 
     Attributes:
         count: messages.
@@ -35,14 +35,14 @@ class Pace:
         """One more message; a negative tick is unknown."""
         self.count += 1
         self.steps += 1
-        self.walls = _widened(self.walls, 1e-6 * (wall_ns - self.last[1]))
-        if tick >= 0 <= self.last[0]:
-            self.ticks = _widened(self.ticks, tick - self.last[0])
+        self.walls = _widen(self.walls, 1e-6 * (wall_ns - self.last[1]))
+        if tick >= 0 and self.last[0] >= 0:
+            self.ticks = _widen(self.ticks, tick - self.last[0])
         self.last = (tick if tick >= 0 else self.last[0]), wall_ns
 
 
-class Paces:
-    """The pace of every key.
+class Rates:
+    """The rate of every key.
 
     Args:
         periods: by a topic's name, ms between its messages.
@@ -50,7 +50,7 @@ class Paces:
 
     def __init__(self, periods: Mapping[str, int]) -> None:
         self._periods = periods
-        self._paces: dict[str, Pace] = {}
+        self._rates: dict[str, KeyRate] = {}
         self._tracks: dict[str, TickTrack] = {}
 
     def add(self, entry: ChunkEntry) -> None:
@@ -60,50 +60,52 @@ class Paces:
             track = TickTrack(self._periods.get(name_of(entry.key), 0))
             self._tracks[entry.key] = track
         track.note(entry.tick)
-        pace = self._paces.get(entry.key)
-        if pace is None:
+        rate = self._rates.get(entry.key)
+        if rate is None:
             at = entry.tick, entry.log_time_ns
-            self._paces[entry.key] = Pace(1, at, at)
+            self._rates[entry.key] = KeyRate(1, at, at)
         else:
-            pace.add(entry.tick, entry.log_time_ns)
+            rate.add(entry.tick, entry.log_time_ns)
 
     @property
     def empty(self) -> bool:
         """Whether no message has come yet."""
-        return not self._paces
+        return not self._rates
 
-    def again(self) -> None:
-        """Begin anew, each key from its last message on; what is lost stays counted."""
-        self._paces = {key: Pace(0, p.last, p.last) for key, p in self._paces.items()}
+    def restart(self) -> None:
+        """Count anew, each key from its last message on; what is lost stays counted."""
+        self._rates = {key: KeyRate(0, rate.last, rate.last) for key, rate in self._rates.items()}
 
-    def table(self) -> list[str]:
+    def format_table(self) -> list[str]:
         """A line for each key: rates, shortest and longest intervals, what is lost."""
-        rows = [_row(key, self._paces[key], self._tracks[key]) for key in sorted(self._paces)]
+        rows = [
+            _format_row(key, self._rates[key], self._tracks[key]) for key in sorted(self._rates)
+        ]
         return columns([_HEADS, *rows], right=range(1, 7), indent="")
 
 
-def _row(key: str, pace: Pace, track: TickTrack) -> tuple[str, ...]:
-    world = pace.last[0] - pace.first[0]
-    wall = 1e-6 * (pace.last[1] - pace.first[1])
+def _format_row(key: str, rate: KeyRate, track: TickTrack) -> tuple[str, ...]:
+    world = rate.last[0] - rate.first[0]
+    wall = 1e-6 * (rate.last[1] - rate.first[1])
     return (
         key,
-        f"{pace.count:,}",
-        _rate(pace.steps, world),
-        _span(pace.ticks, ".0f"),
-        _rate(pace.steps, wall),
-        _span(pace.walls, ".1f"),
+        f"{rate.count:,}",
+        _format_rate(rate.steps, world),
+        _format_span(rate.ticks, ".0f"),
+        _format_rate(rate.steps, wall),
+        _format_span(rate.walls, ".1f"),
         f"{track.lost:,}",
     )
 
 
-def _rate(steps: int, ms: float) -> str:
+def _format_rate(steps: int, ms: float) -> str:
     return f"{1000 * steps / ms:.1f}" if steps and ms > 0 else NOTHING
 
 
-def _span(between: tuple[float, float] | None, digits: str) -> str:
+def _format_span(between: tuple[float, float] | None, digits: str) -> str:
     return NOTHING if between is None else f"{between[0]:{digits}} – {between[1]:{digits}}"
 
 
-def _widened(between: tuple[float, float] | None, value: float) -> tuple[float, float]:
+def _widen(between: tuple[float, float] | None, value: float) -> tuple[float, float]:
     low, high = between or (value, value)
     return min(low, value), max(high, value)

@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.columns import columns
-from quadriga.recordings.survey import open_any
-from quadriga.shared.config.sections import Config
+from quadriga.recordings.readable import config_or_default, open_readable
 from quadriga.shared.errors import RecordingError
-from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import COUNTS, LOST, PROFILE, Recording, RecordingWriter
 from quadriga.shared.recording.salvage import Damage, Salvage
 from quadriga.shared.recording.sequence import TickTrack, periods
@@ -57,7 +55,7 @@ def recover(path: Path, out: Path | None) -> Recovery | None:
     Raises:
         RecordingError: nothing can be read of it, or the new file cannot be written.
     """
-    source, error = open_any(path)
+    source, error = open_readable(path)
     if isinstance(source, Recording) or error is None:
         return None
     if not source.metadata and next(source.entries(), None) is None:
@@ -68,15 +66,12 @@ def recover(path: Path, out: Path | None) -> Recovery | None:
             "neither a message nor the configuration can be read",
         )
     out = out or path.with_name(f"{path.stem}.recovered{path.suffix}")
+    expected = periods(config_or_default(source))
     try:
-        config = recorded_config(source)
-    except RecordingError:
-        config = Config()
-    try:
-        with RecordingWriter(out, source.metadata, periods=periods(config)) as writer:
+        with RecordingWriter(out, source.metadata, periods=expected) as writer:
             for entry in source.entries():
                 writer.write(entry.key, entry.payload, entry.log_time_ns)
-            writer.note(RECOVERED, _account(source, path))
+            writer.note(RECOVERED, _describe_source(source, path))
     except OSError as failure:
         raise RecordingError(str(out), reason(failure), "room for the recovered file") from None
     counts = source.notes.get(COUNTS, {}).get("messages", "")
@@ -92,29 +87,33 @@ def recover(path: Path, out: Path | None) -> Recovery | None:
     )
 
 
-def told(done: Recovery) -> list[str]:
-    """What a user is told of it, line by line."""
-    of = f" of {done.expected:,}" if done.expected is not None else ""
-    lines = [f"{done.out}: {done.messages:,}{of} messages recovered"]
-    lines += ["unreadable"] if done.damages else []
-    lines += [f"  {damage}{_when(damage)}" for damage in done.damages]
-    if not done.damages:
+def format_recovery(recovery: Recovery) -> list[str]:
+    """What was recovered and what was not, line by line."""
+    of = f" of {recovery.expected:,}" if recovery.expected is not None else ""
+    lines = [f"{recovery.out}: {recovery.messages:,}{of} messages recovered"]
+    lines += ["unreadable"] if recovery.damages else []
+    lines += [f"  {damage}{_format_duration(damage)}" for damage in recovery.damages]
+    if not recovery.damages:
         lines.append("unreadable: nothing but the index or a checksum")
-    if not done.has_metadata:
+    if not recovery.has_metadata:
         lines.append("lost: configuration and versions, no copy of them is intact")
-    missing = [(key, *_missing(track)) for key, track in sorted(done.tracks.items()) if track.lost]
+    missing = [
+        (key, *_format_gaps(track)) for key, track in sorted(recovery.tracks.items()) if track.lost
+    ]
     lines += ["missing between the first and the last message"] if missing else []
     lines += columns(missing, right=(1,))
-    if done.never_came:
-        every = ", ".join(f"{key} {count}" for key, count in done.never_came.items())
+    if recovery.never_came:
+        every = ", ".join(f"{key} {count}" for key, count in recovery.never_came.items())
         lines.append(f"of these the recorder had never received: {every}")
-    if done.expected is None:
-        ends = [(key, f"tick {t.last}") for key, t in sorted(done.tracks.items()) if t.first >= 0]
+    if recovery.expected is None:
+        ends = [
+            (key, f"tick {t.last}") for key, t in sorted(recovery.tracks.items()) if t.first >= 0
+        ]
         lines += ["what came after these is lost, if anything did", *columns(ends)]
     return lines
 
 
-def _missing(track: TickTrack) -> tuple[str, str]:
+def _format_gaps(track: TickTrack) -> tuple[str, str]:
     """How many messages of a key are missing, and between which ticks."""
     spans = [f"{before}–{after}" for before, after in track.gaps[:_GAPS]]
     more = len(track.gaps) - _GAPS
@@ -122,7 +121,7 @@ def _missing(track: TickTrack) -> tuple[str, str]:
     return f"{track.lost:,}", text
 
 
-def _when(damage: Damage) -> str:
+def _format_duration(damage: Damage) -> str:
     if damage.log_times is None:
         return ""
     first, last = damage.log_times
@@ -131,7 +130,7 @@ def _when(damage: Damage) -> str:
     return f", {(last - first) / 1e9:.3f} s of wall time"
 
 
-def _account(source: Salvage, path: Path) -> dict[str, str]:
+def _describe_source(source: Salvage, path: Path) -> dict[str, str]:
     return {
         "from": path.name,
         "at_ns": str(wall_ns()),

@@ -1,4 +1,4 @@
-"""A recording read once for what it holds: keys, times, gaps, events, the last words of agents."""
+"""A recording read once for what it holds: keys, times, gaps, events, and how each agent ended."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from quadriga.recordings.readable import open_readable
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.mcap_chunk import name_of
 from quadriga.shared.recording.reader import ChunkEntry, Recording
-from quadriga.shared.recording.salvage import Damage, Salvage
+from quadriga.shared.recording.salvage import Damage
 from quadriga.shared.recording.sequence import TickTrack, periods
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Event, Message, Status
@@ -70,7 +71,7 @@ def survey(path: Path) -> Survey:
     Raises:
         RecordingError: no such file, an empty, a foreign one, or one of a newer version.
     """
-    source, error = open_any(path)
+    source, error = open_readable(path)
     try:
         config: Config | None = recorded_config(source)
     except RecordingError as wrong:
@@ -88,23 +89,6 @@ def survey(path: Path) -> Survey:
         damages=damages,
         **found,
     )
-
-
-def open_any(path: Path) -> tuple[Recording | Salvage, RecordingError | None]:
-    """A whole recording, or what is left of a damaged one and the error that says so.
-
-    Raises:
-        RecordingError: nothing of it can be read.
-    """
-    try:
-        recording = Recording(path)
-        recording.require_whole()
-    except RecordingError as error:
-        salvage = Salvage(path)
-        next(salvage.entries(), None)  # raises if a newer version wrote them
-        return salvage, error
-    next(recording.entries(), None)
-    return recording, None
 
 
 def type_of(key: str) -> str:

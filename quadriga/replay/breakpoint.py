@@ -5,7 +5,34 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from quadriga.agents.agent import Agent, AgentState, Inputs
+from quadriga.replay.comparison import Comparison
 from quadriga.shared.wire.messages import Message
+
+
+class Breakpoint:
+    """A stop before the first step from a tick on.
+
+    Attributes:
+        tick: the tick.
+        reached: whether the replay has come to it.
+    """
+
+    def __init__(self, tick: int) -> None:
+        self.tick = tick
+        self.reached = False
+
+    def before_step(
+        self, agent: Agent, memory: AgentState, inputs: Inputs, comparison: Comparison
+    ) -> None:
+        """Stop if this is the step.
+
+        Raises:
+            bdb.BdbQuit: the user has left the debugger.
+        """
+        tick = inputs.state.tick
+        if not self.reached and tick >= self.tick:
+            self.reached = True
+            stop_here(agent, memory, inputs, comparison.recorded_at(tick))
 
 
 def stop_here(
@@ -17,7 +44,7 @@ def stop_here(
         agent: the agent.
         memory: what it remembers.
         inputs: what it takes in.
-        recorded: what it said then, by topic.
+        recorded: what it sent then, by topic.
 
     Raises:
         bdb.BdbQuit: the user has left the debugger.

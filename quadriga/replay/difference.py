@@ -41,7 +41,7 @@ class Difference:
         )
 
 
-def difference(tick: int, name: str, recorded: bytes, message: Message) -> Difference:
+def find_difference(tick: int, name: str, recorded: bytes, message: Message) -> Difference:
     """How a recomputed message differs from what was recorded in its place.
 
     Args:

@@ -20,22 +20,22 @@ from quadriga.shared.runtime.places import cache_dir
 PREDICTOR: Final = "predictor.npz"  # its name in a run folder
 
 
-def keep(predictor: Path, run_dir: Path) -> None:
+def copy_predictor(predictor: Path, run_dir: Path) -> None:
     """Put a predictor beside the recording, so that a run folder is all a replay needs.
 
     Raises:
         RecordingError: it cannot be written.
     """
-    kept = run_dir / PREDICTOR
+    target = run_dir / PREDICTOR
     try:
-        kept.unlink(missing_ok=True)
-        shutil.copyfile(predictor, kept)
+        target.unlink(missing_ok=True)
+        shutil.copyfile(predictor, target)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise RecordingError(str(kept), reason, "room for the predictor") from None
+        raise RecordingError(str(target), reason, "room for the predictor") from None
 
 
-def recorded_predictor(
+def find_predictor(
     recording: Recording, config: Config, given: Path | None
 ) -> tuple[Predictor | None, bool]:
     """The predictor of a recorded walk's agents, and whether it is the one they had.
@@ -63,7 +63,7 @@ def recorded_predictor(
         return predictor, not sha256 or predictor_sha256(predictor) == sha256
     beside = recording.path.parent / PREDICTOR
     for path in (beside, *sorted(cache_dir().glob("predictor-*.npz"))):
-        if sha256 and _digest(path) == sha256:
+        if sha256 and _read_digest(path) == sha256:
             return read(path)[0], True
     wanted = f"with digest {sha256[:16]}…" if sha256 else "of unknown digest"
     raise PredictorError(
@@ -75,7 +75,7 @@ def recorded_predictor(
     )
 
 
-def _digest(path: Path) -> str:
+def _read_digest(path: Path) -> str:
     """The digest a predictor file says it has; "" if it is none."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:

@@ -9,8 +9,8 @@ from typing import Final
 from rich.console import Console
 
 from quadriga.agents.predictor.store import load, predictor_sha256
-from quadriga.identification.identify import ensure_predictor
-from quadriga.replay.recorded_predictor import keep
+from quadriga.identification.predictors import ensure_predictor
+from quadriga.replay.recorded_predictor import copy_predictor
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
@@ -48,7 +48,7 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
     if config.planner.kind != "none":
         predictor = ensure_predictor(config, console)
         sha256 = predictor_sha256(load(predictor, config)[0])
-        keep(predictor, run_dir)
+        copy_predictor(predictor, run_dir)
     (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
     rows = table(config, run_dir, predictor, sha256)
     with stop_flag() as stopped:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from quadriga.commands.parser import parser
+from quadriga.commands.parser import build_parser
 from quadriga.shared.config.load import load
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.team.launch import ProcessSpec, table
@@ -26,7 +26,7 @@ ROWS = table(CONFIG, Path("/run"), Path("/run/predictor.npz"), "sha")
 
 def arguments_of(service: str) -> Any:
     """What the command line makes of a service's command; the parser exits on a wrong one."""
-    return parser().parse_args(SERVICES[service]["command"])
+    return build_parser().parse_args(SERVICES[service]["command"])
 
 
 def mounts_of(service: str) -> dict[str, str]:
@@ -44,8 +44,8 @@ def environment() -> dict[str, str]:
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
 def test_every_process_of_a_walk_has_a_service(row: ProcessSpec) -> None:
     verb = row.command.index("quadriga") + 1
-    launched, contained = parser().parse_args(row.command[verb:]), arguments_of(row.name)
-    assert contained.verb is launched.verb
+    launched, contained = build_parser().parse_args(row.command[verb:]), arguments_of(row.name)
+    assert contained.call is launched.call
     assert getattr(contained, "robot", None) == getattr(launched, "robot", None)
 
 
@@ -69,7 +69,7 @@ def test_the_team_meets_at_the_router() -> None:
     assert CONFIG.bus.mode == "client"
     _, host, port = re.split("[/:]", CONFIG.bus.endpoint)
     router = arguments_of(host)
-    assert router.verb is parser().parse_args(["router"]).verb
+    assert router.call is build_parser().parse_args(["router"]).call
     assert router.listen == f"tcp/0.0.0.0:{port}"
     assert router.once, "`docker compose up` would not return after the walk"
 

@@ -9,7 +9,7 @@ from itertools import zip_longest
 
 import numpy as np
 
-from quadriga.replay.difference import Difference, difference
+from quadriga.replay.difference import Difference, find_difference
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Message
 from quadriga.shared.wire.topics import topic_of
@@ -29,7 +29,7 @@ def first_difference(recorded: Packets, recomputed: Packets) -> Difference | Non
             return _about(old or new, *there)
         if old[0] != new[0]:
             return _about(old, "a message", f"one of {new[0]}")
-        return difference(_decoded(*old).tick, old[0], old[1], _decoded(*new))
+        return find_difference(_decoded(*old).tick, old[0], old[1], _decoded(*new))
     return None
 
 

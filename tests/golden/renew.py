@@ -23,8 +23,8 @@ from rich.console import Console
 
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import load, predictor_sha256, save
-from quadriga.identification.identify import ensure_predictor
-from quadriga.recorder.process import metadata
+from quadriga.identification.predictors import ensure_predictor
+from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.load import load as load_config
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, QuadrigaError, RecordingError
@@ -120,7 +120,7 @@ def renew(to: Path, predictor_file: Path) -> None:
 
 def write(path: Path, config: Config, predictor: Predictor) -> None:
     """Record the golden walk; equal walks give equal files."""
-    about = metadata(config, predictor_sha256(predictor))
+    about = build_metadata(config, predictor_sha256(predictor))
     about[ARITHMETIC] = json.dumps(arithmetic())
     with path.open("wb") as file:
         writer = Writer(

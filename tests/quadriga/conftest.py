@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.recorder.process import metadata
+from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.sections import Config, ReferenceConfig, TeamConfig, WorldConfig
 from quadriga.shared.recording.reader import RecordingWriter
 from quadriga.shared.robot.a1 import q_stand, robot_names
@@ -152,7 +152,7 @@ def write(
     `change` is given key and message of all traffic and may return another message, raw bytes,
     or None to lose it; `extra` is sent at the end.
     """
-    with RecordingWriter(folder / "run.mcap", metadata(config, "cd" * 32)) as writer:
+    with RecordingWriter(folder / "run.mcap", build_metadata(config, "cd" * 32)) as writer:
         for key, message in chain(packets(config, yaw), extra):
             sent = change(key, message)
             if sent is not None:

@@ -10,8 +10,7 @@ import pytest
 
 from quadriga.identification import cache as keys
 from quadriga.identification.cache import data_path
-from quadriga.identification.collect import Dataset
-from quadriga.identification.identify import write_data
+from quadriga.identification.dataset import Dataset, write_data
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from tests.agents.conftest import LinearTeam

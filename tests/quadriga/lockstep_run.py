@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from quadriga.recorder.process import metadata
+from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.reader import RecordingWriter
@@ -87,7 +87,7 @@ def write_lockstep(
     for place, packet in sent:  # the order of one key is always kept
         last[packet[1]] = max(place, last.get(packet[1], 0.0))
         ordered.append((last[packet[1]], packet))
-    with RecordingWriter(path, metadata(config, ""), 16) as writer:
+    with RecordingWriter(path, build_metadata(config, ""), 16) as writer:
         for at, (tick, key, payload) in sorted(ordered, key=lambda item: item[0]):
             changed = change(tick, key, payload)
             if changed is not None:

@@ -6,12 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-from quadriga.workers import each_done
+from quadriga.workers import run_each
 
 # The interrupt comes a moment after the last call is submitted.
 INTERRUPTED = """
 import signal, sys
-from quadriga.workers import each_done
+from quadriga.workers import run_each
 def interrupt(*_):
     signal.raise_signal(signal.SIGINT)
 class Arguments(list):
@@ -21,7 +21,7 @@ class Arguments(list):
 if __name__ == "__main__":
     signal.signal(signal.SIGALRM, interrupt)
     try:
-        for _ in each_done(len, Arguments([[1]] * 20_000), 1):
+        for _ in run_each(len, Arguments([[1]] * 20_000), 1):
             pass
     except KeyboardInterrupt:
         print("interrupted")
@@ -29,7 +29,7 @@ if __name__ == "__main__":
 
 
 def test_every_argument_comes_with_its_own_answer() -> None:
-    found = dict(each_done(abs, range(-50, 0), 2))
+    found = dict(run_each(abs, range(-50, 0), 2))
     assert found == {value: -value for value in range(-50, 0)}
 
 

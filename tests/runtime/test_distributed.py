@@ -14,8 +14,8 @@ from rich.console import Console
 
 from quadriga.agents.gait import nominal_forces
 from quadriga.agents.time_grid import horizon_stance
-from quadriga.identification.identify import ensure_predictor
-from quadriga.replay.run import replay
+from quadriga.identification.predictors import ensure_predictor
+from quadriga.replay.team_replay import replay
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.reader import Recording

@@ -12,7 +12,8 @@ from rich.console import Console
 from quadriga.agents.planning.local import first_step
 from quadriga.agents.predictor.store import load as load_predictor
 from quadriga.agents.time_grid import step_ms
-from quadriga.identification.identify import ensure_predictor, team_planner
+from quadriga.identification.central_planner import build_central_planner
+from quadriga.identification.predictors import ensure_predictor
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import CENTRAL, Config
@@ -54,7 +55,7 @@ def in_one_process(config: Config, predictor: Path) -> dict[str, list[bytes]]:
         config,
         None if central else fitted,
         lambda tick: reference_at(config, tick) if tick % 100 == 0 else None,
-        planner=team_planner(config, fitted) if central else None,
+        planner=build_central_planner(config, fitted) if central else None,
     )
     sent: dict[str, list[bytes]] = defaultdict(list)
     for tick in rollout.ticks(round(1000 * SECONDS)):

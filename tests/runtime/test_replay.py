@@ -18,11 +18,12 @@ from rich.console import Console
 from quadriga.agents.predictor.store import load as load_predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.commands.parser import main
-from quadriga.identification.identify import ensure_predictor
+from quadriga.identification.predictors import ensure_predictor
 from quadriga.plant.lockstep import ANSWERS
-from quadriga.replay.recorded_predictor import keep
-from quadriga.replay.run import ReplayOutcome, replay
+from quadriga.replay.outcome import ReplayOutcome
+from quadriga.replay.recorded_predictor import copy_predictor
 from quadriga.replay.saved_qp import load as load_qp
+from quadriga.replay.team_replay import replay
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import CENTRAL
@@ -58,7 +59,7 @@ def walked(folder: Path, disturb: Disturb | None = None, **keys: Any) -> Path:
     config = load(None, given)
     predictor = ensure_predictor(config, Console(stderr=True))
     folder.mkdir()
-    keep(predictor, folder)
+    copy_predictor(predictor, folder)
     (folder / "config.toml").write_text(to_toml(config), encoding="utf-8")
     sha256 = predictor_sha256(load_predictor(predictor, config)[0])
     with Launch(table(config, folder, predictor, sha256), folder / "logs") as running:

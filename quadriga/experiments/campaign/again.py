@@ -18,7 +18,7 @@ from quadriga.experiments.campaign.run import config_file
 from quadriga.experiments.trial.trial import figures
 from quadriga.experiments.trial.trial_walk import over_the_bus
 from quadriga.recordings.summary import RECORDING
-from quadriga.replay.recorded_predictor import keep
+from quadriga.replay.recorded_predictor import copy_predictor
 from quadriga.report.page import PAGE
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ConfigError, ProcessError
@@ -77,7 +77,7 @@ def record(
         (run_dir / RECORDING).unlink(missing_ok=True)  # of a walk that was interrupted
         walk = figures(over_the_bus(config, run_dir, fitted.path, fitted.sha256))
         if fitted.path is not None:
-            keep(fitted.path, run_dir)
+            copy_predictor(fitted.path, run_dir)
         found = min(walk.fallen.values(), default=None), walk.distance
         told = row.time_to_fall_s, row.distance_m
         if found != told:

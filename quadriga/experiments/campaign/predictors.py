@@ -12,7 +12,7 @@ from rich.console import Console
 from quadriga.agents.predictor.store import load, predictor_sha256
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.fit_report import reason
-from quadriga.identification.identify import ensure_predictor
+from quadriga.identification.predictors import ensure_predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
 

@@ -23,7 +23,7 @@ from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.config.write import config_sha256, to_toml
 from quadriga.shared.errors import ConfigError
 from quadriga.warm_up import warm_up
-from quadriga.workers import each_done
+from quadriga.workers import run_each
 
 Walks = Callable[
     [Sequence[TrialJob], int, str], Generator[tuple[TrialJob, TrialOutcome], None, None]
@@ -90,7 +90,7 @@ def each_walk(
     todo: Sequence[TrialJob], jobs: int, _address: str
 ) -> Generator[tuple[TrialJob, TrialOutcome], None, None]:
     """Jobs with their outcomes, walked in processes of this machine."""
-    return each_done(walk, todo, jobs)
+    return run_each(walk, todo, jobs)
 
 
 def write_parquet(path: Path, rows: Sequence[TrialOutcome], manifest: Manifest) -> None:

@@ -11,7 +11,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import load
 from quadriga.experiments.trial.trial import Figures, figures
 from quadriga.experiments.trial.trial_walk import roll_out
-from quadriga.identification.identify import team_planner
+from quadriga.identification.central_planner import build_central_planner
 from quadriga.shared.config.sections import CENTRAL, Config, WorldConfig
 
 
@@ -41,4 +41,4 @@ def _predictor(config: Config, path: Path) -> Predictor:
 
 @lru_cache(maxsize=2)
 def _team_planner(config: Config, path: Path, data: Path | None) -> TeamPlanner:
-    return team_planner(config, _predictor(config, path), data)
+    return build_central_planner(config, _predictor(config, path), data)

@@ -84,7 +84,7 @@ class Delay:
         for plan in self._plans:
             self.finding.looked += 1
             for got, limit in self._broken(plan):
-                self.finding.object(plan.tick, plan.key, got, limit)
+                self.finding.add_objection(plan.tick, plan.key, got, limit)
         if self._older:
             self.finding.notes.append(f"{self._older} older plans of peers used, and said so")
         if self._unproven and not self._whole:

@@ -55,7 +55,7 @@ class Finding:
         some = "" if self.passed else f"{self.objections:,} of "
         return f"{some}{self.looked:,} {self.of}"
 
-    def object(self, tick: int, key: str, got: str, limit: str, count: int = 1) -> None:
+    def add_objection(self, tick: int, key: str, got: str, limit: str, count: int = 1) -> None:
         """Count something that breaks the rule."""
         self.objections += count
         if len(self.first) < SHOWN:

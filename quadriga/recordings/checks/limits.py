@@ -34,7 +34,9 @@ class Friction:
         self.finding.looked += 1
         N = self._config.planner.N
         if len(plan.u) != N:
-            self.finding.object(plan.tick, item.key, f"{len(plan.u)} samples", f"{N} samples")
+            self.finding.add_objection(
+                plan.tick, item.key, f"{len(plan.u)} samples", f"{N} samples"
+            )
             return
         stance = horizon_stance(self._config, self._indices[item.robot], plan.step)
         excess, limits = _excess(plan.u.reshape(N, 4, 3), stance, self._config)
@@ -42,7 +44,7 @@ class Friction:
         if excess.max() > TOLERANCE:
             sample, leg, axis = np.unravel_index(int(excess.argmax()), excess.shape)
             force = plan.u.reshape(N, 4, 3)[sample, leg, axis]
-            self.finding.object(
+            self.finding.add_objection(
                 plan.tick,
                 item.key,
                 f"f{'xyz'[axis]} {force:.6g} N of {Leg(int(leg)).name} at sample {sample}",
@@ -84,12 +86,12 @@ class Torques:
         self._largest = max(self._largest, largest)
         if largest > TORQUE_LIMIT + TOLERANCE:
             joint = JOINT_NAMES[int(np.abs(command.tau).argmax())]
-            self.finding.object(
+            self.finding.add_objection(
                 command.tick, item.key, f"{largest:.6g} N·m of {joint}", f"{TORQUE_LIMIT:g} N·m"
             )
         kp, kd = float(np.abs(command.kp).max()), float(command.kd.max())
         if kp > 0.0 or kd > self._damping or float(command.kd.min()) < 0.0:
-            self.finding.object(
+            self.finding.add_objection(
                 command.tick,
                 item.key,
                 f"gains kp up to {kp:.6g}, kd up to {kd:.6g}",

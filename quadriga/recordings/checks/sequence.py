@@ -43,7 +43,7 @@ class Order:
             place < last or (place == last and item.topic not in _MAY_REPEAT)
         ):
             what = "step" if isinstance(message, Plan) else "tick"
-            self.finding.object(
+            self.finding.add_objection(
                 message.tick, item.key, f"{what} {place[0]} after {last[0]}", f"a later {what}"
             )
         self._last[item.key] = max(place, last)
@@ -82,7 +82,7 @@ class Gaps:
             if lockstep or topic in _WORLD:
                 for before, after in track.gaps:
                     count = (after - before - 1) // self._periods[topic]
-                    self.finding.object(
+                    self.finding.add_objection(
                         after,
                         key,
                         f"{count} missing after tick {before}",
@@ -93,9 +93,9 @@ class Gaps:
                 passed_over += track.lost
         if passed_over:
             self.finding.notes.append(f"{passed_over} passed over by agents in real time")
-        self._look_at_robots()
+        self._compare_robots()
 
-    def _look_at_robots(self) -> None:
+    def _compare_robots(self) -> None:
         team = self._config.team
         states = [self._tracks.get(STATE.key(team.name, name)) for name in robot_names(team.robots)]
         seen = [row[1] for row in states if row is not None]
@@ -107,15 +107,17 @@ class Gaps:
             return
         for robot in robot_names(team.robots):
             for topic in _EVERYONE_S:
-                self._look_at_end(topic.key(team.name, robot), topic.name, end)
+                self._check_end(topic.key(team.name, robot), topic.name, end)
 
-    def _look_at_end(self, key: str, topic: str, end: int) -> None:
+    def _check_end(self, key: str, topic: str, end: int) -> None:
         row = self._tracks.get(key)
         if row is None:
-            self.finding.object(-1, key, "no message at all", "messages like the others'")
+            self.finding.add_objection(-1, key, "no message at all", "messages like the others'")
         elif row[1].last < end - self._periods[topic] - _TAIL_MS:
             last = row[1].last
-            self.finding.object(last, key, f"none after tick {last}", f"some until tick {end}")
+            self.finding.add_objection(
+                last, key, f"none after tick {last}", f"some until tick {end}"
+            )
 
 
 class Ages:
@@ -134,12 +136,14 @@ class Ages:
         self.finding.looked += 1
         age = tick - self._last.get(item.key, tick)
         if limit and age > limit:
-            self.finding.object(tick, item.key, f"{age} ms since the one before", f"{limit} ms")
+            self.finding.add_objection(
+                tick, item.key, f"{age} ms since the one before", f"{limit} ms"
+            )
         self._last[item.key] = tick
         if isinstance(item.message, Status) and item.message.mode == "walk":
-            self._look_at_status(item, item.message)
+            self._check_status(item, item.message)
 
-    def _look_at_status(self, item: CheckedMessage, status: Status) -> None:
+    def _check_status(self, item: CheckedMessage, status: Status) -> None:
         for name, age in status.ages_ms.items():
             topic = name.partition(".")[0]
             if topic not in self._limits:
@@ -147,10 +151,12 @@ class Ages:
             limit = self._limits[topic]
             self._oldest[topic] = max(age, self._oldest.get(topic, 0.0))
             if limit and age > limit:
-                self.finding.object(status.tick, item.key, f"{name} {age:g} ms old", f"{limit} ms")
+                self.finding.add_objection(
+                    status.tick, item.key, f"{name} {age:g} ms old", f"{limit} ms"
+                )
 
     def finish(self) -> None:
         """Say how old what the agents used was at most."""
-        told = ", ".join(f"{name} {age:g} ms" for name, age in sorted(self._oldest.items()))
-        if told:
-            self.finding.notes.append(f"agents' inputs at most: {told}")
+        ages = ", ".join(f"{name} {age:g} ms" for name, age in sorted(self._oldest.items()))
+        if ages:
+            self.finding.notes.append(f"agents' inputs at most: {ages}")

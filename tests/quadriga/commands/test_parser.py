@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from quadriga.commands.parser import KEYS, main
+from quadriga.commands.config_options import KEYS
+from quadriga.commands.parser import main
 from quadriga.shared.config.load import load
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from quadriga.commands.parser import main, parser
+from quadriga.commands.parser import build_parser, main
 from quadriga.export import csv_files
 from quadriga.export.run import FORMATS
 from quadriga.export.source import Source
 from quadriga.export.written import Progress
-from quadriga.recorder.process import metadata
+from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.reader import RecordingWriter
 
@@ -45,7 +45,7 @@ def test_mistakes(capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
         assert f"--output: got {below}: Not a directory" in said
     assert "got team.robots" in failed(capsys, file, "--to", "csv", "--robots", "3")
     empty = tmp_path / "empty.mcap"
-    with RecordingWriter(empty, metadata(Config(), "")):
+    with RecordingWriter(empty, build_metadata(Config(), "")):
         pass
     assert "no message of a known topic" in failed(capsys, empty, "--to", "parquet")
     assert not (tmp_path / "empty-parquet").exists()
@@ -97,7 +97,7 @@ def test_without_an_output_it_goes_beside_the_recording(
 
 def test_the_command_line_offers_every_format() -> None:
     for form in FORMATS:
-        assert parser().parse_args(["export", "f", "--to", form]).to == form
+        assert build_parser().parse_args(["export", "f", "--to", form]).to == form
 
 
 def test_what_somebody_else_writes_meanwhile_is_neither_mixed_nor_removed(

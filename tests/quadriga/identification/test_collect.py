@@ -12,10 +12,10 @@ from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.hankel import required_samples
 from quadriga.identification import collect as module
 from quadriga.identification.collect import (
+    build_dataset,
     collect,
     collect_episode,
     collection_config,
-    kept,
     training_seconds,
 )
 from quadriga.identification.rollout import Rollout, Tick
@@ -152,14 +152,14 @@ def test_an_episode_that_ends_in_an_early_fall_is_of_no_use(
 def test_the_seeds_are_those_of_the_episodes_that_were_kept(episode: Episode) -> None:
     """Walk 1 of three was lost, walk 3 is held out."""
     config = config_of(2, identification__seed=1000)
-    found = kept(config, {0: episode, 1: None, 2: episode, 3: episode}, 4.5)
+    found = build_dataset(config, {0: episode, 1: None, 2: episode, 3: episode}, 4.5)
     assert found.seeds == (1000, 1002)
     assert found.training == (episode, episode)
     assert found.held_out == (episode,)
     with pytest.raises(PredictorError, match="150 samples, held-out episode kept"):
-        kept(config, {0: None, 1: None, 2: episode, 3: episode}, 4.5)
+        build_dataset(config, {0: None, 1: None, 2: episode, 3: episode}, 4.5)
     with pytest.raises(PredictorError, match="300 samples, held-out episode lost"):
-        kept(config, {0: episode, 1: None, 2: episode, 3: None}, 4.5)
+        build_dataset(config, {0: episode, 1: None, 2: episode, 3: None}, 4.5)
 
 
 def test_what_is_collected_follows_from_the_rule_unless_it_is_given() -> None:

@@ -17,7 +17,7 @@ from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.predictor.store import read
 from quadriga.commands.parser import main
 from quadriga.identification.cache import predictor_path
-from quadriga.identification.fit import fitted
+from quadriga.identification.fit import report_fit
 from quadriga.identification.fit_report import FitReport, Unfit, horizon_errors
 from quadriga.identification.fit_sheets import comparison, report_sheets
 from quadriga.shared.errors import PredictorError
@@ -112,7 +112,7 @@ def test_every_predictor_is_compared_and_the_refused_ones_are_not_hidden(capsys:
     """Between the radii of two fits of the same data lies a limit that refuses one of them."""
     weight = {"identification__block_weight": 1000.0}
     weighted, plain = (
-        fitted(config_of(**weight, identification__predictor=kind), dataset(), kind)
+        report_fit(config_of(**weight, identification__predictor=kind), dataset(), kind)
         for kind in ("ridge", "pinv")
     )
     assert isinstance(weighted, FitReport)
@@ -139,7 +139,7 @@ def test_every_predictor_is_compared_and_the_refused_ones_are_not_hidden(capsys:
 
 
 def test_what_cannot_be_fitted_at_all_is_a_row_with_the_reason() -> None:
-    report = fitted(config_of(), dataset(), "ridge")
+    report = report_fit(config_of(), dataset(), "ridge")
     assert isinstance(report, FitReport)
     singular = Unfit("arx", PredictorError("normal equations", "a pivot of 0", "positive"))
     table = comparison([report, singular])
@@ -154,4 +154,4 @@ def test_data_that_do_not_excite_are_an_error_not_a_report() -> None:
     data = dataset()
     still = tuple(replace(episode, u=episode.u_nominal.copy()) for episode in data.training)
     with pytest.raises(PredictorError, match="persistently exciting"):
-        fitted(config_of(identification__ridge=2e-6), replace(data, training=still), "ridge")
+        report_fit(config_of(identification__ridge=2e-6), replace(data, training=still), "ridge")

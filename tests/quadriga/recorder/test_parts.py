@@ -26,7 +26,7 @@ def test_a_new_file_begins_when_its_time_is_over(tmp_path: Path) -> None:
             clock.now += 0.1
             parts.flush()
     assert [path.name for path in parts.paths] == ["run.mcap", "run-1.mcap", "run-2.mcap"]
-    assert (parts.messages, parts.all_lost()) == (49, {KEY: 1})
+    assert (parts.messages, parts.count_lost()) == (49, {KEY: 1})
     ticks = [[e.tick for e in Recording(path).entries()] for path in parts.paths]
     assert [t for part in ticks for t in part] == [k for k in range(50) if k != 20]
     notes = [Recording(path).notes()[LOST] for path in parts.paths]
@@ -66,4 +66,4 @@ def test_what_a_key_misses_while_it_is_silent_for_a_whole_file_is_counted(tmp_pa
             clock.now += 0.1
             parts.flush()
     assert len(parts.paths) == 3
-    assert parts.all_lost() == {other: 40}
+    assert parts.count_lost() == {other: 40}

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from quadriga.commands.parser import main
-from quadriga.recordings.check import check, told
+from quadriga.recordings.check import check, format_findings
 from quadriga.recordings.checks.finding import Finding
 from quadriga.shared.config.sections import (
     Config,
@@ -164,7 +164,7 @@ def test_every_broken_rule_is_found_at_its_message(
     first = finding.first[0]
     assert got in first.got
     assert limit in first.limit
-    assert any(first.got in line and "FAIL" not in line for line in told(findings))
+    assert any(first.got in line and "FAIL" not in line for line in format_findings(findings))
 
 
 def test_tolerances_are_a_millionth_of_a_newton(write_run: WriteRun) -> None:
@@ -192,10 +192,10 @@ def test_a_status_that_gave_up_waiting_excuses_an_older_plan(write_run: WriteRun
 
 def plans_only(folder: Path, config: Config, plans: list[tuple[str, msg.Plan]]) -> Finding:
     """The finding on the delay of a recording that holds nothing but plans."""
-    from quadriga.recorder.process import metadata
+    from quadriga.recordings.metadata import build_metadata
 
     path = folder / "plans.mcap"
-    with RecordingWriter(path, metadata(config, "")) as writer:
+    with RecordingWriter(path, build_metadata(config, "")) as writer:
         for robot, each in plans:
             writer.write(f"team/{robot}/plan", encode(each), 1)
     return by_name(check(path))["delay"]

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.replay.difference import difference
+from quadriga.replay.difference import find_difference
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Command, Plan, Truth
 
@@ -26,7 +26,7 @@ def test_any_changed_bit_of_a_command_is_placed(name: str, place: int, ulps: int
     values = getattr(COMMAND_0, name).copy()
     bits = values.view(np.int64)
     bits[place] += ulps
-    found = difference(7, "command", encode(COMMAND_0), replace(COMMAND_0, **{name: values}))
+    found = find_difference(7, "command", encode(COMMAND_0), replace(COMMAND_0, **{name: values}))
     assert (found.tick, found.name, found.field) == (7, "command", f"{name}[{place}]")
     assert float(found.recorded) == getattr(COMMAND_0, name)[place]
     assert float(found.recomputed) == values[place]
@@ -36,21 +36,21 @@ def test_any_changed_bit_of_a_command_is_placed(name: str, place: int, ulps: int
 def test_negative_zero_is_not_zero() -> None:
     u = PLAN_0.u.copy()
     u[2, 5] = -0.0
-    found = difference(40, "plan", encode(PLAN_0), replace(PLAN_0, u=u))
+    found = find_difference(40, "plan", encode(PLAN_0), replace(PLAN_0, u=u))
     assert (found.field, found.recorded, found.recomputed) == ("u[2, 5]", "0.0", "-0.0")
 
 
 def test_plain_fields_shapes_and_what_is_no_message() -> None:
     other = replace(PLAN_0, status="faded", used={"r1": 1}, u=np.ones((3, 12)))
-    text = str(difference(40, "plan", encode(PLAN_0), other))
+    text = str(find_difference(40, "plan", encode(PLAN_0), other))
     assert text.startswith("tick 40, plan.u[0, 0]: recorded 0.0, recomputed 1.0 (36 of 36 entries")
     assert "also in status, used" in text
     shorter = replace(PLAN_0, u=np.zeros((2, 12)), y=np.zeros((2, 6)))
-    text = str(difference(40, "plan", encode(PLAN_0), shorter))
+    text = str(find_difference(40, "plan", encode(PLAN_0), shorter))
     assert "plan.u: recorded (3, 12), recomputed (2, 12)" in text
-    text = str(difference(40, "plan", encode(PLAN_0), replace(PLAN_0, status="faded")))
+    text = str(find_difference(40, "plan", encode(PLAN_0), replace(PLAN_0, status="faded")))
     assert text == "tick 40, plan.status: recorded 'solved', recomputed 'faded'"
-    assert "no message" in str(difference(40, "plan", b"\xc1", PLAN_0))
+    assert "no message" in str(find_difference(40, "plan", b"\xc1", PLAN_0))
 
 
 def test_every_field_of_a_message_is_compared() -> None:
@@ -61,5 +61,5 @@ def test_every_field_of_a_message_is_compared() -> None:
         value = getattr(truth, item.name)
         other = -value if isinstance(value, np.ndarray) else ("r2",) if value == ("r1",) else 4
         changed: dict[str, Any] = {item.name: other}
-        found = difference(3, "k", encode(replace(truth, **changed)), truth)
+        found = find_difference(3, "k", encode(replace(truth, **changed)), truth)
         assert found.field.startswith(item.name)

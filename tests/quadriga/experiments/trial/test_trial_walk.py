@@ -12,7 +12,7 @@ from rich.console import Console
 from quadriga.agents.predictor.store import load
 from quadriga.experiments.trial.trial import Figures, figures
 from quadriga.experiments.trial.trial_walk import over_the_bus, roll_out
-from quadriga.identification.identify import fit
+from quadriga.identification.predictors import fit
 from quadriga.identification.rollout import Tick
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.recording.reader import Recording

@@ -16,7 +16,7 @@ from quadriga.agents.inbox.intake_log import Intake, reference_to, taken_in
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.rehearsal import standing
 from quadriga.replay.agent_log import AgentLog
-from quadriga.replay.intake import Fed, Feed
+from quadriga.replay.recorded_inputs import RecordedInputs, StepInputs
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.wire.codec import encode
@@ -94,8 +94,8 @@ def lived(
     """
     rng = np.random.default_rng(seed)
     config, agent = AGENTS[mode]
-    arrivals, tape = Inbox(config, "r2", agent.peers), AgentLog()
-    intake = Intake(config, arrivals)
+    inbox, log = Inbox(config, "r2", agent.peers), AgentLog()
+    intake = Intake(config, inbox)
     pending: list[tuple[int, str, Source, Message]] = []
 
     def delay() -> int:
@@ -105,50 +105,50 @@ def lived(
     for tick, key, source, message in sent(config):
         comes[source] = max(comes[source], tick + delay())  # a key keeps its order
         pending.append((comes[source], key, source, message))
-        tape.heard[source][order_of(message)].append((key, encode(message)))
+        log.received[source][order_of(message)].append((key, encode(message)))
     for tick, after in second:
         source, message = ("reference", "operator"), Reference(tick, tick, 0.2, 0.0, 0.0, 0.26)
         pending.append((tick + after, "team/reference", source, message))
-        tape.heard[source][order_of(message)].append(("team/reference", encode(message)))
+        log.received[source][order_of(message)].append(("team/reference", encode(message)))
     for comes_at, lead in early:
         for key, source, message in forged(comes_at + lead):
             pending.append((comes_at, key, source, message))
-            tape.heard[source][order_of(message)].append((key, encode(message)))
+            log.received[source][order_of(message)].append((key, encode(message)))
     taken: Taken = []
     last = -1
     for tick in range(TICKS):
-        tape.states[tick].append(encode(standing(tick)))
+        log.states[tick].append(encode(standing(tick)))
         if rng.random() < skipped:
             continue
         awaited = agent.awaited(tick)
-        arrivals.take("team/r2/state", tape.states[tick][0])
+        inbox.take("team/r2/state", log.states[tick][0])
 
         def take(until: int, of: frozenset[Source] | None = None) -> None:
             for item in sorted(pending, key=lambda item: item[0]):
                 if item[0] <= until and (of is None or item[2] in of):
-                    arrivals.take(item[1], encode(item[3]))
+                    inbox.take(item[1], encode(item[3]))
                     pending.remove(item)
 
         take(tick)
         if mode == "lockstep":
-            take(tick + PATIENCE, arrivals.owing(tick, awaited))
-        state = arrivals.state()
+            take(tick + PATIENCE, inbox.owing(tick, awaited))
+        state = inbox.state()
         assert state is not None
-        inputs = arrivals.inputs(state, awaited)
+        inputs = inbox.inputs(state, awaited)
         record = intake.record(last, inputs, awaited)
         if record is not None:
-            tape.records[tick] = record
-        last = tape.last = tick
+            log.records[tick] = record
+        last = log.last = tick
         taken.append((tick, taken_in(inputs)))
     for peer in agent.peers:
-        tape.peers_awake[peer].update(range(0, TICKS, 10))
-    return tape, taken
+        log.peers_awake[peer].update(range(0, TICKS, 10))
+    return log, taken
 
 
-def fed(mode: str, tape: AgentLog) -> list[Fed]:
+def handed_over(mode: str, log: AgentLog) -> list[StepInputs]:
     """What a replay hands over."""
     config, agent = AGENTS[mode]
-    return list(Feed(config, agent, Inbox(config, "r2", agent.peers), tape).steps())
+    return list(RecordedInputs(config, agent, Inbox(config, "r2", agent.peers), log).steps())
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
@@ -181,18 +181,18 @@ def test_a_replay_takes_in_what_the_agent_took_in(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("quadriga.agents.inbox.inbox._HELD", held)
         patch.setattr("quadriga.agents.inbox.inbox.AHEAD_MS", 100)
-        tape, taken = lived(mode, seed, late, skipped, second, early)
+        log, taken = lived(mode, seed, late, skipped, second, early)
         patch.undo()
         patch.setattr("quadriga.agents.inbox.inbox.AHEAD_MS", 100)
-        steps = fed(mode, tape)
+        steps = handed_over(mode, log)
     assert not [step.missing for step in steps if step.missing]
     again = [(step.tick, taken_in(step.inputs)) for step in steps if step.inputs is not None]
     assert again == taken
 
 
 def test_lock_step_without_trouble_needs_no_record_at_all() -> None:
-    tape, taken = lived("lockstep", 1, 0.0, 0.0)
-    assert not tape.records
+    log, taken = lived("lockstep", 1, 0.0, 0.0)
+    assert not log.records
     assert sum(len(found) for _, found in taken) > 50
 
 
@@ -209,19 +209,19 @@ def test_lock_step_without_trouble_needs_no_record_at_all() -> None:
 def test_what_the_recorder_lost_is_named_at_the_step_that_took_it_in(
     mode: str, source: Source, order: Order
 ) -> None:
-    tape, taken = lived(mode, 2, 0.0, 0.0)
+    log, taken = lived(mode, 2, 0.0, 0.0)
     step = next(tick for tick, found in taken if (source, order) in found)
-    del tape.heard[source][order]
-    missing = [(step.tick, step.missing) for step in fed(mode, tape) if step.missing]
+    del log.received[source][order]
+    missing = [(step.tick, step.missing) for step in handed_over(mode, log) if step.missing]
     assert missing == [(step, (reference_to(source, order),))]
 
 
 def test_a_lost_state_and_a_lost_record_are_named() -> None:
-    tape, _ = lived("realtime", 3, 0.0, 0.0)
-    lost = tape.records.pop(sorted(tape.records)[7])
-    before = sorted(tape.records)[6]
-    del tape.states[400]
-    missing = [(step.tick, step.missing) for step in fed("realtime", tape) if step.missing]
+    log, _ = lived("realtime", 3, 0.0, 0.0)
+    lost = log.records.pop(sorted(log.records)[7])
+    before = sorted(log.records)[6]
+    del log.states[400]
+    missing = [(step.tick, step.missing) for step in handed_over("realtime", log) if step.missing]
     assert missing[0][0] == before + 1 <= lost.tick
     assert "1 of inputs of r2 between ticks" in missing[0][1][0]
     assert (400, ("state of r2 at tick 400",)) in missing

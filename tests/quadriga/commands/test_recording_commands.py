@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from mcap.records import Schema
 
 from quadriga.commands.parser import main
-from quadriga.recorder.process import metadata
+from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording import seal as recording_seal
 from quadriga.shared.recording.config import recorded_config
@@ -42,7 +42,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording of 0.6 s in chunks of 16 KiB, with a push, a fall and a stop."""
     source = write(tmp_path_factory.mktemp("source"), CONFIG) / "run.mcap"
     path = tmp_path_factory.mktemp("small") / "run.mcap"
-    about = metadata(CONFIG, "cd" * 32)
+    about = build_metadata(CONFIG, "cd" * 32)
     with RecordingWriter(path, about, 16, periods=periods(CONFIG)) as writer:
         for entry in Recording(source).entries():
             writer.write(entry.key, entry.payload, entry.log_time_ns)
@@ -120,7 +120,7 @@ odd_versions = pytest.mark.parametrize(
 @odd_versions
 def test_metadata_of_anybody_do_no_harm(tmp_path: Path, say: Say, versions: str) -> None:
     path = tmp_path / "odd.mcap"
-    told = metadata(CONFIG, "") | {"versions": versions, "topics": versions}
+    told = build_metadata(CONFIG, "") | {"versions": versions, "topics": versions}
     with RecordingWriter(path, told, 16, periods=periods(CONFIG)) as writer:
         writer.write("team/sim/event", encode(msg.Event(200, 0, "stop", "", "\x1b[2J\nend")), 0)
     status, lines, err = say("info", path)
@@ -148,7 +148,7 @@ def test_a_configuration_that_is_none_is_one_clear_error(
     tmp_path: Path, say: Say, text: str
 ) -> None:
     path = tmp_path / "odd.mcap"
-    with RecordingWriter(path, metadata(CONFIG, "") | {"config_json": text}) as writer:
+    with RecordingWriter(path, build_metadata(CONFIG, "") | {"config_json": text}) as writer:
         writer.write("team/r1/state", b"", 0)
     status, _, err = say("report", path)
     assert (status, err.count("\n")) == (2, 1)
@@ -159,7 +159,7 @@ def test_a_key_that_nests_as_deeply_as_can_be_read_is_one_clear_error(tmp_path: 
     for depth in range(800, 1000, 5):
         path = tmp_path / f"{depth}.mcap"
         told = {"config_json": f'{{"world": {{"seed": {"[" * depth}{"]" * depth}}}}}'}
-        with RecordingWriter(path, metadata(CONFIG, "") | told) as writer:
+        with RecordingWriter(path, build_metadata(CONFIG, "") | told) as writer:
             writer.write("team/r1/state", b"", 0)
         with pytest.raises(RecordingError):
             recorded_config(Recording(path))
@@ -185,7 +185,7 @@ def test_echo_is_one_readable_line_a_message(small: Path, say: Say) -> None:
 
 
 def test_echo_shows_what_is_no_message(tmp_path: Path, say: Say) -> None:
-    with RecordingWriter(tmp_path / "run.mcap", metadata(CONFIG, "")) as writer:
+    with RecordingWriter(tmp_path / "run.mcap", build_metadata(CONFIG, "")) as writer:
         writer.write("team/r1/state", b"\x01garbage", 5)
         writer.write("team/some/thing", b"\x00" * 100, 5)
     _, lines, _ = say("echo", "**", "--file", tmp_path / "run.mcap")
@@ -239,14 +239,14 @@ def test_each_file_that_is_none_gives_one_clear_error(
     path.unlink()
     with monkeypatch.context() as future:
         future.setattr(recording_seal, "FORMAT", 2)
-        RecordingWriter(path, metadata(CONFIG, "")).finish()
+        RecordingWriter(path, build_metadata(CONFIG, "")).finish()
     status, _, err = say(*words(verb, path))
     assert (status, err.count("\n")) == (2, 1)
     assert "got a recording of format 2, expected format 1 (recorded by a newer quadriga" in err
     path.unlink()
     with monkeypatch.context() as future:
         future.setattr(State, "SCHEMA", 2)
-        with RecordingWriter(path, metadata(CONFIG, "")) as writer:
+        with RecordingWriter(path, build_metadata(CONFIG, "")) as writer:
             writer.write("team/r1/state", b"\x80", 0)
     status, _, err = say(*words(verb, path))
     assert (status, err.count("\n")) == (2, 1)

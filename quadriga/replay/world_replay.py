@@ -9,8 +9,7 @@ from typing import Final
 
 from quadriga.plant.lockstep import ANSWERS
 from quadriga.recordings.by_tick import by_tick
-from quadriga.recordings.metadata import recorded_versions
-from quadriga.replay.difference import Difference, difference
+from quadriga.replay.difference import Difference, find_difference
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
@@ -25,7 +24,7 @@ _NAMES: Final = frozenset(topic.name for topic in (STATE, COMMAND, TRUTH, EVENT)
 
 
 @dataclass(frozen=True, slots=True)
-class Resim:
+class WorldComparison:
     """How far the world has been recomputed, and whether it still is the recorded one.
 
     Attributes:
@@ -41,7 +40,7 @@ class Resim:
     difference: Difference | None = None
 
 
-def resim(recording: Recording) -> Iterator[Resim]:
+def replay_world(recording: Recording) -> Iterator[WorldComparison]:
     """Recompute the world tick by tick; the last value tells what came of it.
 
     A robot that the world had given up on at a tick, as the recorded events tell, is silent at
@@ -66,7 +65,7 @@ def resim(recording: Recording) -> Iterator[Resim]:
     compared, lost = 0, ""
     for tick, entries in by_tick(recording, _NAMES):
         if lost:
-            if not any(_published(entry) for entry in entries):
+            if not any(_is_of_world(entry) for entry in entries):
                 continue  # nothing of the world's came after
             if not recording.cut:
                 raise RecordingError(
@@ -75,23 +74,23 @@ def resim(recording: Recording) -> Iterator[Resim]:
                     "a command of each robot at every tick",
                     "recorded by somebody who came later or left topics out, or lost under way",
                 )
-            yield Resim(tick - 1, compared, f"{lost}: {recording.cut}")
+            yield WorldComparison(tick - 1, compared, f"{lost}: {recording.cut}")
             return
-        found = _compare(world, config, entries)
-        if isinstance(found, Difference):
-            yield Resim(tick, compared, difference=found)
+        result = _compare(world, config, entries)
+        if isinstance(result, Difference):
+            yield WorldComparison(tick, compared, difference=result)
             return
-        compared += found
-        silent.hear(entries)
-        commands = _commands(keys, entries, silent.robots)
+        compared += result
+        silent.update(entries)
+        commands = _choose_commands(keys, entries, silent.robots)
         absent = [name for name in world.names if name not in {*commands, *silent.robots}]
         if absent:
             lost = f"no command of {', '.join(absent)} at tick {tick}"
         else:
             world.step(commands)
-        yield Resim(tick + 1, compared)
+        yield WorldComparison(tick + 1, compared)
     if compared and recording.cut:
-        yield Resim(tick + 1, compared, recording.cut)
+        yield WorldComparison(tick + 1, compared, recording.cut)
     if not compared:
         raise RecordingError(
             str(recording.path),
@@ -100,17 +99,7 @@ def resim(recording: Recording) -> Iterator[Resim]:
         )
 
 
-def other_versions(recording: Recording, here: Mapping[str, str]) -> str:
-    """Packages that had another version when recorded, for a difference they may explain."""
-    then = recorded_versions(recording.metadata)
-    return ", ".join(
-        f"{name} {version} (here {here.get(name, 'absent')})"
-        for name, version in then.items()
-        if here.get(name) != version
-    )
-
-
-def _published(entry: ChunkEntry) -> bool:
+def _is_of_world(entry: ChunkEntry) -> bool:
     return topic_of(entry.key)[0] in (STATE, TRUTH)
 
 
@@ -121,8 +110,8 @@ class _Silent:
         self._key = EVENT.key(team)
         self.robots: set[str] = set()
 
-    def hear(self, entries: Iterable[ChunkEntry]) -> None:
-        for event in _valid(self._key, entries):
+    def update(self, entries: Iterable[ChunkEntry]) -> None:
+        for event in _decode_events(self._key, entries):
             if event.kind != "fault" or not event.robot or event.detail.endswith(WEAKENED):
                 continue
             if event.detail.endswith(ANSWERS):
@@ -131,7 +120,7 @@ class _Silent:
                 self.robots.add(event.robot)
 
 
-def _valid(key: str, entries: Iterable[ChunkEntry]) -> Iterator[Event]:
+def _decode_events(key: str, entries: Iterable[ChunkEntry]) -> Iterator[Event]:
     for entry in entries:
         if entry.key == key:
             with suppress(MessageError):  # of a foreign publisher: the world's own are valid
@@ -154,32 +143,32 @@ def _compare(world: World, config: Config, entries: Iterable[ChunkEntry]) -> int
         expected[TRUTH.key(team)] = world.truth()
     for key, message in expected.items():
         if key in recorded and encode(message) not in recorded[key]:
-            return difference(world.tick, key, recorded[key][0], message)
+            return find_difference(world.tick, key, recorded[key][0], message)
         count += key in recorded
     return count
 
 
-def _commands(
+def _choose_commands(
     keys: Mapping[str, tuple[str, str]], entries: Sequence[ChunkEntry], silent: set[str]
 ) -> dict[str, Command]:
     """What each robot that was not silent commanded in a tick, by robot in the team's order."""
-    found = {}
+    commands = {}
     for name, (state, command) in keys.items():
-        valid = [] if name in silent else list(_valid_commands(command, entries))
+        valid = [] if name in silent else list(_decode_commands(command, entries))
         if valid:
             asked = [entry.log_time_ns for entry in entries if entry.key == state]
-            found[name] = _taken(valid, min(asked, default=0))
-    return found
+            commands[name] = _choose_taken(valid, min(asked, default=0))
+    return commands
 
 
-def _valid_commands(key: str, entries: Iterable[ChunkEntry]) -> Iterator[tuple[int, Command]]:
+def _decode_commands(key: str, entries: Iterable[ChunkEntry]) -> Iterator[tuple[int, Command]]:
     for entry in entries:
         if entry.key == key:
             with suppress(MessageError):  # the world dropped it, too
                 yield entry.log_time_ns, decode(entry.payload, Command)
 
 
-def _taken(commands: Sequence[tuple[int, Command]], asked: int) -> Command:
+def _choose_taken(commands: Sequence[tuple[int, Command]], asked: int) -> Command:
     """Which of a robot's commands of one tick the world took, as it refuses early and stale ones.
 
     The one that was recorded closest to the state it answers; links differ in speed, so that it

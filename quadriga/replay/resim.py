@@ -8,8 +8,8 @@ from typing import Final
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-from quadriga.recorder.process import versions
-from quadriga.replay.world import Resim, other_versions, resim
+from quadriga.recordings.metadata import differing_versions
+from quadriga.replay.world_replay import WorldComparison, replay_world
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic
@@ -17,7 +17,7 @@ from quadriga.shared.runtime.clock import monotonic
 _SHOWN: Final = 100  # ticks between looks at the bar
 
 
-def run(path: Path, console: Console) -> bool:
+def compare_world(path: Path, console: Console) -> bool:
     """Recompute a recorded world; whether all of it came out equal.
 
     Raises:
@@ -26,7 +26,7 @@ def run(path: Path, console: Console) -> bool:
     recording = Recording(path)
     seconds = recorded_config(recording).world.seconds
     begun = monotonic()
-    last = Resim(0, 0)
+    last = WorldComparison(0, 0)
     bar = Progress(
         TextColumn("re-simulating"),
         BarColumn(),
@@ -37,15 +37,17 @@ def run(path: Path, console: Console) -> bool:
     )
     with bar:
         task = bar.add_task("", total=seconds)
-        for last in resim(recording):
+        for last in replay_world(recording):
             if last.tick % _SHOWN == 0:
                 bar.update(task, completed=last.tick / 1000)
     spent = monotonic() - begun
-    _say(last, recording, spent, console)
+    _print_verdict(last, recording, spent, console)
     return last.difference is None
 
 
-def _say(last: Resim, recording: Recording, spent: float, console: Console) -> None:
+def _print_verdict(
+    last: WorldComparison, recording: Recording, spent: float, console: Console
+) -> None:
     world = last.tick / 1000
     pace = f"{world:.2f} s of world time in {spent:.1f} s, {world / spent:.1f} × real time"
     if last.difference is None:
@@ -56,7 +58,8 @@ def _say(last: Resim, recording: Recording, spent: float, console: Console) -> N
             f"first difference: {last.difference}",
             f"{last.compared} messages before it are equal; {pace}",
         ]
-        if others := other_versions(recording, versions()):
+        others = differing_versions(recording.metadata)
+        if others:
             lines.append(f"recorded with other versions, which may be why: {others}")
     for line in lines:
         console.print(line, markup=False, highlight=False, soft_wrap=True)

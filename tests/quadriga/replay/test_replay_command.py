@@ -17,12 +17,12 @@ from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, predictor_sha256, save
 from quadriga.agents.rehearsal import standing
 from quadriga.commands.parser import main
-from quadriga.recorder.process import metadata
-from quadriga.replay.recorded_predictor import PREDICTOR, keep, recorded_predictor
-from quadriga.replay.run import replay
+from quadriga.recordings.metadata import build_metadata
+from quadriga.replay.recorded_predictor import PREDICTOR, copy_predictor, find_predictor
 from quadriga.replay.saved_qp import SavedQp
 from quadriga.replay.saved_qp import load as load_qp
 from quadriga.replay.saved_qp import save as save_qp
+from quadriga.replay.team_replay import replay
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, RecordingError
@@ -43,7 +43,7 @@ def configured(**keys: object) -> Config:
 def write(path: Path, config: Config, sha256: str = "", ticks: int = 5) -> Path:
     """A recording of a robot that stands for some ticks with torques that no agent gave."""
     zero = np.zeros(12)
-    with RecordingWriter(path, metadata(config, sha256)) as to:
+    with RecordingWriter(path, build_metadata(config, sha256)) as to:
         to.write("team/reference", encode(Reference(0, 0, 0.0, 0.0, 0.0, 0.26)), 0)
         for tick in range(ticks):
             command = Command(tick, 10**6 * tick, zero, zero, zero, zero, zero)
@@ -125,7 +125,7 @@ def test_a_stop_that_could_not_be_read_is_handed_over_where_it_was_taken_in(tmp_
     agent = Agent(config, "r1", None)
     arrivals = Inbox(config, "r1", agent.peers)
     memory, intake = agent.initial(), Intake(config, arrivals)
-    with RecordingWriter(run, metadata(config, "")) as to:
+    with RecordingWriter(run, build_metadata(config, "")) as to:
         for tick in range(5):
             reference = encode(Reference(0, 0, 0.0, 0.0, 0.0, 0.26))
             if tick == 0:
@@ -183,20 +183,20 @@ def test_the_predictor_is_found_by_its_digest(
     said = complaint(capsys, recording.path, "--all")
     assert f"digest {sha256[:16]}" in said
     assert "--predictor FILE" in said
-    assert recorded_predictor(recording, config, own)[1]
-    assert not recorded_predictor(recording, config, other)[1]
+    assert find_predictor(recording, config, own)[1]
+    assert not find_predictor(recording, config, other)[1]
     with pytest.raises(PredictorError, match="no such file"):
-        recorded_predictor(recording, config, tmp_path / "none.npz")
-    keep(other, tmp_path)  # another one beside the recording is not taken for it
+        find_predictor(recording, config, tmp_path / "none.npz")
+    copy_predictor(other, tmp_path)  # another one beside the recording is not taken for it
     cached = tmp_path / "cache" / "quadriga" / "predictor-0.npz"
     cached.parent.mkdir(parents=True)
     cached.write_bytes(own.read_bytes())
-    found, same = recorded_predictor(recording, config, None)
+    found, same = find_predictor(recording, config, None)
     assert found is not None
     assert (predictor_sha256(found), same) == (sha256, True)
     cached.unlink()
-    keep(own, tmp_path)
-    assert recorded_predictor(recording, config, None)[1]
+    copy_predictor(own, tmp_path)
+    assert find_predictor(recording, config, None)[1]
 
 
 def test_a_kept_predictor_is_a_copy_that_may_be_changed(tmp_path: Path) -> None:
@@ -204,14 +204,14 @@ def test_a_kept_predictor_is_a_copy_that_may_be_changed(tmp_path: Path) -> None:
     source.write_bytes(b"predictor")
     run_dir.mkdir()
 
-    keep(source, run_dir)
+    copy_predictor(source, run_dir)
     assert (run_dir / PREDICTOR).read_bytes() == b"predictor"
     (run_dir / PREDICTOR).write_bytes(b"another")
     assert source.read_bytes() == b"predictor"
-    keep(source, run_dir)
+    copy_predictor(source, run_dir)
     assert (run_dir / PREDICTOR).read_bytes() == b"predictor"
     with pytest.raises(RecordingError, match="room for the predictor"):
-        keep(source, tmp_path / "nowhere")
+        copy_predictor(source, tmp_path / "nowhere")
 
 
 def test_a_saved_problem_can_be_solved_on_its_own(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A recorded agent's configuration with some keys changed, and which changes make sense."""
+"""Change some keys of a recorded agent's configuration, and refuse what cannot be replayed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from quadriga.shared.config.write import departures
 from quadriga.shared.errors import ConfigError
 
 
-def changed_config(config: Config, given: Mapping[str, Any]) -> Config:
+def change_config(config: Config, given: Mapping[str, Any]) -> Config:
     """The configuration with what was given, by section and key, changed.
 
     Raises:
@@ -25,13 +25,13 @@ def changed_config(config: Config, given: Mapping[str, Any]) -> Config:
     return build(overlaid(asdict(config), overrides))
 
 
-def changes(old: Config, new: Config) -> str:
+def format_changes(old: Config, new: Config) -> str:
     """Every changed key with its two values, or ""."""
     return ", ".join(f"{name} {was} → {now}" for name, now, was, _ in departures(new, old))
 
 
-def check_change(old: Agent, new: Agent) -> None:
-    """Refuse a change under which the agent would need what it had not taken in.
+def check_agents(old: Agent, new: Agent) -> None:
+    """Refuse a change under which an agent would need messages that it had not taken in.
 
     Raises:
         ConfigError: it would need other messages than those it had.
@@ -43,16 +43,16 @@ def check_change(old: Agent, new: Agent) -> None:
     ):
         if one != other:
             raise ConfigError(key, repr(other), f"{one!r} as recorded", "a replay keeps the team")
-    unheard = sorted(set(new.peers) - set(old.peers))
-    central = [config.planner.kind in CENTRAL for config in (was, now)]
-    if central[0] != central[1] or unheard:
+    new_peers = sorted(set(new.peers) - set(old.peers))
+    was_central, is_central = (config.planner.kind in CENTRAL for config in (was, now))
+    if was_central != is_central or new_peers:
         raise ConfigError(
             "planner.kind",
             repr(now.planner.kind),
             f"one like the recorded {was.planner.kind!r}",
-            f"the agent had taken in no plans of {', '.join(unheard) or 'such a planner'}",
+            f"the agent had taken in no plans of {', '.join(new_peers) or 'such a planner'}",
         )
-    if now.estimator.kind == "truth" != was.estimator.kind:
+    if now.estimator.kind == "truth" and was.estimator.kind != "truth":
         raise ConfigError(
             "estimator.kind",
             "'truth'",

@@ -17,18 +17,10 @@ from quadriga.agents.predictor.episode import SIGNALS
 from quadriga.agents.predictor.hankel import required_samples
 from quadriga.agents.predictor.store import read
 from quadriga.identification import cache as keys
-from quadriga.identification import identify
+from quadriga.identification import predictors
 from quadriga.identification.cache import data_path, predictor_path
-from quadriga.identification.collect import Dataset
-from quadriga.identification.identify import (
-    check_excitation,
-    ensure_data,
-    ensure_predictor,
-    fit,
-    load_predictor,
-    read_data,
-    write_data,
-)
+from quadriga.identification.dataset import Dataset, check_excitation, read_data, write_data
+from quadriga.identification.predictors import ensure_data, ensure_predictor, fit, load_predictor
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
@@ -71,7 +63,7 @@ def no_collection(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: Any) -> None:
         raise AssertionError("collected although the data were there")
 
-    monkeypatch.setattr(identify, "collect", refuse)
+    monkeypatch.setattr(predictors, "collect", refuse)
 
 
 def limited(**changes: Any) -> Config:
@@ -295,7 +287,7 @@ def test_collected_data_are_kept_even_if_the_fit_is_refused(
         progress(1, 1)
         return Dataset((known.episode(100, 1),), (known.episode(60, 2),), (1,))
 
-    monkeypatch.setattr(identify, "collect", collected)
+    monkeypatch.setattr(predictors, "collect", collected)
     with pytest.raises(PredictorError, match="at least 337"):
         ensure_predictor(TINY, silent())
     assert data_path(TINY).is_file()

@@ -1,0 +1,96 @@
+"""The options that every command has: where its configuration comes from."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Final
+
+from quadriga.commands.command import Given
+from quadriga.shared.config.load import build, layers, parse_assignment
+from quadriga.shared.config.sections import Config
+
+# Options that set one key of the configuration each; the key's own documentation is their help.
+KEYS: Final = {
+    "robots": "team.robots",
+    "yokes": "team.yokes",
+    "team": "team.name",
+    "seconds": "world.seconds",
+    "mode": "world.mode",
+    "seed": "world.seed",
+    "terrain": "world.terrain",
+    "terrain-height": "world.terrain_height",
+    "payload": "world.payload",
+    "payload-on": "world.payload_on",
+    "push": "world.push",
+    "vx": "reference.vx",
+    "vy": "reference.vy",
+    "wz": "reference.wz",
+    "planner": "planner.kind",
+    "interface": "planner.interface",
+    "estimator": "estimator.kind",
+    "preset": "controller.preset",
+    "endpoint": "bus.endpoint",
+}
+
+
+def build_config_options() -> argparse.ArgumentParser:
+    """The parent of every command's parser."""
+    options = argparse.ArgumentParser(add_help=False)
+    options.add_argument("--parent", type=int, default=0, help=argparse.SUPPRESS)
+    group = options.add_argument_group("configuration")
+    group.add_argument(
+        "--scenario",
+        metavar="NAME",
+        help="start from a scenario's keys; see `quadriga scenarios`; --config and "
+        "all other options win over it; a TOML file will do, too",
+    )
+    group.add_argument("--config", type=Path, metavar="FILE", help="TOML; see `quadriga config`")
+    group.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="SECTION.KEY=VALUE",
+        dest="assignments",
+        help="set any key; may be repeated",
+    )
+    defaults = Config()
+    for option, name in KEYS.items():
+        section, _, key = name.partition(".")
+        values = getattr(defaults, section)
+        meta = type(values).__dataclass_fields__[key].metadata
+        default = getattr(values, key)
+        unit = "" if meta["unit"] in ("-", "1") else f" [{meta['unit']}]"
+        group.add_argument(
+            f"--{option}",
+            type=type(default),
+            dest=name,
+            metavar="|".join(meta["choices"]) or "X",
+            help=f"{meta['doc']}{unit} ({default})".replace("%", "%%"),
+        )
+    return options
+
+
+def read_config(arguments: argparse.Namespace) -> tuple[Config, Given]:
+    """The configuration in force, and what of it is given explicitly.
+
+    Sets `arguments.overrides` to the keys of single options, by their full name.
+
+    Raises:
+        ConfigError: a key or a value is wrong, or a file cannot be read.
+    """
+    overrides = dict(parse_assignment(text) for text in arguments.assignments)
+    for name in KEYS.values():
+        value = getattr(arguments, name)
+        if value is not None:
+            overrides[name] = value
+    arguments.overrides = overrides
+    scenario = arguments.scenario
+    if scenario is None:
+        given = layers(arguments.config, overrides)
+    else:
+        from quadriga.team.scenarios import LABEL, label, path
+
+        labelled = {LABEL: label(scenario)} | overrides
+        given = layers(arguments.config, labelled, beneath=path(scenario))
+    return build(given), given

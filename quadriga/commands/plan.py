@@ -1,0 +1,36 @@
+"""`quadriga plan`: the process of a planner that plans for the whole team."""
+
+from __future__ import annotations
+
+import argparse
+
+from quadriga.commands.command import AddCommand, Given
+from quadriga.commands.fitted_predictor import load_predictor
+from quadriga.commands.options import add_predictor, add_wait
+from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.errors import ConfigError
+
+
+def add(add_command: AddCommand) -> None:
+    """The command and its options."""
+    command = add_command(
+        "plan", run, "the planner of the whole team (planner.kind centralised, deepc)"
+    )
+    add_predictor(command)
+    add_wait(command)
+
+
+def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """Run the planner until the walk is over."""
+    from quadriga.agents import central_process
+    from quadriga.identification.central_planner import build_central_planner
+
+    if config.planner.kind not in CENTRAL:
+        raise ConfigError(
+            "planner.kind",
+            repr(config.planner.kind),
+            f"one of {', '.join(CENTRAL)}",
+            "in all other kinds each agent plans for itself",
+        )
+    central_process.run(config, build_central_planner(config, load_predictor(config, arguments)))
+    return 0

@@ -1,0 +1,33 @@
+"""`quadriga walk`: the main job."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from quadriga.commands.command import AddCommand, Given
+from quadriga.commands.options import add_no_render
+from quadriga.shared.config.sections import Config
+
+
+def add(add_command: AddCommand) -> None:
+    """The command and its options."""
+    command = add_command("walk", run, "start all processes, walk, and show what came of it")
+    command.add_argument("--out", type=Path, metavar="DIR", help="run folder (runs/<date>-<time>)")
+    add_no_render(command)
+
+
+def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
+    """Walk once; 0 if all walked to the end, 1 if one fell or stopped, 130 if interrupted."""
+    from rich.console import Console
+
+    from quadriga.team.endpoint import free_endpoint
+    from quadriga.team.run_folder import check_own_config
+    from quadriga.team.walk import walk
+
+    check_own_config(arguments.config, arguments.out)
+    # Several walks on one machine are the rule; only who names an endpoint wants that one.
+    if config.bus.mode == "peer" and "endpoint" not in given.get("bus", {}):
+        config = replace(config, bus=replace(config.bus, endpoint=free_endpoint()))
+    return walk(config, arguments.out, pictures=not arguments.no_render, console=Console())

@@ -1,0 +1,31 @@
+"""The planner of the whole team, from a predictor or from the collected data themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from quadriga.agents.planner.team_planner import TeamPlanner, centralised, deepc
+from quadriga.agents.predictor.deepc import build_model, reduce
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.identification.cache import data_path
+from quadriga.identification.dataset import read_data
+from quadriga.shared.config.sections import Config
+from quadriga.shared.runtime.blas import one_blas_thread
+
+
+def build_central_planner(
+    config: Config, predictor: Predictor, data: Path | None = None
+) -> TeamPlanner:
+    """The planner of the whole team for a `planner.kind` that is one process for all.
+
+    `data` is the file of what was collected, which DeePC plans with; None takes the cache's.
+
+    Raises:
+        PredictorError: the predictor is of another team; there are no collected data for DeePC.
+    """
+    one_blas_thread()
+    if config.planner.kind == "centralised":
+        return centralised(config, predictor)
+    planner = config.planner
+    reduction = reduce(read_data(data or data_path(config)).training, planner.T_ini, planner.N)
+    return deepc(config, build_model(reduction, planner, planner.lambda_g, planner.lambda_sigma))

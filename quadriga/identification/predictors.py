@@ -1,0 +1,106 @@
+"""From configuration to an accepted predictor: collect, fit, gate, keep for later runs."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from quadriga.agents.planner.gates import GateReport, run_gates
+from quadriga.agents.predictor.fits import fit as fit_predictor
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.store import Provenance, load, save, versions
+from quadriga.identification.cache import data_path, predictor_path
+from quadriga.identification.collect import collect, training_seconds
+from quadriga.identification.dataset import Dataset, check_excitation, read_data, write_data
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import config_sha256
+from quadriga.shared.runtime.blas import one_blas_thread
+
+
+def ensure_predictor(config: Config, console: Console) -> Path:
+    """The file of an accepted predictor for `config`; collects and fits if there is none.
+
+    Raises:
+        PredictorError: the data are too little or not exciting, or a gate refuses the fit.
+    """
+    path = predictor_path(config)
+    if path.is_file():
+        load(path, config)
+        return path
+    dataset = ensure_data(config, console)
+    fit(config, dataset, path, console)
+    return path
+
+
+def ensure_data(config: Config, console: Console) -> Dataset:
+    """The collected data for `config`, from the cache or collected now.
+
+    Raises:
+        PredictorError: too many walks ended in a fall.
+    """
+    path = data_path(config)
+    if path.is_file():
+        return read_data(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=path.parent):
+        pass  # a folder that cannot be written is better known before minutes of walking
+    seconds = training_seconds(config) + config.identification.held_out
+    label = f"collecting {seconds:.0f} s of walking, {config.team.robots} robots"
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed}/{task.total} episodes"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task(label, total=None)
+
+        def show(done: int, total: int) -> None:
+            progress.update(task, completed=done, total=total)
+
+        dataset = collect(config, os.cpu_count() or 1, show)
+    write_data(path, dataset)
+    return dataset
+
+
+def fit(config: Config, dataset: Dataset, path: Path, console: Console) -> tuple[str, GateReport]:
+    """Fit a predictor, hold it against its gates and keep it.
+
+    Returns:
+        The predictor's digest and the figures it was accepted with.
+
+    Raises:
+        PredictorError: too little data, not exciting, or refused by a gate.
+    """
+    one_blas_thread()
+    check_excitation(config, dataset.training)
+    with console.status("fitting the predictor"):
+        predictor = fit_predictor(dataset.training, PredictorMeta.of(config))
+        report = run_gates(config, predictor, dataset.held_out)
+    report.check(config.planner.kind)
+    return save(path, predictor, build_provenance(config, dataset, report)), report
+
+
+def build_provenance(config: Config, dataset: Dataset, report: GateReport) -> Provenance:
+    """Where a predictor fitted now comes from."""
+    return Provenance(
+        config_digest=config_sha256(config),
+        seeds=dataset.seeds,
+        samples=tuple(episode.samples for episode in dataset.training),
+        held_out=tuple(episode.samples for episode in dataset.held_out),
+        versions=versions(),
+        gates=report,
+    )
+
+
+def load_predictor(path: Path, config: Config) -> Predictor:
+    """The predictor in a file, if it is for this team and passes its gates.
+
+    Raises:
+        PredictorError: see `quadriga.agents.predictor.store.load`.
+    """
+    return load(path, config)[0]

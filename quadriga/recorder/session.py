@@ -1,0 +1,125 @@
+"""The recorder's loop from the bus to the files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from quadriga.recorder.parts import Parts
+from quadriga.recorder.selection import KeyFilter
+from quadriga.shared.bus.barrier import PLANNER, SIM
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.recording.mcap_chunk import name_of, robot_of
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
+
+FLUSH: Final = 0.05  # s wall between two flushes: a kill loses what has come since the last
+QUIET: Final = 0.2  # s wall without a message after which nothing more is under way
+DRAIN_LIMIT: Final = 5.0  # s wall, longest drain of a team that does not fall silent
+_GATHER: Final = 0.004  # s wall, pause between looks at the inbox: one wake-up for many messages
+_SLICE: Final = 500  # messages that are written at most before a look at the clock
+_LOOK: Final = 1.0  # s wall after which a late recorder says what it has
+
+
+class Session:
+    """What is recorded of one team, from its first to its last message.
+
+    Args:
+        bus: the team's, subscribed to what is recorded.
+        parts: the files.
+        keys: which of the keys heard are recorded.
+        robots: how many the configuration that is stored knows.
+        stopped: asked often whether to stop.
+        say: called with what a user should know at once.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        parts: Parts,
+        keys: KeyFilter,
+        robots: int,
+        stopped: Callable[[], bool],
+        say: Callable[[str], None],
+    ) -> None:
+        self._robots = robots
+        self._bus, self._parts, self._keys, self._stopped = bus, parts, keys, stopped
+        self._say = say
+        self._flushed = self._begun = monotonic()
+        self._ended = self._seen = False
+
+    def record(self, *, late: bool, seen: bool) -> None:
+        """Until the end; a late one says what it has once it knows.
+
+        Args:
+            late: nobody has waited for this recorder.
+            seen: the sim server has been there; its leaving is the end.
+        """
+        self._seen = seen
+        self._flushed = self._begun = monotonic()
+        while not (self._stopped() or self._ended):
+            self._take(max(0.0, self._flushed + FLUSH - monotonic()))
+            if late and monotonic() - self._begun > _LOOK and self._parts.messages:
+                late = False
+                self._say_missed()
+            sleep(_GATHER)
+        if late and self._parts.messages:
+            self._say_missed()
+
+    def _say_missed(self) -> None:
+        first_ticks = self._parts.first_ticks()
+        missed = _format_missed(first_ticks)
+        if missed:
+            self._say(missed)
+        robots = {robot for robot in map(robot_of, first_ticks) if robot}
+        strangers = robots - {*robot_names(self._robots), PLANNER}
+        if strangers:
+            self._say(
+                f"{', '.join(sorted(strangers))} walk too, but the configuration that is stored is "
+                f"of {', '.join(robot_names(self._robots))}: give the team's with --config"
+            )
+
+    def drain(self) -> None:
+        """What was sent before the end may still be under way when the end is noticed."""
+        limit = monotonic() + DRAIN_LIMIT
+        while self._take(QUIET) and monotonic() < limit:
+            pass
+
+    def _take(self, timeout: float) -> bool:
+        """Write all that has arrived; False if nothing came within `timeout` seconds."""
+        first = self._bus.get(timeout)
+        packets = () if first is None else (first, *self._bus.drain())
+        now, recorded, write = wall_ns(), self._keys, self._parts.write
+        every = recorded.all
+        for begin in range(0, len(packets), _SLICE):
+            for key, payload in packets[begin : begin + _SLICE]:
+                if every or recorded(key):
+                    write(key, payload, now)
+            self._tend()
+        self._tend()
+        return bool(packets)
+
+    def _tend(self) -> None:
+        """Flush when it is time to, and see whether the team is still there."""
+        if monotonic() - self._flushed < FLUSH:
+            return
+        self._parts.flush()
+        self._flushed = monotonic()
+        there = SIM in self._bus.present(HERE)
+        self._ended = self._seen and not there
+        self._seen = self._seen or there
+
+
+def _format_missed(first_ticks: Mapping[str, int]) -> str:
+    """Since when a recording has each topic, in words; "" if it has them from the first tick on."""
+    by_topic: dict[str, list[int]] = {}
+    for key, tick in first_ticks.items():
+        if tick >= 0:
+            by_topic.setdefault(name_of(key) or "others", []).append(tick)
+    if min(map(min, by_topic.values()), default=0) == 0:
+        return ""
+    words = []
+    for name, ticks in sorted(by_topic.items(), key=lambda item: min(item[1])):
+        spread = f"{min(ticks)} to {max(ticks)}" if max(ticks) > min(ticks) else f"{min(ticks)}"
+        words.append(f"{name} since tick {spread}")
+    return f"joined late, has {', '.join(words)}; what was before is missing"

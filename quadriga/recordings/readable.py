@@ -1,0 +1,36 @@
+"""A recording as far as it can be read, whether it is whole or damaged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import RecordingError
+from quadriga.shared.recording.config import recorded_config
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.salvage import Salvage
+
+
+def open_readable(path: Path) -> tuple[Recording | Salvage, RecordingError | None]:
+    """A whole recording, or what is left of a damaged one and the error that says so.
+
+    Raises:
+        RecordingError: nothing of it can be read.
+    """
+    try:
+        recording = Recording(path)
+        recording.require_whole()
+    except RecordingError as error:
+        salvage = Salvage(path)
+        next(salvage.entries(), None)  # raises if a newer version wrote them
+        return salvage, error
+    next(recording.entries(), None)
+    return recording, None
+
+
+def config_or_default(source: Recording | Salvage) -> Config:
+    """The configuration of a recorded walk; the default if the file no longer says."""
+    try:
+        return recorded_config(source)
+    except RecordingError:
+        return Config()

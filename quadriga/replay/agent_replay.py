@@ -1,0 +1,181 @@
+"""Run one recorded agent again from what it took in, as it was or with something changed."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from quadriga.agents.agent import Agent
+from quadriga.agents.inbox.inbox import Inbox
+from quadriga.replay.agent_log import read_agent_log
+from quadriga.replay.breakpoint import Breakpoint
+from quadriga.replay.comparison import Comparison, ReplayedStep, ReplayVerdict
+from quadriga.replay.config_changes import change_config, check_agents, format_changes
+from quadriga.replay.figure import Curves, draw
+from quadriga.replay.outcome import ReplayOutcome, format_inputs
+from quadriga.replay.recorded_inputs import RecordedInputs
+from quadriga.replay.recorded_predictor import find_predictor
+from quadriga.replay.saved_qp import PLANNER, WHOLE_BODY, captured, save
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.recording.config import recorded_config
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.wire.topics import PLAN
+
+_SHOWN_EVERY: Final = 100  # ticks
+
+Show = Callable[[str, int], None]
+"""Called with what is being done and up to which tick it has come."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayJob:
+    """One robot's replay.
+
+    Attributes:
+        path: the recording.
+        robot: the robot's name.
+        given: configuration keys to change, by section and key.
+        predictor: a predictor's file instead of the recorded one's.
+        out: folder for what is left behind.
+    """
+
+    path: Path
+    robot: str
+    given: Mapping[str, Any]
+    predictor: Path | None
+    out: Path
+
+
+@dataclass(frozen=True, slots=True)
+class _Agents:
+    """The agent as it was recorded, as it is now, and what was changed, as text."""
+
+    recorded: Agent
+    current: Agent
+    changed: str
+
+
+def replay_agent(
+    job: ReplayJob, show: Show = lambda doing, tick: None, stop_at: Breakpoint | None = None
+) -> ReplayOutcome:
+    """Replay one robot.
+
+    Args:
+        job: whose replay, and how.
+        show: called with what is being done.
+        stop_at: where to stop in the debugger, if anywhere.
+
+    Raises:
+        QuadrigaError: as `quadriga.replay.team_replay.replay`.
+    """
+    begun = monotonic()
+    one_blas_thread()
+    recording = Recording(job.path)
+    config = recorded_config(recording)
+    agents = _build_agents(job, recording, config)
+    inbox = Inbox(config, job.robot, agents.recorded.peers)
+    log = read_agent_log(
+        recording, config, agents.recorded, inbox, lambda tick: show("reading", tick)
+    )
+    curves = Curves(config.planner.applied) if agents.changed else None
+    comparison = Comparison(log, None if curves is None else curves.add)
+    inputs = RecordedInputs(config, agents.recorded, inbox, log)
+    with _without_garbage_collection():  # a long log need not be looked through again and again
+        _replay_steps(agents, inputs, comparison, show, stop_at)
+    verdict = comparison.finish()
+    wall = monotonic() - begun
+    if stop_at is not None and not stop_at.reached:
+        raise ConfigError(
+            "--break",
+            f"{stop_at.tick / 1000:g} s",
+            f"a time up to {log.last / 1000:g} s",
+            f"{job.robot} has no step after it",
+        )
+    files: tuple[Path, ...] = ()
+    if curves is not None:
+        files = (_draw_curves(job, curves, agents.changed),)
+    elif verdict.first is not None:
+        files = _save_problem(job, agents.current, verdict)
+    outcome = ReplayOutcome(
+        job.robot,
+        verdict,
+        agents.changed,
+        seconds=(verdict.last + 1) / 1000,
+        wall=wall,
+        inputs="" if verdict.step is None else format_inputs(verdict.step),
+        files=files,
+    )
+    verdict.step = None  # not to be carried between processes
+    return outcome
+
+
+def _build_agents(job: ReplayJob, recording: Recording, config: Config) -> _Agents:
+    predictor, same = find_predictor(recording, config, job.predictor)
+    recorded = Agent(config, job.robot, predictor)
+    new = change_config(config, job.given)
+    changed = format_changes(config, new) + ("" if same else f" predictor {job.predictor}")
+    current = Agent(new, job.robot, predictor) if changed else recorded
+    check_agents(recorded, current)
+    return _Agents(recorded, current, changed.strip())
+
+
+def _replay_steps(
+    agents: _Agents,
+    inputs: RecordedInputs,
+    comparison: Comparison,
+    show: Show,
+    stop_at: Breakpoint | None,
+) -> None:
+    """Step the agent over everything it took in; up to what is missing unless it is changed."""
+    agent = agents.current
+    memory = agent.initial()
+    for step in inputs.steps():
+        comparison.add_missing(step.tick, step.missing)
+        if step.missing and not agents.changed:
+            return  # nothing after it could be equal but by chance
+        if step.inputs is None:
+            continue
+        if step.tick % _SHOWN_EVERY == 0:
+            show(f"replaying {agent.robot}", step.tick)
+        if stop_at is not None:
+            stop_at.before_step(agent, memory, step.inputs, comparison)
+        before = memory
+        memory, outputs = agent.step(memory, step.inputs)
+        comparison.add(ReplayedStep(before, step.inputs, outputs))
+
+
+@contextmanager
+def _without_garbage_collection() -> Iterator[None]:
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+def _draw_curves(job: ReplayJob, curves: Curves, changed: str) -> Path:
+    """The figure of what a change makes of the recorded values."""
+    path = job.out / f"replay-{job.robot}.png"
+    draw(curves, f"{job.robot} of {job.path.parent.name}/{job.path.name}: {changed}", path)
+    return path
+
+
+def _save_problem(job: ReplayJob, agent: Agent, verdict: ReplayVerdict) -> tuple[Path, ...]:
+    """The problem behind the first difference, if one was solved."""
+    if verdict.first is None or verdict.step is None:
+        return ()
+    with captured(f"{job.robot} at tick {verdict.first.tick}") as found:
+        agent.step(verdict.step.before, verdict.step.inputs)
+    kind = PLANNER if verdict.first.name == PLAN.name else WHOLE_BODY
+    if kind not in found:
+        return ()
+    path = job.out / f"replay-{job.robot}-{verdict.first.tick}-{kind}.npz"
+    save(path, found[kind])
+    return (path,)

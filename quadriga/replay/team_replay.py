@@ -1,0 +1,143 @@
+"""Run recorded agents again, several side by side, and hold every message against the record."""
+
+from __future__ import annotations
+
+import bdb
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from math import isfinite
+from pathlib import Path
+from typing import Any, Final
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from quadriga.replay.agent_replay import ReplayJob, replay_agent
+from quadriga.replay.breakpoint import Breakpoint
+from quadriga.replay.outcome import ReplayOutcome
+from quadriga.shared.errors import ConfigError, QuadrigaError, RecordingError
+from quadriga.shared.recording.config import recorded_config
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.warm_up import warm_up
+from quadriga.workers import run_each
+
+_JOBS: Final = 2  # robots side by side
+
+
+def replay(
+    path: Path,
+    robots: tuple[str, ...],
+    given: Mapping[str, Any],
+    predictor: Path | None,
+    out: Path | None,
+    console: Console,
+) -> list[ReplayOutcome]:
+    """Replay robots of a recording; their outcomes in the team's order.
+
+    Args:
+        path: the recording.
+        robots: their names; none: the whole team.
+        given: configuration keys to change, by section and key.
+        predictor: instead of the one the team walked with.
+        out: folder for what is left behind; by default that of the recording.
+        console: where to show progress.
+
+    Raises:
+        RecordingError: the recording cannot be read, or lacks what a replay needs.
+        ConfigError: no such robot, or a change that cannot be replayed.
+        PredictorError: the predictor is not to be found.
+    """
+    config = recorded_config(Recording(path))
+    jobs = [
+        ReplayJob(path, robot, given, predictor, _make_folder(path, out))
+        for robot in _choose_robots(robots, robot_names(config.team.robots))
+    ]
+    warm_up(config, console)
+    return [_replay_alone(jobs[0], console)] if len(jobs) == 1 else _replay_all(jobs, console)
+
+
+def _replay_alone(job: ReplayJob, console: Console) -> ReplayOutcome:
+    with _build_bar(console) as progress:
+        task = progress.add_task("", total=None)
+
+        def show(doing: str, tick: int) -> None:
+            progress.update(task, description=f"{doing} {tick / 1000:.1f} s")
+
+        return replay_agent(job, show)
+
+
+def _replay_all(jobs: Sequence[ReplayJob], console: Console) -> list[ReplayOutcome]:
+    """Replay robots side by side; the first error that one of them met is raised at the end."""
+    outcomes: dict[str, ReplayOutcome] = {}
+    errors: list[QuadrigaError] = []
+    with closing(run_each(_try_replay, jobs, _JOBS)) as results, _build_bar(console) as progress:
+        for job, result in progress.track(results, len(jobs), description="replaying the team"):
+            if isinstance(result, QuadrigaError):
+                errors.append(result)
+            else:
+                outcomes[job.robot] = result
+    if errors:
+        raise errors[0]
+    return [outcomes[job.robot] for job in jobs]
+
+
+def replay_to_breakpoint(
+    path: Path,
+    robot: str,
+    given: Mapping[str, Any],
+    predictor: Path | None,
+    out: Path | None,
+    seconds: float,
+) -> ReplayOutcome:
+    """Replay one robot with a stop in the debugger before the step at a time, s.
+
+    Raises:
+        ConfigError: that is no time.
+        QuadrigaError: as `replay`.
+        KeyboardInterrupt: the user has left the debugger.
+    """
+    if not isfinite(seconds):
+        raise ConfigError("--break", f"{seconds}", "a time [s]")
+    _choose_robots((robot,), robot_names(recorded_config(Recording(path)).team.robots))
+    job = ReplayJob(path, robot, given, predictor, _make_folder(path, out))
+    try:
+        return replay_agent(job, stop_at=Breakpoint(round(1000 * seconds)))
+    except bdb.BdbQuit:
+        raise KeyboardInterrupt from None
+
+
+def _try_replay(job: ReplayJob) -> ReplayOutcome | QuadrigaError:
+    try:
+        return replay_agent(job)
+    except QuadrigaError as error:
+        return error
+
+
+def _choose_robots(robots: tuple[str, ...], names: tuple[str, ...]) -> tuple[str, ...]:
+    """The robots asked for, or all of a team with these names."""
+    for robot in robots:
+        if robot not in names:
+            raise ConfigError("--robot", repr(robot), f"one of {', '.join(names)}")
+    return robots or names
+
+
+def _make_folder(path: Path, out: Path | None) -> Path:
+    folder = out or path.parent
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise RecordingError(f"--out {folder}", reason, "a folder that can be made") from None
+    return folder
+
+
+def _build_bar(console: Console) -> Progress:
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
