@@ -13,7 +13,8 @@ from typing import Final
 
 from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import Filter, Wanted, wishes
-from quadriga.shared.bus.barrier import PLANNER, RECORDER, SIM, meet, members
+from quadriga.shared.bus.barrier import meet, members
+from quadriga.shared.bus.members import PLANNER, RECORDER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
