@@ -113,7 +113,7 @@ def hz(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Rates, intervals and gaps by key."""
     from quadriga.recordings.listen import config_of, from_bus, from_file
     from quadriga.recordings.rates import Paces
-    from quadriga.shared.recording.sequence import periods
+    from quadriga.shared.config.timing import periods
 
     if arguments.file:
         paces = Paces(periods(config_of(arguments.file)))

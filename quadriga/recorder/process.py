@@ -17,10 +17,10 @@ from quadriga.shared.bus.barrier import meet, members
 from quadriga.shared.bus.members import PLANNER, RECORDER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.timing import periods
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.mcap_chunk import name_of, robot_of
-from quadriga.shared.recording.sequence import periods
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.runtime.signals import stop_on_signals
