@@ -15,7 +15,8 @@ import numpy as np
 from benchmarks.children import SPAWN, child, running
 from quadriga.plant.lockstep import run_lockstep
 from quadriga.plant.server import PlantServer
-from quadriga.shared.bus.barrier import SIM, meet, start_together
+from quadriga.shared.bus.barrier import meet, start_together
+from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
@@ -82,12 +83,12 @@ def measure(robots: int, seconds: float) -> None:
     world = World(config)
     with Bus.open(config.bus, config.team.name, SIM) as bus:
         bus.subscribe(COMMAND.key(config.team.name, "*"))
-        stage = PlantServer(config, world, bus)
+        server = PlantServer(config, world, bus)
         with running(*others):
             meet(bus, config, ended.is_set)
             start_together(bus, config, ended.is_set)
             begun, used = monotonic(), processor_time()
-            run_lockstep(stage, ended.is_set)
+            run_lockstep(server, ended.is_set)
             took, used = monotonic() - begun, processor_time() - used
             ended.set()
     agents = sum(value.value for value in spent.values()) / robots

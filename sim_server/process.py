@@ -8,12 +8,13 @@ from collections.abc import Callable
 from quadriga.plant.lockstep import run_lockstep
 from quadriga.plant.realtime import run_realtime
 from quadriga.plant.server import PlantServer
-from quadriga.shared.bus.barrier import SIM, meet, start_together
+from quadriga.shared.bus.barrier import meet, start_together
+from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.wire.topics import COMMAND
+from quadriga.shared.wire.topics import topics_for
 from quadriga.sim_server.world.world import World
 
 
@@ -33,13 +34,14 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
     stopped = stopped or stop_on_signals()
     world = World(config)
     with Bus.open(config.bus, config.team.name, SIM, stopped) as bus:
-        bus.subscribe(COMMAND.key(config.team.name, "*"))
-        stage = PlantServer(config, world, bus)
+        for topic in topics_for(SIM):
+            bus.subscribe(topic.key(config.team.name, "*"))
+        server = PlantServer(config, world, bus)
         if not (meet(bus, config, stopped) and start_together(bus, config, stopped)):
             return
         gc.collect()
         gc.freeze()
         gc.disable()  # a collection in mid-tick costs more than the tick
-        take_priority(config)
+        take_priority(config.runtime.priority)
         loop = run_realtime if config.world.mode == "realtime" else run_lockstep
-        stage.announce("stop", "", loop(stage, stopped))
+        server.announce("stop", "", loop(server, stopped))

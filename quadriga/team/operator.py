@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from quadriga.shared.bus.barrier import OPERATOR, SIM, meet
+from quadriga.shared.bus import members
+from quadriga.shared.bus.barrier import meet
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
@@ -13,10 +14,10 @@ from quadriga.shared.errors import BusError, MessageError
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.wire.codec import decode, encode, sendable
+from quadriga.shared.wire.codec import decode, encode, truncate_text
 from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.messages import EStop, Event, Reference, Truth
-from quadriga.shared.wire.topics import ESTOP, EVENT, REFERENCE, TRUTH
+from quadriga.shared.wire.topics import ESTOP, REFERENCE, TRUTH, topics_for
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 
 _AHEAD: Final = 4  # epochs; agents in lock-step wait for the one in force
@@ -54,9 +55,9 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
     """
     stopped = stopped or stop_on_signals()
     team = config.team.name
-    with Bus.open(config.bus, team, OPERATOR, stopped) as bus:
-        bus.subscribe(TRUTH.key(team))
-        bus.subscribe(EVENT.key(team))
+    with Bus.open(config.bus, team, members.OPERATOR, stopped) as bus:
+        for topic in topics_for(members.OPERATOR):
+            bus.subscribe(topic.key(team))
         put = bus.publisher(REFERENCE.key(team))
         if not meet(bus, config, stopped):
             return
@@ -78,7 +79,7 @@ def _next_tick(bus: Bus, tick: int) -> tuple[int, bool]:
     """
     packet = bus.get(POLL)
     if packet is None:
-        return tick, SIM not in bus.present(HERE)
+        return tick, members.SIM not in bus.present(HERE)
     for key, payload in (packet, *bus.drain()):
         try:
             if key == TRUTH.key(bus.team):
@@ -99,10 +100,11 @@ def stop_team(config: Config, reason: str) -> None:
         BusError: the bus cannot be opened, or some robots were not reached.
     """
     team, names = config.team.name, robot_names(config.team.robots)
-    reason = sendable(reason, _LONGEST_REASON)
-    with Bus.open(config.bus, team, "estop") as bus:
+    reason = truncate_text(reason, _LONGEST_REASON)
+    with Bus.open(config.bus, team, members.ESTOP) as bus:
         put = bus.publisher(ESTOP.key(team))
-        bus.subscribe(TRUTH.key(team))
+        for topic in topics_for(members.ESTOP):
+            bus.subscribe(topic.key(team))
         reached: frozenset[str] = frozenset()
         tick, stamp_ns, deadline = 0, 0, monotonic() + _ESTOP_WAIT
         while reached < frozenset(names) and monotonic() < deadline:

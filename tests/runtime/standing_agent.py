@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from quadriga.shared.bus.barrier import SIM, meet
+from quadriga.shared.bus.barrier import meet
+from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
@@ -34,7 +35,7 @@ def run(config: Config, robot: str) -> None:
         put = bus.publisher(COMMAND.key(team, robot))
         meet(bus, config, stopped)
         if config.world.mode == "realtime":  # or it lies down on a busy machine
-            take_priority(config)
+            take_priority(config.runtime.priority)
         bus.declare(READY)
         while not (stopped() or ended):
             packet = bus.get(POLL)

@@ -17,7 +17,7 @@ from mcap.reader import make_reader
 
 from quadriga.commands.parser import main
 from quadriga.recordings.survey import survey
-from quadriga.shared.bus.barrier import RECORDER, SIM
+from quadriga.shared.bus.members import RECORDER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig, Config, RecorderConfig, TeamConfig
 from quadriga.shared.config.write import to_toml
@@ -127,7 +127,7 @@ def test_beside_a_team_s_own_recorder_nobody_is_doubled(
         recorder = start(world)
         world.publisher("band/r1/state")(encode(state(0)))
         await_recorded(tmp_path, 1)
-        assert world.doubles(HERE) == frozenset()
+        assert world.duplicates(HERE) == frozenset()
         _, err = ended(recorder, world, tmp_path, 1)
     assert err == ""
     assert len(list(Recording(tmp_path / "run.mcap").entries())) == 1
