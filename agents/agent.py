@@ -306,7 +306,7 @@ class Agent:
             row[48:] = self._damping
         if not mode.limp:
             row[:12] = solution.tau if solution.solved else last_tau
-        return Command.of(tick, tick * 1_000_000, row)
+        return Command.from_row(tick, tick * 1_000_000, row)
 
 
 def _schedules(config: Config, index: int) -> tuple[Schedule, ...]:

@@ -58,7 +58,7 @@ def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None
         gc.collect()
         gc.freeze()
         gc.disable()
-        take_priority(config)
+        take_priority(config.runtime.priority)
         bus.declare(READY)
         shell.work(stopped)
 

@@ -60,7 +60,7 @@ def run(
         gc.collect()
         gc.freeze()
         gc.disable()  # a collection in mid-step costs more than the step
-        take_priority(config)
+        take_priority(config.runtime.priority)
         bus.declare(READY)
         shell.walk(stopped)
 

@@ -68,7 +68,7 @@ class Telemetry:
             tick * 1_000_000,
             *mode,
             self._estimator,
-            {**self._ages_ms, **self._jitter.told("jitter")},
+            {**self._ages_ms, **self._jitter.quantiles("jitter")},
             {**outputs.counters, **counters, **missed},
             np.array(self._planner_ms),
             np.array(self._tick_us),

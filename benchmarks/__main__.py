@@ -79,7 +79,9 @@ def describe_machine() -> dict[str, Any]:
     from quadriga.shared.config.sections import Config
     from quadriga.shared.runtime.scheduling import take_priority
 
-    realtime = result_of(take_priority, Config())  # what this process starts would inherit it
+    realtime = result_of(
+        take_priority, Config().runtime.priority
+    )  # what this process starts would inherit it
     cpus = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     models = [line.partition(":")[2].strip() for line in cpus if line.startswith("model name")]
     return {

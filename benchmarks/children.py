@@ -72,5 +72,5 @@ def result_of(target: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def _answer(sender: Connection, target: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
-    take_priority(Config())
+    take_priority(Config().runtime.priority)
     sender.send(target(*arguments))

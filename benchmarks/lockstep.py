@@ -82,12 +82,12 @@ def measure(robots: int, seconds: float) -> None:
     world = World(config)
     with Bus.open(config.bus, config.team.name, SIM) as bus:
         bus.subscribe(COMMAND.key(config.team.name, "*"))
-        stage = PlantServer(config, world, bus)
+        server = PlantServer(config, world, bus)
         with running(*others):
             meet(bus, config, ended.is_set)
             start_together(bus, config, ended.is_set)
             begun, used = monotonic(), processor_time()
-            run_lockstep(stage, ended.is_set)
+            run_lockstep(server, ended.is_set)
             took, used = monotonic() - begun, processor_time() - used
             ended.set()
     agents = sum(value.value for value in spent.values()) / robots

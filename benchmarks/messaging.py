@@ -104,7 +104,7 @@ def _bus_robot(config: Config, name: str, ended: Event) -> None:
         bus.subscribe(STATE.key(team, name))
         put = bus.publisher(COMMAND.key(team, name))
         bus.declare(HERE)
-        take_priority(config)
+        take_priority(config.runtime.priority)
         while not ended.is_set():
             if bus.get(0.2) is not None:
                 put(command)
@@ -121,7 +121,7 @@ def _socket_robot(config: Config, place: str) -> None:
                 if monotonic() > deadline:
                     raise
                 sleep(0.01)
-        take_priority(config)
+        take_priority(config.runtime.priority)
         while link.recv(_BUFFER):
             link.send(command)
 

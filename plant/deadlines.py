@@ -30,12 +30,12 @@ class Deadlines:
         self._jitter = Histogram(_BIN_MS)
         self._lateness_us: list[float] = []
 
-    def used(self, robot: str, age_ms: int) -> None:
+    def note_age(self, robot: str, age_ms: int) -> None:
         """A tick has been taken with a robot's command of this age."""
         self._ages[robot].add(age_ms)
         self.late[robot] += age_ms > 0
 
-    def woke(self, late_s: float) -> None:
+    def note_lateness(self, late_s: float) -> None:
         """The world went on this much later than its clock says."""
         self._jitter.add(1e3 * late_s)
         self._lateness_us.append(1e6 * late_s)
@@ -47,9 +47,9 @@ class Deadlines:
         counters are `<robot>.late`, `.held`, `.damped`, `ticks` and `overruns`; `tick_us` holds the
         lateness of each tick since the last status.
         """
-        ages: dict[str, float] = self._jitter.told("jitter")
-        for robot, spread in self._ages.items():
-            ages |= spread.told(f"{robot}.command")
+        ages: dict[str, float] = self._jitter.quantiles("jitter")
+        for robot, histogram in self._ages.items():
+            ages |= histogram.quantiles(f"{robot}.command")
         counters = {"overruns": overruns, "ticks": tick}
         for name, count in sorted(self.late.items()):
             robot, _, grade = name.partition(" ")

@@ -14,40 +14,40 @@ ANSWERS: Final = "answers again"  # how the event of a robot's return ends; a re
 _ALONE: Final = 0.001  # s, pace of a world that nobody answers, so that robots can come back
 
 
-def run_lockstep(stage: PlantServer, stopped: Callable[[], bool]) -> str:
+def run_lockstep(server: PlantServer, stopped: Callable[[], bool]) -> str:
     """Step until the walk is over; the reason why it is."""
     while not stopped():
-        stage.publish()
-        if reason := stage.step(_commands(stage, stopped)):
+        server.publish()
+        if reason := server.step(_commands(server, stopped)):
             return reason
     return "signal"
 
 
-def _commands(stage: PlantServer, stopped: Callable[[], bool]) -> dict[str, Command]:
+def _commands(server: PlantServer, stopped: Callable[[], bool]) -> dict[str, Command]:
     """This tick's commands, by robot in the team's order; silent robots are left out."""
-    tick, box, bus = stage.world.tick, stage.commands, stage.bus
-    waiting = set(stage.world.names) - stage.silent
+    tick, box, bus = server.plant.tick, server.commands, server.bus
+    waiting = set(server.plant.names) - server.silent
     alone = not waiting
-    deadline = monotonic() + (_ALONE if alone else stage.config.world.command_timeout)
+    deadline = monotonic() + (_ALONE if alone else server.config.world.command_timeout)
     while (waiting or alone) and not stopped():
         left = deadline - monotonic()
         if left <= 0.0:
-            _give_up(stage, waiting, f"silent for {stage.config.world.command_timeout:g} s")
+            _give_up(server, waiting, f"silent for {server.config.world.command_timeout:g} s")
             break
         packet = bus.get(min(left, POLL))
         if packet is None:
             gone = waiting - bus.present(HERE)
-            _give_up(stage, gone, "gone")
+            _give_up(server, gone, "gone")
             waiting -= gone
         elif robot := box.take(*packet, tick=tick, oldest=tick):
             waiting.discard(robot)
-            if robot in stage.silent:
-                stage.silent.discard(robot)
-                stage.announce("fault", robot, ANSWERS)
-    return {name: box.latest[name] for name in stage.world.names if box.tick_of(name) == tick}
+            if robot in server.silent:
+                server.silent.discard(robot)
+                server.announce("fault", robot, ANSWERS)
+    return {name: box.latest[name] for name in server.plant.names if box.tick_of(name) == tick}
 
 
-def _give_up(stage: PlantServer, robots: set[str], why: str) -> None:
+def _give_up(server: PlantServer, robots: set[str], why: str) -> None:
     for robot in sorted(robots):
-        stage.silent.add(robot)
-        stage.announce("fault", robot, f"{why}: its joints are damped, the world goes on")
+        server.silent.add(robot)
+        server.announce("fault", robot, f"{why}: its joints are damped, the world goes on")

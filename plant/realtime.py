@@ -15,19 +15,19 @@ TICK: Final = 1e-3  # s
 _SLACK: Final = 3.0  # ticks that are made up for
 
 
-def run_realtime(stage: PlantServer, stopped: Callable[[], bool]) -> str:
+def run_realtime(server: PlantServer, stopped: Callable[[], bool]) -> str:
     """Step until the walk is over; the reason why it is, with what came late."""
     # A world that fell behind slows down: in ticks made up for at once nobody could answer.
-    rate, motors = Rate(TICK, slack=_SLACK), _Motors(stage)
+    rate, motors = Rate(TICK, slack=_SLACK), _Motors(server)
     reason = ""
     while not reason and not stopped():
-        stage.publish()
-        motors.deadlines.woke(rate.wait())  # meanwhile the agents answer
-        for packet in stage.bus.drain():
-            stage.commands.take(*packet, tick=stage.world.tick, oldest=0)
-        reason = stage.step(motors.commands())
-        if stage.world.tick % PERIOD_MS == 0 or reason:
-            stage.tell(motors.deadlines.status(stage.world.tick, rate.overruns))
+        server.publish()
+        motors.deadlines.note_lateness(rate.wait())  # meanwhile the agents answer
+        for packet in server.bus.drain():
+            server.commands.take(*packet, tick=server.plant.tick, oldest=0)
+        reason = server.step(motors.commands())
+        if server.plant.tick % PERIOD_MS == 0 or reason:
+            server.publish_status(motors.deadlines.status(server.plant.tick, rate.overruns))
     late = (
         ", ".join(f"{name} {count}" for name, count in sorted(motors.deadlines.late.items()))
         or "none"
@@ -38,27 +38,27 @@ def run_realtime(stage: PlantServer, stopped: Callable[[], bool]) -> str:
 class _Motors:
     """The command each motor follows now; `deadlines` counts how late they were."""
 
-    def __init__(self, stage: PlantServer) -> None:
-        self._stage = stage
+    def __init__(self, server: PlantServer) -> None:
+        self._server = server
         self._held: dict[str, Command] = {}
-        self.deadlines = Deadlines(stage.world.names)
+        self.deadlines = Deadlines(server.plant.names)
 
     def commands(self) -> dict[str, Command]:
         """By robot; a damped robot is left out."""
-        stage, tick = self._stage, self._stage.world.tick
+        server, tick = self._server, self._server.plant.tick
         chosen = {}
-        for name in stage.world.names:
-            command = stage.commands.latest.get(name)
-            age = tick - stage.commands.tick_of(name)
-            state = grade(age, stage.config.world)
-            self.deadlines.used(name, age)
+        for name in server.plant.names:
+            command = server.commands.latest.get(name)
+            age = tick - server.commands.tick_of(name)
+            state = grade(age, server.config.world)
+            self.deadlines.note_age(name, age)
             if command is not None and state == FRESH:
                 chosen[name] = command
                 self._held.pop(name, None)
             elif command is None or state == HOLD:
                 self.deadlines.late[f"{name} held"] += 1
                 if name not in self._held:
-                    self._held[name] = hold(stage.world.states()[name])
+                    self._held[name] = hold(server.plant.states()[name])
                 chosen[name] = self._held[name]
             else:
                 self.deadlines.late[f"{name} damped"] += 1

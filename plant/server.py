@@ -1,4 +1,4 @@
-"""The world on the bus: what lock-step and real time share."""
+"""The plant on the bus: what lock-step and real time share."""
 
 from __future__ import annotations
 
@@ -7,37 +7,37 @@ from collections.abc import Mapping
 from typing import Final
 
 from quadriga.plant.commands import CommandBox
+from quadriga.plant.protocol import Plant
 from quadriga.shared.bus.barrier import SIM
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.wire.codec import encode, sendable
 from quadriga.shared.wire.messages import Command, Event, Status
 from quadriga.shared.wire.topics import EVENT, STATE, STATUS, TRUTH
-from quadriga.sim_server.world.world import World
 
 TRUTH_PERIOD_MS: Final = 10
 FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first fall
 
 
 class PlantServer:
-    """The world, its publishers, the commands that arrive, and when the walk is over.
+    """The plant, its publishers, the commands that arrive, and when the walk is over.
 
     Attributes:
         commands: the newest command of every robot.
         silent: robots that are not waited for.
     """
 
-    def __init__(self, config: Config, world: World, bus: Bus) -> None:
+    def __init__(self, config: Config, plant: Plant, bus: Bus) -> None:
         team, realtime = config.team.name, config.world.mode == "realtime"
-        self.config, self.world, self.bus = config, world, bus
-        self.commands = CommandBox(team, world.names)
+        self.config, self.plant, self.bus = config, plant, bus
+        self.commands = CommandBox(team, plant.names)
         self.silent: set[str] = set()
         self._put_state = {
-            name: bus.publisher(STATE.key(team, name), droppable=realtime) for name in world.names
+            name: bus.publisher(STATE.key(team, name), droppable=realtime) for name in plant.names
         }
         # A robot that no longer reads must not hold up the others once its buffers are full.
         self._put_silent = {
-            name: bus.publisher(STATE.key(team, name), droppable=True) for name in world.names
+            name: bus.publisher(STATE.key(team, name), droppable=True) for name in plant.names
         }
         self._put_truth = bus.publisher(TRUTH.key(team), droppable=realtime)
         self._put_status = bus.publisher(STATUS.key(team, SIM), droppable=True)
@@ -45,44 +45,46 @@ class PlantServer:
         self._put_stop = bus.publisher(EVENT.key(team))  # all leave by it, no tick waits for it
         self._truth_period = 1 if config.estimator.kind == "truth" else TRUTH_PERIOD_MS
         self._last_tick = round(config.world.seconds * 1000)
+        self._fallen: set[str] = set()
         self._malformed = 0
 
     def publish(self) -> None:
         """Send the present tick's truth, when due, and every robot's state."""
-        world = self.world
-        if world.tick % self._truth_period == 0:
-            self._put_truth(encode(world.truth()))
-        for name, state in world.states().items():
+        plant = self.plant
+        if plant.tick % self._truth_period == 0 and (truth := plant.truth()) is not None:
+            self._put_truth(encode(truth))
+        for name, state in plant.states().items():
             put = self._put_silent if name in self.silent else self._put_state
             put[name](encode(state))
-        world.settle()
+        plant.settle()
 
     def announce(self, kind: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""
-        tick = self.world.tick
+        tick = self.plant.tick
         self._send(Event(tick, tick * 1_000_000, kind, robot, sendable(detail)))
 
-    def tell(self, status: Status) -> None:
-        """Publish the world's account of itself."""
+    def publish_status(self, status: Status) -> None:
+        """Publish the plant's account of itself."""
         self._put_status(encode(status))
 
     def step(self, commands: Mapping[str, Command]) -> str:
-        """Advance the world by one tick; the reason to end the walk, or ""."""
+        """Advance the plant by one tick; the reason to end the walk, or ""."""
         self._report_malformed()
-        for event in self.world.step(commands):
+        for event in self.plant.step(commands):
             self._send(event)
             if event.kind == "fall":
+                self._fallen.add(event.robot)
                 self._last_tick = min(self._last_tick, event.tick + FALL_LINGER_MS)
-        if self.world.tick < self._last_tick:
+        if self.plant.tick < self._last_tick:
             return ""
         self._report_malformed(at_once=True)
-        fallen = self.world.fallen()
+        fallen = [name for name in self.plant.names if name in self._fallen]
         return f"fall of {', '.join(fallen)}" if fallen else "end of world.seconds"
 
     def _report_malformed(self, *, at_once: bool = False) -> None:
         """Announce malformed commands, once in a second of world time at most unless `at_once`."""
         count = self.commands.malformed
-        if count != self._malformed and (at_once or self.world.tick % 1000 == 0):
+        if count != self._malformed and (at_once or self.plant.tick % 1000 == 0):
             self._malformed = count
             self.announce("fault", "", f"{count} commands dropped: {self.commands.last_error}")
 

@@ -34,12 +34,12 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
     world = World(config)
     with Bus.open(config.bus, config.team.name, SIM, stopped) as bus:
         bus.subscribe(COMMAND.key(config.team.name, "*"))
-        stage = PlantServer(config, world, bus)
+        server = PlantServer(config, world, bus)
         if not (meet(bus, config, stopped) and start_together(bus, config, stopped)):
             return
         gc.collect()
         gc.freeze()
         gc.disable()  # a collection in mid-tick costs more than the tick
-        take_priority(config)
+        take_priority(config.runtime.priority)
         loop = run_realtime if config.world.mode == "realtime" else run_lockstep
-        stage.announce("stop", "", loop(stage, stopped))
+        server.announce("stop", "", loop(server, stopped))

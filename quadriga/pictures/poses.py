@@ -19,7 +19,8 @@ from quadriga.shared.robot.a1 import Array, q_stand, robot_names
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import State, Truth
 from quadriga.shared.wire.topics import STATE, TRUTH
-from quadriga.sim_server.world.team_model import NQ, TeamModel, build_team_model
+from quadriga.sim_server.world.layout import NQ
+from quadriga.sim_server.world.team_model import TeamModel, build_team_model
 
 _HALF_LENGTH: Final = 0.4  # m, of a robot with its legs
 

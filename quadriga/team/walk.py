@@ -15,7 +15,7 @@ from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.runtime.signals import stop_flag
-from quadriga.sim_server.world.payload import loads
+from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.team.launch import Launch, ProcessSpec, table
 from quadriga.team.progress import WalkProgress
@@ -40,7 +40,7 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
         ProcessError: a process failed or left too early, or the walk did not come to its end.
         QuadrigaError: anything a user can put right before the walk begins.
     """
-    build_scenario(config, loads(config))
+    build_scenario(config, build_loads(config))
     trace_of(config)
     run_dir = make_run_dir(out)
     warm_up(config, console)

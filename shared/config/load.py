@@ -3,32 +3,19 @@
 from __future__ import annotations
 
 import math
-import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import Field, fields
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-from quadriga.shared.config.payload import carriers
+from quadriga.shared.config.check import check
 from quadriga.shared.config.presets import PRESETS, preset_keys
 from quadriga.shared.config.reference_trace import ROW_END, inlined
 from quadriga.shared.config.renamed import RENAMED
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import robot_names
-from quadriga.shared.wire.topics import SAMPLE_MS
-
-_TEAM_NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
-_PAIRS: Final = (
-    "identification.vx",
-    "identification.vy",
-    "identification.wz",
-    "identification.gain_range",
-)
-_ANSWER: Final = 1.0  # s wall, for a robot's step once it has waited for a peer in vain
-_LEAST_PEBBLE: Final = 0.005  # m; the ground holds millions of smaller stones
 
 
 def load(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
@@ -99,7 +86,7 @@ def build(given: Mapping[str, Any]) -> Config:
     for section in given.keys() - known.keys():
         raise _unknown(section, list(known), "a section")
     config = Config(**{name: _section(item, given.get(name, {})) for name, item in known.items()})
-    _check_together(config)
+    check(config)
     return config
 
 
@@ -218,75 +205,3 @@ def _unknown(name: str, known: list[str], what: str) -> ConfigError:
     close = get_close_matches(name, known, 1)
     hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
     return ConfigError(name, "an unknown name", f"{what} of the configuration", hint)
-
-
-def _check_together(config: Config) -> None:
-    """Rules that need more than one key, or more than a range."""
-    if not _TEAM_NAME.fullmatch(config.team.name):
-        raise ConfigError(
-            "team.name",
-            repr(config.team.name),
-            "1 to 64 letters, digits, . _ or -",
-            "it is the first part of every key",
-        )
-    for name, value in (("stance_ms", config.gait.stance_ms), ("stand_ms", config.gait.stand_ms)):
-        if value % SAMPLE_MS:
-            raise ConfigError(
-                f"gait.{name}", str(value), f"a multiple of {SAMPLE_MS} ms", "the planner's samples"
-            )
-    names = robot_names(config.team.robots)
-    carriers(config.world.payload_on, names)
-    for push in filter(None, config.world.push.split(",")):
-        robot = push.partition(":")[0].strip()
-        if robot not in ("all", *names):
-            raise ConfigError(
-                "world.push", f"a push on {robot!r}", f"all or one of {', '.join(names)}"
-            )
-    if config.world.command_damp_ms < config.world.command_hold_ms:
-        raise ConfigError(
-            "world.command_damp_ms",
-            str(config.world.command_damp_ms),
-            f"at least world.command_hold_ms = {config.world.command_hold_ms}",
-            "a late command is held first, then damped",
-        )
-    if config.world.terrain == "pebbles" and config.world.terrain_height < _LEAST_PEBBLE:
-        raise ConfigError(
-            "world.terrain_height",
-            f"{config.world.terrain_height:g}",
-            f"at least {_LEAST_PEBBLE:g} m for terrain 'pebbles'",
-            "the height of the largest stones; terrain 'flat' has none",
-        )
-    _check_planner(config)
-    for pair in _PAIRS:
-        section, _, key = pair.partition(".")
-        first, last = getattr(getattr(config, section), key)
-        if first > last:
-            raise ConfigError(pair, f"[{first}, {last}]", "[least, greatest]")
-
-
-def _check_planner(config: Config) -> None:
-    """Plans reach from one to the next, and who waits for a peer's is waited for."""
-    planner, patience = config.planner, config.world.command_timeout
-    if planner.applied > planner.N:
-        raise ConfigError(
-            "planner.applied", str(planner.applied), f"at most planner.N = {planner.N}"
-        )
-    if planner.kind == "none":
-        return
-    latency = max(1, planner.latency_ms) if planner.kind in CENTRAL else planner.latency_ms
-    longest = SAMPLE_MS * (planner.N - planner.applied)
-    if latency > longest:
-        raise ConfigError(
-            "planner.latency_ms",
-            str(planner.latency_ms),
-            f"at most {SAMPLE_MS}·(planner.N − planner.applied) = {longest} ms",
-            "a plan would have run out before the next one takes effect",
-        )
-    least = planner.peer_timeout + _ANSWER
-    if config.world.mode == "lockstep" and patience < least:
-        raise ConfigError(
-            "world.command_timeout",
-            f"{patience:g}",
-            f"at least planner.peer_timeout + {_ANSWER:g} s = {least:g} s",
-            "else robots that wait for a frozen peer's plan count as frozen too",
-        )

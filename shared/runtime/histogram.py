@@ -1,4 +1,4 @@
-"""How values spread over a walk: counts in bins of fixed width, from which quantiles are told."""
+"""A histogram of values over a walk: counts in bins of fixed width, and quantiles of them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ QUANTILES: Final = {"median": 0.5, "p99": 0.99}
 
 
 class Histogram:
-    """Counts values ≥ 0; what it tells of them is exact to a bin's width.
+    """Counts values ≥ 0; its quantiles are exact to a bin's width.
 
     Args:
         width: of a bin, in the values' unit.
@@ -28,7 +28,7 @@ class Histogram:
         if value > self._max:
             self._max = value
 
-    def told(self, name: str) -> dict[str, float]:
+    def quantiles(self, name: str) -> dict[str, float]:
         """`<name>.median`, `<name>.p99` (lower edges of their bins) and `<name>.max`.
 
         Nothing if nothing has been counted.

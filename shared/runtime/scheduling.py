@@ -8,14 +8,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from quadriga.shared.config.sections import Config
-
 REALTIME: Final = "realtime"
 _PRIORITY: Final = 1  # of 99: before every ordinary process, after everything else of the system
 
 
-def take_priority(config: Config) -> bool:
-    """Schedule all threads of this process round robin in real time, if that is wanted.
+def take_priority(priority: str) -> bool:
+    """Schedule all threads of this process round robin in real time, if `priority` is `REALTIME`.
 
     So a thread that wakes up does not push out one at work, which costs both their caches, and
     no other program delays a command. The system keeps a share (5 % on Linux) for ordinary
@@ -25,7 +23,7 @@ def take_priority(config: Config) -> bool:
         Whether it is so now: a user without the right (CAP_SYS_NICE, or an rtprio limit) is not
         refused, the process merely runs as an ordinary one.
     """
-    if config.runtime.priority != REALTIME:
+    if priority != REALTIME:
         return False
     try:
         for thread in Path("/proc/self/task").iterdir():

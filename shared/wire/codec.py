@@ -61,7 +61,7 @@ def decode(payload: bytes, kind: type[M]) -> M:
     if layout.flat is not None and (found := layout.flat.read(payload)) is not None:
         tick, stamp_ns, row = found
         if tick < MAX_TICK:
-            made: M = layout.of(tick, stamp_ns, row)
+            made: M = layout.from_row(tick, stamp_ns, row)
             return made
     if len(payload) > MAX_BYTES:
         raise _error(kind, f"{len(payload)} bytes", f"at most {MAX_BYTES}", "a foreign publisher?")
@@ -136,11 +136,15 @@ class _Layout:
         sizes = {name: shape[0] for name, shape in self.shapes.items() if len(shape) == 1}
         fixed = {name: size for name, size in sizes.items() if isinstance(size, int)}
         self.flat: FlatLayout | None = None
-        self.of: Callable[[int, int, Array], Any]  # makes a message of a row, if there is `flat`
+        self.from_row: Callable[
+            [int, int, Array], Any
+        ]  # makes a message of a row, if there is `flat`
         if fixed and fixed.keys() == self.shapes.keys() and tuple(self.plain) == _ENVELOPE:
             cuts = cuts_of(fixed)
             self.flat = FlatLayout(kind.SCHEMA, cuts)
-            self.of = kind.of if issubclass(kind, Flat) else partial(_divided, kind, cuts)
+            self.from_row = (
+                kind.from_row if issubclass(kind, Flat) else partial(_divided, kind, cuts)
+            )
 
 
 def _divided(

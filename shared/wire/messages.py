@@ -44,7 +44,7 @@ class Message:
 class Flat(Message):
     """A message whose arrays all have fixed sizes: they are read-only views of one `row`.
 
-    Made of arrays like any other, or with `of` of a row, in the order of its fields.
+    Made of arrays like any other, or with `from_row`, in the order of its fields.
 
     Attributes:
         row: all numbers, float64; not to be changed.
@@ -67,7 +67,7 @@ class Flat(Message):
         self.row = np.concatenate([*parts.values()], dtype=float)
 
     @classmethod
-    def of(cls, tick: int, stamp_ns: int, row: Array) -> Self:
+    def from_row(cls, tick: int, stamp_ns: int, row: Array) -> Self:
         """The message of a row, which is kept, not copied."""
         made = cls.__new__(cls)
         Message.__init__(made, tick, stamp_ns)

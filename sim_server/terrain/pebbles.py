@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.shared.robot.a1 import N_LEGS, Array
+from quadriga.sim_server.terrain.contact import STONE_CONTACT
 from quadriga.sim_server.terrain.course import Course, Rectangle
 
 SIZES: Final = (0.5, 0.67, 0.83, 1.0)  # of the largest
@@ -21,9 +22,6 @@ _PER_LEG: Final = 10  # stones that can move, of all sizes
 # Hard: a light stone between foot and ground must not be pressed into either.
 _SOLREF: Final = (0.004, 1.0)  # s, damping ratio
 _SOLIMP: Final = (0.99, 0.999, 0.001, 0.5, 2.0)
-# Stones touch the ground, feet and each other: beside the bit of all terrain, one of their own.
-GROUND_CONTACT: Final = {"contype": 3, "conaffinity": 0}
-_CONTACT: Final = {"contype": 3, "conaffinity": 2}
 _PARKED: Final = 500.0  # m, height of those not in use
 _RGBA: Final = (
     (0.52, 0.50, 0.47, 1.0), (0.60, 0.56, 0.50, 1.0), (0.44, 0.43, 0.42, 1.0),
@@ -75,7 +73,7 @@ class Pebbles:
                 solref=_SOLREF,
                 solimp=_SOLIMP,
                 rgba=_RGBA[i],
-                **_CONTACT,
+                **STONE_CONTACT,
             )
 
     def draw(self, scene: mujoco.MjvScene, centre: Array, reach: float) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 from quadriga.sim_server.terrain.blocks import Blocks, build_blocks
+from quadriga.sim_server.terrain.contact import GROUND_OF_STONES, TERRAIN_CONTACT
 from quadriga.sim_server.terrain.course import Course, build_course
 from quadriga.sim_server.terrain.height_field import (
     HeightField,
@@ -21,8 +22,7 @@ from quadriga.sim_server.terrain.height_field import (
     build_ramps,
     build_smooth_field,
 )
-from quadriga.sim_server.terrain.pebbles import GROUND_CONTACT, Pebbles, build_pebbles
-from quadriga.sim_server.world.robot_body import TERRAIN_CONTACT
+from quadriga.sim_server.terrain.pebbles import Pebbles, build_pebbles
 
 _STREAM: Final = 1  # of the seed: the sensors draw from another one
 _PLANE: Final = "plane"  # materials
@@ -81,7 +81,7 @@ class Terrain:
             type=mujoco.mjtGeom.mjGEOM_PLANE,
             size=[0.0, 0.0, 1.0],
             material=_PLANE,
-            **(TERRAIN_CONTACT if self.pebbles is None else GROUND_CONTACT),
+            **(TERRAIN_CONTACT if self.pebbles is None else GROUND_OF_STONES),
         )
         if isinstance(self.relief, Blocks):
             self.relief.add_to(spec, TERRAIN_CONTACT)

@@ -34,7 +34,7 @@ class Load:
         return f"{self.mass:.6g} kg{where}"
 
 
-def loads(config: Config) -> tuple[Load, ...]:
+def build_loads(config: Config) -> tuple[Load, ...]:
     """The load on each robot; each one's place has its own draw, whoever else carries something.
 
     Raises:

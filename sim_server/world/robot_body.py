@@ -18,11 +18,7 @@ from quadriga.shared.robot.a1 import (
     TRUNK_MASS,
     a1_urdf,
 )
-
-# Robots collide with the terrain and with nothing else, not even with each other.
-TERRAIN_CONTACT: Final = {"contype": 1, "conaffinity": 0}
-ROBOT_CONTACT: Final = {"contype": 0, "conaffinity": 1}
-NO_CONTACT: Final = {"contype": 0, "conaffinity": 0}
+from quadriga.sim_server.terrain.contact import NO_CONTACT, ROBOT_CONTACT
 
 VISUAL_GROUP: Final = 1
 FOOT_SOLREF: Final = (0.01, 1.0)  # s, damping ratio

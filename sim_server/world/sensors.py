@@ -76,7 +76,7 @@ class Sensors:
         _observe(q, v, tau, sensed, self._block[self._next], self._turns[self._next], rows)
         self._next += 1
         stamp_ns = tick * 1_000_000
-        return {name: State.of(tick, stamp_ns, rows[i]) for i, name in enumerate(self._names)}
+        return {name: State.from_row(tick, stamp_ns, rows[i]) for i, name in enumerate(self._names)}
 
     def _draw(self) -> None:
         """Draw the next block: noise plus bias (_BLOCK, n, 46), and turns (_BLOCK, n, 4, 4)."""

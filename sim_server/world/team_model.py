@@ -11,14 +11,13 @@ import numpy as np
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robot.a1 import FOOT_FRAMES, GRAVITY, STAND_HEIGHT, Array, q_stand, robot_names
+from quadriga.sim_server.terrain.contact import NO_CONTACT
 from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
-from quadriga.sim_server.world.payload import Load, loads
-from quadriga.sim_server.world.robot_body import NO_CONTACT, VISUAL_GROUP, RobotBody
+from quadriga.sim_server.world.layout import JOINT_POSITIONS, NQ
+from quadriga.sim_server.world.payload import Load, build_loads
+from quadriga.sim_server.world.robot_body import VISUAL_GROUP, RobotBody
 
 TIMESTEP: Final = 1e-3  # s, one tick
-NQ: Final = 19  # positions of one robot: trunk xyz, trunk quaternion wxyz, 12 joints
-NV: Final = 18  # velocities: trunk linear (world), trunk angular (trunk frame), 12 joints
-N_SENSORS: Final = 22  # of one robot: gyro (3), specific force (3), touch (4), contact force (4, 3)
 
 _STREAM: Final = 7  # of the seed
 _ANCHOR: Final = (0.0, 0.0, 0.08)  # m, of the yokes' ball joints and of the payload, trunk frame
@@ -40,7 +39,7 @@ class TeamModel:
     """A compiled team and what is needed to read its arrays.
 
     Robot i owns `qpos[19 i : 19 (i + 1)]`, `qvel[18 i : 18 (i + 1)]` and
-    `sensordata[22 i : 22 (i + 1)]`; yoke k is tendon k and equality row k.
+    `sensordata[22 i : 22 (i + 1)]`, see `layout`; yoke k is tendon k and equality row k.
 
     Attributes:
         model: the MuJoCo model.
@@ -74,7 +73,7 @@ def formation(n: int, spacing: float) -> Array:
     return np.stack([-spacing * (index // 2), spacing * side], axis=1)
 
 
-def scattered(config: Config) -> Array:
+def spawn_positions(config: Config) -> Array:
     """Spawn positions off the formation by up to `world.scatter`. Shape (n, 2), m, world.
 
     Each robot's draw is the same however many others there are.
@@ -92,7 +91,7 @@ def build_team_model(config: Config) -> TeamModel:
             URDF is missing.
     """
     names = robot_names(config.team.robots)
-    places, payload = scattered(config), loads(config)
+    places, payload = spawn_positions(config), build_loads(config)
     # Where it is flat must not depend on where exactly the robots stand.
     terrain = build_terrain(config, formation(len(names), config.team.spacing))
     spec = mujoco.MjSpec()
@@ -116,7 +115,7 @@ def build_team_model(config: Config) -> TeamModel:
         terrain.pebbles.add_to(spec, len(names), config.world.friction)
     model = spec.compile()
     q_spawn = model.qpos0.copy()
-    q_spawn[: len(names) * NQ].reshape(len(names), NQ)[:, 7:] = q_stand()
+    q_spawn[: len(names) * NQ].reshape(len(names), NQ)[:, JOINT_POSITIONS] = q_stand()
     return TeamModel(
         model=model,
         terrain=terrain,
@@ -200,7 +199,7 @@ def _add_yoke(spec: mujoco.MjSpec, first: str, second: str) -> None:
 
 
 def _add_sensors(spec: mujoco.MjSpec, prefix: str) -> None:
-    """The robot's block of `sensordata`, in the order of `N_SENSORS`."""
+    """The robot's block of `sensordata`, in the order of `layout`."""
     site, geom = mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_GEOM
     kind = mujoco.mjtSensor
     spec.add_sensor(type=kind.mjSENS_GYRO, objtype=site, objname=prefix + "imu")

@@ -13,10 +13,11 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import FOOT_FRAMES, N_JOINTS, N_LEGS, Array, robot_names
 from quadriga.shared.wire.messages import Command, Event, State, Truth
 from quadriga.sim_server.terrain.loose import PERIOD, LooseStones
+from quadriga.sim_server.world import layout
 from quadriga.sim_server.world.motors import drive
 from quadriga.sim_server.world.scenario import build_scenario, event
 from quadriga.sim_server.world.sensors import Sensors
-from quadriga.sim_server.world.team_model import N_SENSORS, NQ, NV, build_team_model
+from quadriga.sim_server.world.team_model import build_team_model
 
 MOTOR_DAMPING: Final = 2.0  # N·m·s/rad, what a motor does without a command
 _FALL_COSINE: Final = math.cos(1.0)  # of the angle between the trunk's z axis and the vertical
@@ -63,10 +64,11 @@ class World:
         }
         n = len(self.names)
         # Views of MuJoCo's own memory; behind the robots come the loose stones.
-        self._q = self.physics.qpos[: n * NQ].reshape(n, NQ)
-        self._v = self.physics.qvel[: n * NV].reshape(n, NV)
-        self._motor = self.physics.qfrc_applied[: n * NV].reshape(n, NV)[:, 6:]
-        self._sensed = self.physics.sensordata.reshape(n, N_SENSORS)
+        self._q = self.physics.qpos[: n * layout.NQ].reshape(n, layout.NQ)
+        self._v = self.physics.qvel[: n * layout.NV].reshape(n, layout.NV)
+        applied = self.physics.qfrc_applied[: n * layout.NV].reshape(n, layout.NV)
+        self._motor = applied[:, layout.JOINT_RATES]
+        self._sensed = self.physics.sensordata.reshape(n, layout.N_SENSORS)
         self._commanded = np.zeros((n, len(_DAMPED.row)))
         self._tau = np.zeros((n, N_JOINTS))
         self._strength = np.ones((n, N_JOINTS))
@@ -134,12 +136,12 @@ class World:
             tick=self.tick,
             stamp_ns=self.tick * 1_000_000,
             robots=self.names,
-            base_pos=self._q[:, :3].copy(),
-            base_quat_wxyz=self._q[:, 3:7].copy(),
-            base_vel=self._v[:, :3].copy(),
-            base_omega=(rotation @ self._v[:, 3:6, None])[:, :, 0],
+            base_pos=self._q[:, layout.POSITION].copy(),
+            base_quat_wxyz=self._q[:, layout.ATTITUDE].copy(),
+            base_vel=self._v[:, layout.VELOCITY].copy(),
+            base_omega=(rotation @ self._v[:, layout.TRUNK_RATE, None])[:, :, 0],
             # MuJoCo reports the force of the foot on the ground.
-            grf=-self._sensed[:, 10:].reshape(-1, N_LEGS, 3),
+            grf=-self._sensed[:, layout.CONTACT_FORCES].reshape(-1, N_LEGS, 3),
             yoke_error=self.physics.ten_length - self.team.rest_length,
             yoke_force=self._yoke_force,
         )
@@ -162,7 +164,7 @@ class World:
     def _falls(self) -> list[Event]:
         """An event for each robot that fell in this tick."""
         events = []
-        for i, (x, y, z, qw, qx, qy, qz) in enumerate(self._q[:, :7].tolist()):
+        for i, (x, y, z, qw, qx, qy, qz) in enumerate(self._q[:, layout.POSE].tolist()):
             cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
             # Asked this way round, a state that is not a number counts as a fall too.
             if (cosine >= _FALL_COSINE and z >= self._surely_up) or self._fallen[i]:

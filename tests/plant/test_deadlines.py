@@ -12,9 +12,9 @@ from quadriga.shared.wire.messages import Status
 def test_ages_of_commands_and_lateness_of_the_world_are_told() -> None:
     deadlines = Deadlines(("r1", "r2"))
     for tick in range(200):
-        deadlines.used("r1", 0)
-        deadlines.used("r2", 3 if tick % 4 == 0 else 0)
-        deadlines.woke(5e-3 if tick == 100 else 1e-4)
+        deadlines.note_age("r1", 0)
+        deadlines.note_age("r2", 3 if tick % 4 == 0 else 0)
+        deadlines.note_lateness(5e-3 if tick == 100 else 1e-4)
     deadlines.late["r2 held"] += 2
     status = deadlines.status(200, overruns=1)
     assert decode(encode(status), Status).counters == {

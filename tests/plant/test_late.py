@@ -40,7 +40,7 @@ def test_a_robot_that_was_damped_is_not_drawn_back_to_where_it_was_held() -> Non
     """Silent for 400 ms it is held, then damped and sinks; then a command comes, 100 ms old."""
     world = World(replace(Config(), team=TeamConfig(robots=1)))
     box = CommandBox("team", world.names)
-    motors = _Motors(cast(PlantServer, SimpleNamespace(world=world, commands=box, config=Config())))
+    motors = _Motors(cast(PlantServer, SimpleNamespace(plant=world, commands=box, config=Config())))
     box.latest["r1"] = hold(world.states()["r1"])
     poses = {}
     while world.tick < 500:

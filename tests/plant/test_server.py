@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, cast
 
 import msgpack
+import numpy as np
 import pytest
 
-from quadriga.plant.server import PlantServer
+from quadriga.plant.server import FALL_LINGER_MS, PlantServer
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.wire.codec import MAX_TEXT, decode
-from quadriga.shared.wire.messages import Event
+from quadriga.shared.wire.messages import Command, Event, State
 from quadriga.shared.wire.topics import COMMAND, EVENT, STATE, TRUTH
 from quadriga.sim_server.world.world import World
 from tests.sim_server.standing import configured
@@ -32,7 +33,7 @@ class Listener:
         ]
 
 
-def staged(**world: Any) -> tuple[PlantServer, Listener]:
+def served(**world: Any) -> tuple[PlantServer, Listener]:
     config, heard = configured(**world), Listener()
     return PlantServer(config, World(config), cast("Bus", heard)), heard
 
@@ -43,26 +44,26 @@ def staged(**world: Any) -> tuple[PlantServer, Listener]:
     ids=["text", "keys"],
 )
 def test_a_malformed_command_is_reported_in_few_words(body: dict[str, object]) -> None:
-    stage, heard = staged()
-    stage.commands.take(COMMAND.key("team", "r1"), msgpack.packb(body), tick=0, oldest=0)
-    stage.step({})
+    server, heard = served()
+    server.commands.take(COMMAND.key("team", "r1"), msgpack.packb(body), tick=0, oldest=0)
+    server.step({})
     event = next(event for event in heard.events() if event.kind == "fault")
     assert event.detail.startswith("1 commands dropped: command: got ")
     assert len(event.detail) < 300
 
 
 def test_a_detail_is_cut_to_what_an_event_may_hold() -> None:
-    stage, heard = staged()
-    stage.announce("fault", "r1", "x" * (MAX_TEXT + 1))
+    server, heard = served()
+    server.announce("fault", "r1", "x" * (MAX_TEXT + 1))
     assert heard.events()[0].detail == "x" * (MAX_TEXT - 1) + "…"
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
 def test_in_real_time_nothing_but_the_end_waits_for_who_does_not_listen(mode: str) -> None:
-    stage, heard = staged(mode=mode)
-    stage.publish()
+    server, heard = served(mode=mode)
+    server.publish()
     for kind in ("push", "fault", "fall", "stop"):
-        stage.announce(kind, "", "")
+        server.announce(kind, "", "")
     droppable = {key: drop for key, drop, _ in heard.packets[:2]}
     assert droppable == {
         STATE.key("team", "r1"): mode == "realtime",
@@ -72,3 +73,39 @@ def test_in_real_time_nothing_but_the_end_waits_for_who_does_not_listen(mode: st
         *[mode == "realtime"] * 3,
         False,
     ]
+
+
+class BlindPlant:
+    """One robot that stands, or falls at the first tick; nobody knows where it is."""
+
+    names = ("r1",)
+
+    def __init__(self, *, falls: bool = False) -> None:
+        self.tick, self._falls = 0, falls
+
+    def states(self) -> dict[str, State]:
+        return {"r1": State.from_row(self.tick, self.tick * 1_000_000, np.zeros(50))}
+
+    def step(self, commands: Mapping[str, Command]) -> list[Event]:
+        self.tick += 1
+        fell = self._falls and self.tick == 1
+        return [Event(1, 1_000_000, "fall", "r1", "")] if fell else []
+
+    def truth(self) -> None:
+        return None
+
+    def settle(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("falls", [False, True])
+def test_any_plant_is_served(falls: bool) -> None:
+    config, heard = configured(seconds=2.0), Listener()
+    server = PlantServer(config, BlindPlant(falls=falls), cast("Bus", heard))
+    reason = ""
+    while not reason:
+        server.publish()
+        reason = server.step({})
+    assert {key for key, _, _ in heard.packets} <= {STATE.key("team", "r1"), EVENT.key("team")}
+    assert reason == ("fall of r1" if falls else "end of world.seconds")
+    assert server.plant.tick == (1 + FALL_LINGER_MS if falls else 2000)

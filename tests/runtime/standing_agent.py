@@ -34,7 +34,7 @@ def run(config: Config, robot: str) -> None:
         put = bus.publisher(COMMAND.key(team, robot))
         meet(bus, config, stopped)
         if config.world.mode == "realtime":  # or it lies down on a busy machine
-            take_priority(config)
+            take_priority(config.runtime.priority)
         bus.declare(READY)
         while not (stopped() or ended):
             packet = bus.get(POLL)

@@ -36,7 +36,7 @@ from quadriga.shared.wire.topics import (
     STATUS,
     TRUTH,
 )
-from quadriga.sim_server.world.team_model import NV
+from quadriga.sim_server.world.layout import NV
 from quadriga.sim_server.world.world import World
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, table

@@ -15,7 +15,7 @@ from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.a1 import FOOT_RADIUS, q_stand
 from quadriga.shared.wire import messages as msg
-from quadriga.sim_server.world.team_model import NQ
+from quadriga.sim_server.world.layout import NQ
 from tests.quadriga.conftest import SPEED, WriteRun, run_config
 
 

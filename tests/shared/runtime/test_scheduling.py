@@ -10,13 +10,11 @@ import pytest
 
 _SCRIPT = """
 import os, sys, threading
-from dataclasses import replace
-from quadriga.shared.config.sections import Config, RuntimeConfig
 from quadriga.shared.runtime.scheduling import take_priority
 if sys.argv[2] == "deny":
     os.setuid(65534)
 threading.Thread(target=threading.Event().wait, daemon=True).start()
-taken = take_priority(Config(runtime=RuntimeConfig(sys.argv[1])))
+taken = take_priority(sys.argv[1])
 policies = {os.sched_getscheduler(int(task)) for task in os.listdir("/proc/self/task")}
 print(taken, policies == {os.SCHED_RR}, policies == {os.SCHED_OTHER})
 """

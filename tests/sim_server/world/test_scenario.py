@@ -1,13 +1,13 @@
 import numpy as np
 
-from quadriga.sim_server.world.payload import loads
+from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
 from tests.sim_server.standing import configured
 
 
 def test_forces_add_up_and_end() -> None:
     config = configured(3, push="all:10:0:1:1,r2:20:90:1.5:1")
-    scenario = build_scenario(config, loads(config))
+    scenario = build_scenario(config, build_loads(config))
     assert scenario.changes() == {1000, 2000, 1500, 2500}
     along, left, none = np.array([10.0, 0.0, 0.0]), np.array([0.0, 20.0, 0.0]), np.zeros(3)
     expected = {
@@ -25,7 +25,7 @@ def test_events_announce_what_was_configured() -> None:
     config = configured(
         3, push="r3:80:90:2:0.2,all:5:0:1:1", payload=9.0, payload_on="r2", terrain="boxes"
     )
-    events = build_scenario(config, loads(config)).events
+    events = build_scenario(config, build_loads(config)).events
     assert [(event.tick, event.kind, event.robot) for event in events] == [
         (0, "start", ""),
         (0, "terrain", ""),
@@ -52,7 +52,7 @@ def test_what_is_drawn_is_announced() -> None:
         terrain="slope",
         seconds=5.0,
     )
-    scenario = build_scenario(config, loads(config))
+    scenario = build_scenario(config, build_loads(config))
     (_, ground, *payloads, fault, push) = scenario.events
     assert ground.detail == "slope of 8 deg up to 0.05 m, seed 0"
     assert [(event.robot, event.detail.split(",")[0]) for event in payloads] == [
@@ -69,7 +69,7 @@ def test_what_is_drawn_is_announced() -> None:
 
 def test_a_motor_is_weak_from_its_tick_on_and_gives_what_is_announced() -> None:
     config = configured(2, weak_motor="r2:FR_hip:1,r2:FR_hip:2", weak_share=0.5)
-    scenario = build_scenario(config, loads(config))
+    scenario = build_scenario(config, build_loads(config))
     assert scenario.weakenings() == {1000, 2000}
     assert (scenario.strength(999) == 1.0).all()
     told = [event.detail for event in scenario.events if event.kind == "fault"]

@@ -17,7 +17,8 @@ from quadriga.shared.robot.a1 import (
     TRUNK_MASS,
 )
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
-from quadriga.sim_server.world.team_model import NQ, build_team_model, formation, scattered
+from quadriga.sim_server.world.layout import NQ
+from quadriga.sim_server.world.team_model import build_team_model, formation, spawn_positions
 from tests.sim_server.standing import configured
 
 GRAPHS = ("complete", "chain", "ring")
@@ -118,11 +119,11 @@ def test_robots_start_at_least_their_spacing_apart_along_the_columns(
 
 
 def test_robots_are_scattered_around_their_places_by_the_seed() -> None:
-    places = np.array([scattered(configured(3, scatter=0.05, seed=s)) for s in range(40)])
+    places = np.array([spawn_positions(configured(3, scatter=0.05, seed=s)) for s in range(40)])
     off = places - formation(3, 0.9)
     assert np.abs(off).max() <= 0.05
     assert off.std(axis=0).min() > 0.02
-    np.testing.assert_array_equal(scattered(configured(3, seed=5)), formation(3, 0.9))
+    np.testing.assert_array_equal(spawn_positions(configured(3, seed=5)), formation(3, 0.9))
     team = build_team_model(configured(3, scatter=0.05, seed=7))
     np.testing.assert_allclose(team.q_spawn.reshape(3, NQ)[:, :2], places[7])
     assert len(set(team.rest_length.round(6))) == 3

@@ -1,0 +1,112 @@
+"""Contradictions between keys of a configuration, and rules that a range cannot say."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+from quadriga.shared.config.payload import carriers
+from quadriga.shared.config.sections import CENTRAL, Config, GaitConfig, PlannerConfig, WorldConfig
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.wire.topics import SAMPLE_MS
+
+_TEAM_NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
+_PAIRS: Final = (
+    "identification.vx",
+    "identification.vy",
+    "identification.wz",
+    "identification.gain_range",
+)
+_ANSWER: Final = 1.0  # s wall, for a robot's step once it has waited for a peer in vain
+_LEAST_PEBBLE: Final = 0.005  # m; the ground holds millions of smaller stones
+
+
+def check(config: Config) -> None:
+    """Rules that need more than one key, or more than a range.
+
+    Raises:
+        ConfigError: a rule is broken; the first one that is.
+    """
+    _check_team_name(config.team.name)
+    _check_gait(config.gait)
+    _check_world(config.world, robot_names(config.team.robots))
+    _check_planner(config.planner, config.world)
+    _check_pairs(config)
+
+
+def _check_team_name(name: str) -> None:
+    if not _TEAM_NAME.fullmatch(name):
+        raise ConfigError(
+            "team.name",
+            repr(name),
+            "1 to 64 letters, digits, . _ or -",
+            "it is the first part of every key",
+        )
+
+
+def _check_gait(gait: GaitConfig) -> None:
+    for name, value in (("stance_ms", gait.stance_ms), ("stand_ms", gait.stand_ms)):
+        if value % SAMPLE_MS:
+            raise ConfigError(
+                f"gait.{name}", str(value), f"a multiple of {SAMPLE_MS} ms", "the planner's samples"
+            )
+
+
+def _check_world(world: WorldConfig, names: tuple[str, ...]) -> None:
+    carriers(world.payload_on, names)
+    for push in filter(None, world.push.split(",")):
+        robot = push.partition(":")[0].strip()
+        if robot not in ("all", *names):
+            raise ConfigError(
+                "world.push", f"a push on {robot!r}", f"all or one of {', '.join(names)}"
+            )
+    if world.command_damp_ms < world.command_hold_ms:
+        raise ConfigError(
+            "world.command_damp_ms",
+            str(world.command_damp_ms),
+            f"at least world.command_hold_ms = {world.command_hold_ms}",
+            "a late command is held first, then damped",
+        )
+    if world.terrain == "pebbles" and world.terrain_height < _LEAST_PEBBLE:
+        raise ConfigError(
+            "world.terrain_height",
+            f"{world.terrain_height:g}",
+            f"at least {_LEAST_PEBBLE:g} m for terrain 'pebbles'",
+            "the height of the largest stones; terrain 'flat' has none",
+        )
+
+
+def _check_planner(planner: PlannerConfig, world: WorldConfig) -> None:
+    """Plans reach from one to the next, and who waits for a peer's is waited for."""
+    if planner.applied > planner.N:
+        raise ConfigError(
+            "planner.applied", str(planner.applied), f"at most planner.N = {planner.N}"
+        )
+    if planner.kind == "none":
+        return
+    latency = max(1, planner.latency_ms) if planner.kind in CENTRAL else planner.latency_ms
+    longest = SAMPLE_MS * (planner.N - planner.applied)
+    if latency > longest:
+        raise ConfigError(
+            "planner.latency_ms",
+            str(planner.latency_ms),
+            f"at most {SAMPLE_MS}·(planner.N − planner.applied) = {longest} ms",
+            "a plan would have run out before the next one takes effect",
+        )
+    least = planner.peer_timeout + _ANSWER
+    if world.mode == "lockstep" and world.command_timeout < least:
+        raise ConfigError(
+            "world.command_timeout",
+            f"{world.command_timeout:g}",
+            f"at least planner.peer_timeout + {_ANSWER:g} s = {least:g} s",
+            "else robots that wait for a frozen peer's plan count as frozen too",
+        )
+
+
+def _check_pairs(config: Config) -> None:
+    for pair in _PAIRS:
+        section, _, key = pair.partition(".")
+        first, last = getattr(getattr(config, section), key)
+        if first > last:
+            raise ConfigError(pair, f"[{first}, {last}]", "[least, greatest]")

@@ -1,0 +1,68 @@
+"""Section of data collection and the predictor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from quadriga.shared.config.key import key
+
+
+@dataclass(frozen=True, slots=True)
+class IdentificationConfig:
+    """Data collection and the predictor's fit and gates."""
+
+    seconds: float = key(
+        0.0,
+        "s",
+        "world time collected for training; 0 takes what the team's size asks for",
+        low=0.0,
+        high=3600.0,
+    )
+    held_out: float = key(8.0, "s", "world time held out of the fit", low=2.0, high=600.0)
+    episode: float = key(10.5, "s", "length of one episode", low=3.0, high=600.0)
+    noise: tuple[float, ...] = key((15.0, 15.0, 35.0), "N", "force noise (std) fx, fy, fz", low=0.0)
+    noise_hold_ms: int = key(20, "ms", "how long one draw of noise is held", low=10, high=500)
+    vx: tuple[float, ...] = key((-0.2, 0.7), "m/s", "range of random forward speeds", low=-2.0)
+    vy: tuple[float, ...] = key((-0.2, 0.2), "m/s", "range of random sideways speeds", low=-2.0)
+    wz: tuple[float, ...] = key((-0.3, 0.3), "rad/s", "range of random yaw rates", low=-2.0)
+    hold: float = key(1.5, "s", "how long a random speed is held", low=0.1, high=60.0)
+    seed: int = key(1000, "-", "seed of the collection", low=0, high=2**31)
+    predictor: str = key(
+        "ridge",
+        "-",
+        "the fit of G; pinv: the paper's; ridge: regularised, block-weighted; gamma: LQ "
+        "factorisation; causal: no force acts on outputs before it; arx: one-step model rolled "
+        "out; phase: one G for each part of the gait's period",
+        choices=("ridge", "pinv", "gamma", "causal", "arx", "phase"),
+    )
+    neighbours: str = key(
+        "all",
+        "-",
+        "yoked: robots that are not yoked to each other are taken to be uncoupled",
+        choices=("all", "yoked"),
+    )
+    phases: int = key(2, "1", "parts of the gait's period of the predictor 'phase'", low=1, high=40)
+    ridge: float = key(1e-3, "1", "ridge per data column", low=1e-12, high=1e3)
+    phase_ridge: float = key(
+        30.0,
+        "1",
+        "predictor 'phase': ridge on what a phase departs from the fit of all data",
+        low=1e-12,
+        high=1e6,
+    )
+    block_weight: float = key(
+        160.0, "1", "extra penalty weight w (as w²) on the columns of peers", low=1.0, high=1e4
+    )
+    order_per_robot: int = key(
+        12,
+        "states",
+        "assumed system order n = this · robots, for T ≥ (m+1)(T_ini+N+n)−1",
+        low=1,
+        high=100,
+    )
+    max_radius: float = key(
+        0.5, "1", "gate: spectral radius of the best-response map", low=0.01, high=10.0
+    )
+    gain_range: tuple[float, ...] = key(
+        (0.3, 2.0), "1", "gate: predicted over physical height response", low=-10.0
+    )

@@ -1,0 +1,116 @@
+"""Section of the planner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from quadriga.shared.config.key import key
+
+CENTRAL: Final = ("centralised", "deepc")  # kinds of planner that are one process for the team
+
+
+@dataclass(frozen=True, slots=True)
+class PlannerConfig:
+    """The data-driven predictive planner."""
+
+    preset: str = key(
+        "usual",
+        "-",
+        "usual: plans every 40 ms, as in the paper; fast: every 10 ms and with weights of its own, "
+        "for a network whose messages take less: replaces the defaults below",
+        choices=("usual", "fast"),
+    )
+    kind: str = key(
+        "distributed",
+        "-",
+        "distributed: each agent plans with its peers' last plans (eq. 12); decentralised: without "
+        "its peers; centralised: one process plans for all (eq. 7); deepc: so does eq. 5; "
+        "none: nominal forces",
+        choices=("distributed", "decentralised", "centralised", "deepc", "none"),
+    )
+    compensation: bool = key(
+        False, "-", "distributed: bring peers' windows and plans forward by their age"
+    )
+    damping: float = key(
+        0.0, "1", "share of an agent's own last plan that its new one keeps", low=0.0, high=0.95
+    )
+    exchanges: int = key(
+        0, "-", "distributed: best responses to the peers' plans of the same step", low=0, high=8
+    )
+    adaptation: str = key(
+        "none",
+        "-",
+        "recursive: each agent corrects what its own forces do to it by what it measures, as with "
+        "a payload nobody told of (distributed and decentralised)",
+        choices=("none", "recursive"),
+    )
+    forgetting: float = key(
+        0.995, "1", "adaptation: what a planning step leaves of older knowledge", low=0.5, high=1.0
+    )
+    latency_ms: int = key(
+        8,
+        "ms",
+        "a plan made from data at t takes effect at t + this, at most 10·(N − applied)",
+        low=0,
+        high=100,
+    )
+    lambda_g: float = key(1e5, "1", "deepc: weight of ‖g‖²", low=1e-9, high=1e12)
+    lambda_sigma: float = key(1e5, "1", "deepc: weight of ‖σ‖²", low=1e-9, high=1e15)
+    interface: str = key(
+        "feedforward",
+        "-",
+        "feedforward: force deviations become accelerations of the pre-stabilised trunk; "
+        "force: planned forces and speeds are tracked by the whole-body QP (the paper)",
+        choices=("feedforward", "force"),
+    )
+    footholds: str = key(
+        "measured",
+        "-",
+        "velocity that footholds count on: measured, or as planned until the middle of the stance "
+        "to come, as far as the plan reaches",
+        choices=("measured", "planned"),
+    )
+    N: int = key(25, "samples", "control horizon", low=4, high=100)
+    T_ini: int = key(10, "samples", "estimation horizon", low=2, high=50)
+    applied: int = key(4, "samples", "samples applied before the next plan", low=1, high=20)
+    Q: tuple[float, ...] = key(
+        (1e6, 1e5, 1e5, 2e5, 2e5, 2e3), "-", "weights of z, vx, vy, roll, pitch, wz", low=0.0
+    )
+    R: tuple[float, ...] = key((0.2, 0.2, 0.05), "-", "weights of fx, fy, fz", low=1e-9)
+    mu: float = key(0.6, "1", "friction coefficient of the planned forces", low=0.05, high=2.0)
+    force_min: float = key(0.0, "N", "least planned normal force", low=0.0, high=50.0)
+    deviation_max: tuple[float, ...] = key(
+        (20.0, 20.0, 60.0), "N", "largest planned deviation from the nominal force", low=0.0
+    )
+    output_bounds: str = key(
+        "none",
+        "-",
+        "whether planned outputs are bounded by output_max",
+        choices=("none", "soft", "hard"),
+    )
+    output_max: tuple[float, ...] = key(
+        (0.03, 0.4, 0.3, 0.15, 0.15, 0.8),
+        "m, m/s, m/s, rad, rad, rad/s",
+        "largest planned deviation of z, vx, vy, roll, pitch, wz from what is commanded",
+        low=1e-6,
+    )
+    output_weight: float = key(
+        100.0, "1", "soft output bounds: weight of their violation, times Q", low=1e-3, high=1e6
+    )
+    fade: tuple[float, ...] = key(
+        (0.06, 0.5, 0.25, 2.0),
+        "m, m/s, rad, rad/s",
+        "the plan fades out as the state leaves this range of the data",
+        low=1e-6,
+    )
+    solver: str = key("daqp", "-", "QP solver of the planner", choices=("daqp", "osqp"))
+    max_peer_age: int = key(
+        3, "planning steps", "a peer's plan older than this is no longer shifted", low=1, high=25
+    )
+    hold_steps: int = key(
+        5, "planning steps", "a lost peer's terms are held this long, then stop", low=0, high=250
+    )
+    peer_timeout: float = key(
+        5.0, "s wall", "lockstep: longest wait for a peer's plan", low=0.01, high=10.0
+    )

@@ -1,0 +1,64 @@
+"""Sections of the team and of how its processes run, reach each other and are recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from quadriga.shared.config.key import key
+
+
+@dataclass(frozen=True, slots=True)
+class TeamConfig:
+    """Who walks together."""
+
+    name: str = key("team", "-", "first part of every key; teams on one network need own names")
+    robots: int = key(3, "1", "number of robots r1 … rn", low=1, high=10)
+    yokes: str = key(
+        "complete", "-", "which pairs are yoked", choices=("complete", "chain", "ring")
+    )
+    spacing: float = key(0.9, "m", "distance between neighbours at the start", low=0.6, high=3.0)
+    alternate_phase: bool = key(True, "-", "every second robot trots half a gait period later")
+
+
+@dataclass(frozen=True, slots=True)
+class BusConfig:
+    """How the processes reach each other over Zenoh."""
+
+    mode: str = key(
+        "peer",
+        "-",
+        "peer: processes connect directly; client: all through a router",
+        choices=("peer", "client"),
+    )
+    endpoint: str = key(
+        "tcp/127.0.0.1:7447", "-", "where the sim server listens (peer) or the router is (client)"
+    )
+    listen: str = key(
+        "tcp/127.0.0.1:0", "-", "peer mode: where every other process listens; port 0: any free one"
+    )
+    barrier_timeout: float = key(
+        60.0, "s", "how long to wait for all processes before giving up", low=0.1, high=3600.0
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderConfig:
+    """The recording of all traffic."""
+
+    enabled: bool = key(True, "-", "the team waits for the recorder before it walks")
+    chunk_kib: int = key(
+        256, "KiB", "largest MCAP chunk; smaller ones are closed every 50 ms", low=16, high=65536
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class RuntimeConfig:
+    """How the operating system runs the processes."""
+
+    priority: str = key(
+        "realtime",
+        "-",
+        "realtime: agents, planner and sim server go before ordinary processes (SCHED_RR) if the "
+        "user may do so; ordinary: they do not",
+        choices=("realtime", "ordinary"),
+    )

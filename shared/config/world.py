@@ -1,0 +1,125 @@
+"""Sections of the simulated world and its sensors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from quadriga.shared.config.key import key
+
+
+@dataclass(frozen=True, slots=True)
+class WorldConfig:
+    """The simulated world and its seeded disturbances."""
+
+    mode: str = key(
+        "lockstep",
+        "-",
+        "lockstep waits for every command; realtime is paced by the clock",
+        choices=("lockstep", "realtime"),
+    )
+    seed: int = key(0, "-", "seed of terrain, noise and everything else random", low=0, high=2**31)
+    seconds: float = key(20.0, "s", "world time to walk", low=0.5, high=3600.0)
+    scenario: str = key("", "-", "name of the scenario these keys come from: a label only")
+    scatter: float = key(
+        0.0,
+        "m",
+        "how far a robot may start off its place along x and y, drawn from the seed",
+        low=0.0,
+        high=0.1,
+    )
+    terrain: str = key(
+        "flat",
+        "-",
+        "what is under the feet; gravel: stones that lie fixed; pebbles: a layer of stones that "
+        "lie loose; slope: ramps up and down",
+        choices=("flat", "boxes", "gravel", "heightfield", "pebbles", "slope"),
+    )
+    terrain_height: float = key(
+        0.05,
+        "m",
+        "greatest height of the terrain; of pebbles: height of the largest, at least 0.005",
+        low=0.0,
+        high=0.3,
+    )
+    slope: float = key(8.0, "deg", "terrain slope: grade of the ramps", low=0.5, high=25.0)
+    friction: float = key(0.8, "1", "friction coefficient of feet on ground", low=0.05, high=2.0)
+    payload: float = key(0.0, "kg", "load unknown to the agents", low=0.0, high=60.0)
+    payload_on: str = key(
+        "team",
+        "-",
+        "who carries the load: 'team' (equal shares), or names separated by commas, each with a "
+        "share if they are not equal: 'r1:6,r3:4'",
+    )
+    payload_scatter: float = key(
+        0.0,
+        "m",
+        "how far a load may lie off the trunk's centre along x and y, drawn from the seed",
+        low=0.0,
+        high=0.15,
+    )
+    push: str = key(
+        "",
+        "-",
+        "pushes 'robot:force[N]:direction[deg]:start[s]:duration[s]' separated by commas; "
+        "robot may be 'all'; direction 0 is forward, 90 is left",
+    )
+    push_force: float = key(
+        0.0,
+        "N",
+        "a series of sideways pushes on the robots in turn; side, exact times and who is first "
+        "are drawn from the seed; 0: none",
+        low=0.0,
+        high=5000.0,
+    )
+    push_spread: float = key(
+        0.0,
+        "1",
+        "share of push_force by which a push may be weaker or stronger, drawn",
+        low=0.0,
+        high=1.0,
+    )
+    push_every: float = key(3.0, "s", "from push to push, and until the first", low=0.1, high=600.0)
+    push_duration: float = key(0.2, "s", "of each push of the series", low=1e-3, high=10.0)
+    weak_motor: str = key(
+        "",
+        "-",
+        "motors that weaken: 'robot:joint:start[s]' separated by commas; joint as FL_calf, calf or "
+        "FL, either may be 'any', and what is left open is drawn from the seed",
+    )
+    weak_share: float = key(
+        0.6, "1", "share of its torque that a weak motor still gives", low=0.0, high=1.0
+    )
+    command_timeout: float = key(
+        10.0,
+        "s wall",
+        "lockstep: a robot silent longer is put into damping; with a planner at least 1 s more "
+        "than planner.peer_timeout",
+        low=0.05,
+        high=60.0,
+    )
+    command_hold_ms: int = key(
+        20, "ms", "realtime: a command older than this is replaced by holding", low=1, high=1000
+    )
+    command_damp_ms: int = key(
+        200, "ms", "realtime: a command older than this is replaced by damping", low=1, high=10000
+    )
+
+    @property
+    def uneven(self) -> bool:
+        """Whether the ground is anything but a plane."""
+        return self.terrain != "flat" and self.terrain_height > 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class SensorsConfig:
+    """Noise and bias of the simulated sensors (standard deviations)."""
+
+    joint_position: float = key(5e-4, "rad", "encoder noise", low=0.0, high=0.1)
+    joint_velocity: float = key(0.05, "rad/s", "encoder rate noise", low=0.0, high=5.0)
+    joint_torque: float = key(0.1, "N·m", "torque noise", low=0.0, high=10.0)
+    gyro: float = key(0.01, "rad/s", "gyro noise", low=0.0, high=1.0)
+    gyro_bias: float = key(0.002, "rad/s", "gyro bias, drawn once per run", low=0.0, high=1.0)
+    accel: float = key(0.1, "m/s²", "accelerometer noise", low=0.0, high=10.0)
+    accel_bias: float = key(0.02, "m/s²", "accelerometer bias, drawn once", low=0.0, high=5.0)
+    orientation: float = key(1e-3, "rad", "IMU attitude noise", low=0.0, high=0.2)
+    foot_force: float = key(1.0, "N", "foot force noise", low=0.0, high=50.0)
