@@ -15,7 +15,8 @@ from quadriga.agents.planning.operator_references import allowed
 from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.agents.time_grid import step_ms
-from quadriga.shared.bus.barrier import PLANNER, SIM, meet
+from quadriga.shared.bus.barrier import meet
+from quadriga.shared.bus.members import PLANNER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError

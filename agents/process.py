@@ -13,7 +13,8 @@ from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.rehearsal import rehearse
 from quadriga.agents.telemetry import Telemetry
-from quadriga.shared.bus.barrier import SIM, meet
+from quadriga.shared.bus.barrier import meet
+from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError

@@ -15,7 +15,8 @@ import numpy as np
 from benchmarks.children import SPAWN, child, running
 from quadriga.plant.lockstep import run_lockstep
 from quadriga.plant.server import PlantServer
-from quadriga.shared.bus.barrier import SIM, meet, start_together
+from quadriga.shared.bus.barrier import meet, start_together
+from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.children import SPAWN, child, running
-from quadriga.shared.bus.barrier import SIM
+from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config

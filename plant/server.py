@@ -8,7 +8,7 @@ from typing import Final
 
 from quadriga.plant.commands import CommandBox
 from quadriga.plant.protocol import Plant
-from quadriga.shared.bus.barrier import SIM
+from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.wire.codec import encode, sendable

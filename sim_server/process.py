@@ -8,7 +8,8 @@ from collections.abc import Callable
 from quadriga.plant.lockstep import run_lockstep
 from quadriga.plant.realtime import run_realtime
 from quadriga.plant.server import PlantServer
-from quadriga.shared.bus.barrier import SIM, meet, start_together
+from quadriga.shared.bus.barrier import meet, start_together
+from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.scheduling import take_priority

@@ -10,7 +10,7 @@ from quadriga.agents.agent import Inputs
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.planning.operator_references import AHEAD_MS, allowed
 from quadriga.agents.time_grid import step_ms
-from quadriga.shared.bus.barrier import PLANNER
+from quadriga.shared.bus.members import PLANNER
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.robot.a1 import Array

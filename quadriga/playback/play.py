@@ -13,7 +13,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn
 from quadriga.playback.keyboard import PAUSE, QUIT, STEP, Keyboard
 from quadriga.playback.timeline import Timeline
 from quadriga.playback.transport import Transport
-from quadriga.shared.bus.barrier import OPERATOR, PLANNER, SIM
+from quadriga.shared.bus.members import OPERATOR, PLANNER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError, ConfigError

@@ -11,7 +11,8 @@ from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter, Selection
 from quadriga.recorder.session import Session
 from quadriga.recordings.metadata import build_metadata
-from quadriga.shared.bus.barrier import RECORDER, SIM, meet, members
+from quadriga.shared.bus.barrier import meet, members
+from quadriga.shared.bus.members import RECORDER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError

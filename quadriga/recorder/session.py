@@ -7,7 +7,7 @@ from typing import Final
 
 from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter
-from quadriga.shared.bus.barrier import PLANNER, SIM
+from quadriga.shared.bus.members import PLANNER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.recording.mcap_chunk import name_of, robot_of
 from quadriga.shared.robot.a1 import robot_names

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.recordings.truth import Ticks, TruthTrace, build_truth_trace, stack, ticks_of
-from quadriga.shared.bus.barrier import PLANNER, SIM
+from quadriga.shared.bus.members import PLANNER, SIM
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.errors import MessageError, RecordingError

@@ -17,7 +17,7 @@ from quadriga.report.run import Run
 from quadriga.report.samples import slipping
 from quadriga.report.second import BEFORE_MS, SLIP, TILT
 from quadriga.report.tracks import falls, figure, style
-from quadriga.shared.bus.barrier import PLANNER
+from quadriga.shared.bus.members import PLANNER
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import REFERENCE

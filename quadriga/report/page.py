@@ -14,7 +14,7 @@ from quadriga.report.look import SCRIPT
 from quadriga.report.look_at import Trouble, episodes
 from quadriga.report.moments import Moment
 from quadriga.report.run import Run
-from quadriga.shared.bus.barrier import PLANNER
+from quadriga.shared.bus.members import PLANNER
 from quadriga.shared.config.sections import CENTRAL
 from quadriga.shared.errors import RecordingError
 from quadriga.table import rows as summary_rows

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Self
 
-from quadriga.shared.bus.barrier import OPERATOR, PLANNER, RECORDER, SIM
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.bus.barrier import processes
+from quadriga.shared.bus.members import LAST, RECORDER, SIM, Member
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep
 
 _ONE_THREAD: Final = (
@@ -47,21 +47,27 @@ class ProcessSpec:
 def table(
     config: Config, run_dir: Path, predictor: Path | None, sha256: str
 ) -> tuple[ProcessSpec, ...]:
-    """The processes of a walk, in the order in which they are stopped."""
-    config_file = ("--config", str(run_dir / "config.toml"))
-    fitted = () if predictor is None else ("--predictor", str(predictor))
-    rows = [ProcessSpec(SIM, (*QUADRIGA, "sim", *config_file), 5.0)]
-    rows += [
-        ProcessSpec(name, (*QUADRIGA, "agent", "--robot", name, *fitted, *config_file), 5.0)
-        for name in robot_names(config.team.robots)
-    ]
-    if config.planner.kind in CENTRAL:
-        rows.append(ProcessSpec(PLANNER, (*QUADRIGA, "plan", *fitted, *config_file), 5.0))
-    rows.append(ProcessSpec(OPERATOR, (*QUADRIGA, "operate", *config_file), 5.0))
-    if config.recorder.enabled:
-        to = ("-o", str(run_dir / "run.mcap"), "--predictor-sha256", sha256)
-        rows.append(ProcessSpec(RECORDER, (*QUADRIGA, "record", *to, *config_file), 20.0))
-    return tuple(rows)
+    """The processes of a walk, in the order in which they are started.
+
+    Args:
+        config: the team's configuration.
+        run_dir: holds it as `config.toml`, and will hold the recording.
+        predictor: the file that agents and planner read; None if they need none.
+        sha256: the predictor's, for the recording.
+    """
+
+    def build_row(member: Member) -> ProcessSpec:
+        role, options = member.role, list[str]()
+        if role.per_robot:
+            options += ["--robot", member.name]
+        if role.predicts and predictor is not None:
+            options += ["--predictor", str(predictor)]
+        if role.name == RECORDER:
+            options += ["-o", str(run_dir / "run.mcap"), "--predictor-sha256", sha256]
+        options += ["--config", str(run_dir / "config.toml")]
+        return ProcessSpec(member.name, (*QUADRIGA, role.command, *options), role.grace)
+
+    return tuple(map(build_row, processes(config)))
 
 
 class Launch:
@@ -147,9 +153,8 @@ class Launch:
 
         The sim server then tells the others that the walk is over, and the recorder hears it.
         """
-        last = [RECORDER] if RECORDER in self._running else []
-        self._terminate([name for name in self._running if name != RECORDER])
-        self._terminate(last)
+        self._terminate([name for name in self._running if name != LAST])
+        self._terminate([name for name in self._running if name == LAST])
         self._running.clear()
 
     def _terminate(self, names: Collection[str]) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from quadriga.shared.bus.barrier import OPERATOR, SIM, meet
+from quadriga.shared.bus import members
+from quadriga.shared.bus.barrier import meet
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
@@ -54,7 +55,7 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
     """
     stopped = stopped or stop_on_signals()
     team = config.team.name
-    with Bus.open(config.bus, team, OPERATOR, stopped) as bus:
+    with Bus.open(config.bus, team, members.OPERATOR, stopped) as bus:
         bus.subscribe(TRUTH.key(team))
         bus.subscribe(EVENT.key(team))
         put = bus.publisher(REFERENCE.key(team))
@@ -78,7 +79,7 @@ def _next_tick(bus: Bus, tick: int) -> tuple[int, bool]:
     """
     packet = bus.get(POLL)
     if packet is None:
-        return tick, SIM not in bus.present(HERE)
+        return tick, members.SIM not in bus.present(HERE)
     for key, payload in (packet, *bus.drain()):
         try:
             if key == TRUTH.key(bus.team):
@@ -100,7 +101,7 @@ def stop_team(config: Config, reason: str) -> None:
     """
     team, names = config.team.name, robot_names(config.team.robots)
     reason = sendable(reason, _LONGEST_REASON)
-    with Bus.open(config.bus, team, "estop") as bus:
+    with Bus.open(config.bus, team, members.ESTOP) as bus:
         put = bus.publisher(ESTOP.key(team))
         bus.subscribe(TRUTH.key(team))
         reached: frozenset[str] = frozenset()

@@ -8,6 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
+from quadriga.shared.bus.members import LAUNCHER
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
@@ -15,8 +16,6 @@ from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Event, Truth
 from quadriga.shared.wire.topics import EVENT, TRUTH
-
-NAME = "launcher"
 
 
 class WalkProgress:
@@ -28,7 +27,7 @@ class WalkProgress:
 
     def __init__(self, config: Config, console: Console) -> None:
         self._config, self._console = config, console
-        self._bus = Bus.open(config.bus, config.team.name, NAME)
+        self._bus = Bus.open(config.bus, config.team.name, LAUNCHER)
         self._bus.subscribe(TRUTH.key(config.team.name))
         self._bus.subscribe(EVENT.key(config.team.name))
         self._bar = Progress(

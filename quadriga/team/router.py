@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from typing import Final
 
-from quadriga.shared.bus.barrier import SIM
+from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.clock import sleep

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final
 
+from quadriga.shared.bus.members import SIM, Member, team_members
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.robot.a1 import robot_names
 
-SIM: Final = "sim"
-OPERATOR: Final = "operator"
-RECORDER: Final = "recorder"
-PLANNER: Final = "planner"  # plans for all robots, if one process does
+
+def processes(config: Config) -> tuple[Member, ...]:
+    """All processes of a team, in the order of the table of processes."""
+    return team_members(
+        robot_names(config.team.robots),
+        central=config.planner.kind in CENTRAL,
+        recorded=config.recorder.enabled,
+    )
 
 
 def members(config: Config) -> frozenset[str]:
     """Names of all processes of a team."""
-    names = {SIM, OPERATOR, *robot_names(config.team.robots)}
-    names |= {RECORDER} if config.recorder.enabled else set()
-    names |= {PLANNER} if config.planner.kind in CENTRAL else set()
-    return frozenset(names)
+    return frozenset(member.name for member in processes(config))
 
 
 def meet(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:

@@ -11,6 +11,7 @@ from typing import Any, Final, Self
 
 import zenoh
 
+from quadriga.shared.bus.members import ROUTER, SIM
 from quadriga.shared.bus.zenoh_settings import at_fault, member_settings, router_settings
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
@@ -20,7 +21,6 @@ Packet = tuple[str, bytes]  # key, payload as received
 
 HERE: Final = "here"  # a process has declared its subscribers
 READY: Final = "ready"  # it has also warmed up: the world may start
-ROUTER: Final = "router"
 POLL: Final = 0.1  # s, longest wait before a loop looks at its stop flag
 _ACK: Final = "received"  # key of the question whether everything before it has arrived
 _ACK_TIMEOUT: Final = 2.0  # s
@@ -283,7 +283,7 @@ def _cannot_open(key: str, endpoint: str, name: str, error: str) -> BusError:
         cause = "no interface of this machine has that address"
     else:
         cause = "a name that does not resolve, or not of the form tcp/HOST:PORT"
-    where = "sim server" if name == "sim" else name
+    where = "sim server" if name == SIM else name
     return BusError(
         f"{key} {endpoint!r} of {where}",
         error.split(" at /")[0],

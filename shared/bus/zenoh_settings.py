@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from quadriga.shared.bus.members import SIM
 from quadriga.shared.config.sections import BusConfig
 
 _COMMON: Final = {
@@ -29,7 +30,7 @@ def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str
         hub: be who they find although the name is another.
     """
     peer = bus.mode == "peer"
-    hub = peer and (hub or name == "sim")
+    hub = peer and (hub or name == SIM)
     listen = [bus.endpoint] if hub else [bus.listen] if peer else []
     return {
         "mode": bus.mode,

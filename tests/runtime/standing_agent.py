@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from quadriga.shared.bus.barrier import SIM, meet
+from quadriga.shared.bus.barrier import meet
+from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config

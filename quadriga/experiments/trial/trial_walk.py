@@ -19,7 +19,7 @@ from quadriga.identification.rollout import Rollout, Tick
 from quadriga.recordings.summary import RECORDING
 from quadriga.recordings.traces import MeasurementTrace, Traces, read_traces
 from quadriga.recordings.truth import build_truth_trace, ticks_of
-from quadriga.shared.bus.barrier import PLANNER
+from quadriga.shared.bus.members import PLANNER
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.recording.reader import Recording

@@ -15,7 +15,7 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.playback.timeline import Timeline, parse_remap, renamed
-from quadriga.shared.bus.barrier import SIM
+from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import HERE, Bus, Packet
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import ConfigError

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from quadriga.shared.bus.barrier import OPERATOR, SIM
+from quadriga.shared.bus.members import OPERATOR, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig, Config, TeamConfig
 from quadriga.shared.config.write import config_sha256, to_toml

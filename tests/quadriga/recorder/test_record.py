@@ -17,7 +17,7 @@ from mcap.reader import make_reader
 
 from quadriga.commands.parser import main
 from quadriga.recordings.survey import survey
-from quadriga.shared.bus.barrier import RECORDER, SIM
+from quadriga.shared.bus.members import RECORDER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig, Config, RecorderConfig, TeamConfig
 from quadriga.shared.config.write import to_toml

@@ -9,7 +9,7 @@ from threading import Thread
 import numpy as np
 import pytest
 
-from quadriga.shared.bus.barrier import OPERATOR, SIM
+from quadriga.shared.bus.members import OPERATOR, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import BusConfig, Config

@@ -1,0 +1,83 @@
+"""The table of processes: their names on the bus, their roles and how they start and stop.
+
+It imports nothing of the project, so that every module may ask it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+SIM: Final = "sim"  # steps the world; the others leave when it does
+OPERATOR: Final = "operator"  # says how fast to walk where
+RECORDER: Final = "recorder"
+PLANNER: Final = "planner"  # plans for all robots, if one process does
+AGENT: Final = "agent"  # one for each robot, whose name it has: r1 … rn
+
+# On the bus too, but of no team: nobody waits for them.
+ROUTER: Final = "router"
+LAUNCHER: Final = "launcher"  # shows how far the walk has come
+ESTOP: Final = "estop"  # stops the team once
+
+ALWAYS: Final = "always"
+CENTRAL: Final = "central"  # one process plans for all
+RECORDED: Final = "recorded"  # the team is recorded
+
+
+@dataclass(frozen=True, slots=True)
+class Role:
+    """One row of the table.
+
+    Attributes:
+        name: of the role, and of its only process; an agent's process has its robot's name.
+        command: the subcommand of `quadriga` that is this process.
+        needed: when a team has such a process: `ALWAYS`, `CENTRAL` or `RECORDED`.
+        per_robot: whether there is one for each robot.
+        predicts: whether it reads a predictor.
+        grace: how long it may take to leave once the walk is over or it is told to, s.
+    """
+
+    name: str
+    command: str
+    needed: str = ALWAYS
+    per_robot: bool = False
+    predicts: bool = False
+    grace: float = 5.0
+
+
+# In the order in which they are started. The last is stopped when all others have left: it then
+# has heard everything.
+ROLES: Final = (
+    Role(SIM, "sim"),
+    Role(AGENT, "agent", per_robot=True, predicts=True),
+    Role(PLANNER, "plan", needed=CENTRAL, predicts=True),
+    Role(OPERATOR, "operate"),
+    Role(RECORDER, "record", needed=RECORDED, grace=20.0),
+)
+LAST: Final = ROLES[-1].name
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One process of a team, which all others wait for before they walk."""
+
+    name: str
+    role: Role
+
+
+def team_members(robots: Sequence[str], *, central: bool, recorded: bool) -> tuple[Member, ...]:
+    """The processes of a team, in the order of the table.
+
+    Args:
+        robots: their names.
+        central: whether one process plans for all.
+        recorded: whether the team waits for a recorder.
+    """
+    needed = {ALWAYS: True, CENTRAL: central, RECORDED: recorded}
+    return tuple(
+        Member(name, role)
+        for role in ROLES
+        if needed[role.needed]
+        for name in (robots if role.per_robot else (role.name,))
+    )

@@ -1,0 +1,33 @@
+"""The table of processes: who belongs to a team, and what the command line makes of each row."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from quadriga.commands.parser import parser
+from quadriga.shared.bus.members import LAST, RECORDER, ROLES, SIM, Role, team_members
+
+ROBOTS = ("r1", "r2")
+
+
+@pytest.mark.parametrize("central", [False, True])
+@pytest.mark.parametrize("recorded", [False, True])
+def test_a_team_has_what_its_configuration_asks_for(central: bool, recorded: bool) -> None:
+    names = [m.name for m in team_members(ROBOTS, central=central, recorded=recorded)]
+    planner, recorder = ["planner"] * central, ["recorder"] * recorded
+    assert names == ["sim", "r1", "r2", *planner, "operator", *recorder]
+
+
+@pytest.mark.parametrize("role", ROLES, ids=lambda role: role.name)
+def test_every_role_is_a_subcommand(role: Role) -> None:
+    robot = ["--robot", "r1"] if role.per_robot else []
+    arguments = parser().parse_args([role.command, *robot, "--parent", "1"])
+    assert hasattr(arguments, "predictor") == role.predicts
+
+
+def test_the_recorder_hears_all_others_to_the_end() -> None:
+    assert LAST == RECORDER
+    assert ROLES[0].name == SIM
+    assert max(Counter(role.name for role in ROLES).values()) == 1
