@@ -11,11 +11,11 @@ from quadriga.plant.protocol import Plant
 from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.timing import periods
 from quadriga.shared.wire.codec import encode, sendable
 from quadriga.shared.wire.messages import Command, Event, Status
 from quadriga.shared.wire.topics import EVENT, STATE, STATUS, TRUTH
 
-TRUTH_PERIOD_MS: Final = 10
 FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first fall
 
 
@@ -43,7 +43,7 @@ class PlantServer:
         self._put_status = bus.publisher(STATUS.key(team, SIM), droppable=True)
         self._put_event = bus.publisher(EVENT.key(team), droppable=realtime)
         self._put_stop = bus.publisher(EVENT.key(team))  # all leave by it, no tick waits for it
-        self._truth_period = 1 if config.estimator.kind == "truth" else TRUTH_PERIOD_MS
+        self._truth_period = periods(config)[TRUTH.name]
         self._last_tick = round(config.world.seconds * 1000)
         self._fallen: set[str] = set()
         self._malformed = 0

@@ -14,7 +14,7 @@ from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.wire.topics import COMMAND
+from quadriga.shared.wire.topics import topics_for
 from quadriga.sim_server.world.world import World
 
 
@@ -34,7 +34,8 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
     stopped = stopped or stop_on_signals()
     world = World(config)
     with Bus.open(config.bus, config.team.name, SIM, stopped) as bus:
-        bus.subscribe(COMMAND.key(config.team.name, "*"))
+        for topic in topics_for(SIM):
+            bus.subscribe(topic.key(config.team.name, "*"))
         server = PlantServer(config, world, bus)
         if not (meet(bus, config, stopped) and start_together(bus, config, stopped)):
             return

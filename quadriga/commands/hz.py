@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 def _print_recorded(arguments: argparse.Namespace) -> int:
     from quadriga.recordings.listen import config_of, entries_from_file
     from quadriga.recordings.rates import Rates
-    from quadriga.shared.recording.sequence import periods
+    from quadriga.shared.config.timing import periods
 
     rates = Rates(periods(config_of(arguments.file)))
     try:
@@ -45,7 +45,7 @@ def _print_recorded(arguments: argparse.Namespace) -> int:
 def _print_live(arguments: argparse.Namespace, config: Config) -> int:
     from quadriga.recordings.listen import entries_from_bus
     from quadriga.recordings.rates import Rates
-    from quadriga.shared.recording.sequence import periods
+    from quadriga.shared.config.timing import periods
 
     if arguments.count < 0 or not arguments.every > 0.0:
         raise ConfigError("-n, --every", f"{arguments.count}, {arguments.every:g}", "more than 0")

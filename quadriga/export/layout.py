@@ -11,24 +11,10 @@ import numpy as np
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
-from quadriga.shared.robot.a1 import JOINT_NAMES, OUTPUTS, Array, Leg, robot_names
+from quadriga.shared.robot.a1 import Array, robot_names
 from quadriga.shared.wire.messages import Message
 
-LEGS: Final = tuple(leg.name for leg in Leg)
-JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
-_XYZ: Final = ("x", "y", "z")
-_WXYZ: Final = ("w", "x", "y", "z")
-FORCES: Final = tuple(f"{leg}.{axis}" for leg in LEGS for axis in _XYZ)
-_ENTRIES: Final = {  # of one robot and one sample
-    "q_joint": JOINTS, "v_joint": JOINTS, "tau_joint": JOINTS, "imu_quat_wxyz": _WXYZ,
-    "imu_gyro": _XYZ, "imu_accel": _XYZ, "foot_force": LEGS,
-    "tau": JOINTS, "q_des": JOINTS, "v_des": JOINTS, "kp": JOINTS, "kd": JOINTS,
-    "u": FORCES, "y": OUTPUTS, "stance": LEGS,
-    "base_pos": _XYZ, "base_quat_wxyz": _WXYZ, "base_vel": _XYZ, "base_omega": _XYZ,
-    "grf": FORCES, "yoke_error": ("",), "yoke_force": ("",),
-}  # fmt: skip
 _SAMPLES: Final = "N"  # the axis of the horizon: one row per entry
-_LISTS: Final = ("P", "K")  # axes without names, of any length
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,12 +88,12 @@ def build_layout(
                 maps.append((item.name, entries.get(item.name, ())))
             elif of in (int, float, str) and item.name not in ("tick", "stamp_ns"):
                 plain.append((item.name, of))
-        elif shape[0] in _LISTS:
+        elif not item.metadata["entries"]:
             lists.append(item.name)
         else:
             arrays.append(item.name)
             for owner in owners.get(shape[0], ("",)):
-                names = (".".join((owner, item.name, entry)) for entry in _ENTRIES[item.name])
+                names = (".".join((owner, item.name, entry)) for entry in item.metadata["entries"])
                 numbers += [name.strip(".") for name in names]
     for name, among in maps:
         numbers += _entry_names(name, among)

@@ -15,8 +15,8 @@ from quadriga.shared.bus.barrier import meet, members
 from quadriga.shared.bus.members import RECORDER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import RecordingError
-from quadriga.shared.recording.sequence import periods
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.signals import stop_on_signals
 

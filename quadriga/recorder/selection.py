@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from quadriga.recorder.parts import Limits
 from quadriga.recordings.key_patterns import key_patterns
 from quadriga.shared.recording.reader import MAX_CHANNELS
+from quadriga.shared.wire.topics import TABLE
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +17,7 @@ class Selection:
 
     Attributes:
         topics: patterns of the keys that are recorded, see `quadriga.recordings.key_patterns`;
-            empty: all.
+            empty: all that the table of topics has recorded.
         exclude: patterns of keys that are not.
         limits: when a new file is begun.
         at_once: begin with whoever is there, without waiting for a team.
@@ -44,7 +45,8 @@ class KeyFilter:
     def __init__(self, team: str, selection: Selection) -> None:
         """Raises ConfigError if a pattern cannot be that of a key."""
         self._topics = key_patterns(selection.topics, team, "--topics")
-        self._exclude = key_patterns(selection.exclude, team, "--exclude")
+        unasked = () if selection.topics else tuple(t.name for t in TABLE if not t.recorded)
+        self._exclude = key_patterns((*selection.exclude, *unasked), team, "--exclude")
         alone = self._topics[0].expression if len(self._topics) == 1 else ""
         self.expression = alone or f"{team}/**"  # two subscriptions would hear a message twice
         self.all = not (self._topics or self._exclude)

@@ -9,10 +9,11 @@ from typing import Final
 
 from quadriga.columns import columns
 from quadriga.recordings.readable import config_or_default, open_readable
+from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.reader import COUNTS, LOST, PROFILE, Recording, RecordingWriter
 from quadriga.shared.recording.salvage import Damage, Salvage
-from quadriga.shared.recording.sequence import TickTrack, periods
+from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.recording.writer import reason
 from quadriga.shared.runtime.clock import wall_ns
 

@@ -9,12 +9,13 @@ from typing import Any
 
 from quadriga.recordings.readable import open_readable
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.mcap_chunk import name_of
 from quadriga.shared.recording.reader import ChunkEntry, Recording
 from quadriga.shared.recording.salvage import Damage
-from quadriga.shared.recording.sequence import TickTrack, periods
+from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Event, Message, Status
 from quadriga.shared.wire.topics import EVENT, STATUS, TABLE, topic_of

@@ -17,7 +17,7 @@ from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import decode, encode, sendable
 from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.messages import EStop, Event, Reference, Truth
-from quadriga.shared.wire.topics import ESTOP, EVENT, REFERENCE, TRUTH
+from quadriga.shared.wire.topics import ESTOP, REFERENCE, TRUTH, topics_for
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 
 _AHEAD: Final = 4  # epochs; agents in lock-step wait for the one in force
@@ -56,8 +56,8 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
     stopped = stopped or stop_on_signals()
     team = config.team.name
     with Bus.open(config.bus, team, members.OPERATOR, stopped) as bus:
-        bus.subscribe(TRUTH.key(team))
-        bus.subscribe(EVENT.key(team))
+        for topic in topics_for(members.OPERATOR):
+            bus.subscribe(topic.key(team))
         put = bus.publisher(REFERENCE.key(team))
         if not meet(bus, config, stopped):
             return
@@ -103,7 +103,8 @@ def stop_team(config: Config, reason: str) -> None:
     reason = sendable(reason, _LONGEST_REASON)
     with Bus.open(config.bus, team, members.ESTOP) as bus:
         put = bus.publisher(ESTOP.key(team))
-        bus.subscribe(TRUTH.key(team))
+        for topic in topics_for(members.ESTOP):
+            bus.subscribe(topic.key(team))
         reached: frozenset[str] = frozenset()
         tick, stamp_ns, deadline = 0, 0, monotonic() + _ESTOP_WAIT
         while reached < frozenset(names) and monotonic() < deadline:

@@ -15,7 +15,7 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Event, Truth
-from quadriga.shared.wire.topics import EVENT, TRUTH
+from quadriga.shared.wire.topics import TRUTH, topics_for
 
 
 class WalkProgress:
@@ -28,8 +28,8 @@ class WalkProgress:
     def __init__(self, config: Config, console: Console) -> None:
         self._config, self._console = config, console
         self._bus = Bus.open(config.bus, config.team.name, LAUNCHER)
-        self._bus.subscribe(TRUTH.key(config.team.name))
-        self._bus.subscribe(EVENT.key(config.team.name))
+        for topic in topics_for(LAUNCHER):
+            self._bus.subscribe(topic.key(config.team.name))
         self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),

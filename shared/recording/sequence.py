@@ -1,59 +1,15 @@
-"""What the ticks of one key tell: since when it is there, and which messages are missing."""
+"""The ticks of one key: since when it is there, and which messages are missing between them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Final
 
-from quadriga.shared.config.sections import CENTRAL, Config
-from quadriga.shared.wire.topics import (
-    COMMAND,
-    MEASUREMENT,
-    PLAN,
-    REFERENCE,
-    SAMPLE_MS,
-    STATE,
-    STATUS,
-    TABLE,
-    TRUTH,
-)
-
 _JUMP: Final = 600_000  # ms: a longer jump is another clock or a forged tick, not a loss
 _LONG: Final = 10_000  # ms: so long a jump, or one back, is believed if the next message follows it
 _KEPT: Final = 1000  # gaps that are remembered one by one
 
 Gap = tuple[int, int]  # last tick before it, first tick after it
-
-
-def periods(config: Config) -> dict[str, int]:
-    """World time between two messages of a topic by its name, ms; 0: sent on event.
-
-    In real time an agent that was late says its status later.
-    """
-    lockstep = config.world.mode == "lockstep"
-    found = dict.fromkeys((topic.name for topic in TABLE), 0)
-    return found | {
-        STATE.name: 1,
-        COMMAND.name: 1,
-        MEASUREMENT.name: SAMPLE_MS,
-        PLAN.name: SAMPLE_MS * config.planner.applied,
-        STATUS.name: round(1000 / STATUS.rate_hz) if lockstep else 0,
-        REFERENCE.name: round(1000 / REFERENCE.rate_hz),
-        TRUTH.name: 1 if config.estimator.kind == "truth" else SAMPLE_MS,
-    }
-
-
-def max_ages(config: Config) -> dict[str, int]:
-    """Longest gap, and greatest age in use, that is nothing unusual, by topic, ms; 0: none.
-
-    A plan is used until who made it is given up. Those of peers are of the step before; those of
-    a central planner come its latency after their data.
-    """
-    planner = config.planner
-    late = max(1, planner.latency_ms) if planner.kind in CENTRAL else 0
-    steps = 1 + planner.max_peer_age + planner.hold_steps
-    found = {topic.name: topic.max_age_ms for topic in TABLE}
-    return found | {PLAN.name: steps * SAMPLE_MS * planner.applied + late}
 
 
 class TickTrack:

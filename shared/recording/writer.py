@@ -51,7 +51,7 @@ class RecordingWriter:
             metadata: what the reader hands back: configuration, hashes, versions, team.
             chunk_kib: size of the chunks, KiB.
             periods: by a topic's name, ms between its messages, see
-                `quadriga.shared.recording.sequence`; without them nothing is counted as lost.
+                `quadriga.shared.config.timing`; without them nothing is counted as lost.
             after: by key, tick of the last message in the file before this one.
 
         Raises:

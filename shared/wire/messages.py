@@ -15,16 +15,21 @@ from typing import Any, ClassVar, Self, TypeVar, dataclass_transform
 
 import numpy as np
 
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.a1 import OUTPUTS, Array
 from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.entries import FORCES, JOINTS, LEGS, ONE, WXYZ, XYZ
 
 Dim = int | str
 F = TypeVar("F", bound="Flat")
 
 
-def array(*shape: Dim, unit: str, frame: str = "-") -> Any:
-    """Declare an array field of the wire: its shape, unit and frame."""
-    return field(metadata={"shape": shape, "unit": unit, "frame": frame})
+def array(*shape: Dim, entries: tuple[str, ...], unit: str, frame: str = "-") -> Any:
+    """Declare an array field of the wire: its shape, unit and frame.
+
+    `entries` are the names of its numbers: of one robot, yoke or sample if it is of several; () of
+    a list of any length.
+    """
+    return field(metadata={"shape": shape, "entries": entries, "unit": unit, "frame": frame})
 
 
 def plain(kind: type, doc: str) -> Any:
@@ -107,13 +112,13 @@ class State(Flat):
     """What one real robot measures at `tick`; nothing else may enter here."""
 
     __slots__ = ()
-    q_joint: Array = array(12, unit="rad", frame="joint")
-    v_joint: Array = array(12, unit="rad/s", frame="joint")
-    tau_joint: Array = array(12, unit="N·m", frame="joint")
-    imu_quat_wxyz: Array = array(4, unit="1", frame="trunk to world")
-    imu_gyro: Array = array(3, unit="rad/s", frame="trunk")
-    imu_accel: Array = array(3, unit="m/s²", frame="trunk (specific force)")
-    foot_force: Array = array(4, unit="N", frame="ground normal")
+    q_joint: Array = array(12, entries=JOINTS, unit="rad", frame="joint")
+    v_joint: Array = array(12, entries=JOINTS, unit="rad/s", frame="joint")
+    tau_joint: Array = array(12, entries=JOINTS, unit="N·m", frame="joint")
+    imu_quat_wxyz: Array = array(4, entries=WXYZ, unit="1", frame="trunk to world")
+    imu_gyro: Array = array(3, entries=XYZ, unit="rad/s", frame="trunk")
+    imu_accel: Array = array(3, entries=XYZ, unit="m/s²", frame="trunk (specific force)")
+    foot_force: Array = array(4, entries=LEGS, unit="N", frame="ground normal")
 
 
 @flat_record
@@ -121,11 +126,11 @@ class Command(Flat):
     """Motor command; the motor applies `tau + kp (q_des − q) + kd (v_des − v)`, limited."""
 
     __slots__ = ()
-    tau: Array = array(12, unit="N·m", frame="joint")
-    q_des: Array = array(12, unit="rad", frame="joint")
-    v_des: Array = array(12, unit="rad/s", frame="joint")
-    kp: Array = array(12, unit="N·m/rad", frame="joint")
-    kd: Array = array(12, unit="N·m·s/rad", frame="joint")
+    tau: Array = array(12, entries=JOINTS, unit="N·m", frame="joint")
+    q_des: Array = array(12, entries=JOINTS, unit="rad", frame="joint")
+    v_des: Array = array(12, entries=JOINTS, unit="rad/s", frame="joint")
+    kp: Array = array(12, entries=JOINTS, unit="N·m/rad", frame="joint")
+    kd: Array = array(12, entries=JOINTS, unit="N·m·s/rad", frame="joint")
 
 
 @record
@@ -136,9 +141,9 @@ class Measurement(Message):
     plan adds; not what the whole-body controller made of them.
     """
 
-    u: Array = array(12, unit="N", frame="yaw frame, legs FL FR RL RR")
-    y: Array = array(6, unit="m, m/s, m/s, rad, rad, rad/s", frame="yaw frame")
-    stance: Array = array(4, unit="1 stance, 0 swing", frame="legs FL FR RL RR")
+    u: Array = array(12, entries=FORCES, unit="N", frame="yaw frame, legs FL FR RL RR")
+    y: Array = array(6, entries=OUTPUTS, unit="m, m/s, m/s, rad, rad, rad/s", frame="yaw frame")
+    stance: Array = array(4, entries=LEGS, unit="1 stance, 0 swing", frame="legs FL FR RL RR")
 
 
 @record
@@ -146,8 +151,10 @@ class Plan(Message):
     """The planner's solution of planning step `step`: N samples of 10 ms from `tick` on."""
 
     step: int = plain(int, "planning step, tick / (10 · applied samples)")
-    u: Array = array("N", 12, unit="N", frame="yaw frame, legs FL FR RL RR")
-    y: Array = array("N", 6, unit="m, m/s, m/s, rad, rad, rad/s", frame="yaw frame")
+    u: Array = array("N", 12, entries=FORCES, unit="N", frame="yaw frame, legs FL FR RL RR")
+    y: Array = array(
+        "N", 6, entries=OUTPUTS, unit="m, m/s, m/s, rad, rad, rad/s", frame="yaw frame"
+    )
     status: str = plain(str, "solved, or the name of the fallback in force")
     used: Mapping[str, int] = plain(dict, "for each peer the step of the plan consumed")
     exchange: int = plain(int, "0: made with peers' plans of the step before; k: k-th answer since")
@@ -167,8 +174,12 @@ class Status(Message):
     estimator: str = plain(str, "kalman or truth")
     ages_ms: Mapping[str, float] = plain(dict, "age of each input [ms of world time]")
     counters: Mapping[str, int] = plain(dict, "events counted since the start, by name")
-    planner_ms: Array = array("P", unit="ms wall clock per planner step since the last status")
-    tick_us: Array = array("K", unit="µs wall clock per control tick since the last status")
+    planner_ms: Array = array(
+        "P", entries=(), unit="ms wall clock per planner step since the last status"
+    )
+    tick_us: Array = array(
+        "K", entries=(), unit="µs wall clock per control tick since the last status"
+    )
 
 
 @record
@@ -209,13 +220,13 @@ class Truth(Message):
     """The world as the simulator knows it; no agent may use it outside `--estimator truth`."""
 
     robots: tuple[str, ...] = plain(list, "robot names, the order of the first axis")
-    base_pos: Array = array("n", 3, unit="m", frame="world")
-    base_quat_wxyz: Array = array("n", 4, unit="1", frame="trunk to world")
-    base_vel: Array = array("n", 3, unit="m/s", frame="world")
-    base_omega: Array = array("n", 3, unit="rad/s", frame="world")
-    grf: Array = array("n", 4, 3, unit="N", frame="world")
-    yoke_error: Array = array("k", unit="m")
-    yoke_force: Array = array("k", unit="N")
+    base_pos: Array = array("n", 3, entries=XYZ, unit="m", frame="world")
+    base_quat_wxyz: Array = array("n", 4, entries=WXYZ, unit="1", frame="trunk to world")
+    base_vel: Array = array("n", 3, entries=XYZ, unit="m/s", frame="world")
+    base_omega: Array = array("n", 3, entries=XYZ, unit="rad/s", frame="world")
+    grf: Array = array("n", 4, 3, entries=FORCES, unit="N", frame="world")
+    yoke_error: Array = array("k", entries=ONE, unit="m")
+    yoke_force: Array = array("k", entries=ONE, unit="N")
 
 
 @record

@@ -1,12 +1,19 @@
-"""The table of topics: key, message type, rate, maximum age."""
+"""The table of topics: key, message type, period, maximum age, who sends it and who takes it.
+
+What the entries of a message's arrays are called stands with its fields, in `wire.messages`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Final
 
+from quadriga.shared.bus import members
+from quadriga.shared.bus.members import AGENT, LAUNCHER, OPERATOR, PLANNER, SIM
 from quadriga.shared.errors import MessageError
 from quadriga.shared.wire import messages as msg
+
+CONFIGURED: Final = -1  # a time that the configuration says: see `quadriga.shared.config.timing`
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,17 +23,24 @@ class Topic:
     Attributes:
         name: last part of the key; `per_robot` tells whether a robot's name stands before it.
         type: the message's dataclass.
-        rate_hz: nominal rate; 0 means on event.
+        senders: roles whose processes publish it.
+        receivers: roles whose processes act on it, the recorder aside.
+        per_robot: whether every robot has one of its own.
+        period_ms: world time between two of them; 0: sent on event; or `CONFIGURED`.
         max_age_ms: longest gap between two of them, in world time, that is nothing unusual; of a
-            reference also how long it is obeyed. 0: none, or the configuration says it:
-            `quadriga.shared.recording.sequence.max_ages`.
+            reference also how long it is obeyed. 0: none; or `CONFIGURED`.
+        recorded: whether it is part of a recording of everything.
     """
 
     name: str
     type: type[msg.Message]
-    per_robot: bool
-    rate_hz: float
-    max_age_ms: int
+    senders: tuple[str, ...]
+    receivers: tuple[str, ...]
+    _: KW_ONLY
+    per_robot: bool = False
+    period_ms: int
+    max_age_ms: int = 0
+    recorded: bool = True
 
     def key(self, team: str, robot: str = "") -> str:
         """The Zenoh key of this topic; `robot` may be `*`."""
@@ -35,22 +49,48 @@ class Topic:
 
 SAMPLE_MS: Final = 10  # one sample of u and y: forces are means over it, outputs taken at its end
 REFERENCE_EPOCH_MS: Final = 100  # the operator speaks at multiples of this
+STATUS_MS: Final = 100  # so often an agent gives account of itself in lock-step
 
-STATE: Final = Topic("state", msg.State, True, 1000.0, 20)
-COMMAND: Final = Topic("command", msg.Command, True, 1000.0, 20)
-MEASUREMENT: Final = Topic("measurement", msg.Measurement, True, 1000.0 / SAMPLE_MS, 200)
-PLAN: Final = Topic("plan", msg.Plan, True, 25.0, 0)
-STATUS: Final = Topic("status", msg.Status, True, 10.0, 1000)
-INPUTS: Final = Topic("inputs", msg.Consumed, True, 0.0, 0)
-REFERENCE: Final = Topic("reference", msg.Reference, False, 1000.0 / REFERENCE_EPOCH_MS, 500)
-ESTOP: Final = Topic("estop", msg.EStop, False, 0.0, 0)
-TRUTH: Final = Topic("sim/truth", msg.Truth, False, 1000.0 / SAMPLE_MS, 0)
-EVENT: Final = Topic("sim/event", msg.Event, False, 0.0, 0)
+_PLANS: Final = (AGENT, PLANNER)  # who plans
+
+STATE: Final = Topic(
+    "state", msg.State, (SIM,), (AGENT,), per_robot=True, period_ms=1, max_age_ms=20
+)
+COMMAND: Final = Topic(
+    "command", msg.Command, (AGENT,), (SIM,), per_robot=True, period_ms=1, max_age_ms=20
+)
+MEASUREMENT: Final = Topic(
+    "measurement", msg.Measurement, (AGENT,), _PLANS,
+    per_robot=True, period_ms=SAMPLE_MS, max_age_ms=200,
+)  # fmt: skip
+PLAN: Final = Topic(
+    "plan", msg.Plan, _PLANS, (AGENT,),
+    per_robot=True, period_ms=CONFIGURED, max_age_ms=CONFIGURED,
+)  # fmt: skip
+STATUS: Final = Topic(
+    "status", msg.Status, (*_PLANS, SIM), (),
+    per_robot=True, period_ms=CONFIGURED, max_age_ms=1000,
+)  # fmt: skip
+INPUTS: Final = Topic("inputs", msg.Consumed, (AGENT,), (), per_robot=True, period_ms=0)
+REFERENCE: Final = Topic(
+    "reference", msg.Reference, (OPERATOR,), _PLANS, period_ms=REFERENCE_EPOCH_MS, max_age_ms=500
+)
+ESTOP: Final = Topic("estop", msg.EStop, (members.ESTOP,), (AGENT,), period_ms=0)
+TRUTH: Final = Topic(
+    "sim/truth", msg.Truth, (SIM,), (AGENT, OPERATOR, LAUNCHER, members.ESTOP),
+    period_ms=CONFIGURED,
+)  # fmt: skip
+EVENT: Final = Topic("sim/event", msg.Event, (SIM,), (*_PLANS, OPERATOR, LAUNCHER), period_ms=0)
 
 TABLE: Final = (
     STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, ESTOP, TRUTH, EVENT,
 )  # fmt: skip
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}
+
+
+def topics_for(role: str) -> tuple[Topic, ...]:
+    """What the processes of a role receive, in the order of the table."""
+    return tuple(topic for topic in TABLE if role in topic.receivers)
 
 
 def topic_of(key: str) -> tuple[Topic, str]:

@@ -6,7 +6,8 @@ from typing import Final
 
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.shared.config.sections import Config
-from quadriga.shared.recording.sequence import TickTrack, max_ages, periods
+from quadriga.shared.config.timing import max_ages, periods
+from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.wire.messages import Plan, Status
 from quadriga.shared.wire.topics import (

@@ -15,12 +15,12 @@ from mcap.records import Schema
 
 from quadriga.commands.parser import main
 from quadriga.recordings.metadata import build_metadata
+from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording import seal as recording_seal
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.mcap_chunk import check_schema
 from quadriga.shared.recording.reader import Recording, RecordingWriter
-from quadriga.shared.recording.sequence import periods
 from quadriga.shared.wire import messages as msg
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import State

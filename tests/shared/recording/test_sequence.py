@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.shared.config.sections import Config, EstimatorConfig, PlannerConfig, WorldConfig
-from quadriga.shared.recording.sequence import TickTrack, periods
+from quadriga.shared.recording.sequence import TickTrack
 
 
 @given(
@@ -61,15 +60,3 @@ def test_a_file_goes_on_where_the_one_before_ended() -> None:
     track = TickTrack(10, before=90)
     track.note(120)
     assert (track.lost, track.gaps, track.first) == (2, [(90, 120)], 120)
-
-
-def test_periods_follow_the_configuration() -> None:
-    assert periods(Config())["plan"] == 40
-    assert periods(Config())["sim/truth"] == 10
-    other = Config(
-        planner=PlannerConfig(applied=2),
-        estimator=EstimatorConfig(kind="truth"),
-        world=WorldConfig(mode="realtime"),
-    )
-    assert (periods(other)["plan"], periods(other)["sim/truth"]) == (20, 1)
-    assert periods(other)["status"] == 0

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import pytest
 
+from quadriga.agents.inbox.inbox import Inbox
+from quadriga.shared.bus import members
+from quadriga.shared.config.load import load
+from quadriga.shared.config.timing import max_ages, periods
 from quadriga.shared.errors import MessageError
+from quadriga.shared.runtime.places import SOURCE
+from quadriga.shared.wire.markdown import to_markdown
 from quadriga.shared.wire.messages import Flat, Message
-from quadriga.shared.wire.topics import TABLE, Topic, topic_of
+from quadriga.shared.wire.topics import CONFIGURED, TABLE, Topic, topic_of, topics_for
 
 rows = pytest.mark.parametrize("topic", TABLE, ids=lambda topic: topic.name)
 
@@ -20,9 +26,42 @@ def test_a_key_leads_back_to_its_row(topic: Topic, team: str) -> None:
 
 @rows
 def test_a_row_is_plausible(topic: Topic) -> None:
-    assert 0.0 <= topic.rate_hz <= 1000.0
-    # An input must be allowed to miss at least one turn before it counts as too old.
-    assert topic.max_age_ms == 0 or topic.rate_hz == 0 or topic.max_age_ms >= 2e3 / topic.rate_hz
+    assert topic.period_ms >= 0 or topic.period_ms == CONFIGURED
+    assert topic.max_age_ms >= 0 or topic.max_age_ms == CONFIGURED
+    roles = {role.name for role in members.ROLES} | {members.LAUNCHER, members.ESTOP}
+    assert topic.senders
+    assert {*topic.senders, *topic.receivers} <= roles
+
+
+@rows
+@pytest.mark.parametrize("preset", ["usual", "fast"])
+def test_an_input_may_miss_a_turn_before_it_is_too_old(topic: Topic, preset: str) -> None:
+    config = load(None, {"planner.preset": preset})
+    period, age = periods(config)[topic.name], max_ages(config)[topic.name]
+    assert min(period, age) >= 0
+    assert period <= 1000
+    assert age == 0 or age >= 2 * period
+
+
+@rows
+def test_one_robot_has_what_per_robot_says(topic: Topic) -> None:
+    agents_alone = {members.AGENT} & {*topic.senders, *topic.receivers}
+    assert not topic.per_robot or agents_alone
+
+
+@pytest.mark.parametrize("kind", ["distributed", "centralised", "none"])
+@pytest.mark.parametrize("estimator", ["kalman", "truth"])
+def test_an_agent_takes_what_the_table_says(kind: str, estimator: str) -> None:
+    config = load(None, {"planner.kind": kind, "estimator.kind": estimator})
+    taken = {topic for topic, _ in Inbox(config, "r1", ["r2"]).topics.values()}
+    assert taken <= {*topics_for(members.AGENT)}
+    if kind == "distributed" and estimator == "truth":
+        assert taken == {*topics_for(members.AGENT)}
+
+
+def test_the_page_is_in_step_with_the_tables() -> None:
+    page = SOURCE / "docs" / "messages.md"
+    assert page.read_text(encoding="utf-8") == to_markdown()
 
 
 def test_every_message_type_has_one_row_and_one_name() -> None:

@@ -1,0 +1,38 @@
+"""How often each topic is sent, and how old it may grow, where the configuration says it."""
+
+from __future__ import annotations
+
+from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.wire.topics import CONFIGURED, PLAN, SAMPLE_MS, STATUS, STATUS_MS, TABLE, TRUTH
+
+
+def periods(config: Config) -> dict[str, int]:
+    """World time between two messages of a topic by its name, ms; 0: sent on event.
+
+    In real time an agent that was late says its status later.
+    """
+    configured = {
+        PLAN: SAMPLE_MS * config.planner.applied,
+        STATUS: STATUS_MS if config.world.mode == "lockstep" else 0,
+        TRUTH: 1 if config.estimator.kind == "truth" else SAMPLE_MS,
+    }
+    return {
+        topic.name: configured[topic] if topic.period_ms == CONFIGURED else topic.period_ms
+        for topic in TABLE
+    }
+
+
+def max_ages(config: Config) -> dict[str, int]:
+    """Longest gap, and greatest age in use, that is nothing unusual, by topic, ms; 0: none.
+
+    A plan is used until who made it is given up. Those of peers are of the step before; those of
+    a central planner come its latency after their data.
+    """
+    planner = config.planner
+    late = max(1, planner.latency_ms) if planner.kind in CENTRAL else 0
+    steps = 1 + planner.max_peer_age + planner.hold_steps
+    configured = {PLAN: steps * SAMPLE_MS * planner.applied + late}
+    return {
+        topic.name: configured[topic] if topic.max_age_ms == CONFIGURED else topic.max_age_ms
+        for topic in TABLE
+    }

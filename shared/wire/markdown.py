@@ -1,0 +1,65 @@
+"""The table of topics and their messages as a page: `python -m quadriga.shared.wire.markdown`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields
+
+from quadriga.shared.wire.messages import Message
+from quadriga.shared.wire.topics import CONFIGURED, TABLE, Topic
+
+_HEAD = """\
+# Topics and messages
+
+What the processes of a team tell each other. A key on the bus is `<team>/<robot>/<topic>` where a
+topic is one per robot, else `<team>/<topic>`; the planner and the sim server have a `status` under
+their own names. Every message also carries `tick` [ms] and `stamp_ns` [ns], the world's time of its
+content. Periods and ages are world time; the recorder takes what the last column says.
+This page is generated: `python -m quadriga.shared.wire.markdown > docs/messages.md`.
+
+| topic | per robot | message | from | to | period | maximum age | recorded |
+|---|---|---|---|---|---|---|---|
+"""
+
+
+def to_markdown() -> str:
+    """The page: the table of topics, then a table for each message."""
+    rows = "".join(f"| {' | '.join(_row(topic))} |\n" for topic in TABLE)
+    return _HEAD + rows + "".join(_section(topic.type) for topic in TABLE)
+
+
+def _row(topic: Topic) -> Iterator[str]:
+    yield f"`{topic.name}`"
+    yield "yes" if topic.per_robot else ""
+    yield f"[{topic.type.__name__}](#{topic.type.__name__.lower()})"
+    yield ", ".join(topic.senders)
+    yield ", ".join(topic.receivers)
+    yield _time(topic.period_ms, "on event")
+    yield _time(topic.max_age_ms, "")
+    yield "yes" if topic.recorded else "no"
+
+
+def _time(ms: int, nothing: str) -> str:
+    if ms == CONFIGURED:
+        return "configured"
+    return f"{ms} ms" if ms else nothing
+
+
+def _section(kind: type[Message]) -> str:
+    summary = (kind.__doc__ or "").strip().splitlines()[0]
+    lines = ["", f"## {kind.__name__}", "", summary, ""]
+    lines += ["| field | shape | unit | frame, or meaning |", "|---|---|---|---|"]
+    for item in fields(kind):
+        meta = item.metadata
+        if item.name in ("tick", "stamp_ns"):
+            continue
+        if "shape" in meta:
+            shape = " × ".join(map(str, meta["shape"]))
+            lines.append(f"| `{item.name}` | {shape} | {meta['unit']} | {meta['frame']} |")
+        else:
+            lines.append(f"| `{item.name}` | {meta['kind'].__name__} | | {meta['doc']} |")
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    print(to_markdown(), end="")
