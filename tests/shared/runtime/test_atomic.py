@@ -1,0 +1,41 @@
+"""A file is there whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from quadriga.shared.runtime.atomic import atomic_write, write_text
+
+
+def test_a_file_is_replaced_as_a_whole(tmp_path: Path) -> None:
+    path = tmp_path / "notes.txt"
+    write_text(path, "old")
+    with atomic_write(path) as partial:
+        partial.write_text("new")
+        assert path.read_text() == "old"
+    assert path.read_text() == "new"
+    assert [*tmp_path.iterdir()] == [path]
+
+
+def test_what_fails_leaves_all_as_it_was(tmp_path: Path) -> None:
+    path = tmp_path / "notes.txt"
+    write_text(path, "± old")
+
+    def fail() -> None:
+        with atomic_write(path) as partial:
+            partial.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fail()
+    assert path.read_text(encoding="utf-8") == "± old"
+    assert [*tmp_path.iterdir()] == [path]
+
+
+def test_nothing_written_is_nothing_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "figure.png"
+    with atomic_write(path):
+        pass
+    assert not path.exists()
