@@ -12,7 +12,7 @@ from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
-from quadriga.shared.wire.codec import encode, sendable
+from quadriga.shared.wire.codec import encode, truncate_text
 from quadriga.shared.wire.messages import Command, Event, Status
 from quadriga.shared.wire.topics import EVENT, STATE, STATUS, TRUTH
 
@@ -61,7 +61,7 @@ class PlantServer:
     def announce(self, kind: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""
         tick = self.plant.tick
-        self._send(Event(tick, tick * 1_000_000, kind, robot, sendable(detail)))
+        self._send(Event(tick, tick * 1_000_000, kind, robot, truncate_text(detail)))
 
     def publish_status(self, status: Status) -> None:
         """Publish the plant's account of itself."""

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from quadriga.agents.agent import Agent
-from quadriga.shared.config.load import build, overlaid
+from quadriga.shared.config.load import build, overlay
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.config.write import departures
 from quadriga.shared.errors import ConfigError
@@ -22,7 +22,7 @@ def change_config(config: Config, given: Mapping[str, Any]) -> Config:
     overrides = {
         f"{section}.{key}": value for section, keys in given.items() for key, value in keys.items()
     }
-    return build(overlaid(asdict(config), overrides))
+    return build(overlay(asdict(config), overrides))
 
 
 def format_changes(old: Config, new: Config) -> str:

@@ -106,13 +106,14 @@ class Launch:
             ProcessError: a process failed, left while the walk went on, or stays after it; it
                 names the process, how it ended and its last words.
         """
-        left, early = 0.0, ""
+        first_to_leave, left_at = "", 0.0
         while SIM in self._running:
             for name in list(self._running):
-                if self._reap(name) and name != SIM:
-                    left, early = left or monotonic(), early or name
-            if left and monotonic() - left > _EARLY:
-                raise self._error(early, "an end while the team walked", "to walk until the end")
+                if self._reap(name) and name != SIM and not first_to_leave:
+                    first_to_leave, left_at = name, monotonic()
+            if first_to_leave and monotonic() - left_at > _EARLY:
+                got, expected = "an end while the team walked", "to walk until the end"
+                raise self._error(first_to_leave, got, expected)
             if look():
                 self.stop()
                 return

@@ -14,7 +14,7 @@ from quadriga.shared.errors import BusError, MessageError
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.wire.codec import decode, encode, sendable
+from quadriga.shared.wire.codec import decode, encode, truncate_text
 from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.messages import EStop, Event, Reference, Truth
 from quadriga.shared.wire.topics import ESTOP, REFERENCE, TRUTH, topics_for
@@ -100,7 +100,7 @@ def stop_team(config: Config, reason: str) -> None:
         BusError: the bus cannot be opened, or some robots were not reached.
     """
     team, names = config.team.name, robot_names(config.team.robots)
-    reason = sendable(reason, _LONGEST_REASON)
+    reason = truncate_text(reason, _LONGEST_REASON)
     with Bus.open(config.bus, team, members.ESTOP) as bus:
         put = bus.publisher(ESTOP.key(team))
         for topic in topics_for(members.ESTOP):

@@ -62,10 +62,10 @@ def start_together(bus: Bus, config: Config, stopped: Callable[[], bool]) -> boo
 
 
 def _check_single(bus: Bus, config: Config) -> None:
-    if doubles := bus.doubles(HERE):
+    if duplicates := bus.duplicates(HERE):
         raise BusError(
             f"team {bus.team!r} at {config.bus.endpoint}",
-            f"two processes named {', '.join(sorted(doubles))}",
+            f"two processes named {', '.join(sorted(duplicates))}",
             "one of each name",
             "a second team with this team.name, or a process started twice",
         )

@@ -11,8 +11,14 @@ from typing import Any, Final, Self
 
 import zenoh
 
-from quadriga.shared.bus.members import ROUTER, SIM
-from quadriga.shared.bus.zenoh_settings import at_fault, member_settings, router_settings
+from quadriga.shared.bus.members import ROUTER
+from quadriga.shared.bus.presence import Presence
+from quadriga.shared.bus.zenoh_settings import (
+    NO_LINK,
+    member_settings,
+    opening_error,
+    router_settings,
+)
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
 from quadriga.shared.runtime.clock import monotonic, sleep
@@ -25,7 +31,6 @@ POLL: Final = 0.1  # s, longest wait before a loop looks at its stop flag
 _ACK: Final = "received"  # key of the question whether everything before it has arrived
 _ACK_TIMEOUT: Final = 2.0  # s
 _LINK_TIMEOUT: Final = 5.0  # s
-_NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
 
 
 class Bus:
@@ -44,17 +49,19 @@ class Bus:
         self._session = session
         self._me = str(session.info.zid())
         self._inbox: SimpleQueue[zenoh.Sample] = SimpleQueue()
-        self._tokens: set[tuple[str, str, str]] = set()  # name, stage, session of the others
+        self._presence = Presence(self._me)
         self._declared: dict[str, zenoh.LivelinessToken] = {}
         self._closed = False
-        self._kept: list[Any] = []  # Zenoh drops publishers and subscribers nobody refers to
-        self._kept.append(
+        self._declarations: list[
+            Any
+        ] = []  # Zenoh drops publishers and subscribers nobody refers to
+        self._declarations.append(
             session.liveliness().declare_subscriber(
                 f"{team}/*/*/*", _direct(self._note_token), history=True
             )
         )
         ack = f"{team}/{name}/{_ACK}"
-        self._kept.append(
+        self._declarations.append(
             session.declare_queryable(ack, _direct(lambda query: query.reply(ack, b"")))
         )
 
@@ -80,7 +87,7 @@ class Bus:
             try:
                 return cls(_open(settings, name), team, name)
             except BusError as error:
-                if _NO_LINK not in error.got or monotonic() > deadline:
+                if NO_LINK not in error.got or monotonic() > deadline:
                     raise
             if stopped and stopped():
                 raise KeyboardInterrupt
@@ -135,13 +142,13 @@ class Bus:
         """
         control = zenoh.CongestionControl.DROP if droppable else zenoh.CongestionControl.BLOCK
         publisher = self._session.declare_publisher(key, express=True, congestion_control=control)
-        self._kept.append(publisher)
+        self._declarations.append(publisher)
         put: Callable[[bytes], None] = publisher.put
         return put
 
     def subscribe(self, key: str) -> None:
         """Feed what others publish on `key` (may hold `*` and `**`) into the inbox."""
-        self._kept.append(
+        self._declarations.append(
             self._session.declare_subscriber(
                 key, _direct(self._inbox.put), allowed_origin=zenoh.Locality.REMOTE
             )
@@ -177,13 +184,11 @@ class Bus:
 
     def present(self, stage: str) -> frozenset[str]:
         """Names of the other processes that are at `stage` now."""
-        return frozenset(name for name, at, _ in self._tokens.copy() if at == stage)
+        return self._presence.at(stage)
 
-    def doubles(self, stage: str) -> frozenset[str]:
+    def duplicates(self, stage: str) -> frozenset[str]:
         """Names that two processes of the team carry at `stage`, this one's included."""
-        sessions = [name for name, at, _ in self._tokens.copy() if at == stage]
-        sessions += [self.name] if stage in self._declared else []
-        return frozenset(name for name in sessions if sessions.count(name) > 1)
+        return self._presence.duplicates(stage, [self.name] if stage in self._declared else [])
 
     def wait_for(
         self, stage: str, names: Iterable[str], timeout: float, stopped: Callable[[], bool]
@@ -224,7 +229,7 @@ class Bus:
         if self._flush():
             self._session.close()  # type: ignore[no-untyped-call]
             return
-        for declared in self._kept:
+        for declared in self._declarations:
             declared.undeclare()
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._session))
 
@@ -250,13 +255,7 @@ class Bus:
         return all(reply.ok is not None for reply in asked)
 
     def _note_token(self, sample: zenoh.Sample) -> None:
-        _, name, stage, session = str(sample.key_expr).split("/")
-        if session == self._me:
-            return
-        if sample.kind == zenoh.SampleKind.PUT:
-            self._tokens.add((name, stage, session))
-        else:
-            self._tokens.discard((name, stage, session))
+        self._presence.note(str(sample.key_expr), there=sample.kind == zenoh.SampleKind.PUT)
 
 
 def _direct(call: Callable[[Any], None]) -> Any:
@@ -271,22 +270,4 @@ def _open(settings: dict[str, Any], name: str) -> zenoh.Session:
             config.insert_json5(at, json.dumps(value))
         return zenoh.open(config)
     except zenoh.ZError as error:
-        raise _cannot_open(*at_fault(settings, at, str(error)), name, str(error)) from None
-
-
-def _cannot_open(key: str, endpoint: str, name: str, error: str) -> BusError:
-    if "in use" in error:
-        cause = "another team or program listens there; choose another port"
-    elif _NO_LINK in error:
-        cause = "no router there (`quadriga router`), or a name that does not resolve"
-    elif "assign" in error:
-        cause = "no interface of this machine has that address"
-    else:
-        cause = "a name that does not resolve, or not of the form tcp/HOST:PORT"
-    where = "sim server" if name == SIM else name
-    return BusError(
-        f"{key} {endpoint!r} of {where}",
-        error.split(" at /")[0],
-        "an endpoint that can be opened",
-        cause,
-    )
+        raise opening_error(settings, at, name, str(error)) from None

@@ -6,7 +6,9 @@ from typing import Any, Final
 
 from quadriga.shared.bus.members import SIM
 from quadriga.shared.config.sections import BusConfig
+from quadriga.shared.errors import BusError
 
+NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
 _COMMON: Final = {
     # Nobody is found by multicast, nothing goes through shared memory.
     "scouting/multicast/enabled": False,
@@ -60,13 +62,37 @@ def router_settings(listen: str) -> dict[str, Any]:
     }
 
 
-def at_fault(settings: dict[str, Any], at: str, error: str) -> tuple[str, str]:
-    """The key of the configuration that Zenoh's error is about, and its value.
+def opening_error(settings: dict[str, Any], at: str, name: str, error: str) -> BusError:
+    """The error of a process that cannot join the network.
 
     Args:
         settings: all of Zenoh's.
         at: the last of them that was set.
-        error: Zenoh's words, which often do not say.
+        name: the process.
+        error: Zenoh's words.
+    """
+    key, endpoint = _key_at_fault(settings, at, error)
+    if "in use" in error:
+        cause = "another team or program listens there; choose another port"
+    elif NO_LINK in error:
+        cause = "no router there (`quadriga router`), or a name that does not resolve"
+    elif "assign" in error:
+        cause = "no interface of this machine has that address"
+    else:
+        cause = "a name that does not resolve, or not of the form tcp/HOST:PORT"
+    where = "sim server" if name == SIM else name
+    return BusError(
+        f"{key} {endpoint!r} of {where}",
+        error.split(" at /")[0],
+        "an endpoint that can be opened",
+        cause,
+    )
+
+
+def _key_at_fault(settings: dict[str, Any], at: str, error: str) -> tuple[str, str]:
+    """The key of the configuration that Zenoh's error is about, and its value.
+
+    Zenoh often does not say; `at` is the setting that was made last.
     """
     connect, listen = settings["connect/endpoints"], settings["listen/endpoints"]
     if not (connect and listen):

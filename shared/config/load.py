@@ -12,7 +12,7 @@ from typing import Any
 
 from quadriga.shared.config.check import check
 from quadriga.shared.config.presets import PRESETS, preset_keys
-from quadriga.shared.config.reference_trace import ROW_END, inlined
+from quadriga.shared.config.reference_trace import ROW_END, inline_trace
 from quadriga.shared.config.renamed import RENAMED
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
@@ -42,11 +42,11 @@ def layers(
     """
     given = read_toml(beneath) if beneath else {}
     if path:
-        given = overlaid(given, flattened(read_toml(path))) if given else read_toml(path)
-    return overlaid(given, overrides)
+        given = overlay(given, flatten(read_toml(path))) if given else read_toml(path)
+    return overlay(given, overrides)
 
 
-def overlaid(given: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
+def overlay(given: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """`given`, by section and key, with `overrides`, by `section.key`, on top.
 
     A preset that comes with the overrides also replaces what the file says of the keys that
@@ -68,7 +68,7 @@ def overlaid(given: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, A
     reference = given.get("reference")
     trace = reference.get("trace") if isinstance(reference, dict) else None
     if isinstance(trace, str) and "/" in trace and ROW_END not in trace:
-        given["reference"]["trace"] = inlined(Path(trace))
+        given["reference"]["trace"] = inline_trace(Path(trace))
     return given
 
 
@@ -105,7 +105,7 @@ def parse_assignment(text: str, option: str = "--set") -> tuple[str, Any]:
         return name.strip(), value.strip()
 
 
-def flattened(tables: Mapping[str, Any]) -> dict[str, Any]:
+def flatten(tables: Mapping[str, Any]) -> dict[str, Any]:
     """Values by `section.key` of tables by section; what is no table keeps its name."""
     return {
         f"{section}.{key}" if key else section: value

@@ -79,7 +79,7 @@ def trace_sha256(config: Config) -> str:
         ) from None
 
 
-def inlined(path: Path) -> str:
+def inline_trace(path: Path) -> str:
     """A trace's file as one line, as `reference.trace` holds it: nothing then depends on the file.
 
     Raises:

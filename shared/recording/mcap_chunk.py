@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
 from quadriga.shared.errors import MessageError
-from quadriga.shared.recording.seal import newer
+from quadriga.shared.recording.seal import newer_format_error
 from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.topics import TABLE, topic_of
 
@@ -98,7 +98,9 @@ def check_schema(schema: Schema, path: str) -> None:
     except (ValueError, TypeError, LookupError, RecursionError):
         return
     if isinstance(version, int) and version > mine:
-        raise newer(path, f"messages {schema.name} of schema {version}", f"schema {mine}")
+        raise newer_format_error(
+            path, f"messages {schema.name} of schema {version}", f"schema {mine}"
+        )
 
 
 def name_of(key: str) -> str:

@@ -37,11 +37,11 @@ def unseal(stored: Mapping[str, str], name: str) -> dict[str, str]:
         )
     version = values.pop(_FORMAT_KEY, "1")
     if version != str(FORMAT):
-        raise newer(name, f"a recording of format {version[:20]}", f"format {FORMAT}")
+        raise newer_format_error(name, f"a recording of format {version[:20]}", f"format {FORMAT}")
     return values
 
 
-def newer(name: str, got: str, expected: str) -> RecordingError:
+def newer_format_error(name: str, got: str, expected: str) -> RecordingError:
     """The error of a file that only a later version of this project can read."""
     return RecordingError(name, got, expected, "recorded by a newer quadriga: update this one")
 

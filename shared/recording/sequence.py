@@ -33,7 +33,7 @@ class TickTrack:
             before: tick of the message before the first one here, −1 if unknown.
         """
         self._period, self.last = period, before
-        self._odd = -1  # tick that no other has borne out yet
+        self._odd = -1  # tick that no message has confirmed yet
         self.first = -1
         self.count = self.lost = 0
         self.gaps: list[Gap] = []
@@ -55,7 +55,8 @@ class TickTrack:
 
     def _go_on(self, tick: int) -> None:
         step = tick - self.last
-        if step > self._period > 0 <= self.last and step < _JUMP:
+        counted = self._period > 0 and self.last >= 0
+        if counted and self._period < step < _JUMP:
             missing = (step - 1) // self._period
             self.lost += missing
             if missing and len(self.gaps) < _KEPT:

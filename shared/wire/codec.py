@@ -41,7 +41,7 @@ def encode(message: Message) -> bytes:
     return packed
 
 
-def sendable(text: str, limit: int = MAX_TEXT) -> str:
+def truncate_text(text: str, limit: int = MAX_TEXT) -> str:
     """`text` as a message may hold it: cut to `limit` characters, a `?` for what UTF-8 cannot say.
 
     What was typed in a terminal of another encoding holds such characters.
@@ -215,4 +215,4 @@ def _error(
     kind: type[Message], got: str, expected: str, cause: str, name: str = ""
 ) -> MessageError:
     label = f"{kind.__name__.lower()}.{name}" if name else kind.__name__.lower()
-    return MessageError(label, sendable(got, _MOST_SAID), expected, cause)
+    return MessageError(label, truncate_text(got, _MOST_SAID), expected, cause)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from quadriga.experiments.trial.variants import PLANNERS, Keys
-from quadriga.shared.config.load import flattened, parse_assignment, read_toml
+from quadriga.shared.config.load import flatten, parse_assignment, read_toml
 from quadriga.shared.errors import ConfigError
 
 _NAME: Final = re.compile(r"[A-Za-z0-9_.+-]{1,40}")
@@ -138,4 +138,4 @@ def keys_of(tables: Mapping[str, Any], where: str) -> dict[str, Keys]:
     for name, keys in tables.items():
         if not _NAME.fullmatch(name) or not isinstance(keys, dict):
             raise ConfigError(f"{where}: {name}", "no table of a plain name", "[name] and its keys")
-    return {name: flattened(keys) for name, keys in tables.items()}
+    return {name: flatten(keys) for name, keys in tables.items()}

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from quadriga.experiments.campaign.choice import Sweep, Variant
-from quadriga.shared.config.load import build, layers, overlaid
+from quadriga.shared.config.load import build, layers, overlay
 from quadriga.shared.config.presets import PRESETS, preset_keys
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
@@ -159,7 +159,7 @@ def _files(names: Sequence[str]) -> dict[str, Path]:
 
 
 def _over(given: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
-    return overlaid(deepcopy(given), keys)
+    return overlay(deepcopy(given), keys)
 
 
 def _replaced(swept: Iterable[str]) -> set[str]:

@@ -23,7 +23,7 @@ from quadriga.experiments.published.measures import MEASURES
 from quadriga.experiments.published.outcome_columns import COLUMNS
 from quadriga.experiments.trial.variants import seeds_of
 from quadriga.recordings.traces import ERRORS
-from quadriga.shared.config.load import flattened, read_toml
+from quadriga.shared.config.load import flatten, read_toml
 from quadriga.shared.errors import ConfigError
 from quadriga.team import scenarios
 
@@ -154,7 +154,7 @@ class _TomlTable:
 
 def _variants(table: _TomlTable) -> tuple[Variant, ...]:
     """Planners by name, then the tables; each on top of what all have in common."""
-    common = flattened(table.mapping("common"))
+    common = flatten(table.mapping("common"))
     planners = table.texts("planners", ())
     with _of(table, "planners"):
         found = list(variants_of([",".join(planners)], None)) if planners else []

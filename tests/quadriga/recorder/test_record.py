@@ -127,7 +127,7 @@ def test_beside_a_team_s_own_recorder_nobody_is_doubled(
         recorder = start(world)
         world.publisher("band/r1/state")(encode(state(0)))
         await_recorded(tmp_path, 1)
-        assert world.doubles(HERE) == frozenset()
+        assert world.duplicates(HERE) == frozenset()
         _, err = ended(recorder, world, tmp_path, 1)
     assert err == ""
     assert len(list(Recording(tmp_path / "run.mcap").entries())) == 1

@@ -75,7 +75,7 @@ def test_a_team_does_not_start_with_two_of_one_name() -> None:
         double.wait_for("here", {"sim", "operator"}, 10.0, never)
         sim.wait_for(READY, {"r1", "operator"}, 10.0, never)
         deadline = 100
-        while not sim.doubles("here") and deadline:
+        while not sim.duplicates("here") and deadline:
             sim.get(0.05)
             deadline -= 1
         with pytest.raises(BusError, match=r"two processes named r1, expected one of each name"):

@@ -206,12 +206,12 @@ def test_a_barrier_can_be_left(opened: Open) -> None:
 def test_two_processes_of_one_name_are_noticed(opened: Open) -> None:
     sim, first, second = opened("sim"), opened("r1"), opened("r1")
     meet(sim, first)
-    assert sim.doubles(HERE) == frozenset()
+    assert sim.duplicates(HERE) == frozenset()
     second.declare(HERE)
     deadline = monotonic() + WAIT
-    while not (sim.doubles(HERE) and first.doubles(HERE)) and monotonic() < deadline:
+    while not (sim.duplicates(HERE) and first.duplicates(HERE)) and monotonic() < deadline:
         sim.get(0.01)
-    assert sim.doubles(HERE) == first.doubles(HERE) == {"r1"}
+    assert sim.duplicates(HERE) == first.duplicates(HERE) == {"r1"}
 
 
 def test_who_joins_is_found_without_a_sim_server_and_steps_back_for_one_who_listens(
@@ -292,7 +292,7 @@ def test_two_teams_at_one_router_do_not_mix(opened: Open, endpoint: str) -> None
             assert sim.get(WAIT) == (f"{team}/r1/x", team.encode())
             assert sim.get(0.1) is None
             assert sim.present(HERE) == {"r1"}
-            assert not sim.doubles(HERE)
+            assert not sim.duplicates(HERE)
         for _, sim, r1 in teams:
             r1.close()
             sim.close()

@@ -20,7 +20,7 @@ from quadriga.shared.wire.codec import (
     MAX_TICK,
     decode,
     encode,
-    sendable,
+    truncate_text,
 )
 from quadriga.shared.wire.messages import Command, Message, Plan, State, Status, Truth
 from quadriga.shared.wire.topics import TABLE
@@ -246,9 +246,9 @@ def test_the_error_about_foreign_fields_is_a_short_line() -> None:
 
 def test_text_is_made_fit_for_a_message() -> None:
     for text in ("", "Stürz", "x" * MAX_TEXT):
-        assert sendable(text) == text
-    assert sendable("x" * (MAX_TEXT + 1)) == "x" * (MAX_TEXT - 1) + "…"
-    assert sendable("St\udcfcrz", 4) == "St?…"
+        assert truncate_text(text) == text
+    assert truncate_text("x" * (MAX_TEXT + 1)) == "x" * (MAX_TEXT - 1) + "…"
+    assert truncate_text("St\udcfcrz", 4) == "St?…"
 
 
 def test_a_huge_message_is_refused_before_it_is_parsed() -> None:

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from quadriga.shared.config.reference_trace import inlined, trace_of
+from quadriga.shared.config.reference_trace import inline_trace, trace_of
 from quadriga.shared.config.sections import Config, ReferenceConfig
 from quadriga.shared.robot.a1 import Array
 from quadriga.sim_server.terrain.course import build_course
@@ -128,7 +128,7 @@ def test_terrain_follows_a_trace_and_not_the_speed_it_replaces(
         config = replace(
             config,
             world=replace(config.world, seconds=seconds),
-            reference=replace(config.reference, trace=inlined(trace)),
+            reference=replace(config.reference, trace=inline_trace(trace)),
         )
         places = formation(3, config.team.spacing)
         course = build_course(config, places)
