@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 
-from quadriga.commands.parser import parser
+from quadriga.commands.parser import build_parser
 from quadriga.shared.bus.members import LAST, RECORDER, ROLES, SIM, Role, team_members
 
 ROBOTS = ("r1", "r2")
@@ -23,7 +23,7 @@ def test_a_team_has_what_its_configuration_asks_for(central: bool, recorded: boo
 @pytest.mark.parametrize("role", ROLES, ids=lambda role: role.name)
 def test_every_role_is_a_subcommand(role: Role) -> None:
     robot = ["--robot", "r1"] if role.per_robot else []
-    arguments = parser().parse_args([role.command, *robot, "--parent", "1"])
+    arguments = build_parser().parse_args([role.command, *robot, "--parent", "1"])
     assert hasattr(arguments, "predictor") == role.predicts
 
 
