@@ -22,7 +22,7 @@ from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Reference, Truth
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, TRUTH
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.launch import Launch, table
+from quadriga.team.launch import Launch, process_table
 from quadriga.team.operator import reference_at
 
 
@@ -73,7 +73,7 @@ def over_the_bus(
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         (folder / "config.toml").write_text(to_toml(config), encoding="utf-8")
-        rows = table(config, folder, file, sha256)
+        rows = process_table(config, folder, file, sha256)
         memory: dict[str, dict[str, float]] = {}
         with Launch(rows, folder / "logs") as launch, _Watch(config) as watch:
 

@@ -25,7 +25,7 @@ def grade(age_ms: int, world: WorldConfig) -> str:
     return HOLD if age_ms <= world.command_damp_ms else DAMP
 
 
-def hold(state: State) -> Command:
+def hold_joints(state: State) -> Command:
     """The command that holds the joints where they are measured in `state`."""
     zero = np.zeros(N_JOINTS)
     kp, kd = np.full(N_JOINTS, _HOLD_KP), np.full(N_JOINTS, _HOLD_KD)

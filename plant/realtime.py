@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from quadriga.plant.deadlines import PERIOD_MS, Deadlines
-from quadriga.plant.late import FRESH, HOLD, grade, hold
+from quadriga.plant.late import FRESH, HOLD, grade, hold_joints
 from quadriga.plant.server import PlantServer
 from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.wire.messages import Command
@@ -58,7 +58,7 @@ class _Motors:
             elif command is None or state == HOLD:
                 self.deadlines.late[f"{name} held"] += 1
                 if name not in self._held:
-                    self._held[name] = hold(server.plant.states()[name])
+                    self._held[name] = hold_joints(server.plant.states()[name])
                 chosen[name] = self._held[name]
             else:
                 self.deadlines.late[f"{name} damped"] += 1

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import platform
 import zipfile
 from collections.abc import Mapping
@@ -20,6 +19,7 @@ from quadriga.agents.planner.gates import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorFileError
+from quadriga.shared.runtime.atomic import atomic_write
 
 FORMAT: Final = 2
 _PACKAGES: Final = ("quadriga", "numpy", "scipy", "mujoco", "pin", "daqp")
@@ -92,12 +92,10 @@ def save(path: Path, predictor: Predictor, provenance: Provenance) -> str:
         "meta": predictor.meta.to_dict(),
         "provenance": asdict(provenance),
     }
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with partial.open("wb") as file:
+        with atomic_write(path) as partial, partial.open("wb") as file:
             np.savez(file, G=predictor.G, document=np.array(json.dumps(document, sort_keys=True)))
-        partial.replace(path)
     except OSError as error:
         raise PredictorFileError(
             str(path), error.strerror or str(error), "a file that can be written"

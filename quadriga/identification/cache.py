@@ -17,7 +17,7 @@ from quadriga import agents, shared, sim_server
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.runtime.places import cache_dir
+from quadriga.shared.runtime.places import cache_file
 
 _LOOK = 0.2  # s, between two looks for a file that another process writes
 # What a recorded walk depends on: the code of the world and of the agent, and what they rest on.
@@ -83,12 +83,12 @@ def predictor_key(config: Config) -> str:
 
 def predictor_path(config: Config) -> Path:
     """Where the predictor of this configuration is kept."""
-    return cache_dir() / f"predictor-{predictor_key(config)}.npz"
+    return cache_file("predictor", predictor_key(config))
 
 
 def data_path(config: Config) -> Path:
     """Where the collected data of this configuration are kept."""
-    return cache_dir() / f"data-{data_key(config)}.npz"
+    return cache_file("data", data_key(config))
 
 
 def await_predictor(path: Path, timeout: float) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from quadriga.agents.predictor.hankel import excitation, required_samples
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
 from quadriga.shared.robot.a1 import N_FORCES, Array
+from quadriga.shared.runtime.atomic import atomic_write
 
 _FIELDS: Final = (*SIGNALS, "first_tick")
 
@@ -66,10 +66,8 @@ def write_data(path: Path, dataset: Dataset) -> None:
         for k, episode in enumerate(getattr(dataset, part))
         for name in _FIELDS
     }
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    with partial.open("wb") as file:
+    with atomic_write(path) as partial, partial.open("wb") as file:
         np.savez(file, **arrays)
-    partial.replace(path)
 
 
 def read_data(path: Path) -> Dataset:

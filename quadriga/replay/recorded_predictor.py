@@ -15,7 +15,7 @@ from quadriga.agents.predictor.store import predictor_sha256, read
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.errors import PredictorError, RecordingError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.runtime.places import cache_dir
+from quadriga.shared.runtime.places import cache_dir, cache_files
 
 PREDICTOR: Final = "predictor.npz"  # its name in a run folder
 
@@ -62,7 +62,7 @@ def find_predictor(
         predictor = read(given)[0]
         return predictor, not sha256 or predictor_sha256(predictor) == sha256
     beside = recording.path.parent / PREDICTOR
-    for path in (beside, *sorted(cache_dir().glob("predictor-*.npz"))):
+    for path in (beside, *cache_files("predictor")):
         if sha256 and _read_digest(path) == sha256:
             return read(path)[0], True
     wanted = f"with digest {sha256[:16]}…" if sha256 else "of unknown digest"

@@ -44,7 +44,7 @@ class ProcessSpec:
     grace: float
 
 
-def table(
+def process_table(
     config: Config, run_dir: Path, predictor: Path | None, sha256: str
 ) -> tuple[ProcessSpec, ...]:
     """The processes of a walk, in the order in which they are started.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from quadriga.shared.config.reference_trace import scenario_folder
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.runtime.places import scenario_folder
 
 LABEL: Final = "world.scenario"  # the key that carries a scenario's name
 _SUFFIX: Final = ".toml"

@@ -17,7 +17,7 @@ from quadriga.shared.config.write import to_toml
 from quadriga.shared.runtime.signals import stop_flag
 from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
-from quadriga.team.launch import Launch, ProcessSpec, table
+from quadriga.team.launch import Launch, ProcessSpec, process_table
 from quadriga.team.progress import WalkProgress
 from quadriga.team.run_folder import CONFIG, make_run_dir, report, went_wrong
 from quadriga.warm_up import warm_up
@@ -50,7 +50,7 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
         sha256 = predictor_sha256(load(predictor, config)[0])
         copy_predictor(predictor, run_dir)
     (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
-    rows = table(config, run_dir, predictor, sha256)
+    rows = process_table(config, run_dir, predictor, sha256)
     with stop_flag() as stopped:
         fallen = follow(config, rows, run_dir, stopped, console)
         if stopped():

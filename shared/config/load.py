@@ -84,8 +84,10 @@ def build(given: Mapping[str, Any]) -> Config:
             given = {**given, section: {**presets.get(str(keys.get("preset")), {}), **keys}}
     known = {item.name: item for item in fields(Config)}
     for section in given.keys() - known.keys():
-        raise _unknown(section, list(known), "a section")
-    config = Config(**{name: _section(item, given.get(name, {})) for name, item in known.items()})
+        raise _unknown_name(section, list(known), "a section")
+    config = Config(
+        **{name: _build_section(item, given.get(name, {})) for name, item in known.items()}
+    )
     check(config)
     return config
 
@@ -133,34 +135,36 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise ConfigError(str(path), str(error), "TOML") from None
 
 
-def _section(item: Field[Any], given: Any) -> Any:
+def _build_section(item: Field[Any], given: Any) -> Any:
     kind = item.default_factory
     if not isinstance(given, dict):
         raise ConfigError(item.name, repr(given), f"a section, written [{item.name}]")
     known = {key.name: key for key in fields(kind)}  # type: ignore[arg-type]
     for name in given.keys() - known.keys():
-        raise _unknown(f"{item.name}.{name}", [f"{item.name}.{key}" for key in known], "a key")
-    values = {name: _value(f"{item.name}.{name}", known[name], v) for name, v in given.items()}
+        raise _unknown_name(f"{item.name}.{name}", [f"{item.name}.{key}" for key in known], "a key")
+    values = {
+        name: _check_value(f"{item.name}.{name}", known[name], v) for name, v in given.items()
+    }
     return kind(**values)  # type: ignore[operator]
 
 
-def _value(name: str, key: Field[Any], value: Any) -> Any:
+def _check_value(name: str, key: Field[Any], value: Any) -> Any:
     """The value of a key in the type of its default, or one error about it."""
     default, meta = key.default, key.metadata
     if isinstance(default, tuple):
         if not isinstance(value, (list, tuple)) or len(value) != len(default):
             raise ConfigError(name, repr(value), f"{len(default)} numbers{_unit(meta)}")
-        return tuple(_number(f"{name}[{i}]", meta, float, v) for i, v in enumerate(value))
+        return tuple(_check_number(f"{name}[{i}]", meta, float, v) for i, v in enumerate(value))
     if isinstance(default, bool):
         if not isinstance(value, bool):
             raise ConfigError(name, repr(value), "true or false")
         return value
     if isinstance(default, str):
-        return _text(name, meta["choices"], value)
-    return _number(name, meta, type(default), value)
+        return _check_text(name, meta["choices"], value)
+    return _check_number(name, meta, type(default), value)
 
 
-def _text(name: str, choices: tuple[str, ...], value: Any) -> str:
+def _check_text(name: str, choices: tuple[str, ...], value: Any) -> str:
     if choices and value not in choices:
         close = get_close_matches(str(value), choices, 1)
         hint = f"did you mean {close[0]!r}?" if close else ""
@@ -170,14 +174,14 @@ def _text(name: str, choices: tuple[str, ...], value: Any) -> str:
     return value
 
 
-def _finite(value: float) -> bool:
+def _is_finite(value: float) -> bool:
     try:
         return math.isfinite(value)
     except OverflowError:  # an integer beyond all floating-point numbers
         return False
 
 
-def _number(name: str, meta: Mapping[str, Any], kind: type, value: Any) -> Any:
+def _check_number(name: str, meta: Mapping[str, Any], kind: type, value: Any) -> Any:
     low, high = meta["low"], meta["high"]
     what = "an integer" if kind is int else "a finite number"
     if low is not None and high is not None:
@@ -186,7 +190,7 @@ def _number(name: str, meta: Mapping[str, Any], kind: type, value: Any) -> Any:
         what += f" ≥ {low:g}"
     what += _unit(meta)
     right_type = type(value) is int or (kind is float and type(value) is float)
-    if not right_type or not _finite(value):
+    if not right_type or not _is_finite(value):
         raise ConfigError(name, repr(value), what)
     if (low is not None and value < low) or (high is not None and value > high):
         raise ConfigError(name, f"{value!r}", what, "out of range")
@@ -197,7 +201,7 @@ def _unit(meta: Mapping[str, Any]) -> str:
     return "" if meta["unit"] in ("-", "1") else f" [{meta['unit']}]"
 
 
-def _unknown(name: str, known: list[str], what: str) -> ConfigError:
+def _unknown_name(name: str, known: list[str], what: str) -> ConfigError:
     if name in RENAMED:
         return ConfigError(
             name, "a name of an earlier version", RENAMED[name], "the key was renamed, not changed"

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
-# The plain setting of the paper: scheduled contacts, flat ground, a leashed position reference,
-# moderate gains. Walks on flat ground; see `robust` for what keeps a team up elsewhere.
+# The plain setting of the paper: scheduled contacts, flat ground, a position reference of limited
+# lead, moderate gains. Walks on flat ground; see `robust` for what keeps a team up elsewhere.
 _PAPER: Final = MappingProxyType(
     {
         "ki_z": 0.0, "kp_xy": 100.0, "kd_xy": 20.0, "ki_xy": 0.0, "position_error_limit": 0.05,

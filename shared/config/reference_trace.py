@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import hashlib
-import sys
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -15,13 +14,11 @@ import numpy as np
 from quadriga.shared.config.sections import Config, ReferenceConfig
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.a1 import Array
-from quadriga.shared.runtime.places import SOURCE
+from quadriga.shared.runtime.places import scenario_folder
 
 COLUMNS: Final = ("t", "vx", "vy", "wz")
 ROW_END: Final = ";"  # where a trace stands in a configuration, in one line
 _STREAM: Final = 6  # of the seed
-_SOURCE: Final = SOURCE / "deploy" / "scenarios"
-_INSTALLED: Final = Path(sys.prefix) / "share" / "quadriga" / "scenarios"
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +42,6 @@ class Trace:
         return vx, vy, wz
 
 
-def scenario_folder() -> Path:
-    """Where scenarios and traces are kept: beside the source, or where it has been installed."""
-    return _SOURCE if _SOURCE.is_dir() else _INSTALLED
-
-
 def trace_of(config: Config) -> Trace | None:
     """The trace of a configuration, None if it has none.
 
@@ -59,9 +51,9 @@ def trace_of(config: Config) -> Trace | None:
     asked = config.reference
     if not asked.trace:
         return None
-    path = _path(config)
+    path = _trace_file(config)
     begin = np.random.default_rng((config.world.seed, _STREAM)).uniform(0.0, asked.trace_shift)
-    return _read(path, asked.trace if path is None else "", begin)
+    return _read_trace(path, asked.trace if path is None else "", begin)
 
 
 def trace_sha256(config: Config) -> str:
@@ -70,7 +62,7 @@ def trace_sha256(config: Config) -> str:
     Raises:
         ConfigError: the file cannot be read.
     """
-    path = _path(config)
+    path = _trace_file(config)
     try:
         return "" if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
@@ -85,12 +77,12 @@ def inline_trace(path: Path) -> str:
     Raises:
         ConfigError: the file cannot be read, or is no trace.
     """
-    rows = _rows(_text(path))
-    _values(f"reference.trace {path}", rows)
+    rows = _split_rows(_read_text(path))
+    _parse_values(f"reference.trace {path}", rows)
     return ROW_END.join(",".join(row) for row in rows)
 
 
-def _path(config: Config) -> Path | None:
+def _trace_file(config: Config) -> Path | None:
     """The file of a trace that comes with the project; None of one that is given itself."""
     name = config.reference.trace
     if not name or ROW_END in name:
@@ -106,14 +98,14 @@ def _path(config: Config) -> Path | None:
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path | None, given: str, begin: float) -> Trace:
-    text = given.replace(ROW_END, "\n") if path is None else _text(path)
-    values = _values(f"reference.trace{f' {path}' if path else ''}", _rows(text))
+def _read_trace(path: Path | None, given: str, begin: float) -> Trace:
+    text = given.replace(ROW_END, "\n") if path is None else _read_text(path)
+    values = _parse_values(f"reference.trace{f' {path}' if path else ''}", _split_rows(text))
     values.setflags(write=False)
     return Trace(values[:, 0], values[:, 1:], begin)
 
 
-def _text(path: Path) -> str:
+def _read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -121,12 +113,12 @@ def _text(path: Path) -> str:
         raise ConfigError(f"reference.trace {path}", reason, "a file that can be read") from None
 
 
-def _rows(text: str) -> list[list[str]]:
+def _split_rows(text: str) -> list[list[str]]:
     lines = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
     return [[word.strip() for word in row] for row in csv.reader(lines)]
 
 
-def _values(name: str, rows: list[list[str]]) -> Array:
+def _parse_values(name: str, rows: list[list[str]]) -> Array:
     """Checked lines t, vx, vy, wz."""
     if not rows or tuple(rows[0]) != COLUMNS:
         raise ConfigError(name, ",".join(rows[0]) if rows else "nothing", ",".join(COLUMNS))

@@ -21,7 +21,7 @@ _FIRST: Final = {new: old for old, new in RENAMED.items()}
 
 def with_current_names(sections: Mapping[str, Any]) -> dict[str, Any]:
     """Values by section and key as another version wrote them, under today's names."""
-    return {section: _renamed(section, keys, RENAMED) for section, keys in sections.items()}
+    return {section: _rename(section, keys, RENAMED) for section, keys in sections.items()}
 
 
 def with_first_names(sections: Mapping[str, Any]) -> dict[str, Any]:
@@ -29,10 +29,10 @@ def with_first_names(sections: Mapping[str, Any]) -> dict[str, Any]:
 
     What is hashed or compared across versions has these: a new name alone changes no hash.
     """
-    return {section: _renamed(section, keys, _FIRST) for section, keys in sections.items()}
+    return {section: _rename(section, keys, _FIRST) for section, keys in sections.items()}
 
 
-def _renamed(section: str, keys: Any, names: Mapping[str, str]) -> Any:
+def _rename(section: str, keys: Any, names: Mapping[str, str]) -> Any:
     if not isinstance(keys, dict):
         return keys
     return {

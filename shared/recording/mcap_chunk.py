@@ -73,7 +73,7 @@ def messages_of(
                 channel_id = int.from_bytes(chunk[at : at + 2], "little")
                 if channel_id not in wanted:  # every chunk repeats them
                     topic = Channel.read(stream(chunk[at : at + length])).topic
-                    wanted[channel_id] = _asked_for(topic, names, keys)
+                    wanted[channel_id] = _wanted_key(topic, names, keys)
             elif opcode == Opcode.SCHEMA:
                 check_schema(Schema.read(stream(chunk[at : at + length])), path)
             at += length
@@ -119,7 +119,7 @@ def robot_of(key: str) -> str:
         return ""
 
 
-def _asked_for(key: str, names: Container[str] | None, keys: Container[str] | None) -> str | None:
+def _wanted_key(key: str, names: Container[str] | None, keys: Container[str] | None) -> str | None:
     """The key, None if it is not wanted."""
     named = names is None or name_of(key) in names
     return key if named and (keys is None or key in keys) else None

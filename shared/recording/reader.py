@@ -117,27 +117,27 @@ class Recording:
             RecordingError: it is cut or damaged.
         """
         if not self.complete:
-            raise self._damaged(f"a file that is cut after {self._size:,} bytes")
+            raise self._damage_error(f"a file that is cut after {self._size:,} bytes")
         with self.path.open("rb") as file:
             file.seek(self._size - _END + RECORD.size + 4)
             end = file.read(RECORD.size + 20)
             footer = Footer.read(stream(end[RECORD.size :]))
             if end[:1] != bytes([Opcode.FOOTER]) or not 0 < footer.summary_start < self._size:
-                raise self._damaged("an index that is not where it should be")
+                raise self._damage_error("an index that is not where it should be")
             file.seek(footer.summary_start - RECORD.size - 4)
             if file.read(RECORD.size) != RECORD.pack(Opcode.DATA_END, 4):
-                raise self._damaged("content that does not end where it should")
+                raise self._damage_error("content that does not end where it should")
             crc = DataEnd.read(stream(file.read(4))).data_section_crc
             summary = file.read(self._size - len(MCAP0_MAGIC) - 4 - file.tell())
             if footer.summary_crc and zlib.crc32(summary) != footer.summary_crc:
-                raise self._damaged("an index that fails its checksum")
+                raise self._damage_error("an index that fails its checksum")
             if not crc:  # as recordings of the first version are
                 for _ in self._chunks():
                     pass
             elif _crc(file, footer.summary_start - RECORD.size - 4) != crc:
-                raise self._damaged("content that fails its checksum")
+                raise self._damage_error("content that fails its checksum")
         if self.cut:
-            raise self._damaged(self.cut)
+            raise self._damage_error(self.cut)
 
     def notes(self) -> dict[str, dict[str, str]]:
         """What the writer noted at the end, by name: `COUNTS`, `LOST`, `SINCE`; {} after a kill."""
@@ -149,7 +149,7 @@ class Recording:
                     found[record.name] = dict(record.metadata)
         return found
 
-    def _damaged(self, got: str) -> RecordingError:
+    def _damage_error(self, got: str) -> RecordingError:
         return RecordingError(
             str(self.path),
             got,

@@ -22,7 +22,8 @@ MAX_BYTES = 1 << 20  # a message larger than this is refused before it is parsed
 MAX_TICK = 1 << 42  # 139 years of ms, so that a tick in ns is still an integer of the wire
 MAX_INTEGER = 1 << 62  # integers of all other fields are below
 MAX_TEXT = 4096  # characters
-_MOST_SAID = 120  # characters of what is wrong with a message: errors become events and log lines
+# Characters of what is wrong with a message: errors become events and log lines.
+_MAX_DESCRIPTION: Final = 120
 _ENVELOPE: Final = ("tick", "stamp_ns")
 _FLOAT64: Final = np.dtype("<f8")
 
@@ -79,7 +80,10 @@ def decode(payload: bytes, kind: type[M]) -> M:
     schema = body.pop("schema", None)
     if schema != kind.SCHEMA or isinstance(schema, bool):
         raise _error(
-            kind, f"schema {_shown(schema)}", f"schema {kind.SCHEMA}", "another version of quadriga"
+            kind,
+            f"schema {_describe(schema)}",
+            f"schema {kind.SCHEMA}",
+            "another version of quadriga",
         )
     if tuple(body) != layout.order and body.keys() != layout.names:
         missing = sorted(layout.names - body.keys())
@@ -143,11 +147,11 @@ class _Layout:
             cuts = cuts_of(fixed)
             self.flat = FlatLayout(kind.SCHEMA, cuts)
             self.from_row = (
-                kind.from_row if issubclass(kind, Flat) else partial(_divided, kind, cuts)
+                kind.from_row if issubclass(kind, Flat) else partial(_from_row, kind, cuts)
             )
 
 
-def _divided(
+def _from_row(
     kind: type[Message], cuts: Mapping[str, slice], tick: int, stamp_ns: int, row: Array
 ) -> Message:
     row.setflags(write=False)
@@ -169,7 +173,7 @@ def _checker(kind: type[Message], name: str, of: type, annotation: Any) -> Calla
     """A function that returns the checked value of a field that is not an array."""
 
     def wrong(value: Any, expected: str) -> MessageError:
-        return _error(kind, _shown(value), expected, "", name)
+        return _error(kind, _describe(value), expected, "", name)
 
     limit = MAX_TICK if name == "tick" else MAX_INTEGER
 
@@ -202,10 +206,10 @@ def _checker(kind: type[Message], name: str, of: type, annotation: Any) -> Calla
     return {int: integer, float: number, str: text, list: names, dict: mapping}[of]
 
 
-def _shown(value: Any) -> str:
+def _describe(value: Any) -> str:
     """A value of the wire in a few words; `repr` of what nests deeply would overflow the stack."""
     if isinstance(value, (str, bytes)):
-        return repr(value[:_MOST_SAID])
+        return repr(value[:_MAX_DESCRIPTION])
     if value is None or isinstance(value, (bool, int, float)):
         return repr(value)
     return f"a {type(value).__name__}"
@@ -215,4 +219,4 @@ def _error(
     kind: type[Message], got: str, expected: str, cause: str, name: str = ""
 ) -> MessageError:
     label = f"{kind.__name__.lower()}.{name}" if name else kind.__name__.lower()
-    return MessageError(label, truncate_text(got, _MOST_SAID), expected, cause)
+    return MessageError(label, truncate_text(got, _MAX_DESCRIPTION), expected, cause)

@@ -22,15 +22,15 @@ def envelope(payload: bytes) -> tuple[int, int] | None:
     """
     if payload[1:_TICK] == _HEAD:
         try:
-            tick, end = _unsigned(payload, _TICK)
+            tick, end = _read_unsigned(payload, _TICK)
             if payload[end : end + len(_STAMP)] == _STAMP:
-                return _limited(tick, _unsigned(payload, end + len(_STAMP))[0])
+                return _check_limits(tick, _read_unsigned(payload, end + len(_STAMP))[0])
         except (IndexError, KeyError):
             pass
-    return _parsed(payload)
+    return _parse(payload)
 
 
-def _unsigned(payload: bytes, at: int) -> tuple[int, int]:
+def _read_unsigned(payload: bytes, at: int) -> tuple[int, int]:
     first = payload[at]
     if first < 0x80:
         return first, at + 1
@@ -40,7 +40,7 @@ def _unsigned(payload: bytes, at: int) -> tuple[int, int]:
     return int.from_bytes(payload[at + 1 : end], "big"), end
 
 
-def _parsed(payload: bytes) -> tuple[int, int] | None:
+def _parse(payload: bytes) -> tuple[int, int] | None:
     try:
         body: Any = msgpack.unpackb(payload)
     except (ValueError, TypeError, msgpack.exceptions.UnpackException):
@@ -50,8 +50,8 @@ def _parsed(payload: bytes) -> tuple[int, int] | None:
     tick, stamp_ns = body.get("tick"), body.get("stamp_ns")
     if type(tick) is not int or type(stamp_ns) is not int:
         return None
-    return _limited(tick, stamp_ns)
+    return _check_limits(tick, stamp_ns)
 
 
-def _limited(tick: int, stamp_ns: int) -> tuple[int, int] | None:
+def _check_limits(tick: int, stamp_ns: int) -> tuple[int, int] | None:
     return (tick, stamp_ns) if 0 <= tick < MAX_TICK and 0 <= stamp_ns < MAX_INTEGER else None

@@ -13,7 +13,7 @@ import yaml
 from quadriga.commands.parser import build_parser
 from quadriga.shared.config.load import load
 from quadriga.shared.robot.a1 import robot_names
-from quadriga.team.launch import ProcessSpec, table
+from quadriga.team.launch import ProcessSpec, process_table
 
 TOP = Path(__file__).parents[2]
 COMPOSE: dict[str, Any] = yaml.safe_load((TOP / "docker-compose.yml").read_text(encoding="utf-8"))
@@ -21,7 +21,7 @@ SERVICES: dict[str, Any] = COMPOSE["services"]
 DOCKERFILE = (TOP / "deploy/Dockerfile").read_text(encoding="utf-8")
 TEAM = TOP / "deploy/team.toml"
 CONFIG = load(TEAM)
-ROWS = table(CONFIG, Path("/run"), Path("/run/predictor.npz"), "sha")
+ROWS = process_table(CONFIG, Path("/run"), Path("/run/predictor.npz"), "sha")
 
 
 def arguments_of(service: str) -> Any:

@@ -30,6 +30,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, QuadrigaError, RecordingError
 from quadriga.shared.recording.reader import PROFILE, Recording
 from quadriga.shared.robot.a1 import Array, robot_names
+from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.shared.runtime.clock import wall_ns
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.schema import json_schema
@@ -103,8 +104,7 @@ def renew(to: Path, predictor_file: Path) -> None:
         predictor, _ = load(predictor_file, config)
     except PredictorError as error:
         raise PredictorError(error.name, error.got, error.expected, "try --fit") from None
-    partial = to.with_suffix(".partial")
-    try:
+    with atomic_write(to) as partial:
         write(partial, config, predictor)
         entries = list(Recording(partial).entries())
         for robot in robot_names(config.team.robots):
@@ -113,9 +113,6 @@ def renew(to: Path, predictor_file: Path) -> None:
                 raise RecordingError(
                     "the golden walk", str(difference), "agents that repeat themselves to the byte"
                 )
-        partial.replace(to)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def write(path: Path, config: Config, predictor: Predictor) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from quadriga.plant.commands import CommandBox
-from quadriga.plant.late import DAMP, FRESH, HOLD, grade, hold
+from quadriga.plant.late import DAMP, FRESH, HOLD, grade, hold_joints
 from quadriga.plant.realtime import _Motors
 from quadriga.plant.server import PlantServer
 from quadriga.shared.config.sections import Config, TeamConfig
@@ -27,7 +27,7 @@ def test_grades_by_age(age: int, expected: str) -> None:
 def test_holding_keeps_a_standing_robot_up_and_damping_does_not() -> None:
     config = replace(Config(), team=TeamConfig(robots=1))
     held, limp = World(config), World(config)
-    command = {"r1": hold(held.states()["r1"])}
+    command = {"r1": hold_joints(held.states()["r1"])}
     for _ in range(500):
         held.step(command)
         limp.step({})
@@ -41,7 +41,7 @@ def test_a_robot_that_was_damped_is_not_drawn_back_to_where_it_was_held() -> Non
     world = World(replace(Config(), team=TeamConfig(robots=1)))
     box = CommandBox("team", world.names)
     motors = _Motors(cast(PlantServer, SimpleNamespace(plant=world, commands=box, config=Config())))
-    box.latest["r1"] = hold(world.states()["r1"])
+    box.latest["r1"] = hold_joints(world.states()["r1"])
     poses = {}
     while world.tick < 500:
         if world.tick == 450:

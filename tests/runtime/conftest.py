@@ -19,7 +19,7 @@ from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.launch import Launch, ProcessSpec, table
+from quadriga.team.launch import Launch, ProcessSpec, process_table
 from quadriga.warm_up import warm_up
 
 WAIT = 60.0  # s, more than anything here takes on a busy machine
@@ -35,7 +35,7 @@ class Team:
     def rows(self, *, standing: bool) -> tuple[ProcessSpec, ...]:
         """The launcher's table, with agents that merely stand if asked for."""
         (self.folder / "config.toml").write_text(to_toml(self.config), encoding="utf-8")
-        rows = table(self.config, self.folder, None, "")
+        rows = process_table(self.config, self.folder, None, "")
         return tuple(self._standing(row) if standing else row for row in rows)
 
     def _standing(self, row: ProcessSpec) -> ProcessSpec:

@@ -23,7 +23,7 @@ from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command, Measurement, Plan
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.launch import Launch, table
+from quadriga.team.launch import Launch, process_table
 from quadriga.team.operator import reference_at
 
 pytestmark = pytest.mark.usefixtures("_compiled")
@@ -70,7 +70,7 @@ def in_one_process(config: Config, predictor: Path) -> dict[str, list[bytes]]:
 def over_the_bus(config: Config, predictor: Path, folder: Path) -> dict[str, list[bytes]]:
     """Everything recorded, by key."""
     (folder / "config.toml").write_text(to_toml(config), encoding="utf-8")
-    with Launch(table(config, folder, predictor, ""), folder / "logs") as running:
+    with Launch(process_table(config, folder, predictor, ""), folder / "logs") as running:
         running.watch(lambda: False)
     sent: dict[str, list[bytes]] = defaultdict(list)
     for entry in Recording(folder / "run.mcap").entries():

@@ -39,7 +39,7 @@ from quadriga.shared.wire.messages import (
     Status,
 )
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.launch import Launch, table
+from quadriga.team.launch import Launch, process_table
 from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
 from tests.runtime.conftest import WAIT
 from tests.runtime.frozen import PATIENCE, await_event, await_tick, freeze
@@ -62,7 +62,7 @@ def walked(folder: Path, disturb: Disturb | None = None, **keys: Any) -> Path:
     copy_predictor(predictor, folder)
     (folder / "config.toml").write_text(to_toml(config), encoding="utf-8")
     sha256 = predictor_sha256(load_predictor(predictor, config)[0])
-    with Launch(table(config, folder, predictor, sha256), folder / "logs") as running:
+    with Launch(process_table(config, folder, predictor, sha256), folder / "logs") as running:
         if disturb is not None:
             disturb(running, config.bus.endpoint)
         running.watch(lambda: False)

@@ -39,7 +39,7 @@ from quadriga.shared.wire.topics import (
 from quadriga.sim_server.world.layout import NV
 from quadriga.sim_server.world.world import World
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.launch import Launch, table
+from quadriga.team.launch import Launch, process_table
 from quadriga.team.operator import reference_at
 from quadriga.team.run_folder import make_run_dir
 
@@ -98,7 +98,7 @@ def over_the_bus(config: Config, run_dir: Path, predictor: Path | None, sha256: 
     config = replace(config, bus=bus, recorder=replace(config.recorder, enabled=True))
     make_run_dir(run_dir)
     (run_dir / "config.toml").write_text(to_toml(config), encoding="utf-8")
-    with Launch(table(config, run_dir, predictor, sha256), run_dir / "logs") as launch:
+    with Launch(process_table(config, run_dir, predictor, sha256), run_dir / "logs") as launch:
         launch.watch(lambda: False)
     return recorded(run_dir / RECORDING)
 

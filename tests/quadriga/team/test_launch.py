@@ -13,7 +13,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.team import launch
-from quadriga.team.launch import Launch, ProcessSpec, table
+from quadriga.team.launch import Launch, ProcessSpec, process_table
 
 LAST = "import time; time.sleep(60)"
 STUBBORN = "import signal, time; signal.signal(15, signal.SIG_IGN); print('up'); time.sleep(60)"
@@ -99,11 +99,11 @@ def test_stopping_kills_who_does_not_obey_in_his_time(tmp_path: Path) -> None:
 
 
 def test_the_table_starts_everyone_once_and_stops_the_recorder_last() -> None:
-    rows = table(load(None, {"team.robots": 2}), Path("run"), Path("fitted.npz"), "abc")
+    rows = process_table(load(None, {"team.robots": 2}), Path("run"), Path("fitted.npz"), "abc")
     assert [row.name for row in rows] == ["sim", "r1", "r2", "operator", "recorder"]
     assert "--predictor fitted.npz" in " ".join(rows[1].command)
     assert "--predictor-sha256 abc" in " ".join(rows[-1].command)
     assert all("--config run/config.toml" in " ".join(row.command) for row in rows)
-    alone = table(load(None, {"recorder.enabled": False}), Path("run"), None, "")
+    alone = process_table(load(None, {"recorder.enabled": False}), Path("run"), None, "")
     assert "recorder" not in [row.name for row in alone]
     assert "--predictor" not in alone[1].command

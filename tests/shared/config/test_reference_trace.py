@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from quadriga.shared.config.load import build, load
-from quadriga.shared.config.reference_trace import Trace, scenario_folder, trace_of, trace_sha256
+from quadriga.shared.config.reference_trace import Trace, trace_of, trace_sha256
 from quadriga.shared.config.sections import Config, ReferenceConfig
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.runtime.places import scenario_folder
 
 GOOD = "# a comment\nt,vx,vy,wz\n0,0,0,0\n1.0,0.4,0.1,-0.2\n2.0,0.4,0.0,0.0\n4.0,0,0,0\n"
 
