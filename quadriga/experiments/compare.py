@@ -23,7 +23,7 @@ from quadriga.identification.cache import predictor_path
 from quadriga.identification.dataset import Dataset
 from quadriga.identification.fit import report_fit, write_json
 from quadriga.identification.fit_report import FitReport, Unfit, reason, refusal
-from quadriga.identification.fit_sheets import comparison as predictor_sheet
+from quadriga.identification.fit_tables import comparison as predictor_sheet
 from quadriga.identification.predictors import ensure_data
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.config.write import config_sha256, to_toml
@@ -34,7 +34,7 @@ from quadriga.shared.errors import (
     ProcessError,
     QuadrigaError,
 )
-from quadriga.sheet import Sheet, show
+from quadriga.tables import Table, print_tables
 from quadriga.team.run_folder import CONFIG
 from quadriga.warm_up import warm_up
 from quadriga.workers import run_each
@@ -93,7 +93,7 @@ def run(
         rows.sort(key=lambda row: order[row.trial])
         sheets = [predictor_sheet(list(reports.values())), *comparison_sheets(rows)]
         _keep(config, out, rows, reports, sheets)
-    show(sheets)
+    print_tables(sheets)
     if failed := [row for row in rows if row.failed]:
         raise ProcessError(
             f"{len(failed)} of {len(rows)} trials",
@@ -193,7 +193,7 @@ def _keep(
     out: Path,
     rows: Sequence[TrialResult],
     reports: Reports,
-    sheets: Sequence[Sheet],
+    sheets: Sequence[Table],
 ) -> None:
     write_json(
         out / RESULTS,

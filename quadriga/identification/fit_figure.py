@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from quadriga.identification.fit_report import FitReport
 from quadriga.shared.robot.a1 import OUTPUTS
 from quadriga.shared.wire.topics import SAMPLE_MS
-from quadriga.sheet import LABELS, UNITS
+from quadriga.tables import LABELS, UNITS
 
 
 def draw(reports: Sequence[FitReport], path: Path) -> None:

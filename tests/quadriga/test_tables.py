@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from quadriga.columns import columns, printable
-from quadriga.sheet import Sheet, show
+from quadriga.tables import Table, align_columns, print_tables, printable
 
 
 def test_control_characters_do_not_reach_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    show([Sheet("Events", ("what", "said"), (("stop", "\x1b]0;mine\x07\x1b[2J done"),))])
+    print_tables([Table("Events", ("what", "said"), (("stop", "\x1b]0;mine\x07\x1b[2J done"),))])
     said = capsys.readouterr().out
     assert "done" in said
     assert "\x1b" not in said
@@ -17,7 +16,7 @@ def test_control_characters_do_not_reach_the_terminal(capsys: pytest.CaptureFixt
 
 
 def test_a_row_of_columns_is_one_line_that_a_terminal_only_shows() -> None:
-    assert columns([("a", "x\x1b[31m\ny"), ("long", "z")]) == [
+    assert align_columns([("a", "x\x1b[31m\ny"), ("long", "z")]) == [
         "  a     x\N{REPLACEMENT CHARACTER}[31m y",
         "  long  z",
     ]

@@ -1,4 +1,4 @@
-"""One robot's second before a trouble, in words."""
+"""The condition of each robot in the second before a trouble, in words."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import numpy as np
 from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.agents.time_grid import step_ms
 from quadriga.report.run import Run
-from quadriga.report.samples import Samples, slipping
-from quadriga.report.second import (
+from quadriga.report.samples import Samples, find_slip
+from quadriga.report.window import (
     BEFORE_MS,
     SLIP,
     TILT,
     TORQUE,
-    airborne,
-    down_since,
-    window_before,
+    cut_window,
+    find_lost_stance,
+    passive_since,
 )
 from quadriga.shared.config.sections import CENTRAL
 from quadriga.shared.robot.a1 import N_LEGS, Leg
@@ -30,8 +30,14 @@ _AT_LIMIT: Final = 0.99  # share of a planned force's limit
 
 
 @dataclass(frozen=True, slots=True)
-class Account:
-    """One robot's second, in words; what is out of the ordinary is marked."""
+class Condition:
+    """A robot in the second before a trouble.
+
+    Attributes:
+        robot: its name.
+        cells: for each of `COLUMNS` a text, and whether it is out of the ordinary; one cell alone
+            for a robot that was passive before.
+    """
 
     robot: str
     cells: tuple[tuple[str, bool], ...]
@@ -43,19 +49,23 @@ COLUMNS: Final = (
 )  # fmt: skip
 
 
-def build_account(run: Run, index: int, tick: int) -> Account:
-    """The account of the robot at `index` of the second up to `tick`."""
+def assess_robot(run: Run, index: int, tick: int) -> Condition:
+    """The condition of the robot at `index` in the second up to `tick`."""
     robot = run.traces.robots[index]
-    if (down := down_since(run, robot, tick)) is not None:
-        return Account(robot, ((f"down since {down / 1000:.2f} s", False),))
-    window = window_before(run.samples[robot], tick)
-    return Account(
-        robot,
-        (*_trunk(window), *_feet(window), *_planning(run, index, tick), _age(run, robot, tick)),
+    down = passive_since(run, robot, tick)
+    if down is not None:
+        return Condition(robot, ((f"down since {down / 1000:.2f} s", False),))
+    window = cut_window(run.samples[robot], tick)
+    cells = (
+        *_assess_trunk(window),
+        *_assess_feet(window),
+        *_assess_planning(run, index, tick),
+        _find_oldest_input(run, robot, tick),
     )
+    return Condition(robot, cells)
 
 
-def _trunk(window: Samples) -> Iterator[tuple[str, bool]]:
+def _assess_trunk(window: Samples) -> Iterator[tuple[str, bool]]:
     if not len(window.tick):
         yield from [("not recorded", False)] * 2
         return
@@ -63,24 +73,24 @@ def _trunk(window: Samples) -> Iterator[tuple[str, bool]]:
         yield f"{tilt:.2f} rad", tilt > TILT
 
 
-def _feet(window: Samples) -> Iterator[tuple[str, bool]]:
+def _assess_feet(window: Samples) -> Iterator[tuple[str, bool]]:
     if not len(window.tick):
         yield from [("not recorded", False)] * 3
         return
-    slip = slipping(window)
+    slip = find_slip(window)
     speed = np.where(window.stance & window.contact, np.nan_to_num(window.foot_speed), 0.0)
     leg = Leg(int(speed.max(axis=0).argmax())).name
     fastest = float(slip.max())
     unknown = not np.isfinite(window.foot_speed).any()
     yield ("unknown" if unknown else f"{fastest:.2f} m/s, {leg}"), fastest > SLIP
-    lost = {Leg(k).name: sum(b - a for a, b in airborne(window, k)) for k in range(N_LEGS)}
+    lost = {Leg(k).name: sum(b - a for a, b in find_lost_stance(window, k)) for k in range(N_LEGS)}
     named = ", ".join(f"{name} {SAMPLE_MS * count} ms" for name, count in lost.items() if count)
     yield named or "none", bool(named)
     torque = float(window.torque.max())
     yield f"{100 * min(torque, 1.0):.0f} %", torque >= TORQUE
 
 
-def _planning(run: Run, index: int, tick: int) -> Iterator[tuple[str, bool]]:
+def _assess_planning(run: Run, index: int, tick: int) -> Iterator[tuple[str, bool]]:
     config = run.traces.config
     plans = [
         p for p in run.traces.plans[run.traces.robots[index]] if tick - BEFORE_MS < p.tick <= tick
@@ -89,21 +99,21 @@ def _planning(run: Run, index: int, tick: int) -> Iterator[tuple[str, bool]]:
         yield "no plans", False
         yield "none", config.planner.kind != "none"
         return
-    share = float(np.mean([at_limit(run, index, plan) for plan in plans]))
+    share = float(np.mean([share_at_limit(run, index, plan) for plan in plans]))
     yield f"{100 * share:.0f} % of samples", share > 0.0
     counts: dict[str, int] = {}
     for plan in plans:
         counts[plan.status] = counts.get(plan.status, 0) + 1
-    told = ", ".join(f"{k} {v}" for k, v in counts.items())
+    counted = ", ".join(f"{k} {v}" for k, v in counts.items())
     since = tick - plans[-1].tick
     late = since > 2 * step_ms(config)
     yield (
-        told + (f", the last {since} ms before" if late else ""),
+        counted + (f", the last {since} ms before" if late else ""),
         late or set(counts) != {"solved"},
     )
 
 
-def at_limit(run: Run, index: int, plan: Plan) -> float:
+def share_at_limit(run: Run, index: int, plan: Plan) -> float:
     """Share of a plan's applied samples with a force at its friction or deviation limit."""
     planner = run.traces.config.planner
     applied = min(planner.applied, len(plan.u))
@@ -120,8 +130,8 @@ def at_limit(run: Run, index: int, plan: Plan) -> float:
     return float((sliding.any(axis=1) | full.any(axis=1)).mean())
 
 
-def _age(run: Run, robot: str, tick: int) -> tuple[str, bool]:
-    """The oldest of what the agent planned with, as its plans and statuses say."""
+def _find_oldest_input(run: Run, robot: str, tick: int) -> tuple[str, bool]:
+    """The oldest of what the agent planned with, by its plans and statuses."""
     traces, step = run.traces, step_ms(run.traces.config)
     usual = 0 if run.traces.config.planner.kind in CENTRAL else 1
     ages: dict[str, tuple[float, bool]] = {}

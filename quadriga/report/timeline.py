@@ -1,4 +1,4 @@
-"""What happened when: the world's events, the agents' words and plans, gaps in the recording."""
+"""What happened when: the world's events, the agents' modes and plans, gaps in the recording."""
 
 from __future__ import annotations
 
@@ -17,16 +17,15 @@ from quadriga.shared.wire.topics import MEASUREMENT, STATE, TRUTH
 FALL: Final = "fall"
 FAULT: Final = "fault"
 STOP: Final = "stopped"
-SAFE: Final = ("stand", "walk", "")
 _TROUBLE: Final = (FALL, FAULT, STOP)
-# Counted while all is well: the whole-body QP at a limit, and what the plans themselves tell.
+# Counted while all is well: the whole-body QP at a limit, and what the plans themselves report.
 _USUAL: Final = ("qp_constrained", "plan_")
 _LULL_MS: Final = 500  # what is counted again after less than this belongs together
-_GAP_PERIODS: Final = 5  # missing messages in a row that are told
+_GAP_PERIODS: Final = 5  # missing messages in a row that are a gap
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class TimelineEntry:
     """Something that happened.
 
     Attributes:
@@ -49,34 +48,36 @@ class Moment:
         return self.kind in _TROUBLE
 
 
-def build_moments(traces: Traces, begin: int, end: int) -> tuple[Moment, ...]:
-    """All moments of a run, by time."""
+def build_timeline(traces: Traces, begin: int, end: int) -> tuple[TimelineEntry, ...]:
+    """All entries of a run, by time."""
     found = [
-        Moment(e.tick, e.tick, e.robot, e.kind, e.detail) for e in traces.events if e.tick <= end
+        TimelineEntry(e.tick, e.tick, e.robot, e.kind, e.detail)
+        for e in traces.events
+        if e.tick <= end
     ]
     fallen = {event.robot for event in traces.events if event.kind == FALL}
     for robot, statuses in traces.statuses.items():
-        found += [moment for moment in _falls(robot, statuses) if robot not in fallen][:1]
-        found += _modes(robot, [s for s in statuses if s.tick <= end])
-        found += _counted(robot, [s for s in statuses if s.tick <= end])
+        found += [entry for entry in _find_falls(robot, statuses) if robot not in fallen][:1]
+        found += _find_mode_changes(robot, [s for s in statuses if s.tick <= end])
+        found += _find_counts(robot, [s for s in statuses if s.tick <= end])
     for robot, plans in traces.plans.items():
-        found += _plans(robot, [p for p in plans if p.tick <= end], end)
-    found += _gaps(traces, end)
+        found += _find_failed_plans(robot, [p for p in plans if p.tick <= end], end)
+    found += _find_gaps(traces, end)
     if begin > 0:
-        found.append(Moment(begin, begin, "", "recording", "the recording begins here"))
+        found.append(TimelineEntry(begin, begin, "", "recording", "the recording begins here"))
     if traces.cut:
-        found.append(Moment(end, end, "", "recording", traces.cut))
-    return tuple(sorted(found, key=lambda m: (m.tick, m.kind != FALL, m.robot, m.text)))
+        found.append(TimelineEntry(end, end, "", "recording", traces.cut))
+    return tuple(sorted(found, key=lambda e: (e.tick, e.kind != FALL, e.robot, e.text)))
 
 
-def _falls(robot: str, statuses: Sequence[Status]) -> Iterator[Moment]:
-    """A fall by the robot's own word, where no world tells of it."""
+def _find_falls(robot: str, statuses: Sequence[Status]) -> Iterator[TimelineEntry]:
+    """Falls that the robot itself reports, for recordings without a world that does."""
     for status in statuses:
         if status.reason == FALL:
-            yield Moment(status.tick, status.tick, robot, FALL, "by its own word")
+            yield TimelineEntry(status.tick, status.tick, robot, FALL, "by its own word")
 
 
-def _modes(robot: str, statuses: Sequence[Status]) -> Iterator[Moment]:
+def _find_mode_changes(robot: str, statuses: Sequence[Status]) -> Iterator[TimelineEntry]:
     before = ("", "")
     for status in statuses:
         now = (status.mode, status.reason)
@@ -84,16 +85,16 @@ def _modes(robot: str, statuses: Sequence[Status]) -> Iterator[Moment]:
             continue
         if status.reason and status.reason != before[1]:
             text = f"{status.reason} ({status.mode})"
-            yield Moment(status.tick, status.tick, robot, STOP, text)
+            yield TimelineEntry(status.tick, status.tick, robot, STOP, text)
         elif before[0] and status.mode not in (WALK, before[0]):
-            yield Moment(status.tick, status.tick, robot, "mode", status.mode)
+            yield TimelineEntry(status.tick, status.tick, robot, "mode", status.mode)
         elif before[0] == STAND and status.mode == WALK:
-            yield Moment(status.tick, status.tick, robot, "mode", "begins to walk")
+            yield TimelineEntry(status.tick, status.tick, robot, "mode", "begins to walk")
         before = now
 
 
-def _counted(robot: str, statuses: Sequence[Status]) -> Iterator[Moment]:
-    """Counters that rose, by name; rises that follow each other closely are one moment."""
+def _find_counts(robot: str, statuses: Sequence[Status]) -> Iterator[TimelineEntry]:
+    """Counters that rose, by name; rises that follow each other closely are one entry."""
     names = {name for status in statuses for name in status.counters}
     for name in sorted(name for name in names if not name.startswith(_USUAL)):
         counts = [(status.tick, int(status.counters.get(name, 0))) for status in statuses]
@@ -102,13 +103,13 @@ def _counted(robot: str, statuses: Sequence[Status]) -> Iterator[Moment]:
             for (_, before), (tick, count) in zip([(0, 0), *counts], counts, strict=False)
             if count > before
         ]
-        for group in _grouped([tick for tick, _ in rises]):
+        for group in _group([tick for tick, _ in rises]):
             total = sum(rises[k][1] for k in group)
             first, last = rises[group[0]][0], rises[group[-1]][0]
-            yield Moment(first, last, robot, "counted", f"{name} {total:,}")
+            yield TimelineEntry(first, last, robot, "counted", f"{name} {total:,}")
 
 
-def _plans(robot: str, plans: Sequence[Plan], end: int) -> Iterator[Moment]:
+def _find_failed_plans(robot: str, plans: Sequence[Plan], end: int) -> Iterator[TimelineEntry]:
     """Spells of plans that are not simply solved."""
     first = 0
     for k, plan in enumerate(plans):
@@ -119,10 +120,10 @@ def _plans(robot: str, plans: Sequence[Plan], end: int) -> Iterator[Moment]:
         count, first = k + 1 - first, k + 1
         if plan.status != "solved":
             many = f"{count} plans" if count > 1 else "1 plan"
-            yield Moment(begin, min(stop, end), robot, "plan", f"{plan.status}, {many}")
+            yield TimelineEntry(begin, min(stop, end), robot, "plan", f"{plan.status}, {many}")
 
 
-def _gaps(traces: Traces, end: int) -> Iterator[Moment]:
+def _find_gaps(traces: Traces, end: int) -> Iterator[TimelineEntry]:
     """Stretches for which nothing of a topic with a fixed rate was recorded."""
     team = traces.config.team.name
     wanted = [(TRUTH.key(team), "", 10)]
@@ -135,10 +136,10 @@ def _gaps(traces: Traces, end: int) -> Iterator[Moment]:
             missing = (int(ticks[k + 1]) - int(ticks[k])) // period - 1
             name = key.partition("/")[2]
             text = f"{missing:,} messages of {name} are missing"
-            yield Moment(int(ticks[k]) + period, int(ticks[k + 1]), robot, "gap", text)
+            yield TimelineEntry(int(ticks[k]) + period, int(ticks[k + 1]), robot, "gap", text)
 
 
-def _grouped(ticks: Sequence[int]) -> list[list[int]]:
+def _group(ticks: Sequence[int]) -> list[list[int]]:
     """Indices of ticks, in groups that no lull separates."""
     groups: list[list[int]] = []
     for k, tick in enumerate(ticks):

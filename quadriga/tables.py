@@ -1,16 +1,16 @@
-"""A table of text that is shown on the terminal and written as Markdown alike."""
+"""Tables of text: on the terminal, as Markdown, and as aligned lines for a pipe."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
+from unicodedata import category
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Table as RichTable
 
-from quadriga.columns import printable
 from quadriga.shared.robot.a1 import OUTPUTS
 
 NOTHING: Final = "–"
@@ -22,16 +22,16 @@ UNITS: Final = {
 }  # fmt: skip
 
 
-def label(name: str) -> str:
+def label_output(name: str) -> str:
     """An output or an error with its unit, as a heading."""
     return f"{name} [{UNITS[name][0]}]"
 
 
-LABELS: Final = tuple(label(name) for name in OUTPUTS)
+LABELS: Final = tuple(label_output(name) for name in OUTPUTS)
 
 
 @dataclass(frozen=True, slots=True)
-class Sheet:
+class Table:
     """A titled table; every row has a cell for every column, the first is the row's name.
 
     Attributes:
@@ -46,9 +46,9 @@ class Sheet:
     rows: tuple[tuple[str, ...], ...]
     notes: Sequence[str] = ()
 
-    def to_rich(self) -> Table:
+    def to_rich(self) -> RichTable:
         """For a terminal, without the notes."""
-        table = Table(title=escape(self.title), title_justify="left")
+        table = RichTable(title=escape(self.title), title_justify="left")
         for k, column in enumerate(self.columns):
             table.add_column(escape(column), justify="right" if k else "left", no_wrap=not k)
         for row in self.rows:
@@ -63,25 +63,54 @@ class Sheet:
         return "\n".join([f"{'#' * level} {self.title}\n", *lines, *notes]) + "\n"
 
 
-def show(sheets: Iterable[Sheet]) -> None:
+def print_tables(tables: Iterable[Table]) -> None:
     """Print tables to stdout, as wide as the terminal or, without one, as they need."""
     console = Console()
     if not console.is_terminal:
         console = Console(width=_WIDE)
-    for sheet in sheets:
-        console.print(sheet.to_rich())
-        for note in sheet.notes:
+    for table in tables:
+        console.print(table.to_rich())
+        for note in table.notes:
             console.print(note, style="dim", markup=False, highlight=False)
 
 
-def text(value: float | None, digits: str = ".3g", factor: float = 1.0) -> str:
+def format_number(value: float | None, digits: str = ".3g", factor: float = 1.0) -> str:
     """A number, or a dash if there is none."""
     return NOTHING if value is None else format(value * factor, digits)
 
 
-def output_text(name: str, value: float | None) -> str:
+def format_output(name: str, value: float | None) -> str:
     """A figure of an output or an error in the unit of its label."""
-    return text(value, ".1f", UNITS[name][1])
+    return format_number(value, ".1f", UNITS[name][1])
+
+
+def align_columns(
+    rows: Iterable[Sequence[str]], *, right: Collection[int] = (), indent: str = "  "
+) -> list[str]:
+    """Rows of cells as lines without borders, fit for a terminal, a pipe and `grep`.
+
+    Args:
+        rows: cells of text; the same number in each.
+        right: columns that are flush right, as numbers are.
+        indent: what each line begins with.
+    """
+    cells = [tuple(printable(cell).replace("\n", " ") for cell in row) for row in rows]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = []
+    for row in cells:
+        padded = [
+            cell.rjust(width) if k in right else cell.ljust(width)
+            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append((indent + "  ".join(padded)).rstrip())
+    return lines
+
+
+def printable(text: str) -> str:
+    """Text that comes from elsewhere, without what a terminal would obey."""
+    return "".join(
+        "\N{REPLACEMENT CHARACTER}" if category(c) == "Cc" and c != "\n" else c for c in text
+    )
 
 
 def _row(cells: Sequence[str]) -> str:

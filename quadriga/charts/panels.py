@@ -1,19 +1,26 @@
-"""What a figure over world time is made of: curves or bars in panels, and marks across them."""
+"""What a chart is made of: curves or bars in panels, and marks across them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from quadriga.shared.robot.a1 import Array
+
+TIME: Final = "time [s]"
+LEFT: Final = 58.0  # points, for the values of the vertical axis
 
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One curve: times (k,) in s, values (k,), its class in the style sheet.
+    """One curve.
 
     Attributes:
+        time: shape (k,), s.
+        value: shape (k,).
+        style: a key of `colours.LINES`.
         kind: line, step (held until the next point) or dots.
         gap: points further apart than this, s, are not joined; 0 joins all.
     """
@@ -27,7 +34,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Bars:
-    """One row of bars: its name, and (begin s, end s, class) of each."""
+    """One row of bars: its name, and (begin s, end s, a key of `colours.BARS`) of each."""
 
     name: str
     bars: Sequence[tuple[float, float, str]]
@@ -45,6 +52,7 @@ class Panel:
         ceiling: the range reaches no further up than this.
         log: whether values are drawn logarithmically.
         levels: horizontal lines at (value, name).
+        part: its own first and last time, s, instead of the grid's.
     """
 
     title: str
@@ -56,11 +64,12 @@ class Panel:
     ceiling: float = math.inf
     log: bool = False
     levels: Sequence[tuple[float, str]] = ()
+    part: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A time that every panel shows, s: its class in the style sheet and its name."""
+    """A time that every panel shows, s: a key of `colours.LINES`, and its name."""
 
     time: float
     style: str
@@ -68,17 +77,23 @@ class Mark:
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
-    """A panel's place: left, top, width, height in px, and the times at its sides in s."""
+class PanelGrid:
+    """What the panels of a chart share.
 
-    x: float
-    y: float
-    w: float
-    h: float
+    Attributes:
+        begin: time at the left end, s; or whatever else `across` names.
+        end: time at the right end, s.
+        columns: panels in a row.
+        height: of a panel of curves, points.
+        left: room for the names of rows and values, points.
+        across: the horizontal axis, with its unit.
+        points: that a curve may have at most.
+    """
+
     begin: float
     end: float
-
-    def at(self, time: Array) -> Array:
-        """Where times stand, px from the figure's left side."""
-        scaled: Array = self.x + self.w * (time - self.begin) / (self.end - self.begin)
-        return scaled
+    columns: int = 1
+    height: float = 90.0
+    left: float = LEFT
+    across: str = TIME
+    points: int = 1600

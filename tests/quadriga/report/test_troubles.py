@@ -1,4 +1,4 @@
-"""What to look at before a fall is found where it was planted."""
+"""What was out of the ordinary before a fall is found where it was planted."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.report.account import COLUMNS
-from quadriga.report.look_at import Sign, Trouble, episodes
+from quadriga.report.conditions import COLUMNS
 from quadriga.report.run import read_run
+from quadriga.report.troubles import Sign, Trouble, find_troubles
 from quadriga.shared.robot.a1 import TORQUE_LIMIT
 from quadriga.shared.wire import messages as msg
 from quadriga.shared.wire.messages import Command, Message, Plan, State, Status, Truth
@@ -22,33 +22,35 @@ FALL = 1500
 CONFIG = run_config(2, 1.6)
 
 
-def told(write_run: WriteRun, change: Change = lambda _, message: message, **more: Any) -> Path:
+def write_short(
+    write_run: WriteRun, change: Change = lambda _, message: message, **more: Any
+) -> Path:
     """The run without commands, which would take most of the time and say nothing here."""
     return write_run(
         CONFIG, change=lambda k, m: None if isinstance(m, Command) else change(k, m), **more
     )
 
 
-def only(folder: Path) -> Trouble:
-    (episode,) = episodes(read_run(folder / "run.mcap"))
-    return episode
+def find_only(folder: Path) -> Trouble:
+    (trouble,) = find_troubles(read_run(folder / "run.mcap"))
+    return trouble
 
 
-def cell(episode: Trouble, robot: str, column: str) -> tuple[str, bool]:
-    account = next(account for account in episode.accounts if account.robot == robot)
-    return account.cells[COLUMNS.index(column)]
+def cell(trouble: Trouble, robot: str, column: str) -> tuple[str, bool]:
+    condition = next(found for found in trouble.conditions if found.robot == robot)
+    return condition.cells[COLUMNS.index(column)]
 
 
-def signs(episode: Trouble, robot: str) -> list[Sign]:
-    return [sign for sign in episode.signs if sign.robot == robot]
+def signs(trouble: Trouble, robot: str) -> list[Sign]:
+    return [sign for sign in trouble.signs if sign.robot == robot]
 
 
-def test_a_fall_and_the_agents_word_on_it_are_one_episode(write_run: WriteRun) -> None:
-    episode = only(told(write_run, extra=fallen(FALL)))
-    assert (episode.tick, episode.robots) == (FALL, ("r2",))
-    assert {moment.kind for moment in episode.troubles} == {"fall", "stopped"}
-    assert len(episode.accounts) == 2
-    assert all(len(account.cells) == len(COLUMNS) for account in episode.accounts)
+def test_a_fall_and_the_agents_word_on_it_are_one_trouble(write_run: WriteRun) -> None:
+    trouble = find_only(write_short(write_run, extra=fallen(FALL)))
+    assert (trouble.tick, trouble.robots) == (FALL, ("r2",))
+    assert {entry.kind for entry in trouble.entries} == {"fall", "stopped"}
+    assert len(trouble.conditions) == 2
+    assert all(len(condition.cells) == len(COLUMNS) for condition in trouble.conditions)
 
 
 def test_what_goes_on_after_the_fall_is_said_to(write_run: WriteRun) -> None:
@@ -57,15 +59,15 @@ def test_what_goes_on_after_the_fall_is_said_to(write_run: WriteRun) -> None:
             return replace(message, counters={"missed": message.tick // 100})
         return message
 
-    episode = only(told(write_run, change, extra=fallen(1300)))
-    assert "counted: missed 15, until 1.50 s" in [sign.text for sign in signs(episode, "r1")]
+    trouble = find_only(write_short(write_run, change, extra=fallen(1300)))
+    assert "counted: missed 15, until 1.50 s" in [sign.text for sign in signs(trouble, "r1")]
 
 
 def test_troubles_far_apart_are_two_and_who_is_down_is_not_judged(write_run: WriteRun) -> None:
     extra = [*fallen(900, "r1"), *fallen(FALL, "r2")]
-    first, second = episodes(read_run(told(write_run, extra=extra) / "run.mcap"))
+    first, second = find_troubles(read_run(write_short(write_run, extra=extra) / "run.mcap"))
     assert (first.tick, second.tick) == (900, FALL)
-    assert second.accounts[0].cells == (("down since 0.90 s", False),)
+    assert second.conditions[0].cells == (("down since 0.90 s", False),)
     assert not signs(second, "r1")
 
 
@@ -83,14 +85,14 @@ def test_tilt_torque_and_a_foot_without_ground_are_found(write_run: WriteRun) ->
             return replace(message, grf=grf)
         return message
 
-    episode = only(told(write_run, change, extra=fallen(FALL)))
-    assert cell(episode, "r2", "greatest tilt") == ("0.30 rad", True)
-    assert cell(episode, "r1", "greatest tilt") == ("0.00 rad", False)
-    assert cell(episode, "r2", "torque at most") == ("100 %", True)
-    text, marked = cell(episode, "r2", "stance without ground")
+    trouble = find_only(write_short(write_run, change, extra=fallen(FALL)))
+    assert cell(trouble, "r2", "greatest tilt") == ("0.30 rad", True)
+    assert cell(trouble, "r1", "greatest tilt") == ("0.00 rad", False)
+    assert cell(trouble, "r2", "torque at most") == ("100 %", True)
+    text, marked = cell(trouble, "r2", "stance without ground")
     assert marked
     assert "80 ms" in text
-    found = {sign.text.partition(",")[0]: sign.tick for sign in signs(episode, "r2")}
+    found = {sign.text.partition(",")[0]: sign.tick for sign in signs(trouble, "r2")}
     assert found["tilts more than 0.25 rad"] == 1300
     assert found["a joint at its torque limit"] == 1300
     assert any("finds no ground" in text and tick == 1310 for text, tick in found.items())
@@ -105,14 +107,14 @@ def test_a_foot_that_slides_is_told_from_one_that_stands(write_run: WriteRun) ->
             return replace(message, grf=grf)
         return message
 
-    episode = only(told(write_run, lifted, extra=fallen(FALL)))
-    text, marked = cell(episode, "r2", "fastest slip")
+    trouble = find_only(write_short(write_run, lifted, extra=fallen(FALL)))
+    text, marked = cell(trouble, "r2", "fastest slip")
     assert marked
     assert float(text.split()[0]) == pytest.approx(0.51, abs=0.02)
-    assert cell(episode, "r1", "fastest slip") == ("0.00 m/s, FL", False)
+    assert cell(trouble, "r1", "fastest slip") == ("0.00 m/s, FL", False)
 
 
-def test_plans_that_failed_aged_or_pushed_at_their_limits_are_told(write_run: WriteRun) -> None:
+def test_plans_that_failed_aged_or_pushed_at_their_limits_are_found(write_run: WriteRun) -> None:
     def change(key: str, message: Message) -> Message | None:
         if not isinstance(message, Plan) or message.tick < 900:
             return message
@@ -124,17 +126,17 @@ def test_plans_that_failed_aged_or_pushed_at_their_limits_are_told(write_run: Wr
             message, status="nominal:infeasible", used={"r1": message.step - 4}, u=strong
         )
 
-    episode = only(told(write_run, change, extra=fallen(FALL)))
-    text, marked = cell(episode, "r2", "plans")
+    trouble = find_only(write_short(write_run, change, extra=fallen(FALL)))
+    text, marked = cell(trouble, "r2", "plans")
     assert marked
     assert "nominal:infeasible 15" in text
-    assert cell(episode, "r2", "oldest input") == ("plan.r1 160 ms", True)
-    text, marked = cell(episode, "r2", "planned force at a limit")
+    assert cell(trouble, "r2", "oldest input") == ("plan.r1 160 ms", True)
+    text, marked = cell(trouble, "r2", "planned force at a limit")
     assert marked
     assert text != "0 % of samples"
-    assert cell(episode, "r1", "plans")[0].endswith("the last 500 ms before")
+    assert cell(trouble, "r1", "plans")[0].endswith("the last 500 ms before")
     assert ("plan: nominal:infeasible, 17 plans, until 1.56 s", 920) in [
-        (sign.text, sign.tick) for sign in signs(episode, "r2")
+        (sign.text, sign.tick) for sign in signs(trouble, "r2")
     ]
 
 
@@ -142,9 +144,9 @@ def test_a_robot_that_makes_no_plan_is_named(write_run: WriteRun) -> None:
     def change(key: str, message: Message) -> Message | None:
         return None if key == "team/r1/plan" else message
 
-    episode = only(told(write_run, change, extra=fallen(FALL)))
-    assert "makes no plan in this second" in [sign.text for sign in signs(episode, "r1")]
-    assert cell(episode, "r1", "plans") == ("none", True)
+    trouble = find_only(write_short(write_run, change, extra=fallen(FALL)))
+    assert "makes no plan in this second" in [sign.text for sign in signs(trouble, "r1")]
+    assert cell(trouble, "r1", "plans") == ("none", True)
 
 
 def test_a_gap_in_the_sensors_and_a_push_are_signs(write_run: WriteRun) -> None:
@@ -152,7 +154,7 @@ def test_a_gap_in_the_sensors_and_a_push_are_signs(write_run: WriteRun) -> None:
         return None if key == "team/r1/state" and 1000 <= message.tick < 1050 else message
 
     push = [("team/sim/event", msg.Event(800, 0, "push", "r2", "90 N"))]
-    episode = only(told(write_run, change, extra=[*push, *fallen(FALL)]))
+    trouble = find_only(write_short(write_run, change, extra=[*push, *fallen(FALL)]))
     gap = "gap: 50 messages of r1/state are missing"
-    assert (1000, gap) in [(sign.tick, sign.text) for sign in signs(episode, "r1")]
-    assert (800, "push: 90 N") in [(sign.tick, sign.text) for sign in signs(episode, "r2")]
+    assert (1000, gap) in [(sign.tick, sign.text) for sign in signs(trouble, "r1")]
+    assert (800, "push: 90 N") in [(sign.tick, sign.text) for sign in signs(trouble, "r2")]

@@ -1,0 +1,25 @@
+"""The bar that a user watches while something takes long."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+
+def build_progress(
+    console: Console, count: str = "", *, elapsed: bool = False, fleeting: bool = False
+) -> Progress:
+    """A bar behind each task's description; without a terminal nothing is shown.
+
+    Args:
+        console: where to show it.
+        count: what stands behind the bar, in Rich's fields: `{task.completed}/{task.total}`.
+        elapsed: show the time since the beginning.
+        fleeting: nothing of the bar stays at its end.
+    """
+    columns = [TextColumn("{task.description}"), BarColumn()]
+    if count:
+        columns.append(TextColumn(count))
+    if elapsed:
+        columns.append(TimeElapsedColumn())
+    return Progress(*columns, console=console, transient=fleeting, disable=not console.is_terminal)
