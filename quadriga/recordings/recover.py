@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from quadriga.tables import align_columns
 from quadriga.recordings.readable import config_or_default, open_readable
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.reader import COUNTS, LOST, PROFILE, Recording, RecordingWriter

@@ -6,8 +6,8 @@ from typing import Self
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 
+from quadriga.progress import build_progress
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
@@ -31,12 +31,7 @@ class WalkProgress:
         self._bus = Bus.open(config.bus, config.team.name, NAME)
         self._bus.subscribe(TRUTH.key(config.team.name))
         self._bus.subscribe(EVENT.key(config.team.name))
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.fields[text]}"),
-            console=console,
-        )
+        self._bar = build_progress(console, "{task.fields[text]}", hidden=False)
         self._task = self._bar.add_task("starting", total=config.world.seconds, text="")
         self._begun = 0.0
         self.fallen: list[str] = []

@@ -1,9 +1,10 @@
-"""A recording as tables: one for each key, one named column for each number."""
+"""The columns and rows of a key's table: one named column for each number."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 from quadriga.export.layout import Layout
@@ -11,6 +12,8 @@ from quadriga.export.source import ExportedMessage
 
 TIMES: Final = ("tick", "stamp_ns", "log_time_ns")
 SAMPLE: Final = "sample"
+
+TickReached = Callable[[int], None]  # called with the tick that an export has reached
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +52,7 @@ def build_columns(layout: Layout, robot: str) -> Columns:
     )
 
 
-def rows(item: ExportedMessage) -> Iterator[tuple[list[Any], list[float], list[list[float]]]]:
+def list_rows(item: ExportedMessage) -> Iterator[tuple[list[Any], list[float], list[list[float]]]]:
     """Rows of one message: values of `head`, `numbers` and `lists`."""
     message, layout = item.message, item.layout
     times = [message.tick, message.stamp_ns, item.log_time_ns]
@@ -57,3 +60,8 @@ def rows(item: ExportedMessage) -> Iterator[tuple[list[Any], list[float], list[l
     lists = [getattr(message, name).tolist() for name in layout.lists]
     for sample, numbers in enumerate(item.numbers.tolist()):
         yield [*times, *([sample] if layout.by_sample else []), *plain], numbers, lists
+
+
+def table_file(out: Path, name: str, suffix: str) -> Path:
+    """The file of a key without its team: `r1/state` is r1.state.csv."""
+    return out / f"{name.replace('/', '.')}.{suffix}"
