@@ -32,7 +32,12 @@ Legend = Sequence[tuple[str, str]]  # style and name of each entry
 
 
 def draw_panels(
-    panels: Sequence[Panel], grid: PanelGrid, *, marks: Sequence[Mark] = (), legend: Legend = ()
+    panels: Sequence[Panel],
+    grid: PanelGrid,
+    *,
+    marks: Sequence[Mark] = (),
+    legend: Legend = (),
+    title: str = "",
 ) -> Figure:
     """Panels in rows of `grid.columns`, with the marks in each of them.
 
@@ -41,15 +46,18 @@ def draw_panels(
         grid: what the panels share.
         marks: times to mark.
         legend: entries above all panels.
+        title: a line above the legend; empty for none.
     """
     rows = [panels[k : k + grid.columns] for k in range(0, len(panels), grid.columns)]
     heights = [max(_height(panel, grid) for panel in row) for row in rows]
     lines = _break_legend(legend)
-    top = _LEGEND * len(lines)
+    head = _LEGEND if title else 0.0
+    top = head + _LEGEND * len(lines)
     total = top + sum(_ABOVE + tall + _BETWEEN for tall in heights) + _BELOW - _BETWEEN
     figure = Figure(figsize=(WIDTH / POINTS_PER_INCH, total / POINTS_PER_INCH))
+    figure.text(LEFT / WIDTH, 1.0 - 0.5 * head / total, title, va="center", fontsize=TEXT)
     for k, line in enumerate(lines):
-        add_legend(figure, line, above=1.0 - _LEGEND * k / total)
+        add_legend(figure, line, above=1.0 - (head + _LEGEND * k) / total)
     width = WIDTH / grid.columns - grid.left - _RIGHT
     for number, (row, tall) in enumerate(zip(rows, heights, strict=True)):
         top += _ABOVE + tall
