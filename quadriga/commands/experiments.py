@@ -17,7 +17,7 @@ from quadriga.shared.errors import ConfigError
 if TYPE_CHECKING:
     from quadriga.experiments.published.experiment import Experiment
     from quadriga.experiments.published.walk import PartPlan
-    from quadriga.sheet import Sheet
+    from quadriga.tables import Table
 
 LOOKS: Final = "looks"  # the folder of walks that are not published
 
@@ -117,11 +117,11 @@ def _walk(
     )
 
 
-def _show(experiment: Experiment, tables: Iterable[Sheet]) -> None:
+def _show(experiment: Experiment, tables: Iterable[Table]) -> None:
     """Tables made for Markdown, on a terminal."""
-    from quadriga.sheet import show
+    from quadriga.tables import print_tables
 
-    show(
+    print_tables(
         replace(
             sheet,
             title=f"{experiment.title}: {sheet.title}",

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Final
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from quadriga.agents.predictor.store import versions
 from quadriga.experiments.compare_figure import draw
@@ -23,8 +22,9 @@ from quadriga.identification.cache import predictor_path
 from quadriga.identification.dataset import Dataset
 from quadriga.identification.fit import report_fit, write_json
 from quadriga.identification.fit_report import FitReport, Unfit, reason, refusal
-from quadriga.identification.fit_sheets import comparison as predictor_sheet
+from quadriga.identification.fit_tables import comparison as predictor_sheet
 from quadriga.identification.predictors import ensure_data
+from quadriga.progress import build_progress
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.config.write import config_sha256, to_toml
 from quadriga.shared.errors import (
@@ -34,7 +34,7 @@ from quadriga.shared.errors import (
     ProcessError,
     QuadrigaError,
 )
-from quadriga.sheet import Sheet, show
+from quadriga.tables import Table, print_tables
 from quadriga.team.run_folder import CONFIG
 from quadriga.warm_up import warm_up
 from quadriga.workers import run_each
@@ -85,7 +85,12 @@ def run(
     rows, jobs_left = _split(config, wanted, reports)
     found = _one_by_one(jobs_left, out) if bus else _side_by_side(jobs_left, jobs)
     try:
-        with closing(found), _progress(console) as progress:
+        with (
+            closing(found),
+            build_progress(
+                console, "{task.completed}/{task.total} trials", elapsed=True, hidden=False
+            ) as progress,
+        ):
             for row in progress.track(found, len(jobs_left), description="walking"):
                 rows.append(row)
     finally:  # an interrupt must not cost what has been walked
@@ -93,7 +98,7 @@ def run(
         rows.sort(key=lambda row: order[row.trial])
         sheets = [predictor_sheet(list(reports.values())), *comparison_sheets(rows)]
         _keep(config, out, rows, reports, sheets)
-    show(sheets)
+    print_tables(sheets)
     if failed := [row for row in rows if row.failed]:
         raise ProcessError(
             f"{len(failed)} of {len(rows)} trials",
@@ -178,22 +183,12 @@ def _unwalked(trial: Trial, error: QuadrigaError) -> TrialResult:
     return TrialResult(trial, failed=str(error))
 
 
-def _progress(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed}/{task.total} trials"),
-        TimeElapsedColumn(),
-        console=console,
-    )
-
-
 def _keep(
     config: Config,
     out: Path,
     rows: Sequence[TrialResult],
     reports: Reports,
-    sheets: Sequence[Sheet],
+    sheets: Sequence[Table],
 ) -> None:
     write_json(
         out / RESULTS,

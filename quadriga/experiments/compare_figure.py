@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from quadriga.experiments.compare_sheets import label
 from quadriga.experiments.trial.trial import Figures, TrialResult
 from quadriga.shared.robot.a1 import OUTPUTS
-from quadriga.sheet import LABELS
+from quadriga.tables import LABELS
 
 _Measure = tuple[str, Callable[[Figures], float | None]]
 _SHOWN: Final = ("z", "vx", "roll")

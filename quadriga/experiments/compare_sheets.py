@@ -10,12 +10,12 @@ import numpy as np
 
 from quadriga.experiments.trial.trial import Figures, TrialResult
 from quadriga.shared.robot.a1 import OUTPUTS
-from quadriga.sheet import LABELS, NOTHING, Sheet, output_text, text
+from quadriga.tables import LABELS, NOTHING, Table, format_number, format_output
 
 _BASELINE: Final = "none"  # the planner whose cost in the same worlds others' are compared with
 
 
-def comparison_sheets(rows: Sequence[TrialResult]) -> list[Sheet]:
+def comparison_sheets(rows: Sequence[TrialResult]) -> list[Table]:
     """A table for each scenario, means over the seeds."""
     return [
         _sheet(scenario, [row for row in rows if row.trial.scenario == scenario])
@@ -29,7 +29,7 @@ def label(row: TrialResult) -> str:
     return f"{trial.planner} · {trial.predictor}" if trial.predictor else trial.planner
 
 
-def _sheet(scenario: str, rows: Sequence[TrialResult]) -> Sheet:
+def _sheet(scenario: str, rows: Sequence[TrialResult]) -> Table:
     columns = (
         "planner · predictor", "fell", "mean vx", *LABELS, "cost", f"/ {_BASELINE}",
         "plan [ms]", "p99", "plans",
@@ -50,7 +50,7 @@ def _sheet(scenario: str, rows: Sequence[TrialResult]) -> Sheet:
         *(f"{name}: refused: {g[0].refused}." for name, g in groups.items() if g[0].refused),
         *_failures(rows),
     ]
-    return Sheet(f"Closed loop, {scenario}", columns, cells, notes)
+    return Table(f"Closed loop, {scenario}", columns, cells, notes)
 
 
 def _cells(
@@ -70,12 +70,12 @@ def _cells(
     return (
         name,
         _falls(found, failed),
-        text(_mean([f.mean["vx"] for f in upright]), ".3f"),
-        *(output_text(key, _mean([f.rmse[key] for f in upright])) for key in OUTPUTS),
-        text(_mean([f.cost for f in upright]), ".0f"),
-        text(_mean(ratios), ".2f"),
-        text(_mean([f.planner_ms_median for f in found]), ".2f"),
-        text(_mean([f.planner_ms_p99 for f in found]), ".2f"),
+        format_number(_mean([f.mean["vx"] for f in upright]), ".3f"),
+        *(format_output(key, _mean([f.rmse[key] for f in upright])) for key in OUTPUTS),
+        format_number(_mean([f.cost for f in upright]), ".0f"),
+        format_number(_mean(ratios), ".2f"),
+        format_number(_mean([f.planner_ms_median for f in found]), ".2f"),
+        format_number(_mean([f.planner_ms_p99 for f in found]), ".2f"),
         _shares(plans),
     )
 

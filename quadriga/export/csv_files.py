@@ -8,12 +8,11 @@ from math import isnan
 from pathlib import Path
 from typing import Any
 
+from quadriga.export.columns import TickReached, build_columns, list_rows, table_file
 from quadriga.export.source import Source
-from quadriga.export.tables import build_columns, rows
-from quadriga.export.written import Progress, file_of
 
 
-def write_csv(source: Source, out: Path, progress: Progress) -> tuple[Path, ...]:
+def write_csv(source: Source, out: Path, on_tick: TickReached) -> tuple[Path, ...]:
     """Write one file per key into the new folder `out`, numbers in full precision.
 
     Entries that a message does not have are empty, lists are numbers separated by spaces.
@@ -24,12 +23,12 @@ def write_csv(source: Source, out: Path, progress: Progress) -> tuple[Path, ...]
         for item in source.items():
             writer = writers.get(item.name)
             if writer is None:
-                path = file_of(out, item.name, "csv")
+                path = table_file(out, item.name, "csv")
                 file = files.enter_context(path.open("x", newline="", encoding="utf-8"))
                 writer = writers[item.name] = csv.writer(file)
                 writer.writerow(build_columns(item.layout, item.robot).names)
-            for head, numbers, lists in rows(item):
+            for head, numbers, lists in list_rows(item):
                 shown = ["" if isnan(value) else value for value in numbers]
                 writer.writerow([*head, *shown, *(" ".join(map(repr, one)) for one in lists)])
-            progress(item.message.tick)
-    return tuple(file_of(out, name, "csv") for name in writers)
+            on_tick(item.message.tick)
+    return tuple(table_file(out, name, "csv") for name in writers)

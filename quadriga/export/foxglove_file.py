@@ -12,12 +12,12 @@ import foxglove
 import foxglove.messages as fox
 from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateChannel
 
+from quadriga.export.columns import TickReached
 from quadriga.export.layout import Layout
 from quadriga.export.protobuf import ProtobufType, type_of
 from quadriga.export.scene import Scene, path_ticks, stamp_of
 from quadriga.export.source import ExportedMessage, Source
 from quadriga.export.tracking import NAMES, Tracking
-from quadriga.export.written import Progress
 from quadriga.pictures.poses import Poses, read_poses, truth_ticks
 from quadriga.shared.wire.messages import Event, Measurement, Message, Truth
 from quadriga.shared.wire.topics import MEASUREMENT, TRUTH
@@ -26,7 +26,7 @@ _PICTURE: Final = 10  # ms, least time between two poses of the team
 _WARNINGS: Final = ("fall", "fault")
 
 
-def write_foxglove(source: Source, out: Path, progress: Progress) -> tuple[Path, ...]:
+def write_foxglove(source: Source, out: Path, on_tick: TickReached) -> tuple[Path, ...]:
     """Write a recording for Foxglove and Rerun.
 
     Times are the world's: a message of 12.3 s stands at 12.3 s since 1970.
@@ -34,13 +34,13 @@ def write_foxglove(source: Source, out: Path, progress: Progress) -> tuple[Path,
     Args:
         source: what to write.
         out: the file; it must not exist.
-        progress: told the tick that was reached.
+        on_tick: called with each tick that was reached.
 
     Raises:
         OSError: the file cannot be written.
     """
     context = foxglove.Context()
-    with _opened(out, context):
+    with _open(out, context):
         scalars, drawing = _Scalars(source, context), _Drawing(source, context)
         events = LogChannel("/events", context=context)
         for item in source.items():
@@ -48,14 +48,14 @@ def write_foxglove(source: Source, out: Path, progress: Progress) -> tuple[Path,
             scalars.log(item, time)
             if isinstance(message, Truth):
                 drawing.log(message.tick, time)
-                progress(message.tick)
+                on_tick(message.tick)
             elif isinstance(message, Event):
-                events.log(_said(message), log_time=time)
+                events.log(_build_log(message), log_time=time)
     return (out,)
 
 
 @contextmanager
-def _opened(out: Path, context: foxglove.Context) -> Iterator[None]:
+def _open(out: Path, context: foxglove.Context) -> Iterator[None]:
     """What is logged in `context` goes to a file; that its disk is full shows when it is closed."""
     foxglove.set_log_level(logging.CRITICAL)  # it would complain of every message
     writer = foxglove.open_mcap(out, context=context)
@@ -85,7 +85,7 @@ class _Scalars:
             kind = self._types[layout.kind] = type_of(layout)
         cut = layout.sampled
         samples = item.numbers[:, :cut] if cut else None
-        payload = kind.encode(_plain(message, layout), item.numbers[0, cut:], samples)
+        payload = kind.encode(_read_plain(message, layout), item.numbers[0, cut:], samples)
         self._channel(f"/{item.name}", kind).log(payload, log_time=time)
         if self._tracking is not None and isinstance(message, Measurement):
             row = self._tracking.row(item.robot, message.tick)
@@ -132,14 +132,14 @@ class _Drawing:
         self._forces.log(self._scene.forces(tick, self._poses.grf[at]), log_time=time)
 
 
-def _plain(message: Message, layout: Layout) -> dict[str, object]:
+def _read_plain(message: Message, layout: Layout) -> dict[str, object]:
     plain: dict[str, object] = {"tick": message.tick}
     plain |= {name: getattr(message, name) for name, _ in layout.plain}
     plain |= {name: getattr(message, name).tolist() for name in layout.lists}
     return plain
 
 
-def _said(event: Event) -> fox.Log:
+def _build_log(event: Event) -> fox.Log:
     level = fox.LogLevel.Warning if event.kind in _WARNINGS else fox.LogLevel.Info
     return fox.Log(
         timestamp=stamp_of(event.tick),

@@ -10,31 +10,30 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from quadriga.export.columns import Columns, TickReached, build_columns, list_rows, table_file
 from quadriga.export.source import ExportedMessage, Source
-from quadriga.export.tables import Columns, build_columns, rows
-from quadriga.export.written import Progress, file_of
 
 _BATCH: Final = 10_000  # rows that are kept in memory
 _TYPES: Final = {int: pa.int64(), float: pa.float64(), str: pa.string()}
 
 
-def write_parquet(source: Source, out: Path, progress: Progress) -> tuple[Path, ...]:
+def write_parquet(source: Source, out: Path, on_tick: TickReached) -> tuple[Path, ...]:
     """Write one file per key into the new folder `out`; missing numbers are null."""
     out.mkdir(parents=True)
-    tables: dict[str, _Table] = {}
+    tables: dict[str, _ParquetFile] = {}
     with ExitStack() as files:
         for item in source.items():
             table = tables.get(item.name)
             if table is None:
                 columns = build_columns(item.layout, item.robot)
-                path = file_of(out, item.name, "parquet")
-                table = tables[item.name] = files.enter_context(_Table(path, columns))
+                path = table_file(out, item.name, "parquet")
+                table = tables[item.name] = files.enter_context(_ParquetFile(path, columns))
             table.append(item)
-            progress(item.message.tick)
-    return tuple(file_of(out, name, "parquet") for name in tables)
+            on_tick(item.message.tick)
+    return tuple(table_file(out, name, "parquet") for name in tables)
 
 
-class _Table:
+class _ParquetFile:
     """One file, written batch by batch."""
 
     def __init__(self, path: Path, columns: Columns) -> None:
@@ -46,7 +45,7 @@ class _Table:
         self._rows: list[tuple[list[Any], list[float], list[list[float]]]] = []
 
     def append(self, item: ExportedMessage) -> None:
-        self._rows.extend(rows(item))
+        self._rows.extend(list_rows(item))
         if len(self._rows) >= _BATCH:
             self._flush()
 
@@ -57,7 +56,7 @@ class _Table:
         if kind is None:
             self._flush()
             self._writer.close()
-        else:  # the file is given up, and the first error is the one to tell
+        else:  # the file is given up, and the first error is the one to report
             with suppress(OSError, pa.ArrowException):
                 self._writer.close()
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
+import shutil
+from collections.abc import Callable
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 
+from quadriga.export.columns import TickReached
 from quadriga.export.source import Source
-from quadriga.export.written import remove
+from quadriga.progress import build_progress
 from quadriga.shared.errors import ConfigError, RecordingError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic
@@ -24,6 +27,8 @@ _WRITERS: Final = {  # module, function, what the default output is called
 }
 FORMATS: Final = tuple(_WRITERS)
 _STRIDE: Final = 100  # ticks between updates of the bar
+
+_Writer = Callable[[Source, Path, TickReached], tuple[Path, ...]]
 
 
 def run(path: Path, form: str, out: Path | None, console: Console) -> None:
@@ -40,9 +45,8 @@ def run(path: Path, form: str, out: Path | None, console: Console) -> None:
         ConfigError: the output exists or cannot be written, or a package is not installed.
     """
     recording = Recording(path)
-    module, function, name = _WRITERS[form]
-    write = _imported(module, function, form)
-    out = out or path.with_name(name.format(path.stem))
+    write = _import_writer(form)
+    out = out or path.with_name(_WRITERS[form][2].format(path.stem))
     if out.exists():
         raise ConfigError(
             "--output",
@@ -54,39 +58,7 @@ def run(path: Path, form: str, out: Path | None, console: Console) -> None:
     source = Source(recording)
     if not source.topics:
         raise RecordingError(str(path), "no message of a known topic", "a recorded walk")
-    bar = Progress(
-        TextColumn("exporting"),
-        BarColumn(),
-        TextColumn("{task.completed:.1f}/{task.total:.1f} s"),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    )
-    with bar:
-        task = bar.add_task("", total=source.last / 1000)
-        shown = 0
-
-        def progress(tick: int) -> None:
-            nonlocal shown
-            if tick >= shown + _STRIDE:
-                shown = tick
-                bar.update(task, completed=tick / 1000)
-
-        # Under a name of its own, so that what others wrote meanwhile is neither mixed nor removed.
-        partial = out.with_name(f".{out.name}.{os.getpid()}.partial")
-        try:
-            written = write(source, partial, progress)
-            if out.exists():
-                raise ConfigError("--output", f"{out}, which exists by now", "a new file or folder")
-            partial.rename(out)
-        except BaseException as error:
-            remove(partial)
-            if isinstance(error, OSError):
-                raise ConfigError(
-                    "--output", f"{out}: {error.strerror or error}", "a writable place with room"
-                ) from None
-            raise
-    files = [out / file.relative_to(partial) for file in written]
+    files = _write(write, source, out, console)
     size = sum(file.stat().st_size for file in files)
     count = f" with {len(files)} files" if len(files) > 1 else ""
     lines = [f"{out}{count}, {size / 1e6:.1f} MB in {monotonic() - begun:.1f} s"]
@@ -100,9 +72,49 @@ def run(path: Path, form: str, out: Path | None, console: Console) -> None:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
-def _imported(module: str, function: str, form: str) -> Any:
+def _write(write: _Writer, source: Source, out: Path, console: Console) -> list[Path]:
+    """Write all files of an export or none; returns them."""
+    # Under a name of its own, so that what others wrote meanwhile is neither mixed nor removed.
+    partial = out.with_name(f".{out.name}.{os.getpid()}.partial")
+    shown = 0
+    bar = build_progress(console, "{task.completed:.1f}/{task.total:.1f} s", fleeting=True)
+    task = bar.add_task("exporting", total=source.last / 1000)
+
+    def show(tick: int) -> None:
+        nonlocal shown
+        if tick >= shown + _STRIDE:
+            shown = tick
+            bar.update(task, completed=tick / 1000)
+
+    with bar:
+        try:
+            files = write(source, partial, show)
+            if out.exists():
+                raise ConfigError("--output", f"{out}, which exists by now", "a new file or folder")
+            partial.rename(out)
+        except BaseException as error:
+            _remove(partial)
+            if isinstance(error, OSError):
+                raise ConfigError(
+                    "--output", f"{out}: {error.strerror or error}", "a writable place with room"
+                ) from None
+            raise
+    return [out / file.relative_to(partial) for file in files]
+
+
+def _remove(out: Path) -> None:
+    """Take back an export that was not finished."""
+    if out.is_dir():
+        shutil.rmtree(out, ignore_errors=True)
+    else:
+        with suppress(OSError):  # it was never there
+            out.unlink()
+
+
+def _import_writer(form: str) -> _Writer:
+    module, function, _ = _WRITERS[form]
     try:
-        return getattr(import_module(f"quadriga.export.{module}"), function)
+        writer: _Writer = getattr(import_module(f"quadriga.export.{module}"), function)
     except ModuleNotFoundError as error:
         raise ConfigError(
             f"--to {form}",
@@ -110,3 +122,4 @@ def _imported(module: str, function: str, form: str) -> Any:
             "the extra 'export'",
             "pip install -e '.[export]' in the project's folder",
         ) from None
+    return writer

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.pictures.figures import stitched
+from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.recordings.traces import in_force, read_traces
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.recording.reader import Recording
@@ -33,7 +33,9 @@ class Tracking:
         self._rows: dict[str, tuple[Ticks, Array]] = {}
         for i, robot in enumerate(traces.robots):
             tick, estimated = traces.measurements[robot].tick, traces.measurements[robot].y
-            begin, _, planned = stitched(traces.plans[robot], traces.config.planner.applied)
+            begin, _, planned = join_applied_samples(
+                traces.plans[robot], traces.config.planner.applied
+            )
             rows = [
                 _at(tick, traces.truth.tick, traces.truth.y[:, i]),
                 estimated,

@@ -19,13 +19,13 @@ from quadriga.identification.cache import predictor_path
 from quadriga.identification.dataset import Dataset, check_excitation
 from quadriga.identification.fit_figure import draw
 from quadriga.identification.fit_report import FitReport, Unfit, horizon_errors, refusal
-from quadriga.identification.fit_sheets import comparison, report_sheets
+from quadriga.identification.fit_tables import comparison, report_sheets
 from quadriga.identification.predictors import build_provenance, ensure_data
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.runtime.blas import one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.sheet import Sheet, show
+from quadriga.tables import Table, print_tables
 
 
 def fit_and_report(config: Config, console: Console, *, every: bool) -> Path:
@@ -58,7 +58,7 @@ def fit_and_report(config: Config, console: Console, *, every: bool) -> Path:
     else:
         stem, sheets, whole = path.with_suffix(""), _sheets(mine), _sheets(mine, True)
     write_page(stem, "Predictors" if every else f"Predictor {mine.name}", whole, reports)
-    show(sheets)
+    print_tables(sheets)
     if mine.refused:
         raise mine.refused
     return path
@@ -103,7 +103,7 @@ def write_json(path: Path, body: Any) -> None:
 
 
 def write_page(
-    stem: Path, title: str, sheets: Sequence[Sheet], reports: Sequence[FitReport | Unfit]
+    stem: Path, title: str, sheets: Sequence[Table], reports: Sequence[FitReport | Unfit]
 ) -> None:
     """Keep tables as Markdown, and a figure of the errors over the horizon beside them."""
     figure = stem.with_suffix(".png")
@@ -113,7 +113,7 @@ def write_page(
     stem.with_suffix(".md").write_text("\n".join(parts), encoding="utf-8")
 
 
-def _sheets(report: FitReport | Unfit, whole: bool = False) -> list[Sheet]:
+def _sheets(report: FitReport | Unfit, whole: bool = False) -> list[Table]:
     return report_sheets(report, whole=whole) if isinstance(report, FitReport) else []
 
 

@@ -6,19 +6,20 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from quadriga.charts.colours import PALETTE
+from quadriga.charts.draw import tidy_axes
+from quadriga.charts.files import save_png
 from quadriga.identification.fit_report import FitReport
 from quadriga.shared.robot.a1 import OUTPUTS
 from quadriga.shared.wire.topics import SAMPLE_MS
-from quadriga.sheet import LABELS, UNITS
+from quadriga.tables import LABELS, UNITS
 
 
 def draw(reports: Sequence[FitReport], path: Path) -> None:
     """Write the figure of predictors of one horizon, fitted to the same data."""
     figure = Figure(figsize=(10.0, 5.5), layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.subplots(2, 3, sharex=True)
     for i, panel in enumerate(axes.flat):
         factor = UNITS[OUTPUTS[i]][1]
@@ -35,14 +36,20 @@ def draw(reports: Sequence[FitReport], path: Path) -> None:
             )
         if reports:
             held = factor * reports[0].horizon.persistence[:, i]
-            panel.plot(ahead, held, color="0.5", linewidth=1.0, linestyle="--", label="persistence")
+            panel.plot(
+                ahead,
+                held,
+                color=PALETTE["soft"],
+                linewidth=1.0,
+                linestyle="--",
+                label="persistence",
+            )
         panel.set_ylabel(f"RMSE {LABELS[i]}")
         panel.set_ylim(bottom=0.0)
-        panel.grid(color="0.9", linewidth=0.6)
-        panel.spines[["top", "right"]].set_visible(False)
+        tidy_axes(panel)
     for panel in axes[-1]:
         panel.set_xlabel("ahead [ms]")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
-    figure.savefig(path, dpi=110)
+    save_png(figure, path)

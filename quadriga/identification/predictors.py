@@ -7,7 +7,6 @@ import tempfile
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from quadriga.agents.planner.gates import GateReport, run_gates
 from quadriga.agents.predictor.fits import fit as fit_predictor
@@ -16,6 +15,7 @@ from quadriga.agents.predictor.store import Provenance, load, save, versions
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.collect import collect, training_seconds
 from quadriga.identification.dataset import Dataset, check_excitation, read_data, write_data
+from quadriga.progress import build_progress
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.runtime.blas import one_blas_thread
@@ -50,13 +50,8 @@ def ensure_data(config: Config, console: Console) -> Dataset:
         pass  # a folder that cannot be written is better known before minutes of walking
     seconds = training_seconds(config) + config.identification.held_out
     label = f"collecting {seconds:.0f} s of walking, {config.team.robots} robots"
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed}/{task.total} episodes"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=console) as progress:
+    count = "{task.completed}/{task.total} episodes"
+    with build_progress(console, count, elapsed=True, hidden=False) as progress:
         task = progress.add_task(label, total=None)
 
         def show(done: int, total: int) -> None:

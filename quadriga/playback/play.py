@@ -8,11 +8,12 @@ from math import inf
 from typing import Final
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn
+from rich.progress import TaskID
 
 from quadriga.playback.keyboard import PAUSE, QUIT, STEP, Keyboard
 from quadriga.playback.timeline import Timeline
 from quadriga.playback.transport import Transport
+from quadriga.progress import build_progress
 from quadriga.shared.bus.members import OPERATOR, PLANNER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.sections import BusConfig
@@ -149,13 +150,7 @@ class _Status:
     def __init__(self, console: Console, tape: Timeline, transport: Transport, keys: bool) -> None:
         self._transport, self._last = transport, tape.last
         self._hint = "  space pauses, → steps, q quits" if keys else ""
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.fields[text]}"),
-            console=console,
-            disable=not console.is_terminal,
-        )
+        self._bar = build_progress(console, "{task.fields[text]}")
         self._task: TaskID = self._bar.add_task("", total=tape.last, text="")
 
     def show(self, position: float) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from quadriga.columns import columns
 from quadriga.recordings.checks.delay import Delay
 from quadriga.recordings.checks.finding import Check, CheckedMessage, Finding
 from quadriga.recordings.checks.limits import Friction, Torques
@@ -17,6 +16,7 @@ from quadriga.shared.recording.reader import COUNTS, ChunkEntry, Recording
 from quadriga.shared.recording.salvage import Salvage
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.topics import Topic, topic_of
+from quadriga.tables import align_columns
 
 _WIDE = 96  # characters of a value that are shown
 
@@ -53,7 +53,7 @@ def format_findings(findings: list[Finding]) -> list[str]:
     """One line for each check, and below it the first messages that break its rule."""
     rows = [("ok" if f.passed else "FAIL", f.name, f.text, "; ".join(f.notes)) for f in findings]
     lines = []
-    for line, finding in zip(columns(rows, indent=""), findings, strict=True):
+    for line, finding in zip(align_columns(rows, indent=""), findings, strict=True):
         lines.append(line)
         for first in finding.first:
             where = f"tick {first.tick} {first.key}: " if first.key else ""

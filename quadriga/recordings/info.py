@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from datetime import UTC, datetime
 
-from quadriga.columns import NOTHING, columns
 from quadriga.recordings.metadata import recorded_patterns, recorded_versions
 from quadriga.recordings.survey import Survey, type_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import departures
 from quadriga.shared.recording.sequence import TickTrack
+from quadriga.tables import NOTHING, align_columns
 
 _EVENTS = 40  # as many are shown
 
@@ -19,11 +19,13 @@ def format_survey(survey: Survey) -> list[str]:
     """Everything a user wants to know of a recording before looking into it, line by line."""
     heads = ("key", "type", "messages", "per s", "from tick", "to tick", "lost")
     blocks = {
-        str(survey.path): columns(_about(survey)),
-        "topics": columns([heads, *_topics(survey)], right=range(2, 7)),
-        "configuration, where it differs from the defaults": columns(_differences(survey.config)),
-        "events": columns(_events(survey), right=(0,)),
-        "agents at the end": columns(_agents(survey)),
+        str(survey.path): align_columns(_about(survey)),
+        "topics": align_columns([heads, *_topics(survey)], right=range(2, 7)),
+        "configuration, where it differs from the defaults": align_columns(
+            _differences(survey.config)
+        ),
+        "events": align_columns(_events(survey), right=(0,)),
+        "agents at the end": align_columns(_agents(survey)),
     }
     return [line for title, lines in blocks.items() if lines for line in (title, *lines)]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from quadriga.columns import NOTHING, columns
 from quadriga.shared.recording.mcap_chunk import name_of
 from quadriga.shared.recording.reader import ChunkEntry
 from quadriga.shared.recording.sequence import TickTrack
+from quadriga.tables import NOTHING, align_columns
 
 _HEADS = ("key", "messages", "per world s", "world ms", "per wall s", "wall ms", "lost")
 
@@ -81,7 +81,7 @@ class Rates:
         rows = [
             _format_row(key, self._rates[key], self._tracks[key]) for key in sorted(self._rates)
         ]
-        return columns([_HEADS, *rows], right=range(1, 7), indent="")
+        return align_columns([_HEADS, *rows], right=range(1, 7), indent="")
 
 
 def _format_row(key: str, rate: KeyRate, track: TickTrack) -> tuple[str, ...]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from quadriga.columns import columns
 from quadriga.recordings.readable import config_or_default, open_readable
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import RecordingError
@@ -16,6 +15,7 @@ from quadriga.shared.recording.salvage import Damage, Salvage
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.recording.writer import reason
 from quadriga.shared.runtime.clock import wall_ns
+from quadriga.tables import align_columns
 
 RECOVERED: Final = f"{PROFILE}.recovered"
 _GAPS: Final = 6  # of a key, as many are named
@@ -102,7 +102,7 @@ def format_recovery(recovery: Recovery) -> list[str]:
         (key, *_format_gaps(track)) for key, track in sorted(recovery.tracks.items()) if track.lost
     ]
     lines += ["missing between the first and the last message"] if missing else []
-    lines += columns(missing, right=(1,))
+    lines += align_columns(missing, right=(1,))
     if recovery.never_came:
         every = ", ".join(f"{key} {count}" for key, count in recovery.never_came.items())
         lines.append(f"of these the recorder had never received: {every}")
@@ -110,7 +110,7 @@ def format_recovery(recovery: Recovery) -> list[str]:
         ends = [
             (key, f"tick {t.last}") for key, t in sorted(recovery.tracks.items()) if t.first >= 0
         ]
-        lines += ["what came after these is lost, if anything did", *columns(ends)]
+        lines += ["what came after these is lost, if anything did", *align_columns(ends)]
     return lines
 
 

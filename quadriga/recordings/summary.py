@@ -27,9 +27,8 @@ from quadriga.shared.robot.a1 import OUTPUTS, Array
 from quadriga.shared.runtime.histogram import QUANTILES
 from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import STATE
-from quadriga.table import print_table
 
-__all__ = ["RECORDING", "SUMMARY", "print_table", "steady_from", "summarise", "summary_of"]
+__all__ = ["RECORDING", "SUMMARY", "steady_from", "summarise", "summary_of"]
 
 RECORDING: Final = "run.mcap"
 SUMMARY: Final = "summary.json"

@@ -1,22 +1,22 @@
-"""The figure of a changed replay: what was recorded and what the changed agent would have said."""
+"""The figure of a changed replay: what was recorded, and what the changed agent would have sent."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
+from quadriga.charts.draw import draw_panels
+from quadriga.charts.files import save_png
+from quadriga.charts.panels import Curve, Panel, PanelGrid
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.robot.a1 import JOINT_NAMES, OUTPUTS, Array, Leg
 from quadriga.shared.wire.messages import Command, Measurement, Message, Plan
 from quadriga.shared.wire.topics import SAMPLE_MS
 
-_BLUE, _ORANGE = "#1f77b4", "#e6550d"
+_RECORDED, _RECOMPUTED, _DIFFERENCE = "true", "planned", "own"  # styles
 _TINY: Final = 1e-9
 _AXES: Final = "xyz"
 _UNITS: Final = ("m", "m/s", "m/s", "rad", "rad", "rad/s")
@@ -75,52 +75,33 @@ def draw(curves: Curves, title: str, path: Path) -> None:
     Raises:
         RecordingError: it cannot be written.
     """
-    figure = Figure(figsize=(12.0, 9.0), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(len(_TITLES), 2, sharex=True, width_ratios=(3, 2))
-    for kind, (both, apart) in zip(_TITLES, panels, strict=True):
-        _fill(both, apart, curves, kind)
-    for panel in panels[-1]:
-        panel.set_xlabel("time [s]")
-    handles, labels = panels[-1, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
-    figure.suptitle(title, fontsize="medium")
+    panels = [panel for kind in _TITLES for panel in _build_panels(curves, kind)]
+    times = np.concatenate([curves.of(kind)[0] for kind in _TITLES])
+    begin, end = (times.min(), times.max()) if len(times) else (0.0, 0.0)
+    grid = PanelGrid(float(begin), float(end), columns=2, height=140.0)
+    legend = [(_RECORDED, "recorded"), (_RECOMPUTED, "recomputed")]
     try:
-        figure.savefig(path, dpi=110)
+        save_png(draw_panels(panels, grid, legend=legend, title=title), path)
     except OSError as error:
         reason = error.strerror or str(error)
         raise RecordingError(str(path), reason, "a file that can be written") from None
 
 
-def _fill(both: Axes, apart: Axes, curves: Curves, kind: str) -> None:
+def _build_panels(curves: Curves, kind: str) -> tuple[Panel, Panel]:
+    """Both values of the component that has changed most, and beside them their difference."""
     time, old, new = curves.of(kind)
     column = curves.changed_most(kind)
-    name, _, unit = _NAMES[kind][column].rpartition(" ")
-    for panel in (both, apart):
-        panel.spines[["top", "right"]].set_visible(False)
-        panel.grid(color="0.92", linewidth=0.6)
-    both.set_title(f"{_TITLES[kind]}: {name}", loc="left", fontsize="small")
-    both.set_ylabel(unit)
+    name = f"{_TITLES[kind]}: {_NAMES[kind][column]}"
     if not len(time):
-        both.text(0.5, 0.5, "none recorded", transform=both.transAxes, ha="center")
-        return
-    style: Any = "steps-post" if kind == "force" else "default"
-    for values, colour, width, label in (
-        (old, _BLUE, 1.4, "recorded"),
-        (new, _ORANGE, 0.9, "recomputed"),
-    ):
-        both.plot(
-            time, values[:, column], color=colour, linewidth=width, drawstyle=style, label=label
-        )
+        return Panel(f"{name}, none recorded"), Panel("")
+    shape = "step" if kind == "force" else "line"
+    both = [
+        Curve(time, old[:, column], _RECORDED, shape),
+        Curve(time, new[:, column], _RECOMPUTED, shape),
+    ]
     difference = new[:, column] - old[:, column]
-    apart.plot(time, difference, color="0.25", linewidth=0.9, drawstyle=style)
     worst = int(np.abs(difference).argmax())
     rms = float(np.sqrt(np.mean(difference**2)))
-    apart.set_title(
-        f"recomputed − recorded: at most {abs(difference[worst]):.3g}, at {time[worst]:.2f} s; "
-        f"rms {rms:.3g}"
-        if difference.any()
-        else "the same",
-        loc="left",
-        fontsize="small",
-    )
+    size = f"at most {abs(difference[worst]):.3g}, at {time[worst]:.2f} s; rms {rms:.3g}"
+    apart = f"recomputed − recorded: {size}" if difference.any() else "the same"
+    return Panel(name, both), Panel(apart, [Curve(time, difference, _DIFFERENCE, shape)])

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Final
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 
+from quadriga.progress import build_progress
 from quadriga.recordings.metadata import differing_versions
 from quadriga.replay.world_replay import WorldComparison, replay_world
 from quadriga.shared.recording.config import recorded_config
@@ -27,16 +27,9 @@ def compare_world(path: Path, console: Console) -> bool:
     seconds = recorded_config(recording).world.seconds
     begun = monotonic()
     last = WorldComparison(0, 0)
-    bar = Progress(
-        TextColumn("re-simulating"),
-        BarColumn(),
-        TextColumn("{task.completed:.1f}/{task.total:g} s"),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    )
+    bar = build_progress(console, "{task.completed:.1f}/{task.total:g} s", fleeting=True)
     with bar:
-        task = bar.add_task("", total=seconds)
+        task = bar.add_task("re-simulating", total=seconds)
         for last in replay_world(recording):
             if last.tick % _SHOWN == 0:
                 bar.update(task, completed=last.tick / 1000)

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from quadriga.progress import build_progress
 from quadriga.replay.agent_replay import ReplayJob, replay_agent
 from quadriga.replay.breakpoint import Breakpoint
 from quadriga.replay.outcome import ReplayOutcome
@@ -58,7 +58,7 @@ def replay(
 
 
 def _replay_alone(job: ReplayJob, console: Console) -> ReplayOutcome:
-    with _build_bar(console) as progress:
+    with build_progress(console, elapsed=True, fleeting=True) as progress:
         task = progress.add_task("", total=None)
 
         def show(doing: str, tick: int) -> None:
@@ -71,7 +71,8 @@ def _replay_all(jobs: Sequence[ReplayJob], console: Console) -> list[ReplayOutco
     """Replay robots side by side; the first error that one of them met is raised at the end."""
     outcomes: dict[str, ReplayOutcome] = {}
     errors: list[QuadrigaError] = []
-    with closing(run_each(_try_replay, jobs, _JOBS)) as results, _build_bar(console) as progress:
+    bar = build_progress(console, elapsed=True, fleeting=True)
+    with closing(run_each(_try_replay, jobs, _JOBS)) as results, bar as progress:
         for job, result in progress.track(results, len(jobs), description="replaying the team"):
             if isinstance(result, QuadrigaError):
                 errors.append(result)
@@ -130,14 +131,3 @@ def _make_folder(path: Path, out: Path | None) -> Path:
         reason = error.strerror or str(error)
         raise RecordingError(f"--out {folder}", reason, "a folder that can be made") from None
     return folder
-
-
-def _build_bar(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    )

@@ -1,4 +1,4 @@
-"""What the head of the page says: scenario, seed, versions, configuration, what is absent."""
+"""The head of the page: scenario, seed, versions, configuration, and what was not recorded."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from quadriga.recordings.metadata import recorded_versions
 from quadriga.report.run import Run
+from quadriga.report.timeline import FALL
 from quadriga.shared.config.reference_trace import ROW_END
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import departures
@@ -18,29 +19,29 @@ from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, S
 _DIGITS: Final = 12  # of a digest
 
 
-def title(run: Run) -> str:
+def build_title(run: Run) -> str:
     """The run in one line."""
     config = run.traces.config
     n = config.team.robots
     who = f"{n} yoked robots" if n > 1 else "1 robot"
-    return f"{who} on {_ground(config)}, seed {config.world.seed}"
+    return f"{who} on {_describe_ground(config)}, seed {config.world.seed}"
 
 
-def verdict(run: Run) -> tuple[str, bool]:
+def judge(run: Run) -> tuple[str, bool]:
     """How it went in one line, and whether it went well."""
-    falls = [moment for moment in run.moments if moment.kind == "fall"]
+    falls = [entry for entry in run.timeline if entry.kind == FALL]
     if falls or run.summary["fell"]:
-        when = ", ".join(f"{m.robot} at {m.tick / 1000:.2f} s" for m in falls)
+        when = ", ".join(f"{fall.robot} at {fall.tick / 1000:.2f} s" for fall in falls)
         return f"Fell: {when or ', '.join(run.summary['fallen'])}", False
     if run.summary["stop_reasons"]:
-        said = "; ".join(f"{robot}: {why}" for robot, why in run.summary["stop_reasons"].items())
-        return f"Stopped: {said}", False
+        reasons = (f"{robot}: {why}" for robot, why in run.summary["stop_reasons"].items())
+        return f"Stopped: {'; '.join(reasons)}", False
     seconds = (run.end - run.begin) / 1000
     ended = run.summary["end"]
     return f"{seconds:.1f} s without a fall ({ended or 'no end was recorded'})", True
 
 
-def facts(run: Run) -> Iterator[tuple[str, str]]:
+def list_facts(run: Run) -> Iterator[tuple[str, str]]:
     """Name and text of what identifies the run."""
     traces, config = run.traces, run.traces.config
     if traces.log_times:
@@ -53,7 +54,7 @@ def facts(run: Run) -> Iterator[tuple[str, str]]:
     world = config.world
     if world.scenario:
         yield "scenario", world.scenario
-    yield "ground", f"{_ground(config)}, friction {world.friction:g}"
+    yield "ground", f"{_describe_ground(config)}, friction {world.friction:g}"
     if world.payload:
         yield "payload", f"{world.payload:g} kg on {world.payload_on}"
     if world.push:
@@ -79,22 +80,22 @@ def facts(run: Run) -> Iterator[tuple[str, str]]:
     yield "versions", ", ".join(f"{k} {v}" for k, v in versions.items()) or "not recorded"
 
 
-def not_usual(config: Config) -> list[tuple[str, str, str, str]]:
+def list_changed_keys(config: Config) -> list[tuple[str, str, str, str]]:
     """Keys whose values are not the defaults: key, value, default, meaning with unit."""
     found = []
     for name, value, usual, meta in departures(config, Config()):
         doc = meta["doc"] + ("" if meta["unit"] in ("-", "1") else f" [{meta['unit']}]")
-        found.append((name, _text(value), _text(usual), doc))
+        found.append((name, _format(value), _format(usual), doc))
     return found
 
 
-def absent(run: Run) -> list[str]:
+def describe_missing(run: Run) -> list[str]:
     """What the recording does not hold, and what the page leaves out for it; empty if whole."""
-    traces, said = run.traces, []
+    traces, missing = run.traces, list[str]()
     names = {key.partition("/")[2].rpartition("/")[2] or key for key in traces.ticks}
     keys = {key.partition("/")[2] for key in traces.ticks}
     if TRUTH.name not in keys:
-        said.append(
+        missing.append(
             "No sim/truth, as of real robots: measured curves are the agents' own estimates, "
             "contacts are those of the foot sensors; true forces, yokes, paths and estimator "
             "errors are left out."
@@ -107,26 +108,26 @@ def absent(run: Run) -> list[str]:
         (REFERENCE, "what was asked for is not known"),
     ):
         if topic.name not in names and topic.name not in keys:
-            said.append(f"No {topic.name}: {without}.")
+            missing.append(f"No {topic.name}: {without}.")
     if PLAN.name not in names and traces.config.planner.kind != "none":
-        said.append("No plan: planned curves are left out.")
+        missing.append("No plan: planned curves are left out.")
     silent = [
         robot
         for robot in traces.robots
         if STATE.name in names and STATE.key(traces.config.team.name, robot) not in traces.ticks
     ]
     if silent:
-        said.append(f"Nothing of the sensors of {', '.join(silent)}.")
+        missing.append(f"Nothing of the sensors of {', '.join(silent)}.")
     if run.begin > 0:
-        said.append(f"The recording begins at {run.begin / 1000:.2f} s.")
+        missing.append(f"The recording begins at {run.begin / 1000:.2f} s.")
     if traces.cut:
-        said.append(f"The recording is cut: {traces.cut}. Everything before is shown.")
+        missing.append(f"The recording is cut: {traces.cut}. Everything before is shown.")
     elif not run.complete:
-        said.append("The recording was not finished: its recorder was killed or lost its disk.")
-    return said
+        missing.append("The recording was not finished: its recorder was killed or lost its disk.")
+    return missing
 
 
-def traffic(run: Run) -> list[tuple[str, ...]]:
+def list_traffic(run: Run) -> list[tuple[str, ...]]:
     """A row for each key: messages, rate, first and last tick, missing and invalid ones."""
     traces = run.traces
     rows: list[tuple[str, ...]] = []
@@ -141,7 +142,7 @@ def traffic(run: Run) -> list[tuple[str, ...]]:
     return rows
 
 
-def _ground(config: Config) -> str:
+def _describe_ground(config: Config) -> str:
     world = config.world
     if world.terrain == "flat":
         return "flat ground"
@@ -150,7 +151,7 @@ def _ground(config: Config) -> str:
     return f"{world.terrain} up to {1000 * world.terrain_height:.0f} mm"
 
 
-def _text(value: Any) -> str:
+def _format(value: Any) -> str:
     if isinstance(value, tuple):
         return ", ".join(f"{item:g}" for item in value)
     return str(value) if str(value) else "(empty)"

@@ -3,25 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from html import escape
 from pathlib import Path
 from typing import Final
 
-from quadriga.report import about, feet, machine, tracks
-from quadriga.report.account import COLUMNS
-from quadriga.report.html import cells, details, document, figure, key, keys, table, time_link
-from quadriga.report.look import SCRIPT
-from quadriga.report.look_at import Trouble, episodes
-from quadriga.report.moments import Moment
+from quadriga.recordings.summary_table import list_figures
+from quadriga.report import about, foot_figures, process_figures, trunk_figures
+from quadriga.report.conditions import COLUMNS
+from quadriga.report.document import (
+    Cell,
+    Document,
+    Drawing,
+    Fold,
+    PageTable,
+    Paragraph,
+    Part,
+    Section,
+    Subtitle,
+    Text,
+    time_link,
+)
 from quadriga.report.run import Run
-from quadriga.shared.bus.members import PLANNER
+from quadriga.report.timeline import TimelineEntry
+from quadriga.report.top_view import draw_top_view
+from quadriga.report.trouble_figure import draw_trouble
+from quadriga.report.troubles import Trouble, find_troubles
 from quadriga.shared.config.sections import CENTRAL
 from quadriga.shared.errors import RecordingError
-from quadriga.table import rows as summary_rows
 
 PAGE: Final = "report.html"
-_EPISODES: Final = 6  # shown in full
-_MOMENTS: Final = 200
+_TROUBLES: Final = 6  # shown in full
+_ENTRIES: Final = 200  # of the timeline, listed
+_OPENED: Final = 40  # entries that are listed unfolded
+_LASTING_MS: Final = 10
+_TIMES: Final = (
+    "process", "solves", "median [ms]", "99 % [ms]", "greatest [ms]",
+    "ticks", "median [µs]", "99 % [µs]", "greatest [µs]",
+)  # fmt: skip
+_TRAFFIC: Final = ("key", "messages", "rate [Hz]", "from … to [s]", "missing", "invalid")
 
 
 def write_page(run: Run, path: Path) -> Path:
@@ -41,204 +59,161 @@ def write_page(run: Run, path: Path) -> Path:
 
 def build_page(run: Run) -> str:
     """The whole page as HTML; it loads nothing from anywhere."""
-    text, good = about.verdict(run)
-    head = f'<p class="verdict {"good" if good else "bad"}">{escape(text)}</p>{_absent(run)}'
-    return document(about.title(run), head, list(_sections(run)), SCRIPT)
+    lead, good = about.judge(run)
+    return Document(
+        title=about.build_title(run),
+        lead=lead,
+        sections=list(_build_sections(run)),
+        verdict="good" if good else "bad",
+        notes=about.describe_missing(run),
+        clock=True,
+    ).to_html()
 
 
-Section = tuple[str, str, str]  # anchor, title, HTML
-
-
-def _sections(run: Run) -> Iterator[Section]:
-    yield "run", "The run", _run(run)
-    yield "summary", "Summary", table((), summary_rows(run.summary), named=True)
-    troubles = episodes(run)
+def _build_sections(run: Run) -> Iterator[Section]:
+    yield Section("run", "The run", _build_run(run))
+    summary = PageTable((), list_figures(run.summary), named=True)
+    yield Section("summary", "Summary", [summary])
+    troubles = find_troubles(run)
     if troubles:
-        yield "look", "What to look at", _look(run, troubles)
-    yield "timeline", "Timeline", _timeline(run)
-    yield from _trunks(run)
-    yield from _feet(run)
-    yield from _machine(run)
-    yield (
-        "traffic",
-        "The recording",
-        table(
-            ("key", "messages", "rate [Hz]", "from … to [s]", "missing", "invalid"),
-            about.traffic(run),
-            numbers=True,
-        ),
-    )
+        yield Section("look", "What to look at", list(_build_troubles(run, troubles)))
+    yield Section("timeline", "Timeline", _build_timeline(run))
+    yield from _build_trunks(run)
+    yield from _build_feet(run)
+    yield from _build_processes(run)
+    traffic = PageTable(_TRAFFIC, about.list_traffic(run), numbers=True)
+    yield Section("traffic", "The recording", [traffic])
 
 
-def _absent(run: Run) -> str:
-    said = "".join(f"<p>{escape(text)}</p>" for text in about.absent(run))
-    return f'<div class="note">{said}</div>' if said else ""
-
-
-def _run(run: Run) -> str:
-    config = run.traces.config
-    changed = about.not_usual(config)
-    facts = table((), list(about.facts(run)), named=True)
+def _build_run(run: Run) -> list[Part]:
+    facts = PageTable((), list(about.list_facts(run)), named=True)
+    changed = about.list_changed_keys(run.traces.config)
     if not changed:
-        return facts + "<p>Every key of the configuration has its default value.</p>"
-    return facts + details(
-        f"Keys of the configuration that differ from their defaults: {len(changed)}",
-        table(("key", "value", "default", "meaning"), changed),
-        opened=True,
+        return [facts, Paragraph(["Every key of the configuration has its default value."])]
+    title = f"Keys of the configuration that differ from their defaults: {len(changed)}"
+    keys = PageTable(("key", "value", "default", "meaning"), changed)
+    return [facts, Fold(title, [keys], opened=True)]
+
+
+def _build_troubles(run: Run, troubles: Sequence[Trouble]) -> Iterator[Part]:
+    yield Paragraph(
+        [
+            "For each fall, fault or stop: the second before it, what was out of the ordinary then "
+            "and in which order it came. Unusual figures are marked."
+        ]
     )
+    for trouble in troubles[:_TROUBLES]:
+        yield from _build_trouble(run, trouble)
+    rest = troubles[_TROUBLES:]
+    if rest:
+        links: list[Text] = [f"{len(rest)} more, in the timeline: "]
+        for trouble in rest:
+            links += [time_link(trouble.tick), " "]
+        yield Paragraph(links)
 
 
-def _look(run: Run, troubles: Sequence[Trouble]) -> str:
-    parts = [
-        "<p>For each fall, fault or stop: the second before it, what was out of the ordinary then "
-        "and in which order it came. Unusual figures are marked.</p>"
+def _build_trouble(run: Run, trouble: Trouble) -> Iterator[Part]:
+    what = "; ".join(f"{e.robot or 'world'} {e.kind}: {e.text}" for e in trouble.entries)
+    yield Subtitle([time_link(trouble.tick), f" · {what}"])
+    rows: list[list[Text]] = [
+        [condition.robot, *(Cell(text, marked=marked) for text, marked in condition.cells)]
+        for condition in trouble.conditions
     ]
-    for episode in troubles[:_EPISODES]:
-        parts.append(_episode(run, episode))
-    if len(troubles) > _EPISODES:
-        rest = ", ".join(time_link(episode.tick) for episode in troubles[_EPISODES:])
-        parts.append(f"<p>{len(troubles) - _EPISODES} more, in the timeline: {rest}.</p>")
-    return "".join(parts)
-
-
-def _episode(run: Run, episode: Trouble) -> str:
-    what = "; ".join(f"{m.robot or 'world'} {m.kind}: {m.text}" for m in episode.troubles)
-    signs = [
-        (time_link(sign.tick), escape(sign.robot or "world"), escape(sign.text))
-        for sign in episode.signs
+    yield PageTable(("robot", *COLUMNS), rows)
+    figure = draw_trouble(run, trouble)
+    yield Drawing(figure, f"the second before {trouble.tick / 1000:.3f} s")
+    signs: list[list[Text]] = [
+        [time_link(sign.tick), sign.robot or "world", sign.text] for sign in trouble.signs
     ]
-    told = (
-        table(("time", "robot", "what"), signs, raw=True)
-        if signs
-        else ("<p>Nothing out of the ordinary was recorded in this second.</p>")
-    )
-    accounts = [[(a.robot, False), *a.cells] for a in episode.accounts]
-    robots = "".join(key(tracks.style(i), r) for i, r in enumerate(run.traces.robots))
-    return (
-        f"<h3>{time_link(episode.tick)} · {escape(what)}</h3>"
-        f"{cells(('robot', *COLUMNS), accounts)}"
-        f"{figure(machine.closeup(run, episode), robots + _gait_keys(run))}"
-        f"{details('What came first', told, opened=True)}"
-    )
+    first: Part = PageTable(("time", "robot", "what"), signs)
+    if not signs:
+        first = Paragraph(["Nothing out of the ordinary was recorded in this second."])
+    yield Fold("What came first", [first], opened=True)
 
 
-def _timeline(run: Run) -> str:
-    legend = keys(
-        ("mode-walk", "walk"),
-        ("mode-stand", "stand"),
-        ("mode-stopping", "stopping; plan faded"),
-        ("mode-damping", "damping, e-stop; messages missing"),
-        ("nominal", "other plan status"),
-        ("count", "counted by the agent"),
-    )
-    main = machine.timeline(run).replace("<svg ", '<svg data-main="" ', 1)
-    rows = [_moment(moment) for moment in run.moments[:_MOMENTS]]
-    more = len(run.moments) - len(rows)
-    text = table(("time", "robot", "kind", "what"), rows, raw=True)
+def _build_timeline(run: Run) -> list[Part]:
+    rows = [_build_row(entry) for entry in run.timeline[:_ENTRIES]]
+    listed: list[Part] = [PageTable(("time", "robot", "kind", "what"), rows)]
+    more = len(run.timeline) - len(rows)
     if more > 0:
-        text += f"<p>{more} more are left out.</p>"
-    hint = "<p class='soft'>A time is a link: it shows that time in every figure.</p>"
-    opened = len(rows) <= 40
-    return figure(main, legend) + hint + details(f"{len(rows)} entries", text, opened=opened)
+        listed.append(Paragraph([f"{more} more are left out."]))
+    return [
+        Drawing(process_figures.draw_timeline(run), "timeline"),
+        Paragraph(["A time is a link: it shows that time in every figure."], soft=True),
+        Fold(f"{len(rows)} entries", listed, opened=len(rows) <= _OPENED),
+    ]
 
 
-def _moment(moment: Moment) -> tuple[str, ...]:
-    when = time_link(moment.tick)
-    if moment.stop - moment.tick >= 10:
-        when += f" … {moment.stop / 1000:.2f} s"
-    kind = f'<b class="bad">{escape(moment.kind)}</b>' if moment.trouble else escape(moment.kind)
-    return when, escape(moment.robot), kind, escape(moment.text)
+def _build_row(entry: TimelineEntry) -> list[Text]:
+    when = time_link(entry.tick)
+    if entry.stop - entry.tick >= _LASTING_MS:
+        when = Cell(f"{when.text} … {entry.stop / 1000:.2f} s", when.href)
+    return [when, entry.robot, Cell(entry.kind, marked=entry.trouble), entry.text]
 
 
-def _trunks(run: Run) -> Iterator[Section]:
+def _build_trunks(run: Run) -> Iterator[Section]:
     robots = run.traces.robots
-    named = "".join(key(tracks.style(i), robot) for i, robot in enumerate(robots))
-    asked = key("asked", "asked for")
     if any(len(run.measured(i)[0]) for i in range(len(robots))):
-        legend = (
-            (key("true", "measured (truth)") if run.has_truth else "")
-            + key("own", "estimated by the agent")
-            + key("planned", "planned")
-            + asked
-        )
-        parts = []
-        for i, robot in enumerate(robots):
-            whole = figure(tracks.trajectories(run, i), legend)
-            parts.append(details(robot, whole, opened=i < 3))
-            near = figure(tracks.trajectories(run, i, feet.strides(run)), legend)
-            parts.append(details(f"{robot}, four strides enlarged", near, opened=i == 0))
-        fell = "<p class='soft'>The axes are chosen by what came before the first fall.</p>"
-        parts.append(fell if tracks.falls(run) else "")
-        yield "trajectories", "Trajectories", "".join(parts)
+        yield Section("trajectories", "Trajectories", list(_build_trajectories(run)))
         source = "true" if run.has_truth else "estimated"
-        text = f"<p>Each robot's {source} output, averaged over one gait period.</p>"
-        yield (
-            "reference",
-            "Reference against measured",
-            text + figure(tracks.reference_against_measured(run), named + asked),
-        )
-    if run.has_truth:
-        yield "paths", "Paths from above", figure(tracks.top_view(run), named)
-        if any(len(measured.tick) for measured in run.traces.measurements.values()):
-            text = "<p>What the agent estimated, less the truth at the same tick"
-            if run.traces.config.world.uneven:
-                text += ". The height is not compared: it is that over the ground which the feet "
-                text += "feel, the truth's that over the terrain under the hips"
-            text += ".</p>"
-            yield (
-                "estimator",
-                "Estimator errors",
-                text + figure(tracks.estimator_errors(run), named),
+        text = f"Each robot's {source} output, averaged over one gait period."
+        drawing = Drawing(trunk_figures.draw_reference(run), "reference against measured")
+        yield Section("reference", "Reference against measured", [Paragraph([text]), drawing])
+    if not run.has_truth:
+        return
+    drawing = Drawing(draw_top_view(run.traces), "paths from above")
+    yield Section("paths", "Paths from above", [drawing])
+    if any(len(measured.tick) for measured in run.traces.measurements.values()):
+        text = "What the agent estimated, less the truth at the same tick."
+        if run.traces.config.world.uneven:
+            text += (
+                " The height is not compared: the agent's is that over the ground which the feet "
+                "feel, the truth's that over the terrain under the hips."
             )
-        if run.traces.truth.yoke_error.shape[1:] not in ((), (0,)):
-            legend = "".join(
-                key(tracks.style(k), name) for k, name in enumerate(tracks.yoke_names(run))
-            )
-            yield "yokes", "Yokes", figure(tracks.yokes(run), legend)
+        drawing = Drawing(trunk_figures.draw_estimator_errors(run), "estimator errors")
+        yield Section("estimator", "Estimator errors", [Paragraph([text]), drawing])
+    if run.traces.truth.yoke_error.shape[1:] not in ((), (0,)):
+        yield Section("yokes", "Yokes", [Drawing(trunk_figures.draw_yokes(run), "yokes")])
 
 
-def _feet(run: Run) -> Iterator[Section]:
-    if run.has_truth or any(len(s.tick) for s in run.samples.values()):
-        source = "ground reaction (truth)" if run.has_truth else "measured by the foot sensor"
-        legend = key("true", source) + key("planned", "planned, as applied")
-        svg, begin, end = feet.enlarged(run)
-        text = f"<h3>All feet in four strides, {begin:.2f} … {end:.2f} s</h3>"
-        yield "forces", "Vertical forces", figure(feet.whole(run), legend) + text + figure(svg)
-    if any(len(samples.tick) for samples in run.samples.values()):
-        svg, begin, end = feet.gait(run)
-        text = (
-            ""
-            if (begin, end) == (run.begin / 1000, run.end / 1000)
-            else (f"<p>From {begin:.2f} to {end:.2f} s.</p>")
-        )
-        yield "gait", "Gait", text + figure(svg, _gait_keys(run))
+def _build_trajectories(run: Run) -> Iterator[Part]:
+    for i, robot in enumerate(run.traces.robots):
+        whole = Drawing(trunk_figures.draw_trajectory(run, i), f"trajectories of {robot}")
+        yield Fold(robot, [whole], opened=i < 3)
+        near = trunk_figures.draw_trajectory(run, i, foot_figures.four_strides(run))
+        name = f"{robot}, four strides enlarged"
+        yield Fold(name, [Drawing(near, name)], opened=i == 0)
+    if trunk_figures.mark_falls(run):
+        text = "The axes are chosen by what came before the first fall."
+        yield Paragraph([text], soft=True)
 
 
-def _gait_keys(run: Run) -> str:
-    contact = "true contact" if run.has_truth else "contact by the foot sensor"
-    return keys(("stance", "scheduled stance"), ("contact", contact))
+def _build_feet(run: Run) -> Iterator[Section]:
+    sensed = any(len(samples.tick) for samples in run.samples.values())
+    if run.has_truth or sensed:
+        begin, end = foot_figures.four_strides(run)
+        parts: list[Part] = [
+            Drawing(foot_figures.draw_forces(run), "vertical forces"),
+            Subtitle([f"All feet in four strides, {begin:.2f} … {end:.2f} s"]),
+            Drawing(foot_figures.draw_forces_enlarged(run), "vertical forces, four strides"),
+        ]
+        yield Section("forces", "Vertical forces", parts)
+    if sensed:
+        figure, begin, end = foot_figures.draw_gait(run)
+        parts = [Drawing(figure, "gait")]
+        if (begin, end) != (run.begin / 1000, run.end / 1000):
+            parts.insert(0, Paragraph([f"From {begin:.2f} to {end:.2f} s."]))
+        yield Section("gait", "Gait", parts)
 
 
-def _machine(run: Run) -> Iterator[Section]:
+def _build_processes(run: Run) -> Iterator[Section]:
     if not any(run.traces.statuses.values()) and not any(run.traces.plans.values()):
         return
+    times = PageTable(_TIMES, process_figures.list_times(run), numbers=True)
+    drawing = Drawing(process_figures.draw_times(run), "solve and tick times")
+    yield Section("times", "Solve and tick times", [drawing, times])
     central = run.traces.config.planner.kind in CENTRAL
-    named = "".join(key(tracks.style(i), robot) for i, robot in enumerate(run.traces.robots))
-    head = (
-        "process",
-        "solves",
-        "median [ms]",
-        "99 % [ms]",
-        "greatest [ms]",
-        "ticks",
-        "median [µs]",
-        "99 % [µs]",
-        "greatest [µs]",
-    )
-    drawn = figure(machine.times(run), named + (key("asked", PLANNER) if central else ""))
-    told = table(head, machine.times_table(run), numbers=True)
-    yield "times", "Solve and tick times", drawn + told
     what = "the plan in force was" if central else "each peer's plan was when it was planned with"
-    legend = key("planned", "central plan") if central else named
-    drawn = figure(machine.ages(run), legend + key("asked", "reference"))
-    yield "ages", "Ages of inputs", f"<p>How old, by world time, {what}.</p>{drawn}"
+    drawing = Drawing(process_figures.draw_ages(run), "ages of inputs")
+    text = f"How old, by world time, {what}."
+    yield Section("ages", "Ages of inputs", [Paragraph([text]), drawing])

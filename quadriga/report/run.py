@@ -13,8 +13,8 @@ from quadriga.recordings.gaps import end_of_world
 from quadriga.recordings.summary import summary_of
 from quadriga.recordings.traces import Traces, read_traces
 from quadriga.recordings.truth import Ticks
-from quadriga.report.moments import Moment, build_moments
 from quadriga.report.samples import Samples, read_samples
+from quadriga.report.timeline import TimelineEntry, build_timeline
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, STATE, STATUS, TRUTH
@@ -31,7 +31,7 @@ class Run:
         path: the recording.
         complete: whether its file was finished.
         samples: sensors of each robot at 100 Hz.
-        moments: what happened, in order of time.
+        timeline: what happened, in order of time.
         begin: first recorded tick, ms.
         end: last recorded tick, ms.
     """
@@ -41,13 +41,13 @@ class Run:
     traces: Traces
     summary: Mapping[str, Any]
     samples: Mapping[str, Samples]
-    moments: tuple[Moment, ...]
+    timeline: tuple[TimelineEntry, ...]
     begin: int
     end: int
 
     @property
     def has_truth(self) -> bool:
-        """Whether the simulator's word was recorded."""
+        """Whether the simulator's truth was recorded."""
         return len(self.traces.truth.tick) > 0
 
     def measured(self, index: int) -> tuple[Ticks, Array]:
@@ -72,20 +72,20 @@ def build_run(
     recording: Recording, traces: Traces, summary: Mapping[str, Any] | None = None
 ) -> Run:
     """The run of a recording whose traces are read already."""
-    begin, end = _span(traces)
+    begin, end = _find_span(traces)
     return Run(
         path=recording.path,
         complete=recording.complete,
         traces=traces,
         summary=summary_of(traces) if summary is None else summary,
         samples=read_samples(recording, traces),
-        moments=build_moments(traces, begin, end),
+        timeline=build_timeline(traces, begin, end),
         begin=begin,
         end=end,
     )
 
 
-def _span(traces: Traces) -> tuple[int, int]:
+def _find_span(traces: Traces) -> tuple[int, int]:
     """First and last tick of what robots and world sent; of anything, if they sent nothing."""
     last, nothing = end_of_world(traces.config) + _FORGED, np.zeros(0, dtype=np.int64)
     for names in (_PACED, ("",)):

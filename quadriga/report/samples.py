@@ -1,4 +1,4 @@
-"""What every robot's sensors said at 100 Hz, and what follows from it about its feet."""
+"""Every robot's sensors at 100 Hz, and what follows from them about its feet."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Measurement, State
 from quadriga.shared.wire.topics import MEASUREMENT, SAMPLE_MS, STATE, topic_of
 
-_STALE_MS: Final = 100  # a stance said longer ago than this is not that of now
+_STALE_MS: Final = 100  # a stance reported longer ago than this is not that of now
 _LOADED: Final = 10.0  # N of true force that is a contact
 
 
@@ -35,8 +35,8 @@ class Samples:
         foot_speed: horizontal speed of the point of each foot that would touch the ground, shape
             (M, 4), m/s; NaN where the trunk's velocity is not known.
         torque: greatest share of the torque limit among the joints, shape (M,).
-        stance: scheduled stance as the agent said, shape (M, 4), bool; by the clock where it said
-            nothing.
+        stance: scheduled stance as the agent reported it, shape (M, 4), bool; by the clock where
+            it reported none.
         contact: shape (M, 4), bool; by true force, by the foot sensors without truth.
     """
 
@@ -158,7 +158,7 @@ def _newest(tick: Ticks, known: Ticks, values: Any, otherwise: Any) -> Any:
     return np.where(fresh[:, None], values[at], otherwise)
 
 
-def slipping(samples: Samples) -> Array:
+def find_slip(samples: Samples) -> Array:
     """Speed of the fastest foot that should stand and does, 0 without any. Shape (M,), m/s."""
     standing = samples.stance & samples.contact
     speed = np.where(standing, np.nan_to_num(samples.foot_speed), 0.0)

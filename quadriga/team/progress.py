@@ -6,8 +6,8 @@ from typing import Self
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 
+from quadriga.progress import build_progress
 from quadriga.shared.bus.members import LAUNCHER
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
@@ -30,12 +30,7 @@ class WalkProgress:
         self._bus = Bus.open(config.bus, config.team.name, LAUNCHER)
         for topic in topics_for(LAUNCHER):
             self._bus.subscribe(topic.key(config.team.name))
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.fields[text]}"),
-            console=console,
-        )
+        self._bar = build_progress(console, "{task.fields[text]}", hidden=False)
         self._task = self._bar.add_task("starting", total=config.world.seconds, text="")
         self._begun = 0.0
         self.fallen: list[str] = []

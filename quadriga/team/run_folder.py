@@ -8,11 +8,12 @@ from typing import Any, Final
 
 from rich.console import Console
 
-from quadriga.pictures.figures import draw
 from quadriga.pictures.render import render
-from quadriga.recordings.summary import RECORDING, print_table, summarise
+from quadriga.recordings.summary import RECORDING, summarise
+from quadriga.recordings.summary_table import print_summary
 from quadriga.recordings.traces import read_traces
-from quadriga.report.about import absent
+from quadriga.report.about import describe_missing
+from quadriga.report.figure_files import write_figures
 from quadriga.report.page import PAGE, write_page
 from quadriga.report.run import build_run, read_run
 from quadriga.shared.errors import ConfigError, ProcessError
@@ -90,12 +91,13 @@ def report(run_dir: Path, *, pictures: bool, console: Console) -> dict[str, Any]
     recording = Recording(run_dir / RECORDING)
     traces = read_traces(recording)
     summary = summarise(run_dir, traces)
-    draw(run_dir, traces)
-    write_page(build_run(recording, traces, summary), run_dir / PAGE)
+    run = build_run(recording, traces, summary)
+    write_figures(run, run_dir)
+    write_page(run, run_dir / PAGE)
     if pictures:
         with console.status("rendering"):
             render(run_dir)
-    print_table(summary, console)
+    print_summary(summary, console)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False)
     _check_end(summary)
     return summary
@@ -117,9 +119,9 @@ def report_file(path: Path, page: Path | None, *, console: Console) -> dict[str,
     """
     run = read_run(path)
     written = write_page(run, page or path.with_suffix(".html"))
-    print_table(dict(run.summary), console)
-    for said in absent(run):
-        console.print(said, style="yellow", markup=False, highlight=False)
+    print_summary(dict(run.summary), console)
+    for missing in describe_missing(run):
+        console.print(missing, style="yellow", markup=False, highlight=False)
     console.print(f"page: {written}", markup=False, highlight=False)
     return dict(run.summary)
 

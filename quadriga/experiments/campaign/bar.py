@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Final, Self
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import TaskID
 
 from quadriga.experiments.campaign.outcome import TrialOutcome
+from quadriga.progress import build_progress
 from quadriga.shared.runtime.clock import monotonic
 
 _SAY: Final = 60.0  # s, between lines where there is no terminal to draw a bar on
@@ -26,15 +27,9 @@ class Bar:
         self._console, self._total, self._kept = console, total, kept
         self._done = self._fell = 0
         self._begun = self._said = monotonic()
-        self._bar = Progress(
-            TextColumn("walking"),
-            BarColumn(),
-            TextColumn("{task.completed}/{task.total} trials{task.fields[text]}"),
-            TimeElapsedColumn(),
-            console=console,
-            disable=not console.is_terminal,
-        )
-        self._task: TaskID = self._bar.add_task("", total=total, completed=kept, text="")
+        count = "{task.completed}/{task.total} trials{task.fields[text]}"
+        self._bar = build_progress(console, count, elapsed=True)
+        self._task: TaskID = self._bar.add_task("walking", total=total, completed=kept, text="")
 
     def advance(self, row: TrialOutcome) -> None:
         """One more is done."""

@@ -7,17 +7,18 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from quadriga.charts.colours import robot_style
+from quadriga.charts.draw import draw_panels
+from quadriga.charts.panels import Bars, Curve, Panel, PanelGrid
 from quadriga.experiments.campaign.analysis import tally
 from quadriga.experiments.campaign.manifest import Manifest
 from quadriga.experiments.campaign.sheets import Rows, number, order
-from quadriga.report.chart import draw
-from quadriga.report.html import figure, key, keys
-from quadriga.report.panel import Bars, Curve, Panel
+from quadriga.report.document import Drawing
 
 _SUCCESS = "walked to the end [%]"
 
 
-def by_variant(manifest: Manifest, rows: Rows) -> str:
+def by_variant(manifest: Manifest, rows: Rows) -> Drawing:
     """For each world a bar of Wilson's interval for each variant, and a mark at the rate."""
     panels = []
     for world in _worlds(rows):
@@ -37,11 +38,12 @@ def by_variant(manifest: Manifest, rows: Rows) -> str:
         if lines:
             panels.append(Panel(" · ".join(world), rows=lines))
     left = 20.0 + 7.0 * max((len(name) for name in manifest.variants), default=0)
-    svg = draw(panels, 0.0, 100.0, across=_SUCCESS, left=left, name="success by variant")
-    return figure(svg, keys(("event", "share of the walks"), ("stance", "Wilson's 95 % interval")))
+    grid = PanelGrid(0.0, 100.0, across=_SUCCESS, left=left)
+    legend = [("event", "share of the walks"), ("stance", "Wilson's 95 % interval")]
+    return Drawing(draw_panels(panels, grid, legend=legend), "success by variant")
 
 
-def against_swept(manifest: Manifest, rows: Rows) -> Iterator[tuple[str, str]]:
+def against_swept(manifest: Manifest, rows: Rows) -> Iterator[tuple[str, Drawing]]:
     """Name and figure of success against each swept key that has numbers.
 
     A panel for each scenario and each value of the other keys, a curve for each variant.
@@ -61,21 +63,15 @@ def against_swept(manifest: Manifest, rows: Rows) -> Iterator[tuple[str, str]]:
             for place, variant in enumerate(manifest.variants):
                 shift = apart * (place - 0.5 * (len(manifest.variants) - 1))
                 points = _points(rows, variant, _but(world, k), k)
-                curves += _curves(points, shift, f"r{place % 10}")
+                curves += _curves(points, shift, robot_style(place))
             panels.append(
                 Panel(f"{' · '.join(_but(world, k))}: {_SUCCESS}", curves, floor=0.0, span=100.0)
             )
         margin = 0.04 * (values[-1] - values[0])
-        svg = draw(
-            panels,
-            values[0] - margin,
-            values[-1] + margin,
-            height=220.0,
-            across=sweep.name,
-            name=f"success against {sweep.name}",
-        )
-        legend = "".join(key(f"r{i % 10}", name) for i, name in enumerate(manifest.variants))
-        yield sweep.name, figure(svg, f"{legend} bars: Wilson's 95 % intervals")
+        grid = PanelGrid(values[0] - margin, values[-1] + margin, height=220.0, across=sweep.name)
+        legend = [(robot_style(i), name) for i, name in enumerate(manifest.variants)]
+        figure = draw_panels(panels, grid, legend=legend)
+        yield sweep.name, Drawing(figure, f"success against {sweep.name}")
 
 
 Point = tuple[float, float, float, float]  # swept value; rate and ends of its interval, %

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import Final
 
@@ -19,9 +18,19 @@ from quadriga.experiments.campaign.manifest import Manifest
 from quadriga.experiments.campaign.outcome import TrialOutcome
 from quadriga.experiments.campaign.run import config_file
 from quadriga.experiments.campaign.sheets import Rows
-from quadriga.report.html import details, document, table
+from quadriga.report.document import (
+    Cell,
+    Document,
+    Fold,
+    PageTable,
+    Paragraph,
+    Part,
+    Section,
+    Subtitle,
+    Text,
+)
 from quadriga.shared.errors import ConfigError
-from quadriga.sheet import Sheet, show
+from quadriga.tables import Table, print_tables
 
 PAGE: Final = "report.html"
 TABLES: Final = "report.md"
@@ -81,11 +90,11 @@ def report(
         write_text(folder / PAGE, _page(campaign))
         write_text(folder / TABLES, _markdown(campaign, [*first, *rest]))
     if shown:
-        show(first)
+        print_tables(first)
     return folder / PAGE
 
 
-def _tables(campaign: Campaign) -> tuple[list[Sheet], list[Sheet]]:
+def _tables(campaign: Campaign) -> tuple[list[Table], list[Table]]:
     """Tables that are shown at once, and those that are for the files alone."""
     manifest, rows = campaign.manifest, campaign.rows
     falls = sheets.fall_sheets(manifest, rows, campaign.baseline)
@@ -96,7 +105,7 @@ def _tables(campaign: Campaign) -> tuple[list[Sheet], list[Sheet]]:
     ]
 
 
-def _markdown(campaign: Campaign, tables: Sequence[Sheet]) -> str:
+def _markdown(campaign: Campaign, tables: Sequence[Table]) -> str:
     head = [f"# {_title(campaign)}\n", f"{_lead(campaign)}\n"]
     typed = "\n".join(campaign.manifest.typed)
     foot = f"Walked by\n\n```sh\n{typed}\n```\n\nwith {campaign.manifest.versions}.\n"
@@ -104,12 +113,7 @@ def _markdown(campaign: Campaign, tables: Sequence[Sheet]) -> str:
 
 
 def _page(campaign: Campaign) -> str:
-    return document(
-        _title(campaign),
-        f'<p class="verdict">{escape(_lead(campaign))}</p>',
-        list(_sections(campaign)),
-        "",
-    )
+    return Document(_title(campaign), _lead(campaign), list(_sections(campaign))).to_html()
 
 
 def _title(campaign: Campaign) -> str:
@@ -133,65 +137,71 @@ def _lead(campaign: Campaign) -> str:
     return text + (f"; {left:,} are still to be walked" if left > 0 else "")
 
 
-def _sections(campaign: Campaign) -> Iterator[tuple[str, str, str]]:
+def _sections(campaign: Campaign) -> Iterator[Section]:
     manifest, rows, base = campaign.manifest, campaign.rows, campaign.baseline
-    swept = "".join(
-        f"<h3>Against {escape(name)}</h3>{drawn}"
-        for name, drawn in charts.against_swept(manifest, rows)
-    )
+    drawn: list[Part] = []
+    for name, drawing in charts.against_swept(manifest, rows):
+        drawn += [Subtitle([f"Against {name}"]), drawing]
+    if drawn:
+        drawn.append(Paragraph(["Bars: Wilson's 95 % intervals."], soft=True))
+    else:
+        drawn = [charts.by_variant(manifest, rows)]
     tables = _shown(sheets.outcome_sheets(manifest, rows))
-    yield "success", "Success", (swept or charts.by_variant(manifest, rows)) + tables
+    yield Section("success", "Success", drawn + tables)
     if beside := sheets.fall_sheets(manifest, rows, base):
-        yield "falls", f"Falls against {base}", _shown(beside)
+        yield Section("falls", f"Falls against {base}", _shown(beside))
         errors = sheets.ratio_sheets(manifest, rows, base)
-        yield "errors", f"Errors against {base}", _shown(errors)
-    yield "tracking", "Tracking", _shown(sheets.tracking_sheets(manifest, rows))
-    yield "worst", "Worst seeds", _worst(campaign)
-    yield "walked", "What was walked", _walked(campaign)
+        yield Section("errors", f"Errors against {base}", _shown(errors))
+    yield Section("tracking", "Tracking", _shown(sheets.tracking_sheets(manifest, rows)))
+    yield Section("worst", "Worst seeds", list(_worst(campaign)))
+    yield Section("walked", "What was walked", [_walked(campaign)])
 
 
-def _shown(found: Sequence[Sheet]) -> str:
+def _shown(found: Sequence[Table]) -> list[Part]:
     """Tables; notes that all of them share come once, at the end."""
-    parts, notes = [], {note: None for sheet in found for note in sheet.notes}
+    parts: list[Part] = []
+    notes = {note: None for sheet in found for note in sheet.notes}
     for sheet in found:
         # Columns of text at the left stay so: swept values are numbers as they were typed.
-        parts.append(f"<h3>{escape(sheet.title.partition(':')[0])}</h3>")
-        parts.append(table(sheet.columns, sheet.rows, named=True, numbers=True))
-    return "".join(parts) + "".join(f'<p class="soft">{escape(note)}</p>' for note in notes)
+        parts.append(Subtitle([sheet.title.partition(":")[0]]))
+        parts.append(PageTable(sheet.columns, sheet.rows, named=True, numbers=True))
+    return parts + [Paragraph([note], soft=True) for note in notes]
 
 
-def _worst(campaign: Campaign) -> str:
+def _worst(campaign: Campaign) -> Iterator[Part]:
     base = [r for g, rows in campaign.rows.items() if g.variant == campaign.baseline for r in rows]
-    parts = [
-        "<p>The earliest falls of each group, then stops, then the greatest control cost. The "
-        "command walks a trial again over the bus, which comes to the same, and records it; "
-        "<code>--record-worst K</code> does so for the K worst of each group.</p>"
-    ]
+    yield Paragraph(
+        [
+            "The earliest falls of each group, then stops, then the greatest control cost. The "
+            "command walks a trial again over the bus, which comes to the same, and records it; ",
+            Cell("--record-worst K", code=True),
+            " does so for the K worst of each group.",
+        ]
+    )
     for entry in campaign.manifest.groups:
         rows = campaign.rows.get(entry.group, ())
         lines = [_line(campaign, row) for row in worst(rows, campaign.named)]
         if not lines:
             continue
         beside = against(rows, base)
-        said = "".join(
-            f"<p>{what}: seeds {span(seeds)}.</p>"
+        parts: list[Part] = [
+            Paragraph([f"{what}: seeds {span(seeds)}."])
             for what, seeds in (
                 ("Fell where the baseline did not", beside.alone),
                 ("Did not fall where the baseline did", beside.spared),
             )
             if seeds
-        )
-        content = said + table(("seed", "what", "recording", "again"), lines, named=True, raw=True)
+        ]
+        parts.append(PageTable(("seed", "what", "recording", "again"), lines, named=True))
         fell = any(row.fell for row in rows)
-        parts.append(details(" · ".join((*entry.group.world, entry.variant)), content, opened=fell))
-    return "".join(parts)
+        yield Fold(" · ".join((*entry.group.world, entry.variant)), parts, opened=fell)
 
 
-def _line(campaign: Campaign, row: TrialOutcome) -> tuple[str, ...]:
+def _line(campaign: Campaign, row: TrialOutcome) -> list[Text]:
     page = recorded(campaign.folder, row)
-    link = f'<a href="{escape(page.as_posix())}">recording</a>' if page else "–"
-    again = "–" if page else f"<code>{escape(command(campaign.folder, row))}</code>"
-    return str(row.seed), escape(_what(row)), link, again
+    link = Cell("recording", page.as_posix()) if page else "–"
+    again = "–" if page else Cell(command(campaign.folder, row), code=True)
+    return [str(row.seed), _what(row), link, again]
 
 
 def _what(row: TrialOutcome) -> str:
@@ -202,7 +212,7 @@ def _what(row: TrialOutcome) -> str:
     return "walked" if row.control_cost is None else f"walked, control cost {row.control_cost:.0f}"
 
 
-def _walked(campaign: Campaign) -> str:
+def _walked(campaign: Campaign) -> PageTable:
     manifest = campaign.manifest
     facts = [("baseline", campaign.baseline)]
     facts += [
@@ -220,7 +230,7 @@ def _walked(campaign: Campaign) -> str:
         )
     facts.append(("code and libraries", manifest.versions))
     facts.append(("commands", "\n".join(manifest.typed)))
-    return table((), facts, named=True)
+    return PageTable((), facts, named=True)
 
 
 def span(seeds: Sequence[int]) -> str:

@@ -16,7 +16,7 @@ from quadriga.experiments.campaign.statistics import (
     paired_difference,
 )
 from quadriga.recordings.traces import ERRORS
-from quadriga.sheet import NOTHING, Sheet, label, output_text, text
+from quadriga.tables import NOTHING, Table, format_number, format_output, label_output
 
 ALL: Final = "all worlds"
 POOLED_NOTE: Final = (
@@ -27,7 +27,7 @@ Rows = Mapping[Group, Sequence[TrialOutcome]]
 Line = tuple[str, tuple[str, ...], list[TrialOutcome]]  # variant, swept values, its rows
 
 
-def outcome_sheets(manifest: Manifest, rows: Rows) -> list[Sheet]:
+def outcome_sheets(manifest: Manifest, rows: Rows) -> list[Table]:
     """Success, falls, efforts, a table for each scenario."""
     columns = (
         "trials",
@@ -53,9 +53,9 @@ def outcome_sheets(manifest: Manifest, rows: Rows) -> list[Sheet]:
     ]
 
 
-def tracking_sheets(manifest: Manifest, rows: Rows) -> list[Sheet]:
+def tracking_sheets(manifest: Manifest, rows: Rows) -> list[Table]:
     """The RMSE of each of `ERRORS`, a table for each scenario."""
-    columns = tuple(label(name) for name in ERRORS)
+    columns = tuple(label_output(name) for name in ERRORS)
     notes = (
         "Root mean square errors over the steady part, all robots; medians over the walks to the "
         "end. z: over the terrain under the hips; z-felt: over the ground that the feet feel.",
@@ -66,7 +66,7 @@ def tracking_sheets(manifest: Manifest, rows: Rows) -> list[Sheet]:
     ]
 
 
-def fall_sheets(manifest: Manifest, rows: Rows, baseline: str) -> list[Sheet]:
+def fall_sheets(manifest: Manifest, rows: Rows, baseline: str) -> list[Table]:
     """Falls of every variant beside the baseline's: for each scenario, and for all together."""
     columns = (
         "pairs",
@@ -86,7 +86,7 @@ def fall_sheets(manifest: Manifest, rows: Rows, baseline: str) -> list[Sheet]:
     return _beside(manifest, rows, baseline, "falls", columns, _falls, notes)
 
 
-def ratio_sheets(manifest: Manifest, rows: Rows, baseline: str) -> list[Sheet]:
+def ratio_sheets(manifest: Manifest, rows: Rows, baseline: str) -> list[Table]:
     """Errors of every variant over the baseline's: for each scenario, and for all together."""
     columns = ("pairs", COST, *ERRORS)
     notes = (
@@ -104,7 +104,7 @@ def _beside(
     columns: Sequence[str],
     cells: Callable[[Against], Iterable[str]],
     notes: Sequence[str],
-) -> list[Sheet]:
+) -> list[Table]:
     theirs = [row for group, found in rows.items() if group.variant == baseline for row in found]
     scenarios = [
         (scenario, [line for line in lines if line[0] != baseline])
@@ -173,7 +173,7 @@ def _sheet(
     lines: Sequence[Line],
     cells: Callable[[Sequence[TrialOutcome]], Iterable[str]],
     notes: Sequence[str],
-) -> Sheet:
+) -> Table:
     head = ("variant", *(sweep.name for sweep in manifest.sweeps), *columns)
     body, refused = [], []
     for variant, swept, mine in lines:
@@ -181,7 +181,7 @@ def _sheet(
         body.append((*row, *(NOTHING,) * (len(head) - len(row))))
         if why := tally(mine).refused:
             refused.append(f"{' · '.join((variant, *swept))}: refused: {why}.")
-    return Sheet(title, head, tuple(body), (*notes, *refused))
+    return Table(title, head, tuple(body), (*notes, *refused))
 
 
 def _outcome(rows: Sequence[TrialOutcome]) -> Iterator[str]:
@@ -195,18 +195,18 @@ def _outcome(rows: Sequence[TrialOutcome]) -> Iterator[str]:
     yield unbroken(f"{100 * low:.1f} … {100 * high:.1f}")
     yield str(found.falls)
     yield str(found.stops)
-    yield text(found.time_to_fall, ".2f")
-    yield text(found.mean_vx, ".3f")
-    yield text(found.cost_of_transport, ".2f")
-    yield text(found.planner_ms_p50, ".2f")
-    yield text(found.planner_ms_p99, ".2f")
+    yield format_number(found.time_to_fall, ".2f")
+    yield format_number(found.mean_vx, ".3f")
+    yield format_number(found.cost_of_transport, ".2f")
+    yield format_number(found.planner_ms_p50, ".2f")
+    yield format_number(found.planner_ms_p99, ".2f")
     yield _shares(found)
 
 
 def _tracking(rows: Sequence[TrialOutcome]) -> Iterator[str]:
     found = tally(rows)
     for name in ERRORS:
-        yield output_text(name, found.rmse[name])
+        yield format_output(name, found.rmse[name])
 
 
 def _falls(found: Against) -> Iterator[str]:

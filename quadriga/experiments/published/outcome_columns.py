@@ -9,7 +9,7 @@ from quadriga.experiments.campaign.analysis import Tally
 from quadriga.experiments.campaign.sheets import unbroken
 from quadriga.experiments.published.results import Line
 from quadriga.recordings.traces import ERRORS
-from quadriga.sheet import label, output_text, text
+from quadriga.tables import format_number, format_output, label_output
 
 Column = tuple[str, Callable[[Line], str]]  # its heading, and a line's cell
 
@@ -21,11 +21,11 @@ def _success(line: Line) -> str:
 
 
 def _of(read: Callable[[Tally], float | None], digits: str) -> Callable[[Line], str]:
-    return lambda line: text(read(line.tally), digits)
+    return lambda line: format_number(read(line.tally), digits)
 
 
 def _rmse(name: str) -> Callable[[Line], str]:
-    return lambda line: output_text(name, line.tally.rmse[name])
+    return lambda line: format_output(name, line.tally.rmse[name])
 
 
 COLUMNS: Final[Mapping[str, Column]] = {
@@ -39,5 +39,5 @@ COLUMNS: Final[Mapping[str, Column]] = {
     "cost": ("control cost", _of(lambda found: found.control_cost, ".0f")),
     "p50": ("plan p50 [ms]", _of(lambda found: found.planner_ms_p50, ".2f")),
     "p99": ("p99 [ms]", _of(lambda found: found.planner_ms_p99, ".2f")),
-    **{f"rmse-{name}": (f"RMSE {label(name)}", _rmse(name)) for name in ERRORS},
+    **{f"rmse-{name}": (f"RMSE {label_output(name)}", _rmse(name)) for name in ERRORS},
 }

@@ -14,7 +14,7 @@ from quadriga.experiments.published.results import Results
 from quadriga.experiments.published.sheets import asked, finding_text, sheets, word_text
 from quadriga.experiments.published.summarise import POOLED, done
 from quadriga.experiments.published.verdict import RequirementVerdict, verdicts
-from quadriga.sheet import NOTHING, Sheet
+from quadriga.tables import NOTHING, Table
 
 BEGIN: Final = "<!-- results:begin -->"
 END: Final = "<!-- results:end -->"
@@ -82,7 +82,7 @@ def overview(entries: Sequence[PageEntry], link: str) -> str:
         if not found:
             rows.append((*head, "nothing: a comparison", NOTHING, NOTHING))
     columns = ("experiment", "trials", "required", "found, and where it stands worst", "verdict")
-    return table(Sheet("", columns, tuple(rows)), left=len(columns))
+    return table(Table("", columns, tuple(rows)), left=len(columns))
 
 
 def fragment(entries: Sequence[PageEntry]) -> str:
@@ -90,7 +90,7 @@ def fragment(entries: Sequence[PageEntry]) -> str:
     return f"{BEGIN}\n{overview(entries, 'docs/results.md#')}\n{END}"
 
 
-def table(sheet: Sheet, left: int = 1) -> str:
+def table(sheet: Table, left: int = 1) -> str:
     """A sheet without its title; so many columns at the left are text."""
     head, _, *body = sheet.to_markdown().partition("\n\n")[2].strip().split("\n")
     rule = [":--"] * left + ["--:"] * (len(sheet.columns) - left)
@@ -136,7 +136,7 @@ def _variants(experiment: Experiment) -> str:
         )
         for variant in experiment.variants
     )
-    text = table(Sheet("", ("variant", "keys"), rows), left=2)
+    text = table(Table("", ("variant", "keys"), rows), left=2)
     for part in experiment.parts:
         if part.sweep is not None:
             labels = ", ".join(label for label, _ in part.sweep.values)

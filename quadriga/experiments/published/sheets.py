@@ -18,12 +18,12 @@ from quadriga.experiments.published.verdict import (
     stated,
     verdicts,
 )
-from quadriga.sheet import NOTHING, Sheet
+from quadriga.tables import NOTHING, Table
 
 _MARK: Final = {"met": "met", "missed": "**missed**", "open": "open"}
 
 
-def sheets(experiment: Experiment, results: Results) -> list[Sheet]:
+def sheets(experiment: Experiment, results: Results) -> list[Table]:
     """Every table that is published of an experiment and that has a row."""
     published, found = experiment.published, [requirement_sheet(experiment, results)]
     if published.outcome:
@@ -63,7 +63,7 @@ def sheets(experiment: Experiment, results: Results) -> list[Sheet]:
     return [sheet for sheet in found if sheet.rows]
 
 
-def requirement_sheet(experiment: Experiment, results: Results) -> Sheet:
+def requirement_sheet(experiment: Experiment, results: Results) -> Table:
     """Requirements as rows, worlds as columns."""
     found = verdicts(experiment, results)
     worlds = list(dict.fromkeys(one.world for verdict in found for one in verdict.findings))
@@ -78,7 +78,7 @@ def requirement_sheet(experiment: Experiment, results: Results) -> Sheet:
             )
         )
     head = ("required", "verdict", *(" · ".join(world) for world in worlds))
-    return Sheet("Required", head, tuple(rows))
+    return Table("Required", head, tuple(rows))
 
 
 def asked(verdict: RequirementVerdict, experiment: Experiment) -> str:
@@ -141,7 +141,7 @@ def _sheet(
     lines: Sequence[Line],
     columns: Sequence[str],
     cells: Callable[[Line], Iterable[str]],
-) -> Sheet:
+) -> Table:
     """A row for each world and variant; the swept value has a column where there is one."""
     swept = any(line.swept for line in lines)
     head = ("scenario", *(("swept",) if swept else ()), "variant", *columns)
@@ -153,4 +153,4 @@ def _sheet(
     refused = dict.fromkeys(
         f"{line.variant} was refused: {line.tally.refused}." for line in lines if line.tally.refused
     )
-    return Sheet(title, head, tuple(rows), tuple(refused))
+    return Table(title, head, tuple(rows), tuple(refused))

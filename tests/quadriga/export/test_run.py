@@ -10,9 +10,9 @@ import pytest
 
 from quadriga.commands.parser import build_parser, main
 from quadriga.export import csv_files
+from quadriga.export.columns import TickReached
 from quadriga.export.run import FORMATS
 from quadriga.export.source import Source
-from quadriga.export.written import Progress
 from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.reader import RecordingWriter
@@ -106,7 +106,7 @@ def test_what_somebody_else_writes_meanwhile_is_neither_mixed_nor_removed(
     out = tmp_path / "out"
     mine = csv_files.write_csv
 
-    def meanwhile(source: Source, to: Path, progress: Progress) -> tuple[Path, ...]:
+    def meanwhile(source: Source, to: Path, progress: TickReached) -> tuple[Path, ...]:
         out.mkdir()
         (out / "theirs").write_text("precious")
         return mine(source, to, progress)

@@ -19,7 +19,7 @@ from quadriga.commands.parser import main
 from quadriga.identification.cache import predictor_path
 from quadriga.identification.fit import report_fit
 from quadriga.identification.fit_report import FitReport, Unfit, horizon_errors
-from quadriga.identification.fit_sheets import comparison, report_sheets
+from quadriga.identification.fit_tables import comparison, report_sheets
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.a1 import OUTPUTS
 from tests.quadriga.linear_data import arguments, config_of, dataset, put_data

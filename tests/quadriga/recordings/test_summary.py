@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from quadriga.recordings.summary import print_table, summarise
+from quadriga.recordings.summary import summarise
+from quadriga.recordings.summary_table import print_summary
 from quadriga.recordings.traces import ERRORS
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.config.write import config_sha256
@@ -27,9 +28,9 @@ APPROX = 1e-9
 
 
 def table(summary: dict[str, Any]) -> str:
-    """What `print_table` shows."""
+    """What `print_summary` shows."""
     text = io.StringIO()
-    print_table(summary, Console(file=text, width=140))
+    print_summary(summary, Console(file=text, width=140))
     return text.getvalue()
 
 

@@ -17,7 +17,7 @@ from quadriga.experiments.campaign.sheets import (
     tracking_sheets,
 )
 from quadriga.experiments.campaign.statistics import Pairs
-from quadriga.sheet import Sheet
+from quadriga.tables import Table
 from tests.quadriga.experiments.campaign.rows import manifest, row
 
 NARROW = "\N{NO-BREAK SPACE}"
@@ -32,7 +32,7 @@ def rows() -> list[TrialOutcome]:
     return found
 
 
-def cells(sheet: Sheet, line: int = 0) -> dict[str, str]:
+def cells(sheet: Table, line: int = 0) -> dict[str, str]:
     pairs = zip(sheet.columns, sheet.rows[line], strict=True)
     return {name.replace(NARROW, " "): cell.replace(NARROW, " ") for name, cell in pairs}
 

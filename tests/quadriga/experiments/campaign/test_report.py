@@ -63,7 +63,7 @@ def test_success_is_drawn_against_what_was_swept(tmp_path: Path) -> None:
         "steps · 0: walked to the end [%]",
         "steps · 9: walked to the end [%]",
         "steps · 80: walked to the end [%]",
-    } <= set(found.titles)
+    } <= set(found.drawn)
 
 
 def test_what_is_no_campaign_costs_one_line(capsys: Said, tmp_path: Path) -> None:

@@ -1,0 +1,1 @@
+"""Charts of curves and bars, drawn by matplotlib into PNG files and into pages as SVG."""

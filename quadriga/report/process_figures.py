@@ -1,0 +1,173 @@
+"""Figures of the processes: what happened when, solve and tick times, ages of inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from quadriga.agents.time_grid import step_ms
+from quadriga.charts.colours import BARS, PALETTE, robot_colour, robot_style
+from quadriga.charts.draw import POINTS_PER_INCH, TEXT, WIDTH, add_legend, draw_panels, tidy_axes
+from quadriga.charts.panels import Bars, Curve, Mark, Panel, PanelGrid
+from quadriga.recordings.traces import Traces
+from quadriga.report.run import Run
+from quadriga.report.trunk_figures import draw_over_run, mark_falls, robot_legend
+from quadriga.shared.bus.members import PLANNER
+from quadriga.shared.config.sections import CENTRAL
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.messages import Status
+from quadriga.shared.wire.topics import REFERENCE
+
+_SENT_S: Final = 0.3  # statuses further apart than this are not joined
+_WORLD: Final = ("push", "fall", "fault", "stop", "terrain", "payload")
+_LEGEND: Final = (
+    ("mode-walk", "walk"), ("mode-stand", "stand"), ("mode-stopping", "stopping; plan faded"),
+    ("mode-damping", "damping, e-stop; messages missing"), ("nominal", "other plan status"),
+    ("count", "counted by the agent"),
+)  # fmt: skip
+
+
+def draw_timeline(run: Run) -> Figure:
+    """Modes, plans and gaps of every robot, and the events of the world."""
+    last = run.end / 1000
+    world = [
+        (entry.tick / 1000, entry.tick / 1000, "trouble" if entry.trouble else "event")
+        for entry in run.timeline
+        if entry.kind in _WORLD and entry.tick > run.begin
+    ]
+    panels = [Panel("events of the world", rows=[Bars("", world)])] if world else []
+    for robot in run.traces.robots:
+        mine = [entry for entry in run.timeline if entry.robot == robot]
+        plans = [
+            (e.tick / 1000, e.stop / 1000, "faded" if e.text.startswith("faded") else "nominal")
+            for e in mine
+            if e.kind == "plan"
+        ]
+        other = [
+            (e.tick / 1000, e.stop / 1000, "gap" if e.kind == "gap" else "count")
+            for e in mine
+            if e.kind in ("gap", "counted")
+        ]
+        modes = list(_build_mode_bars(run.traces.statuses[robot], last))
+        panels.append(
+            Panel(robot, rows=[Bars("mode", modes), Bars("plan", plans), Bars("other", other)])
+        )
+    stops = [Mark(e.tick / 1000, "stopped", "") for e in run.timeline if e.kind == "stopped"]
+    grid = PanelGrid(run.begin / 1000, last)
+    return draw_panels(panels, grid, marks=[*stops, *mark_falls(run)], legend=_LEGEND)
+
+
+def _build_mode_bars(
+    statuses: tuple[Status, ...], last: float
+) -> Iterator[tuple[float, float, str]]:
+    begin = 0
+    for k, status in enumerate(statuses):
+        following = statuses[k + 1] if k + 1 < len(statuses) else None
+        if following is not None and following.mode == status.mode:
+            continue
+        stop = following.tick / 1000 if following else last
+        name = f"mode-{status.mode}"
+        yield statuses[begin].tick / 1000, stop, name if name in BARS else "mode-other"
+        begin = k + 1
+
+
+def draw_times(run: Run) -> Figure:
+    """The longest planner and tick time between two statuses, every robot."""
+    planner, tick = [], []
+    for index, name in enumerate((*run.traces.robots, PLANNER)):
+        statuses = run.traces.statuses[name]
+        style = robot_style(index) if name != PLANNER else "asked"
+        planner.append(_build_worst(statuses, [s.planner_ms for s in statuses], style))
+        tick.append(_build_worst(statuses, [s.tick_us for s in statuses], style))
+    kilohertz = [(1000.0, "1 kHz")]
+    panels = [
+        Panel("longest planner solve in 100 ms [ms]", planner, log=True, span=1.0),
+        Panel("longest control tick in 100 ms [µs]", tick, log=True, span=1.0, levels=kilohertz),
+    ]
+    legend = robot_legend(run)
+    if run.traces.config.planner.kind in CENTRAL:
+        legend.append(("asked", PLANNER))
+    return draw_over_run(run, panels, legend, height=130.0)
+
+
+def _build_worst(statuses: tuple[Status, ...], values: list[Array], style: str) -> Curve:
+    kept = [(s.tick / 1000, v.max()) for s, v in zip(statuses, values, strict=True) if len(v)]
+    time, worst = np.array(kept).reshape(-1, 2).T
+    return Curve(time, worst, style, gap=_SENT_S)
+
+
+def list_times(run: Run) -> list[tuple[str, ...]]:
+    """A row for each process: medians, 99 % quantiles and maxima."""
+    rows = []
+    for name, statuses in run.traces.statuses.items():
+        if not statuses:
+            continue
+        cells = [name]
+        for field, digits in (("planner_ms", ".2f"), ("tick_us", ".0f")):
+            values = np.concatenate([np.zeros(0), *(getattr(s, field) for s in statuses)])
+            cells.append(f"{len(values):,}")
+            for q in (0.5, 0.99, 1.0):
+                cells.append(format(np.quantile(values, q), digits) if len(values) else "–")
+        rows.append(tuple(cells))
+    return rows
+
+
+def draw_ages(run: Run) -> Figure:
+    """Age of the reference and of every peer's plan that a plan was made with."""
+    traces, step = run.traces, step_ms(run.traces.config)
+    panels = []
+    for robot in traces.robots:
+        curves = []
+        for index, peer in enumerate(traces.robots):
+            used = [
+                (plan.tick, step * (plan.step - plan.used[peer]))
+                for plan in traces.plans[robot]
+                if peer in plan.used
+            ]
+            if used:
+                time, age = np.array(used, dtype=float).T
+                style = robot_style(index)
+                curves.append(Curve(time / 1000, age, style, "step", gap=2.1e-3 * step))
+        for name, style in (("reference", "asked"), ("plan", "planned")):
+            ages = [(s.tick, s.ages_ms[name]) for s in traces.statuses[robot] if name in s.ages_ms]
+            if ages:
+                time, age = np.array(ages, dtype=float).T
+                curves.append(Curve(time / 1000, age, style, "step", gap=_SENT_S))
+        levels = [(float(REFERENCE.max_age_ms), "reference: stops")]
+        panels.append(Panel(f"{robot}: age [ms]", curves, span=100.0, floor=0.0, levels=levels))
+    central = traces.config.planner.kind in CENTRAL
+    legend = [("planned", "central plan")] if central else robot_legend(run)
+    return draw_over_run(run, panels, [*legend, ("asked", "reference")], height=70.0)
+
+
+def draw_time_histograms(traces: Traces) -> Figure:
+    """Distribution of planner solve times and control tick times of every robot."""
+    figure = Figure(figsize=(WIDTH / POINTS_PER_INCH, 280.0 / POINTS_PER_INCH))
+    places = ((0.058, 0.18, 0.428, 0.68), (0.558, 0.18, 0.428, 0.68))
+    for place, field, label in zip(
+        places, ("planner_ms", "tick_us"), ("planner solve [ms]", "control tick [µs]"), strict=True
+    ):
+        axes = figure.add_axes(place)
+        tidy_axes(axes)
+        axes.set_title("count", loc="left", fontsize=TEXT, fontweight="bold")
+        axes.set_xlabel(label, fontsize=TEXT, color=PALETTE["soft"])
+        times = [
+            np.concatenate([np.zeros(0), *(getattr(s, field) for s in traces.statuses[robot])])
+            for robot in traces.robots
+        ]
+        every = np.concatenate(times)
+        if not len(every):
+            axes.text(0.5, 0.5, "none recorded", transform=axes.transAxes, ha="center")
+            continue
+        # Beyond the 99.5 % quantile lie single outliers that would flatten the rest.
+        high = float(np.quantile(every, 0.995)) * 1.1 + 1e-9
+        for i, values in enumerate(times):
+            axes.hist(
+                np.minimum(values, high), bins=np.linspace(0.0, high, 60).tolist(),
+                histtype="step", color=robot_colour(i),
+            )  # fmt: skip
+    add_legend(figure, [(robot_style(i), robot) for i, robot in enumerate(traces.robots)])
+    return figure

@@ -1,0 +1,38 @@
+"""The figure of a changed replay shows what has changed most, and by how much."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quadriga.replay.figure import Curves, draw
+from quadriga.shared.errors import RecordingError
+from quadriga.shared.wire.messages import Measurement
+
+
+def curves() -> Curves:
+    found = Curves(4)
+    for tick in range(0, 1000, 10):
+        y = np.full(6, np.sin(tick))
+        changed = y.copy()
+        changed[2] += 0.5
+        stance = np.ones(4)
+        found.add(
+            Measurement(tick, 0, np.zeros(12), y, stance),
+            Measurement(tick, 0, np.zeros(12), changed, stance),
+        )
+    return found
+
+
+def test_the_component_that_has_changed_most_is_shown(tmp_path: Path) -> None:
+    found = curves()
+    assert found.changed_most("output") == 2
+    draw(found, "r1 of a/run.mcap: planner.mu=0.3", tmp_path / "a.png")
+    assert (tmp_path / "a.png").stat().st_size > 10_000
+
+
+def test_a_figure_that_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="a file that can be written"):
+        draw(curves(), "", tmp_path / "no" / "a.png")

@@ -1,0 +1,27 @@
+"""Tables for people: what a recording from elsewhere says is shown, and not obeyed."""
+
+from __future__ import annotations
+
+import pytest
+
+from quadriga.tables import Table, align_columns, print_tables, printable
+
+
+def test_control_characters_do_not_reach_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    print_tables([Table("Events", ("what", "said"), (("stop", "\x1b]0;mine\x07\x1b[2J done"),))])
+    said = capsys.readouterr().out
+    assert "done" in said
+    assert "\x1b" not in said
+    assert "\x07" not in said
+
+
+def test_a_row_of_columns_is_one_line_that_a_terminal_only_shows() -> None:
+    assert align_columns([("a", "x\x1b[31m\ny"), ("long", "z")]) == [
+        "  a     x\N{REPLACEMENT CHARACTER}[31m y",
+        "  long  z",
+    ]
+
+
+def test_all_else_stays() -> None:
+    text = "r2: 0.5 m · τ ≤ 33 N·m,\N{NO-BREAK SPACE}– \n next"
+    assert printable(text) == text
