@@ -8,11 +8,12 @@ from dataclasses import field, replace
 
 import numpy as np
 
-from quadriga.agents.controller.controller import Controller, Schedule, Task
+from quadriga.agents.controller.controller import Controller, Task
 from quadriga.agents.controller.estimator import trunk_from_truth
 from quadriga.agents.controller.memory import Memory
-from quadriga.agents.controller.sensing import Sensed
-from quadriga.agents.controller.whole_body_qp import UNCONSTRAINED, WholeBodySolution
+from quadriga.agents.controller.schedule import Schedule
+from quadriga.agents.controller.sensed import Sensed
+from quadriga.agents.controller.whole_body.problem import UNCONSTRAINED, WholeBodySolution
 from quadriga.agents.gait import stance_of_half, stance_progress
 from quadriga.agents.modes import (
     DAMPING,
@@ -282,9 +283,7 @@ class Agent:
         # One that is lost or late is bridged by the filter.
         if self._by_truth and truth is not None and inputs.state.tick - truth.tick <= _TRUTH_AGE_MS:
             estimate = trunk_from_truth(truth, self.robot, inputs.state)
-            return self._controller.place(
-                state.low_level, estimate, inputs.state.imu_quat_wxyz, schedule, dt
-            )
+            return self._controller.place(state.low_level, estimate, schedule, dt)
         return self._controller.sense(state.low_level, inputs.state, schedule, dt)
 
     def _failures(

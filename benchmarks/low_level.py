@@ -19,9 +19,10 @@ import numpy as np
 
 from benchmarks.low_level_ticks import AgentTick
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
-from quadriga.agents.controller.controller import Controller, ControllerOutputs, Schedule, Task
+from quadriga.agents.controller.controller import Controller, ControllerOutputs, Task
 from quadriga.agents.controller.memory import Memory
-from quadriga.agents.controller.sensing import Sensed
+from quadriga.agents.controller.schedule import Schedule
+from quadriga.agents.controller.sensed import Sensed
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
@@ -141,14 +142,14 @@ class _Watched(Controller):
 
     def sense(self, memory: Memory | None, state: State, schedule: Schedule, dt: float) -> Sensed:
         begun = monotonic_ns()
-        seen = super().sense(memory, state, schedule, dt)
+        sensed = super().sense(memory, state, schedule, dt)
         self._watch.ns["sense"] += monotonic_ns() - begun
-        return seen
+        return sensed
 
     def act(
-        self, seen: Sensed, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
+        self, sensed: Sensed, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
     ) -> ControllerOutputs:
         begun = monotonic_ns()
-        acted = super().act(seen, schedule, task, dt, new_sample=new_sample)
+        outputs = super().act(sensed, schedule, task, dt, new_sample=new_sample)
         self._watch.ns["act"] += monotonic_ns() - begun
-        return acted
+        return outputs

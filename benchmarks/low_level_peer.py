@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 import tsid
 
-from quadriga.agents.controller.whole_body_qp import Weights
+from quadriga.agents.controller.whole_body.problem import Weights
 from quadriga.shared.robot.a1 import FOOT_FRAMES, N_JOINTS, TORQUE_LIMIT, Array
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,11 +21,14 @@ from benchmarks.children import result_of
 from benchmarks.low_level import collector_off
 from benchmarks.low_level_ticks import AgentTick
 from quadriga.agents.agent import Agent
-from quadriga.agents.controller.controller import Controller, ControllerOutputs, Schedule, Task
+from quadriga.agents.controller.controller import Controller, ControllerOutputs, Task
 from quadriga.agents.controller.maths.rigid_body import rigid_body_terms
+from quadriga.agents.controller.maths.rows import numbers
 from quadriga.agents.controller.model import RigidBody
-from quadriga.agents.controller.sensing import Sensed
-from quadriga.agents.controller.whole_body_qp import Goal, Weights, closed_form, solve_goal
+from quadriga.agents.controller.schedule import Schedule
+from quadriga.agents.controller.sensed import Sensed, coordinates_of, feet_of, trunk_of
+from quadriga.agents.controller.whole_body.problem import N_WEIGHTS, SOLUTION_SIZE, Goal, Weights
+from quadriga.agents.controller.whole_body.solution import solve_closed_form, solve_goal
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
@@ -35,12 +38,18 @@ from quadriga.shared.runtime.jit import compiled
 
 @dataclass(frozen=True, slots=True)
 class TsidCase:
-    """What one tick gives the whole-body part, see `Sensed` and `Goal`; q (19,), v (18,)."""
+    """What one tick gives the whole-body part.
 
+    Attributes:
+        sensed: `Sensed.flat`.
+        q: Pinocchio's configuration, (19,).
+        v: Pinocchio's velocity, (18,).
+        goal: what the QP is asked for.
+    """
+
+    sensed: Array
     q: Array
     v: Array
-    R: Array
-    p_foot: Array
     goal: Goal
 
 
@@ -78,7 +87,7 @@ def _turns(config: Config, found: list[TsidCase]) -> dict[str, Any]:
     from benchmarks.low_level_peer import Tsid
 
     # TSID weighs turning like moving, and a foot like the trunk: so do both here.
-    weights = replace(Controller(config).weights, tilt_length=1.0, swing_weight=1.0)
+    weights = Controller(config).weights._replace(tilt_length=1.0, swing_weight=1.0)
     ours, peer = _Ours(weights), Tsid(weights)
     times, differences = np.empty((2, len(found))), []
     for case in found[:20]:
@@ -111,28 +120,26 @@ class _Ours:
     """Terms, assembly and solution as `Controller.act` goes about them."""
 
     def __init__(self, weights: Weights) -> None:
-        self._body, self._weights, self._flat = RigidBody(), weights, weights.as_array()
-        self._x = np.zeros(42)
+        self._body, self._weights, self._row = RigidBody(), weights, np.array(weights)
+        self._x = np.zeros(SOLUTION_SIZE)
 
     def solve(self, case: TsidCase) -> None:
         """One tick's torques."""
         goal = case.goal
-        self._x = np.zeros(42)
+        self._x = np.zeros(SOLUTION_SIZE)
         if not _whole_body(
-            case.q,
-            case.v,
+            case.sensed,
             self._body.links,
-            case.R,
-            case.p_foot,
             goal.contact,
             goal.trunk,
             goal.swing,
             goal.force,
-            self._flat,
+            self._row,
             self._x,
         ):
             terms = self._body.terms(case.q, case.v)
-            self._x = solve_goal(terms, case.R, case.p_foot, goal, self._weights).x
+            R, p_foot = trunk_of(case.sensed).R, feet_of(case.sensed)
+            self._x = solve_goal(terms, R, p_foot, goal, self._weights).x
 
     def torques(self) -> Array:
         """Of the last tick, (12,), N·m."""
@@ -141,11 +148,8 @@ class _Ours:
 
 @compiled
 def _whole_body(
-    q: Array,
-    v: Array,
+    sensed: Array,
     links: Array,
-    R: Array,
-    p_foot: Array,
     contact: Array,
     trunk: Array,
     swing: Array,
@@ -153,12 +157,15 @@ def _whole_body(
     weights: Array,
     x: Array,
 ) -> int:
-    """Terms and `closed_form`."""
-    M_inverse, nle = np.empty((18, 18)), np.empty(18)
-    J, dJ = np.empty((6, 18)), np.empty((6, 18))
-    rigid_body_terms(q, v, links, M_inverse, nle, J, dJ)
-    return closed_form(
-        M_inverse, nle, J, dJ, v, R, p_foot, contact, trunk, swing, force, weights, x
+    """Terms and `solve_closed_form`: rows are cheaper to hand over than tuples."""
+    q, v = coordinates_of(sensed)
+    return solve_closed_form(
+        rigid_body_terms(q, v, links),
+        trunk_of(sensed).R,
+        feet_of(sensed),
+        Goal(contact, trunk, swing, force),
+        Weights(*numbers(weights, N_WEIGHTS)),
+        x,
     )
 
 
@@ -170,18 +177,9 @@ class _Listening(Controller):
         self.cases: list[TsidCase] = []
 
     def act(
-        self, seen: Sensed, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
+        self, sensed: Sensed, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
     ) -> ControllerOutputs:
-        acted = super().act(seen, schedule, task, dt, new_sample=new_sample)
-        q, v = seen.flat[:19].copy(), seen.flat[19:37].copy()
-        goal = acted.goal
-        self.cases.append(
-            TsidCase(
-                q,
-                v,
-                seen.R.copy(),
-                seen.p_foot.copy(),
-                Goal(goal.contact.copy(), goal.trunk.copy(), goal.swing.copy(), goal.force.copy()),
-            )
-        )
-        return acted
+        outputs = super().act(sensed, schedule, task, dt, new_sample=new_sample)
+        goal = Goal(*(part.copy() for part in outputs.goal))
+        self.cases.append(TsidCase(sensed.flat.copy(), sensed.q.copy(), sensed.v.copy(), goal))
+        return outputs

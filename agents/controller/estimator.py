@@ -7,22 +7,51 @@ Attitude and angular velocity are the IMU's.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from quadriga.agents.controller.maths.leg_kinematics import leg_kinematics
 from quadriga.agents.controller.maths.rotation import cross, rotation_matrix
+from quadriga.agents.controller.memory import FilterState
 from quadriga.shared.config.sections import EstimatorConfig
 from quadriga.shared.robot.a1 import FOOT_RADIUS, GRAVITY, STAND_HEIGHT, Array
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import State, Truth
 
-_SURE = (1e-6, 1e-4, 1e-5, 1e-5, 1e-5, 1e-5)  # variances of a state that is known, m², m²/s²
+# Variances of a known state: position, velocity, four feet; m², m²/s², m².
+_KNOWN: Final = (1e-6, 1e-4, 1e-5, 1e-5, 1e-5, 1e-5)
+
+# Where `State.row` keeps what.
+_Q_JOINT: Final = State.CUTS["q_joint"]
+_V_JOINT: Final = State.CUTS["v_joint"]
+_QUAT: Final = State.CUTS["imu_quat_wxyz"]
+_GYRO: Final = State.CUTS["imu_gyro"]
+_ACCEL: Final = State.CUTS["imu_accel"]
+_FOOT_FORCE: Final = State.CUTS["foot_force"]
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
+class Readings(NamedTuple):
+    """What the sensors measure, see `State`.
+
+    Attributes:
+        q_joint: joint angles, (12,), rad.
+        v_joint: joint rates, (12,), rad/s.
+        quat_wxyz: attitude of the IMU, trunk to world, (4,).
+        gyro: angular velocity, (3,), rad/s, trunk frame.
+        accel: specific force, (3,), m/s², trunk frame.
+        foot_force: normal forces, (4,), N.
+    """
+
+    q_joint: Array
+    v_joint: Array
+    quat_wxyz: Array
+    gyro: Array
+    accel: Array
+    foot_force: Array
+
+
+class Estimate(NamedTuple):
     """The trunk and the feet as the controller sees them (odometry frame, z up).
 
     Attributes:
@@ -34,6 +63,7 @@ class Estimate:
         q_joint: joint angles, (12,), rad.
         v_joint: joint rates, (12,), rad/s.
         foot_force: measured normal forces, (4,), N.
+        quat_wxyz: attitude that the IMU measures, (4,), of any positive norm.
     """
 
     position: Array
@@ -44,39 +74,73 @@ class Estimate:
     q_joint: Array
     v_joint: Array
     foot_force: Array
+    quat_wxyz: Array
 
 
-def noise_parameters(config: EstimatorConfig) -> Array:
-    """The filter's standard deviations as the compiled step takes them. Shape (5,)."""
-    return np.array(
-        [
-            config.accel_sigma,
-            config.foot_sigma,
-            config.swing_sigma,
-            config.leg_position_sigma,
-            config.leg_velocity_sigma,
-        ]
+class FilterNoise(NamedTuple):
+    """Standard deviations of the filter.
+
+    Attributes:
+        accel: of the accelerometer, m/s².
+        foot: drift of a stance foot, m/s.
+        swing: drift of a swing foot, m/s.
+        leg_position: of a foot's place relative to the trunk, m.
+        leg_velocity: of the trunk's velocity by a stance leg, m/s.
+    """
+
+    accel: float
+    foot: float
+    swing: float
+    leg_position: float
+    leg_velocity: float
+
+
+N_NOISE: Final = len(FilterNoise._fields)
+
+
+def filter_noise(config: EstimatorConfig) -> FilterNoise:
+    """The standard deviations that a configuration sets."""
+    return FilterNoise(
+        accel=config.accel_sigma,
+        foot=config.foot_sigma,
+        swing=config.swing_sigma,
+        leg_position=config.leg_position_sigma,
+        leg_velocity=config.leg_velocity_sigma,
     )
 
 
-def standing_mean(state: State) -> Array:
-    """Mean of a robot that stands still at the origin, feet where the joints say. (6, 3)."""
+@compiled
+def readings_of(state: Array) -> Readings:
+    """Views of a `State.row`."""
+    return Readings(
+        state[_Q_JOINT],
+        state[_V_JOINT],
+        state[_QUAT],
+        state[_GYRO],
+        state[_ACCEL],
+        state[_FOOT_FORCE],
+    )
+
+
+def known_covariance() -> Array:
+    """Covariance of a state that is known, (6, 6), m², m²/s²."""
+    return np.diag(_KNOWN)
+
+
+def standing_filter(state: State) -> FilterState:
+    """Of a robot that stands still at the origin, its feet where the joints say."""
     R = rotation_matrix(state.imu_quat_wxyz)
     p_foot, _, _ = leg_kinematics(state.q_joint, state.v_joint)
     mean = np.zeros((6, 3))
     mean[0, 2] = STAND_HEIGHT
     mean[2:] = mean[0] + p_foot @ R.T
-    return mean
+    return FilterState(mean, known_covariance())
 
 
-def mean_at(estimate: Estimate) -> Array:
-    """The mean of a filter that takes an estimate for right, to go on from it. (6, 3)."""
-    return np.vstack([estimate.position, estimate.velocity, estimate.p_foot])
-
-
-def sure() -> Array:
-    """Covariance of a state that is known, (6, 6), m², m²/s²."""
-    return np.diag(_SURE)
+def filter_at(estimate: Estimate) -> FilterState:
+    """Of a robot whose estimate is right, to go on from there."""
+    mean = np.vstack([estimate.position, estimate.velocity, estimate.p_foot])
+    return FilterState(mean, known_covariance())
 
 
 @compiled
@@ -105,69 +169,92 @@ def _update(mean: Array, covariance: Array, h: Array, innovation: Array, varianc
 
 
 @compiled
-def filter_step(
-    mean0: Array,
-    covariance0: Array,
-    quat: Array,
-    gyro: Array,
-    accel: Array,
-    q_joint: Array,
-    v_joint: Array,
-    trust: Array,
-    noise: Array,
-    dt: float,
-) -> tuple[Array, Array, Array]:
-    """Predict with the accelerometer over `dt`, correct with the leg kinematics.
-
-    Rows of the mean (6, 3) are trunk position, trunk velocity, feet FL FR RL RR; the covariance
-    (6, 6) is the same for all axes. `quat` (wxyz) to `v_joint` are of `State`; `trust` (4,) is that
-    in each foot as an anchor, 0 (swing, unloaded) to 1; `noise` is `noise_parameters`; `dt` in s is
-    since the last tick.
-
-    Returns:
-        The new mean and covariance; the trunk's R, (3, 3), over the feet's places, (4, 3).
-    """
-    R = rotation_matrix(quat)
-    p_leg, v_leg, omega_leg = leg_kinematics(q_joint, v_joint)
-    mean, covariance = mean0.copy(), covariance0.copy()
-    acceleration = R @ accel
-    acceleration[2] -= GRAVITY
-    omega = R @ gyro
-    roll_velocity = np.empty((4, 3))  # the foot's centre moves as the sphere rolls
+def _rolling_velocity(R: Array, omega: Array, omega_leg: Array) -> Array:
+    """Velocities of stance feet's centres as their spheres roll, (4, 3), m/s, odometry frame."""
+    roll_velocity = np.empty((4, 3))
     up = np.array([0.0, 0.0, FOOT_RADIUS])
     for leg in range(4):
         roll_velocity[leg] = cross(omega + R @ omega_leg[leg], up)
+    return roll_velocity
 
+
+@compiled
+def _predict(
+    state: FilterState,
+    acceleration: Array,
+    roll_velocity: Array,
+    trust: Array,
+    noise: FilterNoise,
+    dt: float,
+) -> None:
+    """Advance mean and covariance by `dt` in place: the trunk accelerates, stance feet roll."""
+    mean, covariance = state
     mean[0] += dt * mean[1] + 0.5 * dt * dt * acceleration
     mean[1] += dt * acceleration
     for column in range(6):  # F P Fᵀ with F = I + dt e0 e1ᵀ
         covariance[0, column] += dt * covariance[1, column]
     for row in range(6):
         covariance[row, 0] += dt * covariance[row, 1]
-    covariance[1, 1] += (noise[0] * dt) ** 2
+    covariance[1, 1] += (noise.accel * dt) ** 2
     for leg in range(4):
         if trust[leg] > 0.0:
             mean[2 + leg] += dt * roll_velocity[leg]
-            covariance[2 + leg, 2 + leg] += (noise[1] * dt / trust[leg]) ** 2
+            covariance[2 + leg, 2 + leg] += (noise.foot * dt / trust[leg]) ** 2
         else:
-            covariance[2 + leg, 2 + leg] += (noise[2] * dt) ** 2
+            covariance[2 + leg, 2 + leg] += (noise.swing * dt) ** 2
 
+
+@compiled
+def filter_step(
+    before: FilterState, readings: Readings, trust: Array, noise: FilterNoise, dt: float
+) -> tuple[FilterState, Estimate]:
+    """Predict with the accelerometer over `dt`, correct with the leg kinematics.
+
+    Args:
+        before: the filter at the last tick.
+        readings: of the sensors.
+        trust: in each foot as an anchor, (4,), 0 (swing, unloaded) to 1.
+        noise: the filter's.
+        dt: time since the last tick, s.
+
+    Returns:
+        The filter now, and what it estimates.
+    """
+    R = rotation_matrix(readings.quat_wxyz)
+    p_leg, v_leg, omega_leg = leg_kinematics(readings.q_joint, readings.v_joint)
+    state = FilterState(before.mean.copy(), before.covariance.copy())
+    mean, covariance = state
+    acceleration = R @ readings.accel
+    acceleration[2] -= GRAVITY
+    omega = R @ readings.gyro
+    roll_velocity = _rolling_velocity(R, omega, omega_leg)
+    _predict(state, acceleration, roll_velocity, trust, noise, dt)
     h = np.zeros(6)
-    frame = np.empty((7, 3))
-    frame[:3] = R
     for leg in range(4):
         reach = R @ p_leg[leg]
         h[:] = 0.0
         h[0], h[2 + leg] = -1.0, 1.0
-        _update(mean, covariance, h, reach - (mean[2 + leg] - mean[0]), noise[3] ** 2)
+        _update(mean, covariance, h, reach - (mean[2 + leg] - mean[0]), noise.leg_position**2)
         if trust[leg] > 0.0:
             h[:] = 0.0
             h[1] = 1.0
             v_trunk = roll_velocity[leg] - R @ v_leg[leg] - cross(omega, reach)
-            _update(mean, covariance, h, v_trunk - mean[1], (noise[4] / trust[leg]) ** 2)
+            _update(mean, covariance, h, v_trunk - mean[1], (noise.leg_velocity / trust[leg]) ** 2)
+    p_foot = np.empty((4, 3))
     for leg in range(4):
-        frame[3 + leg] = mean[0] + R @ p_leg[leg]
-    return mean, 0.5 * (covariance + covariance.T), frame
+        p_foot[leg] = mean[0] + R @ p_leg[leg]
+    estimate = Estimate(
+        mean[0],
+        mean[1],
+        R,
+        readings.gyro,
+        p_foot,
+        readings.q_joint,
+        readings.v_joint,
+        readings.foot_force,
+        readings.quat_wxyz,
+    )
+    return FilterState(mean, 0.5 * (covariance + covariance.T)), estimate
 
 
 def trunk_from_truth(truth: Truth, robot: str, state: State) -> Estimate:
@@ -191,4 +278,5 @@ def trunk_from_truth(truth: Truth, robot: str, state: State) -> Estimate:
         state.q_joint,
         state.v_joint,
         state.foot_force,
+        state.imu_quat_wxyz,
     )

@@ -2,127 +2,88 @@
 
 from __future__ import annotations
 
+from typing import Final, NamedTuple
+
 import numpy as np
 
-from quadriga.agents.controller import swing
 from quadriga.agents.controller.maths.rotation import heading
-from quadriga.agents.controller.memory import anchors_of, legs_of, swings_of
-from quadriga.agents.controller.sensing import SWITCHED, feet_of, trunk_of
+from quadriga.agents.controller.memory import feet_memory_of, foot_goal_of, swing_start_of
+from quadriga.agents.controller.schedule import GaitPhase
+from quadriga.agents.controller.sensed import FeetState, TrunkState
+from quadriga.agents.controller.swing import (
+    MotionReference,
+    foothold,
+    limit_foothold,
+    swing_reference,
+)
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import GRAVITY, Array
 from quadriga.shared.runtime.jit import compiled
 
 _LONGEST = 0.37  # m, how far under the hip a foot is lowered; legs end at 0.4
 _SHORTEST = 0.1  # m, how near to the hip a foot is lifted
-_CLEARANCE = 0.03  # m, how far a foot that stumbled still rises
-_BACK = 0.3  # of the speed at which a foot that stumbled rises: away from what stopped it
+_CLEARANCE = 0.03  # m, how far a foot that was stopped still rises
+_BACK = 0.3  # of the speed at which a foot rises in its reflex: away from what stopped it
 
 
-@compiled
-def feet_demand(
-    memory: Array,
-    seen: Array,
-    schedule: Array,
-    v_foot: Array,
-    v_ahead: Array,
-    v_des: Array,
-    wz: float,
-    deviation: Array,
-    mass: float,
-    dt: float,
-    constants: Array,
-) -> tuple[Array, Array]:
-    """Desired accelerations of the feet off the ground and desired forces of the others, (4, 3).
+class FeetGains(NamedTuple):
+    """What feet are asked for.
 
-    Where swings begin, where feet are lowered to and what each foot feels change in `memory`.
-
-    Args:
-        memory: of this tick, see `Memory`.
-        seen: at this tick, see `Sensed`.
-        schedule: `Schedule.row`.
-        v_foot: velocities of the feet, (4, 3), m/s, odometry frame.
-        v_ahead: velocity that footholds count on, (3,), m/s, odometry frame.
-        v_des: desired velocity, (3,), m/s, odometry frame.
-        wz: desired yaw rate, rad/s.
-        deviation: planned deviation from the nominal forces, (12,), N, yaw frame.
-        mass: of robot and load, kg.
-        dt: time since the last tick, s.
-        constants: `feet_constants`.
+    Attributes:
+        stance_time: duration of the half cycle, s.
+        raibert_gain: k of the foothold, s.
+        swing_height: of a foot over the highest ground, m.
+        descent_speed: at which a stance foot without ground is lowered, m/s.
+        kp: of the feedback on a swing foot's position, 1/s².
+        kd: of the feedback on its velocity, 1/s.
+        delay: share of swing in which a foot rises before it goes forward.
+        reflex_lift: speed at which a foot rises in its reflex, m/s.
+        acceleration: greatest of a swing that began anew, m/s².
+        track_sinking_trunk: 1 where feet are lowered as seen from a trunk that sinks, and lifted no
+            nearer to the hip than legs reach; else 0.
     """
-    _lower(memory, seen, schedule, dt, constants)
-    acceleration = _feet_acceleration(memory, seen, schedule, v_foot, v_ahead, v_des, wz, constants)
-    R = trunk_of(seen).R
-    return acceleration, _desired_force(legs_of(memory)[0], deviation, R, mass)
+
+    stance_time: float
+    raibert_gain: float
+    swing_height: float
+    descent_speed: float
+    kp: float
+    kd: float
+    delay: float
+    reflex_lift: float
+    acceleration: float
+    track_sinking_trunk: float
 
 
-def feet_constants(config: Config) -> Array:
-    """What `feet_demand` needs of the configuration. Shape (10,)."""
+N_FEET_GAINS: Final = len(FeetGains._fields)
+
+
+def feet_gains(config: Config) -> FeetGains:
+    """The gains that a configuration sets."""
     controller = config.controller
-    return np.array(
-        [
-            1e-3 * config.gait.stance_ms,
-            controller.raibert_gain,
-            controller.swing_height,
-            controller.descent_speed,
-            controller.kp_swing,
-            controller.kd_swing,
-            controller.swing_delay,
-            controller.reflex_lift,
-            controller.swing_acceleration,
-            float(controller.track_sinking_trunk),
-        ]
+    return FeetGains(
+        stance_time=1e-3 * config.gait.stance_ms,
+        raibert_gain=controller.raibert_gain,
+        swing_height=controller.swing_height,
+        descent_speed=controller.descent_speed,
+        kp=controller.kp_swing,
+        kd=controller.kd_swing,
+        delay=controller.swing_delay,
+        reflex_lift=controller.reflex_lift,
+        acceleration=controller.swing_acceleration,
+        track_sinking_trunk=float(controller.track_sinking_trunk),
     )
 
 
 @compiled
-def _lower(memory: Array, seen: Array, schedule: Array, dt: float, constants: Array) -> None:
-    """Note where swings begin; lower the feet that shall stand and have no ground.
-
-    With `track_sinking_trunk` they are lowered as seen from a trunk that sinks, as far as legs
-    reach.
-    """
-    descent, track_sinking_trunk = constants[3] * dt, constants[9] > 0.5
-    stance, progress, switched = schedule[0:4], schedule[4], seen[SWITCHED] > 0.5
-    start, goal = anchors_of(memory)
-    legs, lift = legs_of(memory), swings_of(memory).lift
-    contact, early = legs[0], legs[1]
-    trunk = trunk_of(seen)
-    p_foot = feet_of(seen)
-    for leg in range(4):
-        if stance[leg] < 0.5 and (switched or lift[leg] == progress):
-            start[leg] = p_foot[leg]
-        if contact[leg] > 0.5:
-            goal[leg] = p_foot[leg]
-        elif stance[leg] > 0.5 or early[leg] > 0.5:
-            if not track_sinking_trunk:
-                goal[leg, 2] -= descent
-                continue
-            if switched and stance[leg] > 0.5:
-                goal[leg] = p_foot[leg]
-            goal[leg, 2] -= descent - min(0.0, trunk.velocity[2]) * dt
-            goal[leg, 2] = max(goal[leg, 2], trunk.position[2] - _LONGEST)
-        elif track_sinking_trunk:
-            goal[leg] = p_foot[leg]
-
-
-@compiled
-def _desired_force(contact: Array, deviation: Array, R: Array, mass: float) -> Array:
-    """Nominal weight on the feet in contact plus the planned deviation, (4, 3), N."""
-    count = max(1.0, np.sum(contact))
-    c, s = heading(R)
-    force = np.zeros((4, 3))
-    for leg in range(4):
-        if contact[leg] > 0.5:
-            dx, dy, dz = deviation[3 * leg], deviation[3 * leg + 1], deviation[3 * leg + 2]
-            force[leg, 0] = c * dx - s * dy
-            force[leg, 1] = s * dx + c * dy
-            force[leg, 2] = mass * GRAVITY / count + dz
-    return force
-
-
-@compiled
 def foot_velocities(J: Array, v: Array, p_foot: Array) -> Array:
-    """Velocities of the foot centres, (4, 3), m/s, odometry frame."""
+    """Velocities of the foot centres, (4, 3), m/s, odometry frame.
+
+    Args:
+        J: spatial Jacobians, see `RigidBodyTerms`, (6, 18).
+        v: generalised velocity, (18,).
+        p_foot: foot centres, (4, 3), m, odometry frame.
+    """
     out = np.empty((4, 3))
     for leg in range(4):
         twist = np.zeros(6)
@@ -138,97 +99,173 @@ def foot_velocities(J: Array, v: Array, p_foot: Array) -> Array:
 
 
 @compiled
-def _feet_acceleration(
-    memory: Array,
-    seen: Array,
-    schedule: Array,
-    v_foot: Array,
-    v_ahead: Array,
-    v_des: Array,
-    wz: float,
-    constants: Array,
-) -> Array:
-    """Desired accelerations of the feet not in contact, (4, 3), m/s²; what they feel is updated."""
-    (
-        duration,
-        raibert_gain,
-        height,
-        descent_speed,
-        kp,
-        kd,
-        delay,
-        reflex_lift,
-        nimble,
-        in_reach,
-    ) = constants
-    stance, progress = schedule[0:4], schedule[4]
-    legs = legs_of(memory)
-    contact, early, ground = legs[0], legs[1], legs[4]
-    lift, stumble, felt = swings_of(memory)
-    swing_start, foot_goal = anchors_of(memory)
-    position, _, R, _ = trunk_of(seen)
-    p_foot = feet_of(seen)
-    out = np.zeros((4, 3))
-    expected = 0.0  # the ground at the foothold: what the feet now standing feel
-    count = 0.0
+def update_anchors(
+    memory: Array, phase: GaitPhase, trunk: TrunkState, p_foot: Array, gains: FeetGains, dt: float
+) -> None:
+    """Note where swings begin; lower the feet that shall stand and have no ground.
+
+    With `track_sinking_trunk` they are lowered as seen from a trunk that sinks, as far as legs
+    reach.
+
+    Args:
+        memory: `Memory.flat` of this tick; `swing_start` and `foot_goal` change.
+        phase: of the gait.
+        trunk: where it is and how it moves.
+        p_foot: foot centres, (4, 3), m, odometry frame.
+        gains: what feet are asked for.
+        dt: time since the last tick, s.
+    """
+    descent, tracks = gains.descent_speed * dt, gains.track_sinking_trunk > 0.5
+    start, goal, feet = swing_start_of(memory), foot_goal_of(memory), feet_memory_of(memory)
     for leg in range(4):
-        if stance[leg] > 0.5:
-            expected += ground[leg]
-            count += 1.0
-    expected = expected / max(1.0, count)
-    highest = np.max(ground)
+        stands = phase.stance[leg] > 0.5
+        if not stands and (phase.switched or feet.lift[leg] == phase.progress):
+            start[leg] = p_foot[leg]
+        if feet.contact[leg] > 0.5:
+            goal[leg] = p_foot[leg]
+        elif stands or feet.early_contact[leg] > 0.5:
+            if not tracks:
+                goal[leg, 2] -= descent
+                continue
+            if phase.switched and stands:
+                goal[leg] = p_foot[leg]
+            goal[leg, 2] -= descent - min(0.0, trunk.velocity[2]) * dt
+            goal[leg, 2] = max(goal[leg, 2], trunk.position[2] - _LONGEST)
+        elif tracks:
+            goal[leg] = p_foot[leg]
+
+
+@compiled
+def desired_forces(contact: Array, deviation: Array, R: Array, mass: float) -> Array:
+    """Nominal weight on the feet in contact plus the planned deviation, (4, 3), N, odometry frame.
+
+    Args:
+        contact: 1 for the feet that may push, (4,).
+        deviation: planned, from the nominal forces, (12,), N, yaw frame.
+        R: trunk to odometry frame, (3, 3).
+        mass: of robot and load, kg.
+    """
+    count = max(1.0, np.sum(contact))
+    c, s = heading(R)
+    force = np.zeros((4, 3))
     for leg in range(4):
         if contact[leg] > 0.5:
-            felt[leg] = 0.0
+            dx, dy, dz = deviation[3 * leg], deviation[3 * leg + 1], deviation[3 * leg + 2]
+            force[leg, 0] = c * dx - s * dy
+            force[leg, 1] = s * dx + c * dy
+            force[leg, 2] = mass * GRAVITY / count + dz
+    return force
+
+
+@compiled
+def desired_accelerations(
+    memory: Array,
+    phase: GaitPhase,
+    trunk: TrunkState,
+    feet_state: FeetState,
+    motion: MotionReference,
+    gains: FeetGains,
+) -> Array:
+    """Desired accelerations of the feet not in contact, (4, 3), m/s², odometry frame.
+
+    ẍ_des = ẍ_ref + kp (x_ref − x) + kd (ẋ_ref − ẋ)
+
+    Args:
+        memory: `Memory.flat` of this tick after `update_anchors`; `reaction` changes.
+        phase: of the gait.
+        trunk: where it is and how it moves.
+        feet_state: where the feet are and how they move.
+        motion: of the trunk, as footholds count on it.
+        gains: what feet are asked for.
+    """
+    feet, goal = feet_memory_of(memory), foot_goal_of(memory)
+    out = np.zeros((4, 3))
+    expected, highest = _expected_ground(phase.stance, feet.ground), np.max(feet.ground)
+    for leg in range(4):
+        if feet.contact[leg] > 0.5:
+            feet.reaction[leg] = 0.0
             continue
+        position, velocity = feet_state.position[leg], feet_state.velocity[leg]
         reference = np.zeros((3, 3))
-        if stance[leg] > 0.5 or early[leg] > 0.5:
-            reference[0] = foot_goal[leg]
-            reference[1, 2] = -descent_speed
-        elif stumble[leg] > 0.0:
-            reference[0] = p_foot[leg]
-            reference[1] = _away(felt[leg], reflex_lift)
+        if phase.stance[leg] > 0.5 or feet.early_contact[leg] > 0.5:
+            reference[0] = goal[leg]
+            reference[1, 2] = -gains.descent_speed
+        elif feet.reflex[leg] > 0.0:
+            reference[0] = position
+            reference[1] = _reflex_velocity(feet.reaction[leg], gains.reflex_lift)
         else:
-            target = swing.foothold(
+            target = foothold(
                 leg,
-                position,
-                v_ahead,
-                R,
-                v_des,
-                wz,
-                (1.0 - progress) * duration,
-                duration,
-                raibert_gain,
+                trunk.position,
+                trunk.R,
+                motion,
+                (1.0 - phase.progress) * gains.stance_time,
+                gains.stance_time,
+                gains.raibert_gain,
             )
-            left = 1.0 - lift[leg]
-            apex = highest + height
-            if lift[leg] > 0.0:
-                apex = max(apex, swing_start[leg, 2] + _CLEARANCE)
-                swing.within_reach(target, swing_start[leg], nimble, left * duration, delay)
-            if in_reach > 0.5:
-                apex = min(apex, max(position[2] - _SHORTEST, swing_start[leg, 2]))
-            reference = swing.swing_reference(
-                swing_start[leg],
-                target,
-                expected,
-                apex,
-                (progress - lift[leg]) / left,
-                left * duration,
-                delay,
+            start, lift = swing_start_of(memory)[leg], feet.lift[leg]
+            reference = _swing(
+                start, target, (expected, highest), lift, phase.progress, trunk.position[2], gains
             )
-        feedback = kp * (reference[0] - p_foot[leg]) + kd * (reference[1] - v_foot[leg])
-        out[leg] = reference[2] + feedback
+        correction = gains.kp * (reference[0] - position) + gains.kd * (reference[1] - velocity)
+        out[leg] = reference[2] + correction
         # What stops a foot that is to move with an acceleration a holds it back by −a.
-        felt[leg] = -feedback
+        feet.reaction[leg] = -correction
     return out
 
 
 @compiled
-def _away(felt: Array, speed: float) -> Array:
-    """Velocity at which a foot gives way: up, and back from what it feels in the plane. (3,)."""
+def _expected_ground(stance: Array, ground: Array) -> float:
+    """Height of the ground at a foothold: the mean under the feet that stand, m."""
+    expected, count = 0.0, 0.0
+    for leg in range(4):
+        if stance[leg] > 0.5:
+            expected += ground[leg]
+            count += 1.0
+    return expected / max(1.0, count)
+
+
+@compiled
+def _swing(
+    start: Array,
+    target: Array,
+    ground: tuple[float, float],
+    lift: float,
+    progress: float,
+    trunk_z: float,
+    gains: FeetGains,
+) -> Array:
+    """Reference of a swing foot, see `swing_reference`.
+
+    Args:
+        start: where its swing began, (3,), m, odometry frame.
+        target: foothold, (2,), m; brought near where the swing began anew.
+        ground: expected and highest height of the ground, m.
+        lift: progress of the half cycle at which the swing began.
+        progress: of the half cycle.
+        trunk_z: height of the trunk, m.
+        gains: what feet are asked for.
+    """
+    expected, highest = ground
+    remaining = 1.0 - lift
+    duration = remaining * gains.stance_time
+    apex = highest + gains.swing_height
+    if lift > 0.0:
+        apex = max(apex, start[2] + _CLEARANCE)
+        limit_foothold(target, start, gains.acceleration, duration, gains.delay)
+    if gains.track_sinking_trunk > 0.5:
+        apex = min(apex, max(trunk_z - _SHORTEST, start[2]))
+    return swing_reference(
+        start, target, expected, apex, (progress - lift) / remaining, duration, gains.delay
+    )
+
+
+@compiled
+def _reflex_velocity(reaction: Array, speed: float) -> Array:
+    """Velocity of a foot in its reflex: up, and back from what stopped it in the plane. (3,)."""
     out = np.array([0.0, 0.0, speed])
-    plane = np.sqrt(felt[0] ** 2 + felt[1] ** 2)
+    plane = np.sqrt(reaction[0] ** 2 + reaction[1] ** 2)
     if plane > 1e-6:
-        out[0] = _BACK * speed * felt[0] / plane
-        out[1] = _BACK * speed * felt[1] / plane
+        out[0] = _BACK * speed * reaction[0] / plane
+        out[1] = _BACK * speed * reaction[1] / plane
     return out

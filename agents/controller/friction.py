@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
+from quadriga.agents.controller.schedule import GaitPhase
+from quadriga.agents.controller.sensed import FeetState
+from quadriga.shared.config.sections import ControllerConfig
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.jit import compiled
 
-_SETTLED = 0.2  # of a half period: before this a foot may still be landing
+_SETTLED = 0.2  # of a half cycle: before this a foot may still be landing
 _LOSS = 15.0  # 1/s, of the coefficient counted on while a foot slides
 
 
@@ -17,7 +20,7 @@ class FrictionRule(NamedTuple):
     Attributes:
         slip_speed: from which on a foot slides, m/s; 0: never.
         slip_load: force from which on it matters, N: a foot that hardly bears load is easily
-            dragged along, and tells nothing of the ground.
+            dragged along, and shows nothing of the ground.
         mu: coefficient counted on where nothing slides.
         mu_min: coefficient that is always counted on.
         recovery: by which what is taken off falls, 1/s.
@@ -30,14 +33,26 @@ class FrictionRule(NamedTuple):
     recovery: float
 
 
+N_FRICTION_RULE: Final = len(FrictionRule._fields)
+
+
+def friction_rule(config: ControllerConfig) -> FrictionRule:
+    """The rule that a configuration sets."""
+    return FrictionRule(
+        slip_speed=config.slip_speed,
+        slip_load=config.slip_load,
+        mu=config.mu,
+        mu_min=config.mu_min,
+        recovery=config.mu_recovery,
+    )
+
+
 @compiled
-def caution(
-    caution0: float,
+def update_mu_reduction(
+    mu_reduction0: float,
     contact: Array,
-    stance: Array,
-    progress: float,
-    v_foot: Array,
-    foot_force: Array,
+    phase: GaitPhase,
+    feet: FeetState,
     rule: FrictionRule,
     dt: float,
 ) -> float:
@@ -49,21 +64,19 @@ def caution(
     0 ≤ c ≤ `mu` − `mu_min`.
 
     Args:
-        caution0: c at the last tick.
+        mu_reduction0: c at the last tick.
         contact: 1 for the feet the QP may push on, (4,).
-        stance: scheduled stance, (4,).
-        progress: progress of the half period in [0, 1).
-        v_foot: velocities of the foot centres, (4, 3), m/s, odometry frame.
-        foot_force: measured normal forces, (4,), N.
+        phase: of the gait.
+        feet: how they move and what they bear.
         rule: how much friction to count on.
         dt: time since the last tick, s.
     """
     if rule.slip_speed <= 0.0:
         return 0.0
-    slides = False
-    if progress >= _SETTLED:
+    slides, v = False, feet.velocity
+    if phase.progress >= _SETTLED:
         for leg in range(4):
-            if contact[leg] > 0.5 and stance[leg] > 0.5 and foot_force[leg] >= rule.slip_load:
-                slides = slides or v_foot[leg, 0] ** 2 + v_foot[leg, 1] ** 2 > rule.slip_speed**2
+            if contact[leg] > 0.5 and phase.stance[leg] > 0.5 and feet.force[leg] >= rule.slip_load:
+                slides = slides or v[leg, 0] ** 2 + v[leg, 1] ** 2 > rule.slip_speed**2
     rate = _LOSS if slides else -rule.recovery
-    return min(max(0.0, rule.mu - rule.mu_min), max(0.0, caution0 + rate * dt))
+    return min(max(0.0, rule.mu - rule.mu_min), max(0.0, mu_reduction0 + rate * dt))

@@ -1,6 +1,6 @@
-"""What the low level remembers from tick to tick, as one flat array: a tick costs one copy of it.
+"""What the low level remembers from tick to tick, as one flat row: a tick costs one copy of it.
 
-The compiled tick takes and gives the array; `Memory` names its parts for everyone else.
+Compiled code takes and fills the row; `Memory` names its parts for everyone else.
 """
 
 from __future__ import annotations
@@ -9,195 +9,245 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.shared.robot.a1 import Array
+from quadriga.agents.controller.maths.rows import places, row_size
+from quadriga.shared.robot.a1 import N_FORCES, N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.runtime.record import record
 
-SIZE: Final = 141
-LEVEL: Final = 102  # filtered height of the ground under the stance feet, m
-HALF: Final = 103  # number of the gait's half period, to notice a switch
-HEIGHT: Final = 104  # integral of the height error, m·s
-YAW: Final = 105  # desired heading, rad
-COUNT: Final = 118  # ticks of the present sample
-CAUTION: Final = 139  # what is taken off the friction coefficient
-LOAD: Final = 140  # what the robot carries, kg
+
+class MemoryLayout(NamedTuple):
+    """Where `Memory.flat` keeps what; units, shapes and frames: see the properties of `Memory`."""
+
+    mean: slice
+    covariance: slice
+    contact: slice
+    early_contact: slice
+    unloaded: slice
+    touchdown_seen: slice
+    ground: slice
+    swing_start: slice
+    foot_goal: slice
+    speed_integral: slice
+    position_error: slice
+    ground_height: int
+    half_cycle: int
+    height_integral: int
+    yaw_des: int
+    force_sum: slice
+    force_count: int
+    lift: slice
+    reflex: slice
+    reaction: slice
+    mu_reduction: int
+    load: int
 
 
-class Swings(NamedTuple):
-    """Of each foot off the ground.
+MEMORY: Final = MemoryLayout(
+    **places(
+        mean=6 * 3,
+        covariance=6 * 6,
+        contact=N_LEGS,
+        early_contact=N_LEGS,
+        unloaded=N_LEGS,
+        touchdown_seen=N_LEGS,
+        ground=N_LEGS,
+        swing_start=N_LEGS * 3,
+        foot_goal=N_LEGS * 3,
+        speed_integral=2,
+        position_error=2,
+        ground_height=1,
+        half_cycle=1,
+        height_integral=1,
+        yaw_des=1,
+        force_sum=N_FORCES,
+        force_count=1,
+        lift=N_LEGS,
+        reflex=N_LEGS,
+        reaction=N_LEGS * 3,
+        mu_reduction=1,
+        load=1,
+    )
+)
+MEMORY_SIZE: Final = row_size(MEMORY)
+
+
+class FilterState(NamedTuple):
+    """What the estimator remembers, in the odometry frame; the axes share one covariance.
 
     Attributes:
-        lift: progress of the half period at which its swing began, (4,); −1: not yet.
-        stumble: time for which it will still give way to what stopped it, (4,), s.
-        felt: from where it was stopped at the last tick: the acceleration that was to bring it back
-            to its reference, turned round, (4, 3), m/s².
+        mean: trunk position, trunk velocity, feet FL FR RL RR, (6, 3), m, m/s.
+        covariance: of the six, the same for each axis, (6, 6), m², m²/s².
     """
 
+    mean: Array
+    covariance: Array
+
+
+class FeetMemory(NamedTuple):
+    """What is remembered of the feet, see the properties of `Memory`; (4,) each, where not said."""
+
+    contact: Array
+    early_contact: Array
+    unloaded: Array
+    touchdown_seen: Array
+    ground: Array
     lift: Array
-    stumble: Array
-    felt: Array
+    reflex: Array
+    reaction: Array  # (4, 3)
 
 
 @compiled
-def filter_of(flat: Array) -> tuple[Array, Array]:
-    """Views of the estimator's mean, (6, 3), and covariance, (6, 6)."""
-    return flat[0:18].reshape(6, 3), flat[18:54].reshape(6, 6)
+def filter_state_of(flat: Array) -> FilterState:
+    """Views of the estimator's mean and covariance."""
+    return FilterState(flat[MEMORY.mean].reshape(6, 3), flat[MEMORY.covariance].reshape(6, 6))
 
 
 @compiled
-def legs_of(flat: Array) -> Array:
-    """View (5, 4), of each leg: contact, early, unloaded, latched, ground."""
-    return flat[54:74].reshape(5, 4)
+def feet_memory_of(flat: Array) -> FeetMemory:
+    """Views of what is remembered of the feet."""
+    return FeetMemory(
+        flat[MEMORY.contact],
+        flat[MEMORY.early_contact],
+        flat[MEMORY.unloaded],
+        flat[MEMORY.touchdown_seen],
+        flat[MEMORY.ground],
+        flat[MEMORY.lift],
+        flat[MEMORY.reflex],
+        flat[MEMORY.reaction].reshape(4, 3),
+    )
 
 
 @compiled
-def swings_of(flat: Array) -> Swings:
-    """Views of what is remembered of the swings."""
-    return Swings(flat[119:123], flat[123:127], flat[127:139].reshape(4, 3))
+def swing_start_of(flat: Array) -> Array:
+    """View of where swings began, (4, 3), m, odometry frame."""
+    return flat[MEMORY.swing_start].reshape(4, 3)
 
 
 @compiled
-def anchors_of(flat: Array) -> tuple[Array, Array]:
-    """Views of where swings began and where unloaded stance feet are lowered to, (4, 3) each."""
-    return flat[74:86].reshape(4, 3), flat[86:98].reshape(4, 3)
-
-
-@compiled
-def speed_of(flat: Array) -> tuple[Array, Array]:
-    """Views of the speed integral and the lead of the position reference, (2,) each."""
-    return flat[98:100], flat[100:102]
-
-
-@compiled
-def forces_of(flat: Array) -> Array:
-    """View of the sum of the forces applied in the present sample, (12,), N."""
-    return flat[106:118]
+def foot_goal_of(flat: Array) -> Array:
+    """View of where unloaded stance feet are lowered to, (4, 3), m, odometry frame."""
+    return flat[MEMORY.foot_goal].reshape(4, 3)
 
 
 @record
 class Memory:
-    """The low level's memory; `flat` is (141,) and not to be changed."""
+    """The low level's memory; `flat`, see `MemoryLayout`, is not to be changed."""
 
     flat: Array
 
     @property
     def mean(self) -> Array:
         """Trunk position, trunk velocity, feet FL FR RL RR, (6, 3), m, m/s, odometry frame."""
-        mean, _ = filter_of(self.flat)
-        return mean
+        return self.flat[MEMORY.mean].reshape(6, 3)
 
     @property
     def covariance(self) -> Array:
-        """Of the mean, the same for all axes, (6, 6)."""
-        _, covariance = filter_of(self.flat)
-        return covariance
+        """Of the mean, the same for all axes, (6, 6), m², m²/s²."""
+        return self.flat[MEMORY.covariance].reshape(6, 6)
 
     @property
     def contact(self) -> Array:
         """1 where the QP may push, (4,)."""
-        row: Array = legs_of(self.flat)[0]
-        return row
+        return self.flat[MEMORY.contact]
 
     @property
-    def early(self) -> Array:
+    def early_contact(self) -> Array:
         """1 where the foot landed before its stance began, (4,)."""
-        row: Array = legs_of(self.flat)[1]
-        return row
+        return self.flat[MEMORY.early_contact]
 
     @property
     def unloaded(self) -> Array:
         """Time without force during stance, (4,), s."""
-        row: Array = legs_of(self.flat)[2]
-        return row
+        return self.flat[MEMORY.unloaded]
 
     @property
-    def latched(self) -> Array:
-        """1 where the ground has been felt in this stance, (4,)."""
-        row: Array = legs_of(self.flat)[3]
-        return row
+    def touchdown_seen(self) -> Array:
+        """1 where the foot has borne load in this stance, (4,)."""
+        return self.flat[MEMORY.touchdown_seen]
 
     @property
     def ground(self) -> Array:
-        """Height of the ground felt last under each foot, (4,), m, odometry frame."""
-        row: Array = legs_of(self.flat)[4]
-        return row
+        """Height of the ground last measured under each foot, (4,), m, odometry frame."""
+        return self.flat[MEMORY.ground]
 
     @property
-    def level(self) -> float:
-        """Filtered height of the ground under the stance feet, m."""
-        return float(self.flat[LEVEL])
+    def ground_height(self) -> float:
+        """Filtered height of the ground under the stance feet, m, odometry frame."""
+        return float(self.flat[MEMORY.ground_height])
 
     @property
-    def half(self) -> int:
-        """Number of the gait's half period at the last tick."""
-        return int(self.flat[HALF])
+    def half_cycle(self) -> int:
+        """Number of the gait's half cycle at the last tick; a new one is a switch."""
+        return int(self.flat[MEMORY.half_cycle])
 
     @property
     def swing_start(self) -> Array:
         """Where each foot left the ground, (4, 3), m, odometry frame."""
-        return anchors_of(self.flat)[0]
+        return self.flat[MEMORY.swing_start].reshape(4, 3)
 
     @property
     def foot_goal(self) -> Array:
-        """Where a foot that lost contact is being lowered to, (4, 3), m."""
-        return anchors_of(self.flat)[1]
+        """Where a foot that lost contact is being lowered to, (4, 3), m, odometry frame."""
+        return self.flat[MEMORY.foot_goal].reshape(4, 3)
 
     @property
     def lift(self) -> Array:
-        """Progress of the half period at which each foot's swing began; −1: not yet. (4,)."""
-        return swings_of(self.flat).lift
+        """Progress of the half cycle at which each foot's swing began; −1: not yet. (4,)."""
+        return self.flat[MEMORY.lift]
 
     @property
-    def stumble(self) -> Array:
-        """How long each swing foot will still give way to what stopped it, (4,), s."""
-        return swings_of(self.flat).stumble
+    def reflex(self) -> Array:
+        """Time for which each swing foot will still back off from what stopped it, (4,), s."""
+        return self.flat[MEMORY.reflex]
 
     @property
-    def caution(self) -> float:
-        """What is taken off the friction coefficient the QP may use, because feet slid."""
-        return float(self.flat[CAUTION])
+    def reaction(self) -> Array:
+        """What stops each foot off the ground, (4, 3), m/s², odometry frame.
+
+        The negative of the acceleration that was to bring it back to its reference.
+        """
+        return self.flat[MEMORY.reaction].reshape(4, 3)
+
+    @property
+    def mu_reduction(self) -> float:
+        """What is taken off the friction coefficient of the QP because feet slid."""
+        return float(self.flat[MEMORY.mu_reduction])
 
     @property
     def load(self) -> float:
-        """What the robot seems to carry, kg."""
-        return float(self.flat[LOAD])
+        """Estimate of what the robot carries, kg."""
+        return float(self.flat[MEMORY.load])
 
     @property
-    def felt(self) -> Array:
-        """From where each foot off the ground was stopped, see `contact.py`, (4, 3), m/s²."""
-        return swings_of(self.flat).felt
-
-    @property
-    def height(self) -> float:
+    def height_integral(self) -> float:
         """Integral of the height error, m·s."""
-        return float(self.flat[HEIGHT])
+        return float(self.flat[MEMORY.height_integral])
 
     @property
-    def speed(self) -> Array:
-        """Integral of the speed error, slowly forgotten, yaw frame, (2,), m."""
-        return speed_of(self.flat)[0]
+    def speed_integral(self) -> Array:
+        """Leaking integral of the speed error, (2,), m, yaw frame."""
+        return self.flat[MEMORY.speed_integral]
 
     @property
-    def lead(self) -> Array:
-        """Lead of the position reference over the trunk, yaw frame, (2,), m."""
-        return speed_of(self.flat)[1]
+    def position_error(self) -> Array:
+        """Limited position error, the integral of the speed error, (2,), m, yaw frame."""
+        return self.flat[MEMORY.position_error]
 
     @property
-    def yaw(self) -> float:
+    def yaw_des(self) -> float:
         """Desired heading, rad."""
-        return float(self.flat[YAW])
+        return float(self.flat[MEMORY.yaw_des])
 
     @property
     def mean_force(self) -> Array:
         """Mean of the planned forces so far in the present sample, (12,), N, yaw frame."""
-        mean: Array = self.flat[106:118] / max(1.0, self.flat[COUNT])
+        mean: Array = self.flat[MEMORY.force_sum] / max(1.0, self.flat[MEMORY.force_count])
         return mean
 
 
-def blank() -> Array:
-    """The memory of a robot that stands on flat ground at height zero; all else is zero."""
-    flat = np.zeros(SIZE)
-    contact, _, _, latched, _ = legs_of(flat)
-    contact[:] = latched[:] = 1.0
-    flat[HALF] = -1.0
+def initial_memory() -> Array:
+    """`Memory.flat` of a robot that stands on flat ground at height zero; all else is zero."""
+    flat = np.zeros(MEMORY_SIZE)
+    flat[MEMORY.contact] = flat[MEMORY.touchdown_seen] = 1.0
+    flat[MEMORY.half_cycle] = -1.0
     return flat

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from quadriga.agents.controller.maths.rigid_body import link_table, rigid_body_terms
-from quadriga.agents.controller.payload_estimate import loaded
+from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms, link_table, rigid_body_terms
+from quadriga.agents.controller.payload_estimate import add_load
 from quadriga.shared.robot.a1 import Array, q_stand
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
-from quadriga.shared.runtime.record import record
 
 
 def _single_rigid_body(model: pin.Model) -> tuple[Array, Array]:
@@ -19,25 +18,6 @@ def _single_rigid_body(model: pin.Model) -> tuple[Array, Array]:
     pin.ccrba(model, scratch, q, np.zeros(model.nv))
     com = pin.centerOfMass(model, scratch, q)
     return np.linalg.inv(scratch.Ig.inertia), np.array(com)
-
-
-@record
-class Terms:
-    """Terms of M(q) v̇ + h(q, v) = S τ + Jᵀ f at one instant (Pinocchio's coordinates).
-
-    Attributes:
-        M_inverse: inverse mass matrix, (18, 18).
-        nle: Coriolis, centrifugal and gravity terms h, (18,).
-        J: spatial Jacobians of all joints, world frame, (6, 18), linear rows first.
-        dJ: its time derivative, (6, 18).
-        v: generalised velocity; the trunk's in the trunk frame, (18,).
-    """
-
-    M_inverse: Array
-    nle: Array
-    J: Array
-    dJ: Array
-    v: Array
 
 
 class RigidBody:
@@ -56,13 +36,10 @@ class RigidBody:
         self.mass: float = float(pin.computeTotalMass(model))
         self.inertia_inverse, self.com = _single_rigid_body(model)
 
-    def terms(self, q: Array, v: Array, load: float = 0.0) -> Terms:
+    def terms(self, q: Array, v: Array, load: float = 0.0) -> RigidBodyTerms:
         """Terms at Pinocchio's coordinates, (19,) and (18,), of a robot with a load, kg.
 
         The quaternion is normalised.
         """
-        terms = Terms(np.empty((18, 18)), np.empty(18), np.empty((6, 18)), np.empty((6, 18)), v)
-        rigid_body_terms(
-            q, v, loaded(self.links, load), terms.M_inverse, terms.nle, terms.J, terms.dJ
-        )
+        terms: RigidBodyTerms = rigid_body_terms(q, v, add_load(self.links, load))
         return terms

@@ -12,7 +12,7 @@ _HEIGHT = 0.08  # m, of a load's centre above the trunk's origin
 
 
 @compiled
-def felt_load(load0: float, foot_force: Array, mass: float, rate: float) -> float:
+def estimate_load(load0: float, foot_force: Array, mass: float, rate: float) -> float:
     """The load, kg, filtered: on average the feet bear the weight of robot and load.
 
     What yokes pull up or down counts as load. Robots that are lifted carry nothing.
@@ -23,12 +23,12 @@ def felt_load(load0: float, foot_force: Array, mass: float, rate: float) -> floa
         mass: of the robot alone, kg.
         rate: share of a tick in the filter.
     """
-    carried = np.sum(foot_force) / GRAVITY - mass
-    return min(_MOST, max(0.0, load0 + rate * (carried - load0)))
+    surplus = np.sum(foot_force) / GRAVITY - mass
+    return min(_MOST, max(0.0, load0 + rate * (surplus - load0)))
 
 
 @compiled
-def loaded(links: Array, load: float) -> Array:
+def add_load(links: Array, load: float) -> Array:
     """The rows of `link_table` with a load, kg, on the middle of the trunk's top.
 
     Two bodies that move as one: the centre is the mean, and about it I = I₁ + I₂ +

@@ -6,135 +6,60 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.agents.controller.contact import ContactRule, contacts_by_force, contacts_by_schedule
-from quadriga.agents.controller.estimator import filter_step, foot_trust, noise_parameters
-from quadriga.agents.controller.maths.rotation import roll_pitch_yaw
-from quadriga.agents.controller.memory import (
-    HALF,
-    LEVEL,
-    LOAD,
-    Memory,
-    filter_of,
-    legs_of,
-    swings_of,
+from quadriga.agents.controller.contact import (
+    N_CONTACT_RULE,
+    ContactRule,
+    contact_rule,
+    update_contacts,
 )
-from quadriga.agents.controller.payload_estimate import felt_load
+from quadriga.agents.controller.estimator import (
+    N_NOISE,
+    Estimate,
+    FilterNoise,
+    filter_noise,
+    filter_step,
+    foot_trust,
+    readings_of,
+)
+from quadriga.agents.controller.maths.rotation import roll_pitch_yaw
+from quadriga.agents.controller.maths.rows import numbers, places
+from quadriga.agents.controller.memory import MEMORY, FilterState, feet_memory_of, filter_state_of
+from quadriga.agents.controller.payload_estimate import estimate_load
+from quadriga.agents.controller.schedule import SCHEDULE, phase_of
+from quadriga.agents.controller.sensed import SENSED, feet_of, trunk_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import TOTAL_MASS, Array
 from quadriga.shared.runtime.jit import compiled
-from quadriga.shared.runtime.record import record
-
-SEEN_SIZE: Final = 72
-SWITCHED: Final = 67  # 1 if stances and swings have just ended
 
 
-@compiled
-def coordinates_of(flat: Array) -> tuple[Array, Array]:
-    """Views of Pinocchio's q, (19,), and v, (18,), in what was seen."""
-    return flat[0:19], flat[19:37]
-
-
-class Trunk(NamedTuple):
-    """Where the trunk is and how it moves.
+class SensingLayout(NamedTuple):
+    """Where the row of `sensing_constants` keeps what.
 
     Attributes:
-        position: of its origin, (3,), m, odometry frame.
-        velocity: of its origin, (3,), m/s, odometry frame.
-        R: trunk to odometry frame, (3, 3).
-        omega: angular velocity, (3,), rad/s, trunk frame.
+        trust_ramp: share of stance in which trust in a foot ramps up and down.
+        least_force: below which a foot is not trusted, N.
+        load_time: time constant of the load's filter, s; 0: no load is estimated.
+        noise: `FilterNoise`.
+        rule: `ContactRule`.
     """
 
-    position: Array
-    velocity: Array
-    R: Array
-    omega: Array
+    trust_ramp: int
+    least_force: int
+    load_time: int
+    noise: slice
+    rule: slice
 
 
-@compiled
-def trunk_of(flat: Array) -> Trunk:
-    """Views of the trunk in what was seen."""
-    return Trunk(flat[0:3], flat[58:61], flat[37:46].reshape(3, 3), flat[22:25])
-
-
-@compiled
-def feet_of(flat: Array) -> Array:
-    """View of the foot centres, (4, 3), m, odometry frame."""
-    return flat[46:58].reshape(4, 3)
-
-
-@compiled
-def foot_force_of(flat: Array) -> Array:
-    """View of the measured normal forces of the feet, (4,), N."""
-    return flat[68:72]
-
-
-@record
-class Sensed:
-    """What a robot sees of itself at one tick; `flat` is (72,) and not to be changed.
-
-    Attributes:
-        memory: the low level's memory, its estimator and contacts advanced to this tick.
-        flat: the rest.
-    """
-
-    memory: Memory
-    flat: Array
-
-    @property
-    def outputs(self) -> Array:
-        """The outputs y: z over the ground, vx, vy (yaw frame), roll, pitch, wz. (6,)."""
-        return self.flat[61:67]
-
-    @property
-    def upright(self) -> float:
-        """Cosine of the angle between the trunk's z axis and the vertical."""
-        return float(self.flat[45])
-
-    @property
-    def position(self) -> Array:
-        """Trunk origin, (3,), m, odometry frame."""
-        return self.flat[0:3]
-
-    @property
-    def velocity(self) -> Array:
-        """Of the trunk's origin, (3,), m/s, odometry frame."""
-        return self.flat[58:61]
-
-    @property
-    def R(self) -> Array:
-        """Trunk to odometry frame, (3, 3)."""
-        return self.flat[37:46].reshape(3, 3)
-
-    @property
-    def p_foot(self) -> Array:
-        """Foot centres, (4, 3), m, odometry frame."""
-        return self.flat[46:58].reshape(4, 3)
+_CONSTANTS: Final = SensingLayout(
+    **places(trust_ramp=1, least_force=1, load_time=1, noise=N_NOISE, rule=N_CONTACT_RULE)
+)
 
 
 def sensing_constants(config: Config) -> Array:
-    """What `sense` needs of the configuration. Shape (15,)."""
-    controller, estimator = config.controller, config.estimator
-    return np.array(
-        [
-            estimator.trust_ramp,
-            estimator.contact_force,
-            float(controller.contact_detection),
-            controller.contact_force,
-            1e-3 * controller.lost_contact_ms,
-            1e-3 * controller.ground_filter_ms,
-            controller.liftoff_hold_ms / config.gait.stance_ms,
-            1e-3 * controller.reflex_ms,
-            float(controller.reject_side_contacts),
-            controller.load_time,
-            *noise_parameters(estimator),
-        ]
-    )
-
-
-@compiled
-def sensors_of(row: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """Joint angles and rates, attitude, gyro, accelerometer and foot forces in a `State.row`."""
-    return row[0:12], row[12:24], row[36:40], row[40:43], row[43:46], row[46:50]
+    """What `sense` needs of the configuration, see `SensingLayout`."""
+    estimator = config.estimator
+    ahead = [estimator.trust_ramp, estimator.contact_force, config.controller.load_time]
+    return np.concatenate([ahead, filter_noise(estimator), contact_rule(config)])
 
 
 @compiled
@@ -145,121 +70,95 @@ def sense(
     dt: float,
     constants: Array,
     memory: Array,
-    seen: Array,
+    sensed: Array,
 ) -> None:
     """Estimate the trunk's state and the contacts.
 
-    From the memory at the last tick, the row of a `State`, the gait's `Schedule.row` and the time
-    since the last tick, s, `memory` and `seen` are filled: see `Memory` and `Sensed`.
-    `constants` are `sensing_constants`.
+    Args:
+        memory0: `Memory.flat` of the last tick.
+        state: `State.row`.
+        schedule: `Schedule.row`.
+        dt: time since the last tick, s.
+        constants: `sensing_constants`.
+        memory: the new `Memory.flat`, filled.
+        sensed: `Sensed.flat`, filled.
     """
-    q_joint, v_joint, quat, gyro, accel, foot_force = sensors_of(state)
-    stance, progress = schedule[0:4], schedule[4]
-    ramp, least_force = constants[0:2]
-    trust = foot_trust(stance, progress, foot_force, ramp, least_force)
-    mean0, covariance0 = filter_of(memory0)
-    mean, covariance, frame = filter_step(
-        mean0, covariance0, quat, gyro, accel, q_joint, v_joint, trust, constants[10:15], dt
+    readings = readings_of(state)
+    trust = foot_trust(
+        schedule[SCHEDULE.stance],
+        schedule[SCHEDULE.progress],
+        readings.foot_force,
+        constants[_CONSTANTS.trust_ramp],
+        constants[_CONSTANTS.least_force],
     )
-    place(
-        memory0,
-        mean,
-        covariance,
-        quat,
-        frame[:3],
-        gyro,
-        frame[3:],
-        q_joint,
-        v_joint,
-        foot_force,
-        schedule,
-        dt,
-        constants,
-        memory,
-        seen,
-    )
+    noise = FilterNoise(*numbers(constants[_CONSTANTS.noise], N_NOISE))
+    filtered, estimate = filter_step(filter_state_of(memory0), readings, trust, noise, dt)
+    place(memory0, filtered, estimate, schedule, dt, constants, memory, sensed)
 
 
 @compiled
 def place(
     memory0: Array,
-    mean: Array,
-    covariance: Array,
-    quat: Array,
-    R: Array,
-    omega: Array,
-    p_foot: Array,
-    q_joint: Array,
-    v_joint: Array,
-    foot_force: Array,
+    filtered: FilterState,
+    estimate: Estimate,
     schedule: Array,
     dt: float,
     constants: Array,
     memory: Array,
-    seen: Array,
+    sensed: Array,
 ) -> None:
-    """The same once the trunk is known: `mean` and `covariance` of the filter, R, its rate."""
-    stance, progress, half = schedule[0:4], schedule[4], schedule[5]
-    level0 = memory0[LEVEL]
-    position, velocity = mean[0], mean[1]
-    q, v = coordinates_of(seen)
-    q[:3] = position
-    norm = np.sqrt(np.sum(quat * quat))
-    q[3:6] = quat[1:] / norm
-    q[6] = quat[0] / norm
-    q[7:] = q_joint
-    v[:3] = R.T @ velocity
-    v[3:6] = omega
-    v[6:] = v_joint
-    trunk = trunk_of(seen)
-    trunk.R[:] = R
-    trunk.velocity[:] = velocity
-    feet_of(seen)[:] = p_foot
-    foot_force_of(seen)[:] = foot_force
-    seen[61:67] = outputs_at(position, velocity, R, omega, level0)
+    """The same once the estimate is known; `filtered` is the estimator's new memory."""
+    ground_height0 = memory0[MEMORY.ground_height]
+    switched = schedule[SCHEDULE.half_cycle] != memory0[MEMORY.half_cycle]
+    _fill(sensed, estimate, ground_height0, switched)
 
     memory[:] = memory0
-    new_mean, new_covariance = filter_of(memory)
-    new_mean[:], new_covariance[:] = mean, covariance
-    switched = half != memory0[HALF]
-    seen[SWITCHED] = 1.0 if switched else 0.0
-    (
-        by_force,
-        least_force,
-        lost_after,
-        ground_filter,
-        hold,
-        give_way,
-        reject_side_contacts,
-        load_time,
-    ) = constants[2:10]
-    rate = dt / (ground_filter + dt)
-    if by_force > 0.5:
-        rule = ContactRule(least_force, lost_after, hold, give_way, reject_side_contacts > 0.5)
-        legs, level = contacts_by_force(
-            legs_of(memory0),
-            level0,
-            switched,
-            stance,
-            progress,
-            foot_force,
-            p_foot[:, 2],
-            swings_of(memory),
-            rule,
-            rate,
-            dt,
-        )
-    else:
-        legs, level = contacts_by_schedule(legs_of(memory0)[4], level0, stance, p_foot[:, 2], rate)
-    legs_of(memory)[:] = legs
-    memory[LEVEL], memory[HALF] = level, half
+    memory[MEMORY.half_cycle] = schedule[SCHEDULE.half_cycle]
+    new = filter_state_of(memory)
+    new.mean[:], new.covariance[:] = filtered
+    memory[MEMORY.ground_height] = update_contacts(
+        feet_memory_of(memory),
+        ground_height0,
+        phase_of(schedule, switched),
+        estimate.foot_force,
+        estimate.p_foot[:, 2],
+        ContactRule(*numbers(constants[_CONSTANTS.rule], N_CONTACT_RULE)),
+        dt,
+    )
+    load_time = constants[_CONSTANTS.load_time]
     if load_time > 0.0:
-        memory[LOAD] = felt_load(memory0[LOAD], foot_force, TOTAL_MASS, dt / (load_time + dt))
+        rate = dt / (load_time + dt)
+        memory[MEMORY.load] = estimate_load(
+            memory0[MEMORY.load], estimate.foot_force, TOTAL_MASS, rate
+        )
+
+
+@compiled
+def _fill(sensed: Array, estimate: Estimate, ground_height: float, switched: bool) -> None:
+    """Fill `Sensed.flat`; `ground_height` is the one over which the output z counts, m."""
+    quat, R, velocity = estimate.quat_wxyz, estimate.R, estimate.velocity
+    norm = np.sqrt(np.sum(quat * quat))
+    sensed[SENSED.position] = estimate.position
+    quat_xyzw = sensed[SENSED.quat_xyzw]
+    quat_xyzw[:3] = quat[1:] / norm
+    quat_xyzw[3] = quat[0] / norm
+    sensed[SENSED.q_joint] = estimate.q_joint
+    sensed[SENSED.v_trunk] = R.T @ velocity
+    sensed[SENSED.omega] = estimate.omega
+    sensed[SENSED.v_joint] = estimate.v_joint
+    trunk_of(sensed).R[:] = R
+    feet_of(sensed)[:] = estimate.p_foot
+    sensed[SENSED.velocity] = velocity
+    sensed[SENSED.foot_force] = estimate.foot_force
+    sensed[SENSED.outputs] = outputs_at(
+        estimate.position, velocity, R, estimate.omega, ground_height
+    )
+    sensed[SENSED.switched] = 1.0 if switched else 0.0
 
 
 @compiled
 def outputs_at(position: Array, velocity: Array, R: Array, omega: Array, ground: float) -> Array:
-    """The outputs y of the planner over ground at a height: z, vx, vy, roll, pitch, wz. (6,)."""
+    """The outputs y of the planner over ground at a height, m: z, vx, vy, roll, pitch, wz. (6,)."""
     rpy = roll_pitch_yaw(R)
     c, s = np.cos(rpy[2]), np.sin(rpy[2])
     return np.array(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from quadriga.agents.controller.maths.leg_kinematics import hip_neutral
@@ -10,30 +12,51 @@ from quadriga.shared.robot.a1 import FOOT_RADIUS, Array
 from quadriga.shared.runtime.jit import compiled
 
 _PLANE_DONE = 0.9  # of swing: the foot comes down vertically
-_PENETRATION = 0.005  # m below the expected ground, so that touchdown is felt
+_PENETRATION = 0.005  # m below the expected ground, so that touchdown is sure
+
+
+class MotionReference(NamedTuple):
+    """How the trunk moves and shall move, as footholds count on it.
+
+    Attributes:
+        v_expected: velocity to be expected until the foot has stood, (3,), m/s, odometry frame.
+        v_des: desired velocity, (3,), m/s, odometry frame.
+        wz: desired yaw rate, rad/s.
+    """
+
+    v_expected: Array
+    v_des: Array
+    wz: float
 
 
 @compiled
 def foothold(
     leg: int,
     position: Array,
-    velocity: Array,
     R: Array,
-    v_des: Array,
-    wz: float,
+    motion: MotionReference,
     remaining: float,
     stance_time: float,
     gain: float,
 ) -> Array:
     """Raibert foothold p = p_hip + v·t_remaining + v·T_stance/2 + k (v − v_des). Shape (2,), m.
 
-    `velocity`, `v_des` are the trunk's in the odometry frame; the hip's own velocity from the
-    yaw rate `wz` [rad/s] is added. `remaining` is the time to touchdown [s].
+    v is the expected velocity; the hip's own velocity from the yaw rate is added to it.
+
+    Args:
+        leg: which.
+        position: of the trunk's origin, (3,), m, odometry frame.
+        R: trunk to odometry frame, (3, 3).
+        motion: of the trunk.
+        remaining: time to touchdown, s.
+        stance_time: T_stance, s.
+        gain: k, s.
     """
     hip = hip_neutral()[leg]
     c, s = heading(R)
     rx, ry = c * hip[0] - s * hip[1], s * hip[0] + c * hip[1]
     ahead = remaining + 0.5 * stance_time
+    velocity, v_des, wz = motion
     out = np.empty(2)
     out[0] = position[0] + rx + (velocity[0] - wz * ry) * ahead
     out[1] = position[1] + ry + (velocity[1] + wz * rx) * ahead
@@ -43,7 +66,7 @@ def foothold(
 
 
 @compiled
-def within_reach(
+def limit_foothold(
     target: Array, start: Array, acceleration: float, duration: float, delay: float
 ) -> None:
     """Shorten the way from `start` to the foothold `target`, (2,), to what can be done in time.

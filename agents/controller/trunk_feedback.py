@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from quadriga.agents.controller.maths.rotation import cross, heading, roll_pitch_yaw, wrap_angle
-from quadriga.agents.controller.sensing import Trunk
+from quadriga.agents.controller.sensed import TrunkState
 from quadriga.shared.config.sections import ControllerConfig
 from quadriga.shared.robot.a1 import GRAVITY, Array
 from quadriga.shared.runtime.jit import compiled
@@ -17,28 +17,33 @@ _SPEED_LIMIT = 0.15  # m, speed integrator
 _YAW_LIMIT = 0.3  # rad, of the heading error that is acted on
 
 
-def trunk_gains(config: ControllerConfig) -> Array:
-    """The gains as `feedback` takes them. Shape (12,)."""
-    return np.array(
-        [
-            config.kp_z,
-            config.kd_z,
-            config.ki_z,
-            config.kp_xy,
-            config.kd_xy,
-            config.ki_xy,
-            config.kp_tilt,
-            config.kd_tilt,
-            config.kp_yaw,
-            config.kd_yaw,
-            config.position_error_limit,
-            config.leak_xy,
-        ]
-    )
+class TrunkGains(NamedTuple):
+    """Gains of `feedback`: the keys of these names in the section `controller`, units there."""
+
+    kp_z: float
+    kd_z: float
+    ki_z: float
+    kp_xy: float
+    kd_xy: float
+    ki_xy: float
+    kp_tilt: float
+    kd_tilt: float
+    kp_yaw: float
+    kd_yaw: float
+    position_error_limit: float
+    leak_xy: float
 
 
-class Asked(NamedTuple):
-    """What the trunk is asked for.
+N_TRUNK_GAINS: Final = len(TrunkGains._fields)
+
+
+def trunk_gains(config: ControllerConfig) -> TrunkGains:
+    """The gains that a configuration sets."""
+    return TrunkGains(*(getattr(config, name) for name in TrunkGains._fields))
+
+
+class TrunkReference(NamedTuple):
+    """What the trunk is to do.
 
     Attributes:
         v: vx and vy, (2,), m/s, yaw frame.
@@ -57,14 +62,14 @@ class Integrators(NamedTuple):
     Attributes:
         height: integral of the height error, m·s.
         speed: leaking integral of the speed error, (2,), m, yaw frame.
-        lead: of the position reference over the position, (2,), m, yaw frame; held by
+        position_error: integral of the speed error, (2,), m, yaw frame, held within
             `position_error_limit`.
         yaw: desired heading, rad.
     """
 
     height: float
     speed: Array
-    lead: Array
+    position_error: Array
     yaw: float
 
 
@@ -84,71 +89,98 @@ class SingleRigidBody(NamedTuple):
 
 @compiled
 def feedback(
-    before: Integrators, gains: Array, trunk: Trunk, asked: Asked, dt: float
+    before: Integrators, gains: TrunkGains, trunk: TrunkState, reference: TrunkReference, dt: float
 ) -> tuple[Integrators, Array, Array]:
-    """Accelerations that bring the outputs to what is asked.
+    """Accelerations that bring the outputs to their reference.
 
     Args:
         before: what it remembers.
-        gains: `trunk_gains`.
+        gains: of the feedback.
         trunk: where it is and how it moves.
-        asked: where and how it should.
+        reference: where and how it should.
         dt: time since the last tick, s.
 
     Returns:
         What it remembers now, the linear and angular acceleration, (6,), m/s² and rad/s², and the
         desired velocity, (3,), m/s, both in the odometry frame.
     """
-    (
-        kp_z,
-        kd_z,
-        ki_z,
-        kp_xy,
-        kd_xy,
-        ki_xy,
-        kp_tilt,
-        kd_tilt,
-        kp_yaw,
-        kd_yaw,
-        position_error_limit,
-        leak,
-    ) = gains
-    position, velocity, R, omega_trunk = trunk
-    rpy = roll_pitch_yaw(R)
+    rpy = roll_pitch_yaw(trunk.R)
     c, s = np.cos(rpy[2]), np.sin(rpy[2])
-    omega = R @ omega_trunk
-    out = np.empty(6)
-    forward, left = asked.v
+    forward, left = reference.v
     v_des = np.array([c * forward - s * left, s * forward + c * left, 0.0])
-
-    z_error = asked.height - position[2]
+    out = np.empty(6)
+    z_error = reference.height - trunk.position[2]
     height = min(_Z_LIMIT, max(-_Z_LIMIT, before.height + dt * z_error))
-    out[2] = kp_z * z_error - kd_z * velocity[2] + ki_z * height
+    out[2] = gains.kp_z * z_error - gains.kd_z * trunk.velocity[2] + gains.ki_z * height
+    speed, position_error, out[:2] = _plane_feedback(before, gains, trunk, reference, c, s, dt)
+    yaw = _desired_heading(before.yaw, rpy[2], reference.wz, dt)
+    out[3:] = _attitude_feedback(gains, trunk, rpy, yaw, reference.wz)
+    return Integrators(height, speed, position_error, yaw), out, v_des
 
-    error = asked.v - np.array(
+
+@compiled
+def _plane_feedback(
+    before: Integrators,
+    gains: TrunkGains,
+    trunk: TrunkState,
+    reference: TrunkReference,
+    c: float,
+    s: float,
+    dt: float,
+) -> tuple[Array, Array, Array]:
+    """The new speed integral and position error, and the horizontal acceleration, (2,) each.
+
+    c and s are the cosine and sine of the trunk's yaw.
+    """
+    velocity, limit = trunk.velocity, gains.position_error_limit
+    error = reference.v - np.array(
         [c * velocity[0] + s * velocity[1], -s * velocity[0] + c * velocity[1]]
     )
-    speed, lead, push = np.empty(2), np.empty(2), np.empty(2)
+    speed, position_error, push = np.empty(2), np.empty(2), np.empty(2)
     for axis in range(2):
-        kept = (1.0 - dt / leak) * before.speed[axis]
-        speed[axis] = min(_SPEED_LIMIT, max(-_SPEED_LIMIT, kept + dt * error[axis]))
-        lead[axis] = min(
-            position_error_limit, max(-position_error_limit, before.lead[axis] + dt * error[axis])
+        remaining = (1.0 - dt / gains.leak_xy) * before.speed[axis]
+        speed[axis] = min(_SPEED_LIMIT, max(-_SPEED_LIMIT, remaining + dt * error[axis]))
+        position_error[axis] = min(
+            limit, max(-limit, before.position_error[axis] + dt * error[axis])
         )
-        push[axis] = kd_xy * error[axis] + ki_xy * speed[axis] + kp_xy * lead[axis]
-    out[0], out[1] = c * push[0] - s * push[1], s * push[0] + c * push[1]
+        push[axis] = (
+            gains.kd_xy * error[axis]
+            + gains.ki_xy * speed[axis]
+            + gains.kp_xy * position_error[axis]
+        )
+    acceleration = np.array([c * push[0] - s * push[1], s * push[0] + c * push[1]])
+    return speed, position_error, acceleration
 
-    # A robot that cannot turn must not be asked for a heading that goes round behind it.
-    waits = asked.wz * wrap_angle(before.yaw - rpy[2]) > abs(asked.wz) * _YAW_LIMIT
-    yaw = before.yaw if waits else wrap_angle(before.yaw + dt * asked.wz)
-    yaw_error = min(_YAW_LIMIT, max(-_YAW_LIMIT, wrap_angle(yaw - rpy[2])))
+
+@compiled
+def _desired_heading(before: float, yaw: float, wz: float, dt: float) -> float:
+    """The heading reached by turning on with wz, rad.
+
+    A robot that cannot turn must not be asked for a heading that goes round behind it.
+    """
+    if wz * wrap_angle(before - yaw) > abs(wz) * _YAW_LIMIT:
+        return before
+    return wrap_angle(before + dt * wz)
+
+
+@compiled
+def _attitude_feedback(
+    gains: TrunkGains, trunk: TrunkState, rpy: Array, yaw_des: float, wz: float
+) -> Array:
+    """Angular acceleration towards level and the desired heading, (3,), rad/s², odometry frame."""
+    c, s = np.cos(rpy[2]), np.sin(rpy[2])
+    omega = trunk.R @ trunk.omega
+    yaw_error = min(_YAW_LIMIT, max(-_YAW_LIMIT, wrap_angle(yaw_des - rpy[2])))
     # Tilt error about the horizontal axes of the yaw frame, taken to the odometry frame.
-    roll_push = -kp_tilt * rpy[0] - kd_tilt * (c * omega[0] + s * omega[1])
-    pitch_push = -kp_tilt * rpy[1] - kd_tilt * (-s * omega[0] + c * omega[1])
-    out[3] = c * roll_push - s * pitch_push
-    out[4] = s * roll_push + c * pitch_push
-    out[5] = kp_yaw * yaw_error + kd_yaw * (asked.wz - omega[2])
-    return Integrators(height, speed, lead, yaw), out, v_des
+    roll_push = -gains.kp_tilt * rpy[0] - gains.kd_tilt * (c * omega[0] + s * omega[1])
+    pitch_push = -gains.kp_tilt * rpy[1] - gains.kd_tilt * (-s * omega[0] + c * omega[1])
+    return np.array(
+        [
+            c * roll_push - s * pitch_push,
+            s * roll_push + c * pitch_push,
+            gains.kp_yaw * yaw_error + gains.kd_yaw * (wz - omega[2]),
+        ]
+    )
 
 
 @compiled
@@ -165,7 +197,7 @@ def fall_freely(trunk: Array, contact: Array) -> None:
 
 @compiled
 def feedforward(
-    deviation: Array, stance: Array, trunk: Trunk, p_foot: Array, body: SingleRigidBody
+    deviation: Array, stance: Array, trunk: TrunkState, p_foot: Array, body: SingleRigidBody
 ) -> Array:
     """Accelerations that force deviations at the scheduled stance feet give a rigid body, (6,).
 

@@ -25,7 +25,7 @@ import daqp
 import numpy as np
 
 from quadriga.agents.controller.controller import Controller, ControllerOutputs
-from quadriga.agents.controller.sensing import Sensed
+from quadriga.agents.controller.sensed import Sensed
 from quadriga.agents.planner.free_step import FreeStep
 from quadriga.agents.planner.qp_solver import SOLVERS
 from quadriga.shared.errors import RecordingError

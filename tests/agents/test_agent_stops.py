@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.agents.controller import controller, whole_body_qp
-from quadriga.agents.controller.whole_body_qp import WholeBodyProblem
+from quadriga.agents.controller import acting, controller
+from quadriga.agents.controller.whole_body.problem import WholeBodyProblem
 from quadriga.agents.rehearsal import standing
 from quadriga.agents.telemetry import Telemetry
 from quadriga.shared.robot.a1 import Array
@@ -87,9 +87,9 @@ def fail(monkeypatch: pytest.MonkeyPatch) -> None:
         act(*arguments)
         return 0
 
-    act = controller._act
-    monkeypatch.setattr(controller, "_act", limits_matter)
-    monkeypatch.setattr(whole_body_qp, "solve", no_solution)
+    act = acting.act
+    monkeypatch.setattr(controller, "act", limits_matter)
+    monkeypatch.setattr(controller, "solve", no_solution)
 
 
 def test_without_a_solution_the_last_torques_hold_and_then_the_joints_are_damped(

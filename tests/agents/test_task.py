@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from quadriga.agents.agent import Agent, Outputs
-from quadriga.agents.controller.controller import ControllerOutputs, Schedule, Task
+from quadriga.agents.controller.controller import ControllerOutputs, Task
+from quadriga.agents.controller.schedule import Schedule
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config, TeamConfig
 from quadriga.shared.robot.a1 import Array

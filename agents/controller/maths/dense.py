@@ -55,7 +55,7 @@ def add_gram(weight: float, A: Array, H: Array) -> None:
 
 
 @compiled
-def mirror(H: Array) -> None:
+def symmetrise(H: Array) -> None:
     """Copy the lower triangle of H to the upper one."""
     for i in range(H.shape[0]):
         for j in range(i):
@@ -63,7 +63,7 @@ def mirror(H: Array) -> None:
 
 
 @compiled
-def factorise(H: Array) -> Array:
+def cholesky(H: Array) -> Array:
     """The lower Cholesky factor of H, (n, n), of which the lower triangle is read.
 
     NaN where H is not positive definite.
@@ -83,7 +83,7 @@ def factorise(H: Array) -> Array:
 
 
 @compiled
-def solve_factorised(L: Array, B: Array) -> None:
+def cholesky_solve(L: Array, B: Array) -> None:
     """Replace B, (n, m), by (L Lᵀ)⁻¹ B."""
     n, m = B.shape
     for i in range(n):

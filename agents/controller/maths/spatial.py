@@ -16,7 +16,7 @@ Inertia = tuple[float, Vector, Symmetric]  # mass, mass · centre, moments about
 
 
 @compiled
-def plus(a: Vector, b: Vector) -> Vector:
+def add_vectors(a: Vector, b: Vector) -> Vector:
     """The sum of two vectors."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
@@ -28,7 +28,7 @@ def vector_product(a: Vector, b: Vector) -> Vector:
 
 
 @compiled
-def combined(a: float, x: Vector, b: float, y: Vector, c: float, z: Vector) -> Vector:
+def linear_combination(a: float, x: Vector, b: float, y: Vector, c: float, z: Vector) -> Vector:
     """The vector a x + b y + c z."""
     return (
         a * x[0] + b * y[0] + c * z[0],
@@ -38,7 +38,7 @@ def combined(a: float, x: Vector, b: float, y: Vector, c: float, z: Vector) -> V
 
 
 @compiled
-def rotated(R: Array, a: Vector) -> Vector:
+def rotate(R: Array, a: Vector) -> Vector:
     """The vector R a."""
     return (
         R[0, 0] * a[0] + R[0, 1] * a[1] + R[0, 2] * a[2],
@@ -48,13 +48,13 @@ def rotated(R: Array, a: Vector) -> Vector:
 
 
 @compiled
-def added(a: Spatial, b: Spatial) -> Spatial:
+def add_spatial(a: Spatial, b: Spatial) -> Spatial:
     """The sum of two motions, or of two forces."""
-    return plus(a[0], b[0]), plus(a[1], b[1])
+    return add_vectors(a[0], b[0]), add_vectors(a[1], b[1])
 
 
 @compiled
-def scaled(a: Spatial, factor: float) -> Spatial:
+def scale(a: Spatial, factor: float) -> Spatial:
     """A motion or force times a factor."""
     (x, y, z), (p, q, r) = a
     return (factor * x, factor * y, factor * z), (factor * p, factor * q, factor * r)
@@ -71,23 +71,24 @@ def power(motion: Spatial, force: Spatial) -> float:
 @compiled
 def motion_cross(a: Spatial, b: Spatial) -> Spatial:
     """How b, fixed to a body that moves with a, changes."""
-    return plus(vector_product(a[1], b[0]), vector_product(a[0], b[1])), vector_product(a[1], b[1])
+    linear = add_vectors(vector_product(a[1], b[0]), vector_product(a[0], b[1]))
+    return linear, vector_product(a[1], b[1])
 
 
 @compiled
 def to_world(R: Array, position: Vector, motion: Spatial) -> Spatial:
     """A motion about the trunk's origin, in its frame, as one about the world's, in the world's."""
-    angular = rotated(R, motion[1])
-    return plus(rotated(R, motion[0]), vector_product(position, angular)), angular
+    angular = rotate(R, motion[1])
+    return add_vectors(rotate(R, motion[0]), vector_product(position, angular)), angular
 
 
 @compiled
-def joined(a: Inertia, b: Inertia) -> Inertia:
+def combine_inertias(a: Inertia, b: Inertia) -> Inertia:
     """Of two bodies that move as one."""
     i, j = a[2], b[2]
     return (
         a[0] + b[0],
-        plus(a[1], b[1]),
+        add_vectors(a[1], b[1]),
         (i[0] + j[0], i[1] + j[1], i[2] + j[2], i[3] + j[3], i[4] + j[4], i[5] + j[5]),
     )
 
@@ -97,13 +98,16 @@ def momentum_of(inertia: Inertia, motion: Spatial) -> Spatial:
     """I V: with h = m c, linear m v + ω × h, angular h × v + I ω."""
     mass, h, (xx, xy, xz, yy, yz, zz) = inertia
     linear, w = motion
-    turned = (
+    spin = (
         xx * w[0] + xy * w[1] + xz * w[2],
         xy * w[0] + yy * w[1] + yz * w[2],
         xz * w[0] + yz * w[1] + zz * w[2],
     )
-    moved = (mass * linear[0], mass * linear[1], mass * linear[2])
-    return plus(moved, vector_product(w, h)), plus(turned, vector_product(h, linear))
+    linear_momentum = (mass * linear[0], mass * linear[1], mass * linear[2])
+    return (
+        add_vectors(linear_momentum, vector_product(w, h)),
+        add_vectors(spin, vector_product(h, linear)),
+    )
 
 
 @compiled
@@ -112,5 +116,5 @@ def inertial_force(inertia: Inertia, motion: Spatial, acceleration: Spatial) -> 
     p, momentum = momentum_of(inertia, motion)
     linear, w = motion
     f, n = momentum_of(inertia, acceleration)
-    turned = plus(vector_product(w, momentum), vector_product(linear, p))
-    return plus(f, vector_product(w, p)), plus(n, turned)
+    torque = add_vectors(vector_product(w, momentum), vector_product(linear, p))
+    return add_vectors(f, vector_product(w, p)), add_vectors(n, torque)

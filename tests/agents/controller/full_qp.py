@@ -9,7 +9,7 @@ import osqp
 import pinocchio as pin
 from scipy import sparse
 
-from quadriga.agents.controller.whole_body_qp import Goal, Weights
+from quadriga.agents.controller.whole_body.problem import Goal, Weights
 from quadriga.shared.robot.a1 import TORQUE_LIMIT, Array
 from tests.agents.controller.poses import FEET, MODEL, Pose
 

@@ -2,138 +2,76 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from quadriga.agents.controller.contact import ContactRule, contacts_by_force, contacts_by_schedule
+from quadriga.agents.controller.contact import contact_rule, update_contacts
 from quadriga.agents.controller.controller import Task
-from quadriga.agents.controller.estimator import Estimate, filter_step, mean_at, standing_mean, sure
-from quadriga.agents.controller.memory import Swings
+from quadriga.agents.controller.estimator import Estimate, FilterNoise, filter_step, readings_of
+from quadriga.agents.controller.memory import (
+    FeetMemory,
+    FilterState,
+    feet_memory_of,
+    initial_memory,
+)
 from quadriga.agents.controller.model import RigidBody
-from quadriga.agents.controller.sensing import Trunk
+from quadriga.agents.controller.schedule import Schedule, phase_of
+from quadriga.agents.controller.sensed import TrunkState
 from quadriga.agents.controller.trunk_feedback import (
-    Asked,
     Integrators,
     SingleRigidBody,
+    TrunkGains,
+    TrunkReference,
     feedback,
     feedforward,
 )
-from quadriga.shared.config.sections import ControllerConfig
+from quadriga.shared.config.sections import Config, ControllerConfig
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.wire.messages import State
 
 
-@dataclass(frozen=True)
-class FilterState:
-    """Mean (6, 3) and covariance (6, 6) of the estimator."""
-
-    mean: Array
-    covariance: Array
-
-
-def initial_filter(state: State) -> FilterState:
-    """Of a robot that stands still."""
-    return FilterState(standing_mean(state), sure())
-
-
-def filter_at(estimate: Estimate) -> FilterState:
-    """That takes an estimate for right."""
-    return FilterState(mean_at(estimate), sure())
-
-
 def estimate_trunk(
-    previous: FilterState, state: State, trust: Array, noise: Array, dt: float
+    previous: FilterState, state: State, trust: Array, noise: FilterNoise, dt: float
 ) -> tuple[FilterState, Estimate]:
     """One step of the estimator."""
-    mean, covariance, frame = filter_step(
-        previous.mean,
-        previous.covariance,
-        state.imu_quat_wxyz,
-        state.imu_gyro,
-        state.imu_accel,
-        state.q_joint,
-        state.v_joint,
-        trust,
-        noise,
-        dt,
-    )
-    estimate = Estimate(
-        mean[0],
-        mean[1],
-        frame[:3],
-        state.imu_gyro,
-        frame[3:],
-        state.q_joint,
-        state.v_joint,
-        state.foot_force,
-    )
-    return FilterState(mean, covariance), estimate
+    return filter_step(previous, readings_of(state.row), trust, noise, dt)
 
 
 @dataclass(frozen=True)
 class ContactState:
-    """Contacts: see `Memory`."""
+    """What is remembered of the feet, the ground's height and the half cycle, see `Memory`."""
 
-    contact: Array
-    early: Array
-    unloaded: Array
-    latched: Array
-    ground: Array
-    level: float
-    half: int
-    lift: Array = field(default_factory=lambda: np.zeros(4))
-    stumble: Array = field(default_factory=lambda: np.zeros(4))
-    felt: Array = field(default_factory=lambda: np.zeros((4, 3)))
+    feet: FeetMemory
+    ground_height: float
+    half_cycle: int
 
 
 def initial_contact() -> ContactState:
     """All four feet on flat ground at height zero."""
-    return ContactState(np.ones(4), np.zeros(4), np.zeros(4), np.ones(4), np.zeros(4), 0.0, -1)
+    return ContactState(feet_memory_of(initial_memory()), 0.0, -1)
 
 
 def step_contact(
     previous: ContactState,
     config: ControllerConfig,
-    stance: Array,
-    progress: float,
-    half: int,
+    schedule: Schedule,
     foot_force: Array,
     foot_z: Array,
     dt: float,
-    stance_time: float = 0.2,
 ) -> ContactState:
-    """One step of the contact detection; what the feet feel stays as it is."""
-    p, rate = previous, dt / (1e-3 * config.ground_filter_ms + dt)
-    before = np.array([p.contact, p.early, p.unloaded, p.latched, p.ground])
-    lift, stumble = p.lift.copy(), p.stumble.copy()
-    if config.contact_detection:
-        rule = ContactRule(
-            config.contact_force,
-            1e-3 * config.lost_contact_ms,
-            1e-3 * config.liftoff_hold_ms / stance_time,
-            1e-3 * config.reflex_ms,
-            config.reject_side_contacts,
-        )
-        legs, level = contacts_by_force(
-            before,
-            p.level,
-            half != p.half,
-            stance,
-            progress,
-            foot_force,
-            foot_z,
-            Swings(lift, stumble, p.felt),
-            rule,
-            rate,
-            dt,
-        )
-    else:
-        legs, level = contacts_by_schedule(p.ground, p.level, stance, foot_z, rate)
-    contact, early, unloaded, latched, ground = legs
-    return ContactState(
-        contact, early, unloaded, latched, ground, level, half, lift, stumble, p.felt
+    """One step of the contact detection; reactions stay as they are."""
+    feet = FeetMemory(*(part.copy() for part in previous.feet))
+    ground_height = update_contacts(
+        feet,
+        previous.ground_height,
+        phase_of(schedule.row, schedule.half_cycle != previous.half_cycle),
+        foot_force,
+        foot_z,
+        contact_rule(replace(Config(), controller=config)),
+        dt,
     )
+    return ContactState(feet, ground_height, schedule.half_cycle)
 
 
 def initial_integrators(yaw: float) -> Integrators:
@@ -141,9 +79,9 @@ def initial_integrators(yaw: float) -> Integrators:
     return Integrators(0.0, np.zeros(2), np.zeros(2), yaw)
 
 
-def trunk_at(estimate: Estimate) -> Trunk:
+def trunk_at(estimate: Estimate) -> TrunkState:
     """Where the trunk is and how it moves."""
-    return Trunk(estimate.position, estimate.velocity, estimate.R, estimate.omega)
+    return TrunkState(estimate.position, estimate.velocity, estimate.R, estimate.omega)
 
 
 def rigid(body: RigidBody) -> SingleRigidBody:
@@ -153,18 +91,18 @@ def rigid(body: RigidBody) -> SingleRigidBody:
 
 def trunk_acceleration(
     previous: Integrators,
-    gains: Array,
+    gains: TrunkGains,
     body: RigidBody,
     estimate: Estimate,
     task: Task,
-    level: float,
+    ground_height: float,
     stance: Array,
     dt: float,
 ) -> tuple[Integrators, Array, Array]:
     """One step of the trunk's references."""
     trunk = trunk_at(estimate)
-    asked = Asked(np.array([task.vx, task.vy]), task.wz, level + task.height)
-    after, push, v_des = feedback(previous, gains, trunk, asked, dt)
+    reference = TrunkReference(np.array([task.vx, task.vy]), task.wz, ground_height + task.height)
+    after, push, v_des = feedback(previous, gains, trunk, reference, dt)
     if task.feedforward:
         push += feedforward(task.deviation, stance, trunk, estimate.p_foot, rigid(body))
     return after, push, v_des

@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from quadriga.agents.controller.estimator import Estimate
-from quadriga.agents.controller.model import RigidBody, Terms
+from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms
+from quadriga.agents.controller.model import RigidBody
 from quadriga.shared.robot.a1 import FOOT_FRAMES, N_JOINTS, STAND_HEIGHT, Array, q_stand
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 
@@ -19,14 +20,13 @@ BODY = RigidBody()
 
 @dataclass(frozen=True)
 class Pose:
-    """One state: Pinocchio's q (19,) and v (18,), the same as an estimate, its attitude, wxyz."""
+    """One state: Pinocchio's q (19,) and v (18,), and the same as an estimate."""
 
     q: Array
     v: Array
     estimate: Estimate
-    quat_wxyz: Array
 
-    def terms(self) -> Terms:
+    def terms(self) -> RigidBodyTerms:
         """What the controller computes of it."""
         return BODY.terms(self.q, self.v)
 
@@ -47,8 +47,9 @@ def pose_of(q: Array, v: Array, foot_force: float = 30.0) -> Pose:
         q[7:].copy(),
         v[6:].copy(),
         np.full(4, foot_force),
+        np.array([q[6], q[3], q[4], q[5]]),
     )
-    return Pose(q, v, estimate, np.array([q[6], q[3], q[4], q[5]]))
+    return Pose(q, v, estimate)
 
 
 def standing_pose(yaw: float = 0.0) -> Pose:

@@ -13,17 +13,19 @@ from hypothesis import strategies as st
 
 from quadriga.agents.controller.estimator import (
     Estimate,
+    filter_at,
+    filter_noise,
     foot_trust,
-    noise_parameters,
+    standing_filter,
     trunk_from_truth,
 )
 from quadriga.shared.config.sections import EstimatorConfig
 from quadriga.shared.robot.a1 import FOOT_RADIUS, GRAVITY, N_JOINTS, STAND_HEIGHT, Array, q_stand
 from quadriga.shared.wire.messages import State, Truth
-from tests.agents.controller.parts import estimate_trunk, filter_at, initial_filter
+from tests.agents.controller.parts import estimate_trunk
 from tests.agents.controller.poses import FEET, MODEL, pose_of
 
-NOISE = noise_parameters(EstimatorConfig())
+NOISE = filter_noise(EstimatorConfig())
 ALL = np.ones(4)
 DT = 1e-3
 
@@ -84,7 +86,7 @@ class Rolling:
 
 def test_standing_still_stays_still() -> None:
     state = sensed(*standing())
-    memory = initial_filter(state)
+    memory = standing_filter(state)
     for _ in range(1000):
         memory, estimate = estimate_trunk(memory, state, ALL, NOISE, DT)
     np.testing.assert_allclose(estimate.velocity, 0.0, atol=1e-12)
@@ -110,7 +112,7 @@ def test_a_steady_trunk_over_rolling_feet_is_tracked(
     """
     motion = Rolling(np.array(velocity), np.array(omega))
     known = filter_at(pose_of(*next(motion.walk(1))).estimate)
-    start = initial_filter(sensed(*next(motion.walk(1))))
+    start = standing_filter(sensed(*next(motion.walk(1))))
     for q, v in motion.walk(200):
         known, tracked = estimate_trunk(known, sensed(q, v), ALL, NOISE, DT)
         np.testing.assert_allclose(tracked.velocity, velocity, atol=1e-3)
@@ -126,7 +128,7 @@ def test_acceleration_between_two_corrections_is_the_accelerometers() -> None:
     """No foot is trusted: what remains is integration of the specific force."""
     q, v = standing()
     state = sensed(q, v, np.array([1.0, -2.0, 0.5]))
-    memory = initial_filter(state)
+    memory = standing_filter(state)
     for _ in range(100):
         memory, estimate = estimate_trunk(memory, state, np.zeros(4), NOISE, DT)
     np.testing.assert_allclose(estimate.velocity, [0.1, -0.2, 0.05], rtol=1e-4)
@@ -136,7 +138,7 @@ def test_acceleration_between_two_corrections_is_the_accelerometers() -> None:
 def test_a_foot_in_swing_is_not_trusted(trust: float) -> None:
     """One leg swings while three stand: it pulls the velocity along only if it is an anchor."""
     q, v = standing()
-    memory = initial_filter(sensed(q, v))
+    memory = standing_filter(sensed(q, v))
     worst = 0.0
     for tick in range(300):
         t = DT * tick
@@ -162,7 +164,7 @@ def test_the_covariance_stays_symmetric_and_positive_definite(
 ) -> None:
     random = np.random.default_rng(seed)
     q, v = standing()
-    memory, trust = initial_filter(sensed(q, v)), np.array(first)
+    memory, trust = standing_filter(sensed(q, v)), np.array(first)
     for tick in range(300):
         if tick % 50 == 49:
             trust = random.choice([0.0, 0.02, 1.0], size=4)
@@ -202,7 +204,7 @@ def moving(seed: int) -> tuple[Truth, State, Estimate]:
     q[3:7] = pin.Quaternion(pin.rpy.rpyToMatrix(*random.uniform(-0.5, 0.5, 3))).coeffs()
     v[:] = random.uniform(-1.0, 1.0, 18)
     pose = pose_of(q, v)
-    row = (pose.estimate.position, pose.quat_wxyz, pose.estimate.velocity)
+    row = (pose.estimate.position, pose.estimate.quat_wxyz, pose.estimate.velocity)
     omega = pose.estimate.R @ pose.estimate.omega
     first = (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))
     both = (np.array([a, b]) for a, b in zip(first, (*row, omega), strict=True))

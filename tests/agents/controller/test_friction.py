@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quadriga.agents.controller.friction import FrictionRule, caution
+from quadriga.agents.controller.friction import FrictionRule, update_mu_reduction
+from quadriga.agents.controller.schedule import GaitPhase
+from quadriga.agents.controller.sensed import FeetState
 from quadriga.shared.robot.a1 import Array
 
 CONTACT, STANCE = np.array([1.0, 0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0, 1.0])
@@ -21,9 +23,10 @@ def after(
     contact: Array = CONTACT,
     force: float = LOAD,
 ) -> float:
-    foot_force, rule = np.full(4, force), FrictionRule(speed, LOAD, MU, LEAST, RECOVERY)
+    feet = FeetState(np.zeros((4, 3)), v_foot, np.full(4, force))
+    phase, rule = GaitPhase(STANCE, progress, False), FrictionRule(speed, LOAD, MU, LEAST, RECOVERY)
     for _ in range(ticks):
-        before = caution(before, contact, STANCE, progress, v_foot, foot_force, rule, DT)
+        before = update_mu_reduction(before, contact, phase, feet, rule, DT)
     return before
 
 

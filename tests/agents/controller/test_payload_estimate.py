@@ -1,4 +1,4 @@
-"""What a robot carries: felt by its feet, and part of its rigid body."""
+"""What a robot carries: estimated from its feet, and part of its rigid body."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from quadriga.agents.controller.payload_estimate import felt_load, loaded
+from quadriga.agents.controller.payload_estimate import add_load, estimate_load
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import (
     Config,
@@ -20,26 +20,26 @@ from quadriga.shared.wire.messages import Reference
 from tests.agents.controller.poses import BODY, MODEL, random_pose
 
 
-def felt_after(seconds: float, forces: list[float], load0: float = 0.0) -> float:
-    """The load that feet which bear `forces`, N, tell of, filtered over 1 s."""
+def load_after(seconds: float, forces: list[float], load0: float = 0.0) -> float:
+    """The load estimated from feet that bear `forces`, N, filtered over 1 s."""
     load = load0
     for _ in range(round(1000 * seconds)):
-        load = felt_load(load, np.array(forces), TOTAL_MASS, 1e-3 / 1.001)
+        load = estimate_load(load, np.array(forces), TOTAL_MASS, 1e-3 / 1.001)
     return load
 
 
 @pytest.mark.parametrize("load", [0.0, 4.5, 12.0])
 def test_standing_feet_bear_robot_and_load(load: float) -> None:
     weight = (TOTAL_MASS + load) * GRAVITY
-    assert felt_after(1.0, [0.0, weight / 2, weight / 2, 0.0]) == pytest.approx(
+    assert load_after(1.0, [0.0, weight / 2, weight / 2, 0.0]) == pytest.approx(
         (1.0 - np.exp(-1.0)) * load, rel=2e-3, abs=1e-12
     )
-    assert felt_after(10.0, [weight / 4] * 4) == pytest.approx(load, rel=1e-4, abs=1e-12)
+    assert load_after(10.0, [weight / 4] * 4) == pytest.approx(load, rel=1e-4, abs=1e-12)
 
 
 def test_a_load_is_never_negative_nor_beyond_what_legs_carry() -> None:
-    assert felt_after(5.0, [0.0] * 4, load0=3.0) == 0.0
-    assert felt_after(5.0, [1000.0] * 4) == 25.0
+    assert load_after(5.0, [0.0] * 4, load0=3.0) == 0.0
+    assert load_after(5.0, [1000.0] * 4) == 25.0
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -59,7 +59,7 @@ def test_the_terms_are_those_of_a_robot_with_that_load(load: float, seed: int) -
 
 def test_a_load_leaves_the_table_as_it_was() -> None:
     before = BODY.links.copy()
-    assert loaded(BODY.links, 5.0)[0, 0] == before[0, 0] + 5.0
+    assert add_load(BODY.links, 5.0)[0, 0] == before[0, 0] + 5.0
     np.testing.assert_array_equal(BODY.links, before)
 
 

@@ -10,7 +10,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from quadriga.agents.controller.maths.leg_kinematics import hip_neutral
-from quadriga.agents.controller.swing import foothold, swing_reference, within_reach
+from quadriga.agents.controller.swing import (
+    MotionReference,
+    foothold,
+    limit_foothold,
+    swing_reference,
+)
 from quadriga.shared.robot.a1 import FOOT_RADIUS, Array
 
 START, TARGET = np.array([0.1, -0.2, 0.03]), np.array([0.25, -0.15])
@@ -100,7 +105,7 @@ def test_a_foothold_within_reach_asks_for_no_more_acceleration(
     way: Array, acceleration: float, duration: float, delay: float
 ) -> None:
     start, target = np.array([0.1, 0.2, 0.0]), np.array([0.1, 0.2]) + way
-    within_reach(target, start, acceleration, duration, delay)
+    limit_foothold(target, start, acceleration, duration, delay)
     found = target - start[:2]
     asked = [
         swing_reference(start, target, GROUND, APEX, progress, duration, delay)[2, :2]
@@ -127,5 +132,6 @@ def test_the_foothold_is_raiberts(leg: int, seed: int) -> None:
     hip_velocity = velocity + np.cross([0.0, 0.0, wz], arm)
     expected = position + arm + hip_velocity * (remaining + stance_time / 2)
     expected += gain * (velocity - v_des)
-    found = foothold(leg, position, velocity, R, v_des, wz, remaining, stance_time, gain)
+    motion = MotionReference(velocity, v_des, wz)
+    found = foothold(leg, position, R, motion, remaining, stance_time, gain)
     np.testing.assert_allclose(found, expected[:2], atol=1e-12)

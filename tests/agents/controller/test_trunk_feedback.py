@@ -31,9 +31,9 @@ REST = initial_integrators(0.0)
 
 
 def trunk(
-    estimate: Estimate, task: Task = NOTHING, before: Integrators = REST, level: float = 0.0
+    estimate: Estimate, task: Task = NOTHING, before: Integrators = REST, ground_height: float = 0.0
 ) -> Array:
-    return trunk_acceleration(before, GAINS, BODY, estimate, task, level, ALL, 1e-3)[1]
+    return trunk_acceleration(before, GAINS, BODY, estimate, task, ground_height, ALL, 1e-3)[1]
 
 
 def rigid_body(deviation: Array, stance: Array, estimate: Estimate) -> Array:
@@ -43,8 +43,7 @@ def rigid_body(deviation: Array, stance: Array, estimate: Estimate) -> Array:
 def turned(estimate: Estimate, yaw: float) -> Estimate:
     """The same situation seen from an odometry frame turned by −yaw."""
     Z = pin.utils.rotate("z", yaw)
-    return replace(
-        estimate,
+    return estimate._replace(
         position=Z @ estimate.position,
         velocity=Z @ estimate.velocity,
         R=Z @ estimate.R,
@@ -118,14 +117,14 @@ def test_a_robot_that_does_what_it_is_told_is_left_alone() -> None:
 def test_feedback_opposes_every_error(
     change: dict[str, Array], component: int, expected: float
 ) -> None:
-    found = trunk(replace(standing_pose().estimate, **change))
+    found = trunk(standing_pose().estimate._replace(**change))
     assert found[component] == pytest.approx(expected, rel=0.01)
     np.testing.assert_allclose(np.delete(found, component), 0.0, atol=1e-6)
 
 
 def test_the_operator_is_followed() -> None:
     task = Task(0.2, -0.1, 0.3, STAND_HEIGHT + 0.01, np.zeros(12), feedforward=False)
-    found = trunk(standing_pose().estimate, task, level=0.02)
+    found = trunk(standing_pose().estimate, task, ground_height=0.02)
     expected = [0.2 * CONFIG.kd_xy, -0.1 * CONFIG.kd_xy, 0.03 * CONFIG.kp_z, 0.0, 0.0]
     np.testing.assert_allclose(found[:5], expected, rtol=0.02, atol=1e-9)
     assert found[5] == pytest.approx(0.3 * CONFIG.kd_yaw, rel=0.02)
@@ -149,7 +148,7 @@ def test_north_is_nowhere(seed: int, yaw: float) -> None:
 
 def test_integrators_take_standing_errors_out_but_never_wind_up() -> None:
     """Held 5 cm low and back for 10 s: every integral stops at its limit and is soon undone."""
-    stuck = replace(standing_pose().estimate, position=np.array([0.0, 0.0, STAND_HEIGHT - 0.05]))
+    stuck = standing_pose().estimate._replace(position=np.array([0.0, 0.0, STAND_HEIGHT - 0.05]))
     task = replace(NOTHING, vx=0.5, vy=-0.5)
     state, pushes = REST, []
     for _ in range(10_000):
@@ -158,10 +157,10 @@ def test_integrators_take_standing_errors_out_but_never_wind_up() -> None:
     assert pushes[-1][2] > pushes[0][2] + 1.0
     assert pushes[-1][0] > pushes[0][0] + 1.0
     np.testing.assert_array_equal(pushes[-1], pushes[-2])
-    np.testing.assert_allclose(np.abs(state.lead), CONFIG.position_error_limit)
+    np.testing.assert_allclose(np.abs(state.position_error), CONFIG.position_error_limit)
     assert abs(state.height) <= 0.05
     assert np.abs(state.speed).max() <= 0.15
-    back = replace(stuck, position=np.array([0.0, 0.0, STAND_HEIGHT + 0.05]))
+    back = stuck._replace(position=np.array([0.0, 0.0, STAND_HEIGHT + 0.05]))
     released, _, _ = trunk_acceleration(state, GAINS, BODY, back, task, 0.0, ALL, 1e-3)
     assert released.height < state.height
 

@@ -12,15 +12,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.optimize import nnls
 
-from quadriga.agents.controller.whole_body_qp import (
+from quadriga.agents.controller.whole_body.assembly import build
+from quadriga.agents.controller.whole_body.problem import (
     Goal,
     Weights,
     WholeBodyProblem,
     WholeBodySolution,
-    build,
-    solve,
-    solve_goal,
 )
+from quadriga.agents.controller.whole_body.solution import solve, solve_goal
 from quadriga.shared.robot.a1 import GRAVITY, TORQUE_LIMIT, TOTAL_MASS, Array
 from tests.agents.controller.full_qp import desired, dynamics, solve_full
 from tests.agents.controller.poses import Pose, random_pose, standing_pose
@@ -41,7 +40,7 @@ def goal_of(contact: Array, trunk: Array = REST, swing: Array | None = None) -> 
 
 def random_goal(random: np.random.Generator, contact: Array, size: float) -> Goal:
     goal = goal_of(contact, size * random.normal(size=6), 5.0 * size * random.normal(size=(4, 3)))
-    return replace(goal, force=goal.force + size * random.normal(size=(4, 3)))
+    return goal._replace(force=goal.force + size * random.normal(size=(4, 3)))
 
 
 def problem_of(pose: Pose, goal: Goal, weights: Weights = WEIGHTS) -> WholeBodyProblem:
@@ -112,7 +111,7 @@ def test_what_cannot_be_had_together_is_weighed_by_the_length() -> None:
     across = np.array([0.1805, 0.1308]) / np.hypot(0.1805, 0.1308)
     trunk = np.array([0.0, 0.0, 5.0, *(100.0 * across), 0.0])
     linear, angular = [], []
-    for weights in (WEIGHTS, replace(WEIGHTS, tilt_length=0.15)):
+    for weights in (WEIGHTS, WEIGHTS._replace(tilt_length=0.15)):
         solution = solution_of(standing_pose(), goal_of(TROT, trunk), weights)
         assert solution.solved
         linear.append(np.linalg.norm(solution.defect[:3]))
@@ -180,7 +179,7 @@ def test_without_contact_only_the_feet_can_be_moved() -> None:
 @pytest.mark.parametrize("contact", [ALL, TROT])
 def test_what_cannot_be_done_is_refused_by_name(contact: Array) -> None:
     """Feet pressed down with more than the motors can give."""
-    weights = replace(WEIGHTS, force_min=5000.0)
+    weights = WEIGHTS._replace(force_min=5000.0)
     solution = solution_of(standing_pose(), goal_of(contact), weights)
     assert solution.status.startswith("infeasible:")
     assert not solution.solved
@@ -206,7 +205,7 @@ def test_numbers_beyond_all_bounds_are_refused_by_name(places: slice, value: flo
 
 def test_a_problem_without_curvature_gives_numbers_within_the_limits() -> None:
     """Neither torques nor forces weighed: on four feet the six outputs leave τ undetermined."""
-    weights = replace(WEIGHTS, gamma_tau=0.0, gamma_force=0.0)
+    weights = WEIGHTS._replace(gamma_tau=0.0, gamma_force=0.0)
     solution = solution_of(standing_pose(), goal_of(ALL), weights)
     assert np.isfinite(solution.tau).all()
     assert np.abs(solution.tau).max() <= TORQUE_LIMIT
@@ -226,7 +225,7 @@ def test_no_pose_and_no_goal_gives_anything_but_a_number(
     """Legs straight, folded or wound up, falling and tumbling: torques, or a named refusal."""
     random = np.random.default_rng(seed)
     start = random_pose(random, tilt=1.5, speed=speed)
-    estimate = replace(start.estimate, q_joint=joints)
+    estimate = start.estimate._replace(q_joint=joints)
     goal = random_goal(random, contact, size)
     solution = solution_of(replace(start, estimate=estimate), goal)
     for array in (solution.tau, solution.force, solution.defect):

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from quadriga.agents.controller.maths.dense import (
     add_gram,
-    factorise,
-    mirror,
+    cholesky,
+    cholesky_solve,
     product,
-    solve_factorised,
+    symmetrise,
     times,
     transposed_times,
 )
@@ -29,7 +29,7 @@ def test_products(m: int, k: int, n: int, seed: int) -> None:
     np.testing.assert_allclose(product(A, B), A @ B, atol=1e-12)
     H = np.zeros((k, k))
     add_gram(2.5, A, H)
-    mirror(H)
+    symmetrise(H)
     np.testing.assert_allclose(H, 2.5 * A.T @ A, atol=1e-12)
 
 
@@ -38,13 +38,13 @@ def test_solutions(n: int, m: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(n, n + 2))
     H, B = root @ root.T + np.eye(n), rng.normal(size=(n, m))
-    L = factorise(np.tril(H))  # only the lower triangle is read
+    L = cholesky(np.tril(H))  # only the lower triangle is read
     np.testing.assert_allclose(L @ L.T, H, atol=1e-11)
     X = B.copy()
-    solve_factorised(L, X)
+    cholesky_solve(L, X)
     np.testing.assert_allclose(H @ X, B, atol=1e-9)
 
 
 @pytest.mark.parametrize("H", [[[0.0]], [[1.0, 2.0], [2.0, 1.0]], [[np.nan]]])
 def test_what_is_not_positive_definite_has_no_factor(H: list[list[float]]) -> None:
-    assert np.isnan(factorise(np.array(H))).any()
+    assert np.isnan(cholesky(np.array(H))).any()
