@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from quadriga.shared.config.renamed import with_current_names, with_first_names
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
@@ -65,8 +66,11 @@ class PredictorMeta:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """A form that JSON can carry."""
-        return asdict(self) | {"controller": dict(self.controller)}
+        """A form that JSON can carry, with keys of the controller under their first names.
+
+        So a key's new name alone changes neither a predictor's file nor its digest.
+        """
+        return asdict(self) | with_first_names({"controller": dict(self.controller)})
 
     @classmethod
     def from_dict(cls, body: dict[str, Any]) -> PredictorMeta:
@@ -75,7 +79,8 @@ class PredictorMeta:
         Raises:
             TypeError, AttributeError: fields are missing, unknown or of another type.
         """
-        return cls(**body | {"controller": tuple(sorted(body.get("controller", {}).items()))})
+        controller = with_current_names({"controller": body.get("controller", {})})["controller"]
+        return cls(**body | {"controller": tuple(sorted(controller.items()))})
 
     @property
     def width(self) -> int:
