@@ -17,6 +17,8 @@ TRUNK_RATE: Final = slice(3, 6)  # of `qvel`: trunk frame, rad/s
 JOINT_RATES: Final = slice(6, 6 + N_JOINTS)  # of `qvel`, rad/s; so are torques in `qfrc_applied`
 NV: Final = JOINT_RATES.stop  # velocities of one robot
 
-# Of `sensordata`: gyro (3), specific force (3), normal force by foot (4), then these.
+# Of `sensordata`, behind the gyro (3):
+SPECIFIC_FORCE: Final = slice(3, 6)  # trunk frame, m/s²
+FOOT_FORCES: Final = slice(6, 6 + N_LEGS)  # normal force by foot, N
 CONTACT_FORCES: Final = slice(10, 10 + 3 * N_LEGS)  # of each foot on the ground, world, N
 N_SENSORS: Final = CONTACT_FORCES.stop  # of one robot

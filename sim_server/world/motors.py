@@ -10,8 +10,10 @@ import numpy as np
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import JOINT_NAMES, TORQUE_LIMIT, Array, robot_names
+from quadriga.shared.robot.a1 import JOINT_NAMES, N_JOINTS, TORQUE_LIMIT, Array, robot_names
 from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.wire.messages import Command
+from quadriga.sim_server.world.layout import JOINT_POSITIONS, JOINT_RATES
 
 WEAKENED: Final = "of its torque"  # how the event of a weak motor ends; a re-simulation reads it
 _KEY: Final = "world.weak_motor"
@@ -19,6 +21,12 @@ _GRAMMAR: Final = "'robot:joint:start[s]', commas between motors"
 _ANY: Final = "any"
 _JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 _LATEST: Final = 3600.0  # s
+# Where a command's row has its fields.
+_TAU: Final = Command.CUTS["tau"]
+_Q_DES: Final = Command.CUTS["q_des"]
+_V_DES: Final = Command.CUTS["v_des"]
+_KP: Final = Command.CUTS["kp"]
+_KD: Final = Command.CUTS["kd"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +63,13 @@ def drive(commands: Array, q: Array, v: Array, strength: Array, tau: Array) -> N
         tau: N·m.
     """
     for i in range(len(commands)):
-        row = commands[i]
-        for k in range(12):
-            torque = row[36 + k] * (row[12 + k] - q[i, 7 + k])
-            torque += row[48 + k] * (row[24 + k] - v[i, 6 + k])
-            torque += row[k]
+        row, angles, rates = commands[i], q[i, JOINT_POSITIONS], v[i, JOINT_RATES]
+        tau_ff, q_des, v_des = row[_TAU], row[_Q_DES], row[_V_DES]
+        kp, kd = row[_KP], row[_KD]
+        for k in range(N_JOINTS):
+            torque = kp[k] * (q_des[k] - angles[k])
+            torque += kd[k] * (v_des[k] - rates[k])
+            torque += tau_ff[k]
             torque = min(max(torque, -TORQUE_LIMIT), TORQUE_LIMIT)
             tau[i, k] = strength[i, k] * torque
 

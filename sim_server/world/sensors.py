@@ -10,6 +10,14 @@ from quadriga.shared.config.sections import SensorsConfig
 from quadriga.shared.robot.a1 import N_JOINTS, N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import State
+from quadriga.sim_server.world.layout import (
+    ATTITUDE,
+    FOOT_FORCES,
+    JOINT_POSITIONS,
+    JOINT_RATES,
+    SPECIFIC_FORCE,
+    TRUNK_RATE,
+)
 
 _STREAM: Final = 2  # of the seed: the terrain draws from another one
 # Columns of a robot's noise: those of its joints, its gyro, its accelerometer and its feet, in the
@@ -23,7 +31,15 @@ _FOOT = slice(_ACCEL.stop, _ACCEL.stop + N_LEGS)
 _SUMS: Final = _FOOT.stop
 _TURN = slice(_FOOT.stop, _FOOT.stop + 3)
 
-_ROW: Final = _SUMS + 4  # numbers of a `State`
+# Where a state's row has its fields.
+_STATE_Q: Final = State.CUTS["q_joint"]
+_STATE_V: Final = State.CUTS["v_joint"]
+_STATE_TAU: Final = State.CUTS["tau_joint"]
+_STATE_QUAT: Final = State.CUTS["imu_quat_wxyz"]
+_STATE_GYRO: Final = State.CUTS["imu_gyro"]
+_STATE_ACCEL: Final = State.CUTS["imu_accel"]
+_STATE_FOOT: Final = State.CUTS["foot_force"]
+_ROW: Final = _STATE_FOOT.stop  # numbers of a `State`
 _BLOCK: Final = 64  # ticks of noise drawn at once, because many small draws cost more
 
 # Q(p) with q ⊗ p = Q(p) q is _SIGN[a, b] · p[_INDEX[a, b]], quaternions wxyz.
@@ -94,18 +110,20 @@ def _observe(
     """Fill the rows of all robots' states."""
     for i in range(len(rows)):
         row, extra = rows[i], noise[i]
-        row[0:12] = extra[0:12] + q[i, 7:19]
-        row[12:24] = extra[12:24] + v[i, 6:18]
-        row[24:36] = extra[24:36] + tau[i]
+        row[_STATE_Q] = extra[_Q] + q[i, JOINT_POSITIONS]
+        row[_STATE_V] = extra[_V] + v[i, JOINT_RATES]
+        row[_STATE_TAU] = extra[_TAU] + tau[i]
+        measured, attitude = row[_STATE_QUAT], q[i, ATTITUDE]
         for a in range(4):
-            row[36 + a] = 0.0
+            measured[a] = 0.0
             for b in range(4):
-                row[36 + a] += turns[i, a, b] * q[i, 3 + b]
-        row[40:43] = extra[36:39] + v[i, 3:6]
-        row[43:46] = extra[39:42] + sensed[i, 3:6]
-        for foot in range(4):
+                measured[a] += turns[i, a, b] * attitude[b]
+        row[_STATE_GYRO] = extra[_GYRO] + v[i, TRUNK_RATE]
+        row[_STATE_ACCEL] = extra[_ACCEL] + sensed[i, SPECIFIC_FORCE]
+        feet, normal, noise_of_feet = row[_STATE_FOOT], sensed[i, FOOT_FORCES], extra[_FOOT]
+        for foot in range(N_LEGS):
             # A foot sensor cannot pull.
-            row[46 + foot] = max(0.0, extra[42 + foot] + sensed[i, 6 + foot])
+            feet[foot] = max(0.0, noise_of_feet[foot] + normal[foot])
 
 
 def turn_matrices(rotation: Array) -> Array:

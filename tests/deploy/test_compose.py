@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from quadriga.commands.parser import build_parser
+from quadriga.shared.bus.members import LAST, ROUTER
 from quadriga.shared.config.load import load
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.team.launch import ProcessSpec, process_table
@@ -50,7 +51,7 @@ def test_every_process_of_a_walk_has_a_service(row: ProcessSpec) -> None:
 
 
 def test_no_service_is_left_over() -> None:
-    assert SERVICES.keys() == {row.name for row in ROWS} | {"prepare", "router"}
+    assert SERVICES.keys() == {row.name for row in ROWS} | {"prepare", ROUTER}
 
 
 def test_the_team_is_that_of_the_default_walk() -> None:
@@ -87,8 +88,13 @@ def test_who_needs_the_predictor_also_waits_by_itself(service: str) -> None:
 
 
 def test_the_recorder_hears_the_others_to_the_end() -> None:
-    walkers = SERVICES.keys() - {"prepare", "router", "recorder"}
-    assert all("recorder" in SERVICES[name]["depends_on"] for name in walkers)
+    walkers = SERVICES.keys() - {"prepare", ROUTER, LAST}
+    assert all(LAST in SERVICES[name]["depends_on"] for name in walkers)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
+def test_a_service_has_the_time_to_leave_that_its_process_has(row: ProcessSpec) -> None:
+    assert float(SERVICES[row.name]["stop_grace_period"].removesuffix("s")) >= row.grace
 
 
 def reachable(service: str) -> set[str]:
