@@ -52,7 +52,7 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
     (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
     rows = process_table(config, run_dir, predictor, sha256)
     with stop_flag() as stopped:
-        fallen = follow(config, rows, run_dir, stopped, console)
+        fallen = watch_walk(config, rows, run_dir, stopped, console)
         if stopped():
             console.print(f"interrupted; what was recorded is in {run_dir}", markup=False)
             return INTERRUPTED
@@ -62,7 +62,7 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
     return FELL if fallen or went_wrong(summary) else OK
 
 
-def follow(
+def watch_walk(
     config: Config,
     rows: tuple[ProcessSpec, ...],
     run_dir: Path,
@@ -76,10 +76,10 @@ def follow(
     """
     with Launch(rows, run_dir / "logs") as launch, WalkProgress(config, console) as progress:
 
-        def look() -> bool:
+        def update() -> bool:
             progress.update()
             return stopped()
 
-        launch.watch(look)
+        launch.watch(update)
         progress.update()
         return progress.fallen
