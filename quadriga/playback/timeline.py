@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 from quadriga.shared.errors import ConfigError, RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import ChunkEntry, Recording
-from quadriga.shared.wire.topics import STATE, TRUTH
+from quadriga.shared.wire.topics import SAMPLE_MS, STATE, TRUTH
 
 Remap = tuple[str, str]
 
@@ -55,7 +55,7 @@ class Timeline:
                 configuration is another version's.
         """
         config = recorded_config(recording)
-        self.step = 10 * config.planner.applied
+        self.step = SAMPLE_MS * config.planner.applied
         self._recording, self._topics, self._remaps = recording, topics, remaps
         self._keys: dict[str, str] = {}  # as played; empty if left out
         self.messages = 0

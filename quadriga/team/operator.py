@@ -96,7 +96,7 @@ def _next_tick(bus: Bus, tick: int) -> tuple[int, bool]:
 def stop_team(config: Config, reason: str) -> None:
     """Send one emergency stop to every robot of the team.
 
-    Whatever the reason's text is and whoever else tells the time, agents can read it.
+    Agents can read it whatever the reason's text is and whoever else publishes a time.
 
     Raises:
         BusError: the bus cannot be opened, or some robots were not reached.
