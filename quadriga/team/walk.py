@@ -19,7 +19,8 @@ from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.team.launch import Launch, ProcessSpec, process_table
 from quadriga.team.progress import WalkProgress
-from quadriga.team.run_folder import CONFIG, make_run_dir, report, went_wrong
+from quadriga.team.run_folder import CONFIG, make_run_dir
+from quadriga.team.run_report import has_failed, report_folder
 from quadriga.warm_up import warm_up
 
 OK: Final = 0
@@ -58,8 +59,8 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
             return INTERRUPTED
     if not config.recorder.enabled:
         return FELL if fallen else OK
-    summary = report(run_dir, pictures=pictures, console=console)
-    return FELL if fallen or went_wrong(summary) else OK
+    summary = report_folder(run_dir, pictures=pictures, console=console)
+    return FELL if fallen or has_failed(summary) else OK
 
 
 def watch_walk(
