@@ -17,18 +17,18 @@ def warm_up(config: Config, console: Console) -> None:
     from quadriga.agents.controller.maths.rotation import roll_pitch_yaw
 
     # Beside what the compiler keeps: in __pycache__, or the user's cache if the code is read-only.
-    kept = getattr(roll_pitch_yaw, "stats", None)
-    if kept is None:
-        return  # numba was told not to compile
-    stamp = Path(kept.cache_path) / f"compiled-{digest()}"
+    stats = getattr(roll_pitch_yaw, "stats", None)
+    if stats is None:
+        return  # numba's compiler is switched off
+    stamp = Path(stats.cache_path) / f"compiled-{digest()}"
     if stamp.exists():
         return
     with console.status("compiling the agents (the first time only)"):
-        _rehearse_alone(config)
+        _rehearse_lone_agent(config)
     stamp.touch()
 
 
-def _rehearse_alone(config: Config) -> None:
+def _rehearse_lone_agent(config: Config) -> None:
     """Everything that one agent does, with a predictor that predicts nothing."""
     from quadriga.agents.agent import Agent
     from quadriga.agents.predictor.predictor import Predictor, PredictorMeta

@@ -1,4 +1,4 @@
-"""Calls side by side in processes of their own, which an interrupt leaves none of."""
+"""Calls side by side in processes of their own, all of which an interrupt ends."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ B = TypeVar("B")
 def run_each(
     call: Callable[[A], B], arguments: Sequence[A], jobs: int
 ) -> Generator[tuple[A, B], None, None]:
-    """Arguments with what `call` made of them, in the order in which they are done.
+    """Each argument with what `call` returns for it, in the order in which they are done.
 
     Args:
         call: a function of a module, so that another process finds it.

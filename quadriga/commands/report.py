@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     from rich.console import Console
 
     from quadriga.shared.recording.reader import Recording
-    from quadriga.team.run_folder import report, report_file, went_wrong
+    from quadriga.team.run_report import has_failed, report_file, report_folder
 
     html = arguments.html
     if html is not None and html.suffix.lower() not in (".html", ".htm"):
@@ -49,5 +49,5 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
             "a run folder's page is its report.html",
         )
     else:
-        summary = report(arguments.run, pictures=not arguments.no_render, console=Console())
-    return int(went_wrong(summary))
+        summary = report_folder(arguments.run, pictures=not arguments.no_render, console=Console())
+    return int(has_failed(summary))

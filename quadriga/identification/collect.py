@@ -23,7 +23,7 @@ from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 from quadriga.shared.wire.topics import SAMPLE_MS
 from quadriga.workers import run_each
 
-_LEAST = 2000  # samples, whatever the rule says
+_LEAST = 2000  # samples, however few the rule asks for
 _MARGIN = 2  # times what the rule asks for: data far in excess average the noise out
 _LEAST_EPISODE_S = 3.0  # a walk that ended in a fall earlier is not worth keeping
 _BEFORE_FALL = 50  # samples cut off before a fall

@@ -118,7 +118,7 @@ def _sheets(report: FitReport | Unfit, whole: bool = False) -> list[Table]:
 
 
 def _read_fit_seconds(path: Path, digest: str) -> float | None:
-    """How long the fit of a predictor that is kept took, as its report says."""
+    """How long the fit of a stored predictor took, from its report; None without one."""
     try:
         report = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
         return float(report["fit_seconds"]) if report["sha256"] == digest else None

@@ -49,11 +49,11 @@ class Keyboard:
 
     def _read(self) -> bytes:
         try:
-            found = os.read(self._stdin, 64)
+            keys = os.read(self._stdin, 64)
         except OSError:  # how a terminal that was closed answers
-            found = b""
-        self.listens = bool(found)
-        return found
+            keys = b""
+        self.listens = bool(keys)
+        return keys
 
     def __enter__(self) -> Self:
         if sys.stdin is None:  # started with it closed

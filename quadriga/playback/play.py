@@ -29,7 +29,7 @@ _MEMBER: Final = re.compile(rf"r\d+|{SIM}|{OPERATOR}|{PLANNER}|{PLAYER}")
 
 def play(
     bus: BusConfig,
-    tape: Timeline,
+    timeline: Timeline,
     console: Console,
     *,
     rate: float,
@@ -37,47 +37,51 @@ def play(
     loop: bool,
     paused: bool,
 ) -> None:
-    """Publish a tape until its end, a `q` or a signal.
+    """Publish a recording until its end, a `q` or a signal.
 
     Args:
         bus: where.
-        tape: what.
-        console: for the status line and the last word.
+        timeline: what.
+        console: for the status line and the result.
         rate: world time per wall time.
         start: the world time to begin at, s.
         loop: begin again at the end.
         paused: begin paused.
 
     Raises:
-        ConfigError: the rate is not positive, or the start is not on the tape.
+        ConfigError: the rate is not positive, or the start is after its end.
         BusError: the bus cannot be opened, or a live team of that name is on it.
     """
     if not 0.0 < rate < inf:
         raise ConfigError("--rate", f"{rate:g}", "a number above 0")
-    if not 0.0 <= 1000 * start <= tape.last:
+    if not 0.0 <= 1000 * start <= timeline.last:
         raise ConfigError(
-            "--start", f"{start:g} s", f"at most {tape.last / 1000:g} s", "the recording ends there"
+            "--start",
+            f"{start:g} s",
+            f"at most {timeline.last / 1000:g} s",
+            "the recording ends there",
         )
-    with Bus.join(bus, tape.team, PLAYER) as joined, Keyboard() as keys:
+    with Bus.join(bus, timeline.team, PLAYER) as joined, Keyboard() as keys:
         sleep(_SETTLE)
         _refuse_live(joined, bus.endpoint)
         joined.declare(HERE)  # only now: a player that came before must not be the one to leave
-        begin = max(1000 * start, tape.first)
+        begin = max(1000 * start, timeline.first)
         transport = Transport(rate, begin, monotonic(), paused=paused)
-        with _Status(console, tape, transport, keys.listens) as status:
-            player = _Player(tape, transport, keys, joined, status, bus.endpoint)
+        with _Status(console, timeline, transport, keys.listens) as status:
+            player = _Player(timeline, transport, keys, joined, status, bus.endpoint)
             while player.play(begin) and loop:
                 transport.seek(begin, monotonic())
         spent = monotonic() - player.begun
     console.print(
-        f"played {player.sent} messages as team {tape.team!r} in {spent:.1f} s",
+        f"played {player.sent} messages as team {timeline.team!r} in {spent:.1f} s",
         markup=False,
         highlight=False,
     )
 
 
 def _refuse_live(bus: Bus, endpoint: str) -> None:
-    if live := sorted(name for name in bus.present(HERE) if _MEMBER.fullmatch(name)):
+    live = sorted(name for name in bus.present(HERE) if _MEMBER.fullmatch(name))
+    if live:
         raise BusError(
             f"team {bus.team!r} at {endpoint}",
             f"{', '.join(live)} of a live team of that name",
@@ -96,22 +100,22 @@ class _Player:
 
     def __init__(
         self,
-        tape: Timeline,
+        timeline: Timeline,
         transport: Transport,
         keys: Keyboard,
         bus: Bus,
         status: _Status,
         endpoint: str,
     ) -> None:
-        self._tape, self._transport, self._keys = tape, transport, keys
+        self._timeline, self._transport, self._keys = timeline, transport, keys
         self._bus, self._status, self._endpoint = bus, status, endpoint
         self._put: dict[str, Callable[[bytes], None]] = {}
         self._looked = self.begun = monotonic()
         self.sent = 0
 
     def play(self, begin: float) -> bool:
-        """Play from `begin` ms to the end; False if told to quit before."""
-        for at, key, payload in self._tape.cues(begin):
+        """Play from `begin` ms to the end; False if the user quit before."""
+        for at, key, payload in self._timeline.cues(begin):
             if not self._wait(at):
                 return False
             put = self._put.get(key)
@@ -122,7 +126,7 @@ class _Player:
         return True
 
     def _wait(self, at: float) -> bool:
-        """Until `at` ms is reached; False if told to quit."""
+        """Wait until `at` ms is reached; False if the user quit before."""
         while True:
             now = monotonic()
             left = self._transport.until(at, now)
@@ -141,17 +145,19 @@ class _Player:
             if key == PAUSE:
                 self._transport.toggle(now)
             elif key == STEP:
-                self._transport.step(self._tape.step, now)
+                self._transport.step(self._timeline.step, now)
 
 
 class _Status:
     """The line that shows world time and rate, on a terminal."""
 
-    def __init__(self, console: Console, tape: Timeline, transport: Transport, keys: bool) -> None:
-        self._transport, self._last = transport, tape.last
+    def __init__(
+        self, console: Console, timeline: Timeline, transport: Transport, keys: bool
+    ) -> None:
+        self._transport, self._last = transport, timeline.last
         self._hint = "  space pauses, → steps, q quits" if keys else ""
         self._bar = build_progress(console, "{task.fields[text]}")
-        self._task: TaskID = self._bar.add_task("", total=tape.last, text="")
+        self._task: TaskID = self._bar.add_task("", total=timeline.last, text="")
 
     def show(self, position: float) -> None:
         """Show a position, ms."""

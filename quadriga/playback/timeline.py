@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 from quadriga.shared.errors import ConfigError, RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import ChunkEntry, Recording
-from quadriga.shared.wire.topics import STATE, TRUTH
+from quadriga.shared.wire.topics import SAMPLE_MS, STATE, TRUTH
 
 Remap = tuple[str, str]
 
@@ -32,7 +32,7 @@ class Timeline:
 
     Attributes:
         team: the first part of every key that is played.
-        first, last: when the first and the last message are due, ms of the tape's clock.
+        first, last: when the first and the last message are due, ms of the clock that paces.
         messages: how many there are.
         step: a planning step, ms.
     """
@@ -55,7 +55,7 @@ class Timeline:
                 configuration is another version's.
         """
         config = recorded_config(recording)
-        self.step = 10 * config.planner.applied
+        self.step = SAMPLE_MS * config.planner.applied
         self._recording, self._topics, self._remaps = recording, topics, remaps
         self._keys: dict[str, str] = {}  # as played; empty if left out
         self.messages = 0
@@ -82,7 +82,7 @@ class Timeline:
                 yield Cue(now, key, entry.payload)
 
     def _time(self, entry: ChunkEntry) -> float:
-        """The clock as far as this entry tells; 0 if it does not."""
+        """The time of this entry on the clock that paces, ms; 0 if it has none."""
         if self._by_log:
             return (entry.log_time_ns - self._log_zero) / 1e6
         return max(entry.tick, 0) if entry.key.endswith(_WORLD) else 0.0
@@ -95,7 +95,7 @@ class Timeline:
             if entry.key not in self._keys:
                 self._log_zero = self._log_zero or entry.log_time_ns
                 fits = any(_fits(entry.key, pattern) for pattern in self._topics)
-                self._keys[entry.key] = renamed(entry.key, self._remaps) if fits else ""
+                self._keys[entry.key] = rename(entry.key, self._remaps) if fits else ""
             world = max(world, self._time(entry))
             if self._keys[entry.key]:
                 self.messages += 1
@@ -122,7 +122,7 @@ def parse_remap(text: str) -> Remap:
     return old, new
 
 
-def renamed(key: str, remaps: Sequence[Remap]) -> str:
+def rename(key: str, remaps: Sequence[Remap]) -> str:
     """A key with its first parts replaced by the first of `remaps` that fits them."""
     for old, new in remaps:
         if key == old or key.startswith(f"{old}/"):

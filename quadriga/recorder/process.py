@@ -46,7 +46,7 @@ def run(
     """Record until SIGINT, SIGTERM or the sim server's leaving; then drain and finish the file.
 
     The recorder is a member that the team waits for, unless the team walks already or has one:
-    then it records beside it from now on, nobody waits for it, and it says what it missed.
+    then it records beside it from now on, nobody waits for it, and it reports what it missed.
     A message's log time is when it was taken from the inbox, some ms after its reception.
 
     Args:
@@ -55,7 +55,7 @@ def run(
         predictor_sha256: hash of the predictor the team walks with, stored as well.
         stopped: asked often whether to stop; by default a flag that the two signals raise.
         selection: what to record; by default everything, in one file.
-        say: told what a user should know at once.
+        say: called with what a user should know at once.
 
     Raises:
         RecordingError: the file cannot be written.

@@ -18,7 +18,7 @@ QUIET: Final = 0.2  # s wall without a message after which nothing more is under
 DRAIN_LIMIT: Final = 5.0  # s wall, longest drain of a team that does not fall silent
 _GATHER: Final = 0.004  # s wall, pause between looks at the inbox: one wake-up for many messages
 _SLICE: Final = 500  # messages that are written at most before a look at the clock
-_LOOK: Final = 1.0  # s wall after which a late recorder says what it has
+_LOOK: Final = 1.0  # s wall after which a late recorder reports what it has
 
 
 class Session:
@@ -49,7 +49,7 @@ class Session:
         self._ended = self._seen = False
 
     def record(self, *, late: bool, seen: bool) -> None:
-        """Until the end; a late one says what it has once it knows.
+        """Record until the end; a late recorder reports what it has once it knows.
 
         Args:
             late: nobody has waited for this recorder.
@@ -80,7 +80,7 @@ class Session:
             )
 
     def drain(self) -> None:
-        """What was sent before the end may still be under way when the end is noticed."""
+        """Record what is still under way when the end is noticed."""
         limit = monotonic() + DRAIN_LIMIT
         while self._take(QUIET) and monotonic() < limit:
             pass

@@ -1,6 +1,6 @@
 """Messages of some keys, live from the bus or from a recording, for whoever wants to look at them.
 
-Who listens is a member of the network that nobody waits for.
+Nobody waits for a listener: it is no member of the team.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from quadriga.shared.recording.reader import ChunkEntry
 from quadriga.shared.runtime.clock import monotonic, wall_ns
 from quadriga.shared.wire.envelope import envelope
 
-_PATIENCE: Final = 3.0  # s wall without a message after which a listener is told where it listens
+_PATIENCE: Final = 3.0  # s wall without a message after which a listener is shown where it listens
 
 
 def entries_from_file(path: Path, keys: Sequence[str]) -> Generator[ChunkEntry]:
@@ -46,7 +46,7 @@ def entries_from_file(path: Path, keys: Sequence[str]) -> Generator[ChunkEntry]:
 
 
 def config_of(path: Path) -> Config:
-    """The configuration of a recorded walk; the default if the file no longer says.
+    """The configuration of a recorded walk; the default if the file has lost it.
 
     Raises:
         RecordingError: nothing can be read of the file.

@@ -1,4 +1,4 @@
-"""What a recording says of itself beside its messages: configuration, predictor, versions.
+"""What a recording holds beside its messages: configuration, predictor, versions.
 
 A recording may come from anybody, so whoever reads it takes nothing of this for granted.
 """

@@ -12,7 +12,7 @@ from quadriga.shared.recording.salvage import Salvage
 
 
 def open_readable(path: Path) -> tuple[Recording | Salvage, RecordingError | None]:
-    """A whole recording, or what is left of a damaged one and the error that says so.
+    """A whole recording, or what is left of a damaged one and what is wrong with it.
 
     Raises:
         RecordingError: nothing of it can be read.
@@ -29,7 +29,7 @@ def open_readable(path: Path) -> tuple[Recording | Salvage, RecordingError | Non
 
 
 def config_or_default(source: Recording | Salvage) -> Config:
-    """The configuration of a recorded walk; the default if the file no longer says."""
+    """The configuration of a recorded walk; the default if the file has lost it."""
     try:
         return recorded_config(source)
     except RecordingError:

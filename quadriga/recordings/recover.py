@@ -28,10 +28,10 @@ class Recovery:
     Attributes:
         out: the new file.
         messages: how many are in it.
-        expected: how many the recorder had written, None if the file no longer says.
+        expected: how many the recorder had written, None if the file has lost that.
         damages: what could not be read.
         tracks: ticks by key of what could.
-        never_came: by key, messages that had not reached the recorder, if the file still says.
+        never_came: by key, messages that had not reached the recorder, if the file still has that.
         has_metadata: whether an intact copy of the metadata was found.
         error: why the file was not whole.
     """

@@ -67,7 +67,7 @@ class RecordedInputs:
     def _replay_step(self, tick: int) -> StepInputs:
         record = self._log.records.get(tick)
         missing = list(self._lost.get(tick, ()))
-        state = self._take_state(tick)  # first: it says what time it is, see `Inbox`
+        state = self._take_state(tick)  # first: it sets the time, see `Inbox`
         awaited = self._agent.awaited(tick) if self._lockstep else NOTHING
         wanted = [] if awaited == NOTHING else self._inbox.wanted(tick, awaited)
         if record is not None:

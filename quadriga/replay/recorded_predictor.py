@@ -76,7 +76,7 @@ def find_predictor(
 
 
 def _read_digest(path: Path) -> str:
-    """The digest a predictor file says it has; "" if it is none."""
+    """The digest that is written in a predictor file; "" if it is none."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             return str(json.loads(str(archive["document"]))["sha256"])

@@ -41,9 +41,9 @@ class WorldComparison:
 
 
 def replay_world(recording: Recording) -> Iterator[WorldComparison]:
-    """Recompute the world tick by tick; the last value tells what came of it.
+    """Recompute the world tick by tick; the last value is the outcome.
 
-    A robot that the world had given up on at a tick, as the recorded events tell, is silent at
+    A robot that the world had given up on at a tick, by the recorded events, is silent at
     that tick again, even if its late command was recorded.
 
     Raises:
@@ -104,7 +104,7 @@ def _is_of_world(entry: ChunkEntry) -> bool:
 
 
 class _Silent:
-    """The robots that the world does not wait for, as its events tell."""
+    """The robots that the world does not wait for, by its events."""
 
     def __init__(self, team: str) -> None:
         self._key = EVENT.key(team)

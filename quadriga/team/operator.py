@@ -33,14 +33,14 @@ def reference_at(config: Config, tick: int) -> Reference:
     Raises:
         ConfigError: the trace cannot be read, or is none.
     """
-    asked, trace = config.reference, trace_of(config)
-    walked = tick - config.gait.stand_ms
-    ramp_ms = 1000 * asked.ramp
-    factor = min(1.0, max(0, walked) / ramp_ms) if ramp_ms else float(walked >= 0)
-    vx, vy, wz = asked.vx, asked.vy, asked.wz
+    full, trace = config.reference, trace_of(config)
+    since_start = tick - config.gait.stand_ms
+    ramp_ms = 1000 * full.ramp
+    factor = min(1.0, max(0, since_start) / ramp_ms) if ramp_ms else float(since_start >= 0)
+    vx, vy, wz = full.vx, full.vy, full.wz
     if trace is not None:
-        vx, vy, wz = trace.at(1e-3 * max(0, walked))
-    return Reference(tick, tick * 1_000_000, factor * vx, factor * vy, factor * wz, asked.height)
+        vx, vy, wz = trace.at(1e-3 * max(0, since_start))
+    return Reference(tick, tick * 1_000_000, factor * vx, factor * vy, factor * wz, full.height)
 
 
 def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
@@ -84,17 +84,19 @@ def _next_tick(bus: Bus, tick: int) -> tuple[int, bool]:
         try:
             if key == TRUTH.key(bus.team):
                 tick = max(tick, decode(payload, Truth).tick)
-            elif (event := decode(payload, Event)).kind == "stop":
-                return max(tick, event.tick - 1), True
+                continue
+            event = decode(payload, Event)
         except MessageError:
             continue  # not for the operator to count: the recorder keeps it
+        if event.kind == "stop":
+            return max(tick, event.tick - 1), True
     return tick, False
 
 
 def stop_team(config: Config, reason: str) -> None:
     """Send one emergency stop to every robot of the team.
 
-    Whatever the reason's text is and whoever else tells the time, agents can read it.
+    Agents can read it whatever the reason's text is and whoever else publishes a time.
 
     Raises:
         BusError: the bus cannot be opened, or some robots were not reached.
@@ -108,14 +110,17 @@ def stop_team(config: Config, reason: str) -> None:
         reached: frozenset[str] = frozenset()
         tick, stamp_ns, deadline = 0, 0, monotonic() + _ESTOP_WAIT
         while reached < frozenset(names) and monotonic() < deadline:
-            truth = bus.get(POLL)
-            tick, stamp_ns = (truth and envelope(truth[1])) or (tick, stamp_ns)
+            packet = bus.get(POLL)
+            head = None if packet is None else envelope(packet[1])
+            if head is not None:
+                tick, stamp_ns = head
             there = frozenset(names) & bus.present(HERE)
             if there > reached:  # at once, whoever is still absent: to hear it twice is no harm
                 put(encode(EStop(tick, stamp_ns, reason)))
                 reached = there
-        if absent := [name for name in names if name not in reached]:
-            put(encode(EStop(tick, stamp_ns, reason)))  # one who is there but does not say so hears
+        absent = [name for name in names if name not in reached]
+        if absent:
+            put(encode(EStop(tick, stamp_ns, reason)))  # for one who is there but does not say so
             others = ", ".join(sorted(reached)) or "nobody"
             raise BusError(
                 f"emergency stop of team {team!r}",

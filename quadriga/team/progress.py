@@ -43,13 +43,13 @@ class WalkProgress:
                 if key == TRUTH.key(self._bus.team):
                     truth = decode(payload, Truth)
                 else:
-                    self._note(decode(payload, Event))
+                    self._show_event(decode(payload, Event))
             except MessageError:
                 continue  # the recorder keeps it
         if truth is not None:
-            self._show(truth)
+            self._show_truth(truth)
 
-    def _note(self, event: Event) -> None:
+    def _show_event(self, event: Event) -> None:
         if event.kind == "fall":
             self.fallen.append(event.robot)
         if event.kind in ("fall", "fault", "push"):
@@ -58,7 +58,7 @@ class WalkProgress:
                 markup=False,
             )
 
-    def _show(self, truth: Truth) -> None:
+    def _show_truth(self, truth: Truth) -> None:
         now, seconds = monotonic(), truth.tick / 1000
         self._begun = self._begun or now - seconds
         speed = float(np.linalg.norm(truth.base_vel.mean(axis=0)[:2]))

@@ -1,23 +1,13 @@
-"""The run folder: made before the walk, filled with figures and pictures after it."""
+"""The run folder, made before the walk."""
 
 from __future__ import annotations
 
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from rich.console import Console
-
-from quadriga.pictures.render import render
-from quadriga.recordings.summary import RECORDING, summarise
-from quadriga.recordings.summary_table import print_summary
-from quadriga.recordings.traces import read_traces
-from quadriga.report.about import describe_missing
-from quadriga.report.figure_files import write_figures
-from quadriga.report.page import PAGE, write_page
-from quadriga.report.run import build_run, read_run
-from quadriga.shared.errors import ConfigError, ProcessError
-from quadriga.shared.recording.reader import Recording
+from quadriga.recordings.summary import RECORDING
+from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.clock import wall_ns
 
 RUNS: Final = Path("runs")
@@ -37,7 +27,7 @@ def make_run_dir(out: Path | None) -> Path:
         raise ConfigError(f"--out {out}", "a folder with a recording", "a new folder")
     try:
         if out is None:
-            return _folder_of_its_own()
+            return _make_dated_folder()
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = error.strerror or str(error)
@@ -64,7 +54,7 @@ def check_own_config(given: Path | None, out: Path | None) -> None:
         )
 
 
-def _folder_of_its_own() -> Path:
+def _make_dated_folder() -> Path:
     """`runs/<date>-<time>`, with a number where another walk began in the same second."""
     now = datetime.fromtimestamp(1e-9 * wall_ns(), UTC).astimezone()
     name, number = f"{now:%Y%m%d-%H%M%S}", 1
@@ -76,67 +66,3 @@ def _folder_of_its_own() -> Path:
             number += 1
         else:
             return run_dir
-
-
-def report(run_dir: Path, *, pictures: bool, console: Console) -> dict[str, Any]:
-    """Sum up the recording in `run_dir`, draw its figures, write its page, show its table.
-
-    Returns:
-        The summary.
-
-    Raises:
-        RecordingError: there is no recording, it is empty or foreign, or a file cannot be written.
-        ProcessError: the walk did not come to its end.
-    """
-    recording = Recording(run_dir / RECORDING)
-    traces = read_traces(recording)
-    summary = summarise(run_dir, traces)
-    run = build_run(recording, traces, summary)
-    write_figures(run, run_dir)
-    write_page(run, run_dir / PAGE)
-    if pictures:
-        with console.status("rendering"):
-            render(run_dir)
-    print_summary(summary, console)
-    console.print(f"run folder: {run_dir}", markup=False, highlight=False)
-    _check_end(summary)
-    return summary
-
-
-def report_file(path: Path, page: Path | None, *, console: Console) -> dict[str, Any]:
-    """Write the page of a recording that may have come from elsewhere, show its table.
-
-    Args:
-        path: the recording.
-        page: the file to write; by default beside the recording, with its name.
-        console: where to show the table.
-
-    Returns:
-        The summary.
-
-    Raises:
-        RecordingError: the recording is empty or foreign, or the page cannot be written.
-    """
-    run = read_run(path)
-    written = write_page(run, page or path.with_suffix(".html"))
-    print_summary(dict(run.summary), console)
-    for missing in describe_missing(run):
-        console.print(missing, style="yellow", markup=False, highlight=False)
-    console.print(f"page: {written}", markup=False, highlight=False)
-    return dict(run.summary)
-
-
-def went_wrong(summary: dict[str, Any]) -> bool:
-    """Whether a robot fell, or stopped for a reason of its own before the end."""
-    return bool(summary["fell"] or summary["stop_reasons"])
-
-
-def _check_end(summary: dict[str, Any]) -> None:
-    end = summary["end"]
-    if not end or end.startswith("signal"):
-        raise ProcessError(
-            "the walk",
-            f"an end at {summary['duration']:.1f} s",
-            "world.seconds or a fall",
-            "the sim server was told to stop" if end else "the sim server or its link failed",
-        )

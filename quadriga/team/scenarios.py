@@ -27,7 +27,7 @@ def path(name: str) -> Path:
         ConfigError: there is no such scenario.
     """
     if name.endswith(_SUFFIX):
-        return Path(name)  # whoever reads it says if it is not there
+        return Path(name)  # whoever reads it complains if it is not there
     if name not in names():
         raise ConfigError(
             "--scenario",
@@ -55,9 +55,9 @@ def description(name: str) -> str:
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "bytes that are not UTF-8"
         raise ConfigError(str(file), reason, "a readable TOML file") from None
-    said = []
+    comment = []
     for line in lines:
         if not line.startswith("#"):
             break
-        said.append(line.removeprefix("#").strip())
-    return " ".join(said)
+        comment.append(line.removeprefix("#").strip())
+    return " ".join(comment)

@@ -19,7 +19,8 @@ from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.team.launch import Launch, ProcessSpec, process_table
 from quadriga.team.progress import WalkProgress
-from quadriga.team.run_folder import CONFIG, make_run_dir, report, went_wrong
+from quadriga.team.run_folder import CONFIG, make_run_dir
+from quadriga.team.run_report import has_failed, report_folder
 from quadriga.warm_up import warm_up
 
 OK: Final = 0
@@ -52,17 +53,17 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
     (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
     rows = process_table(config, run_dir, predictor, sha256)
     with stop_flag() as stopped:
-        fallen = follow(config, rows, run_dir, stopped, console)
+        fallen = watch_walk(config, rows, run_dir, stopped, console)
         if stopped():
             console.print(f"interrupted; what was recorded is in {run_dir}", markup=False)
             return INTERRUPTED
     if not config.recorder.enabled:
         return FELL if fallen else OK
-    summary = report(run_dir, pictures=pictures, console=console)
-    return FELL if fallen or went_wrong(summary) else OK
+    summary = report_folder(run_dir, pictures=pictures, console=console)
+    return FELL if fallen or has_failed(summary) else OK
 
 
-def follow(
+def watch_walk(
     config: Config,
     rows: tuple[ProcessSpec, ...],
     run_dir: Path,
@@ -76,10 +77,10 @@ def follow(
     """
     with Launch(rows, run_dir / "logs") as launch, WalkProgress(config, console) as progress:
 
-        def look() -> bool:
+        def update() -> bool:
             progress.update()
             return stopped()
 
-        launch.watch(look)
+        launch.watch(update)
         progress.update()
         return progress.fallen

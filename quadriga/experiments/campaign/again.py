@@ -22,7 +22,7 @@ from quadriga.replay.recorded_predictor import copy_predictor
 from quadriga.report.page import PAGE
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ConfigError, ProcessError
-from quadriga.team.run_folder import report
+from quadriga.team.run_report import report_folder
 
 RECORDINGS: Final = "recordings"
 
@@ -87,7 +87,7 @@ def record(
                 "{} s, {} m, as in the campaign".format(*told),
                 "another trace than it was walked with?",
             )
-        report(run_dir, pictures=False, console=Console(quiet=True))
+        report_folder(run_dir, pictures=False, console=Console(quiet=True))
 
 
 def _run_dir(folder: Path, row: TrialOutcome) -> Path:

@@ -1,4 +1,4 @@
-"""The one-step communication delay, plan by plan: of which step were the peers' plans it used?"""
+"""The one-step communication delay: of which step were the peers' plans that each plan used?"""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from quadriga.shared.wire.messages import Plan, Status
 
 GIVEN_UP: Final = "waits_given_up"  # the agent's count of messages it no longer waited for
 _SOLVED: Final = "solved"
-Broken = tuple[str, str]  # got, limit
+Violation = tuple[str, str]  # got, limit
 
 
 @dataclass(frozen=True, slots=True)
-class _Made:
+class _PlanHead:
     """A plan without its arrays."""
 
     key: str
@@ -55,7 +55,7 @@ class Delay:
         self._config, self._step_ms = config, step_ms(config)
         names = robot_names(config.team.robots)
         self._peers = {name: _peers(config, i, names) for i, name in enumerate(names)}
-        self._plans: list[_Made] = []
+        self._plans: list[_PlanHead] = []
         self._steps: defaultdict[str, set[int]] = defaultdict(set)
         self._impatient: set[str] = set()
         self._older = 0
@@ -68,7 +68,7 @@ class Delay:
         if isinstance(plan, Plan) and item.robot in self._peers:
             self._steps[item.robot].add(plan.step)
             self._plans.append(
-                _Made(
+                _PlanHead(
                     item.key,
                     item.robot,
                     plan.tick,
@@ -83,7 +83,7 @@ class Delay:
         """Hold every plan against the rule."""
         for plan in self._plans:
             self.finding.looked += 1
-            for got, limit in self._broken(plan):
+            for got, limit in self._find_violations(plan):
                 self.finding.add_objection(plan.tick, plan.key, got, limit)
         if self._older:
             self.finding.notes.append(f"{self._older} older plans of peers used, and said so")
@@ -93,7 +93,7 @@ class Delay:
             names = ", ".join(sorted(self._impatient))
             self.finding.notes.append(f"no longer waited for everyone: {names}")
 
-    def _broken(self, plan: _Made) -> Iterator[Broken]:
+    def _find_violations(self, plan: _PlanHead) -> Iterator[Violation]:
         config = self._config
         if plan.tick != plan.step * self._step_ms:
             yield f"step {plan.step}", f"step {plan.tick / self._step_ms:g} at this tick"
@@ -111,20 +111,20 @@ class Delay:
             elif step > last:
                 yield f"used step {step} of {peer}", f"step {last}"
             else:
-                yield from self._old(plan, peer, step, last)
+                yield from self._check_older(plan, peer, step, last)
         for peer in self._peers[plan.robot]:
-            if peer not in plan.used and self._owed(plan, peer, last):
+            if peer not in plan.used and self._must_be_used(plan, peer, last):
                 yield f"used none of {peer}", f"step {last}"
 
-    def _old(self, plan: _Made, peer: str, step: int, last: int) -> Iterator[Broken]:
-        """What is wrong with the use of a plan that is not too new."""
+    def _check_older(self, plan: _PlanHead, peer: str, step: int, last: int) -> Iterator[Violation]:
+        """What is wrong with the use of a plan that is not newer than allowed."""
         steps, planner = self._steps[peer], self._config.planner
         if steps and step not in steps and step > min(steps):
             if self._whole:
                 yield f"used step {step} of {peer}, which is not recorded", f"step {last}"
             self._unproven += 1
         elif step < last:
-            if self._owed(plan, peer, last):
+            if self._must_be_used(plan, peer, last):
                 yield f"used step {step} of {peer}", f"step {last}, which was there"
                 return
             self._older += 1
@@ -133,8 +133,8 @@ class Delay:
                 oldest = last - planner.max_peer_age - planner.hold_steps
                 yield f"used step {step} of {peer}", f"step {oldest} or later"
 
-    def _owed(self, plan: _Made, peer: str, last: int) -> bool:
-        """Whether the peer's plan of step `last` must have been there."""
+    def _must_be_used(self, plan: _PlanHead, peer: str, last: int) -> bool:
+        """Whether the peer's plan of step `last` was there, so that it must have been used."""
         lockstep = self._config.world.mode == "lockstep"
         return lockstep and plan.robot not in self._impatient and last in self._steps[peer]
 

@@ -1,4 +1,4 @@
-"""What a check says: how much it looked at, what it objects to, what it merely notes."""
+"""The outcome of a check: how much it looked at, what breaks its rule, what is worth a note."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Finding:
         objections: how many break the rule.
         first: the first of those.
         notes: what is worth knowing though no rule is broken.
-        count: said instead of how many of them break the rule.
+        count: text in place of how many of them break the rule.
     """
 
     name: str

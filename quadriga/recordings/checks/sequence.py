@@ -122,7 +122,7 @@ class Gaps:
 
 
 class Ages:
-    """Nothing is older than it may be: between two messages, and by the agents' word."""
+    """Nothing is older than it may be: between two messages, and as the agents report it."""
 
     def __init__(self, config: Config) -> None:
         """Of a recording made with this configuration."""

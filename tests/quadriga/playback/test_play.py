@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from quadriga.commands.parser import main
-from quadriga.playback.timeline import Timeline, parse_remap, renamed
+from quadriga.playback.timeline import Timeline, parse_remap, rename
 from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import HERE, Bus, Packet
 from quadriga.shared.config.sections import BusConfig
@@ -226,7 +226,7 @@ def test_mistakes(
     assert (out, err.count("\n")) == ("", 1)
 
 
-def test_the_tape_knows_its_length_on_both_clocks(file: Path) -> None:
+def test_the_timeline_knows_its_length_on_both_clocks(file: Path) -> None:
     world = Timeline(Recording(file), ["*"], [], "world")
     assert (world.first, world.last, world.step) == (0.0, TICKS - 1, 40)
     cues = list(world.cues(100.0))
@@ -242,16 +242,16 @@ def test_without_the_worlds_messages_the_log_paces(tmp_path: Path) -> None:
     path = write_lockstep(
         tmp_path / "run.mcap", config(), lambda _, key, p: p if key.endswith("command") else None
     )
-    tape = Timeline(Recording(path), ["*"], [], "world")
-    assert tape.last > 0.0
-    assert tape.last == list(tape.cues(0.0))[-1].at
+    timeline = Timeline(Recording(path), ["*"], [], "world")
+    assert timeline.last > 0.0
+    assert timeline.last == list(timeline.cues(0.0))[-1].at
 
 
 def test_only_whole_parts_of_keys_are_replaced() -> None:
     remaps = [parse_remap("team/r1:ghost/r9"), parse_remap("team:ghost")]
-    assert renamed("team/r1/state", remaps) == "ghost/r9/state"
-    assert renamed("team/r10/state", remaps) == "ghost/r10/state"
-    assert renamed("teams/r1/state", remaps) == "teams/r1/state"
+    assert rename("team/r1/state", remaps) == "ghost/r9/state"
+    assert rename("team/r10/state", remaps) == "ghost/r10/state"
+    assert rename("teams/r1/state", remaps) == "teams/r1/state"
     for wrong in ("team:", ":team", "a:b/*", "a:/b", "a:b/", "a:b//c"):
         with pytest.raises(ConfigError, match="FROM:TO"):
             parse_remap(wrong)

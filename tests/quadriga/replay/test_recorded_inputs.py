@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -74,7 +75,44 @@ def forged(of: int) -> list[tuple[str, Source, Message]]:
     ]
 
 
-def lived(
+@dataclass
+class Traffic:
+    """What others send, with the tick at which it arrives; all of it is recorded."""
+
+    log: AgentLog
+    pending: list[tuple[int, str, Source, Message]] = field(default_factory=list)
+
+    def send(self, arrival: int, key: str, source: Source, message: Message) -> None:
+        self.pending.append((arrival, key, source, message))
+        self.log.received[source][order_of(message)].append((key, encode(message)))
+
+    def deliver(self, inbox: Inbox, until: int, of: frozenset[Source] | None = None) -> None:
+        for item in sorted(self.pending, key=lambda item: item[0]):
+            if item[0] <= until and (of is None or item[2] in of):
+                inbox.take(item[1], encode(item[3]))
+                self.pending.remove(item)
+
+
+def send_all(
+    traffic: Traffic,
+    config: Config,
+    delay: Callable[[], int],
+    second: Sequence[tuple[int, int]],
+    early: Sequence[tuple[int, int]],
+) -> None:
+    arrivals: Counter[Source] = Counter()
+    for tick, key, source, message in sent(config):
+        arrivals[source] = max(arrivals[source], tick + delay())  # a key keeps its order
+        traffic.send(arrivals[source], key, source, message)
+    for tick, after in second:
+        source, message = ("reference", "operator"), Reference(tick, tick, 0.2, 0.0, 0.0, 0.26)
+        traffic.send(tick + after, "team/reference", source, message)
+    for arrival, lead in early:
+        for key, source, message in forged(arrival + lead):
+            traffic.send(arrival, key, source, message)
+
+
+def simulate_walk(
     mode: str,
     seed: int,
     late: float,
@@ -95,25 +133,12 @@ def lived(
     rng = np.random.default_rng(seed)
     config, agent = AGENTS[mode]
     inbox, log = Inbox(config, "r2", agent.peers), AgentLog()
-    intake = Intake(config, inbox)
-    pending: list[tuple[int, str, Source, Message]] = []
+    intake, traffic = Intake(config, inbox), Traffic(log)
 
     def delay() -> int:
         return 1 + (int(rng.integers(200)) if rng.random() < late else 0)
 
-    comes: Counter[Source] = Counter()
-    for tick, key, source, message in sent(config):
-        comes[source] = max(comes[source], tick + delay())  # a key keeps its order
-        pending.append((comes[source], key, source, message))
-        log.received[source][order_of(message)].append((key, encode(message)))
-    for tick, after in second:
-        source, message = ("reference", "operator"), Reference(tick, tick, 0.2, 0.0, 0.0, 0.26)
-        pending.append((tick + after, "team/reference", source, message))
-        log.received[source][order_of(message)].append(("team/reference", encode(message)))
-    for comes_at, lead in early:
-        for key, source, message in forged(comes_at + lead):
-            pending.append((comes_at, key, source, message))
-            log.received[source][order_of(message)].append((key, encode(message)))
+    send_all(traffic, config, delay, second, early)
     taken: Taken = []
     last = -1
     for tick in range(TICKS):
@@ -122,16 +147,9 @@ def lived(
             continue
         awaited = agent.awaited(tick)
         inbox.take("team/r2/state", log.states[tick][0])
-
-        def take(until: int, of: frozenset[Source] | None = None) -> None:
-            for item in sorted(pending, key=lambda item: item[0]):
-                if item[0] <= until and (of is None or item[2] in of):
-                    inbox.take(item[1], encode(item[3]))
-                    pending.remove(item)
-
-        take(tick)
+        traffic.deliver(inbox, tick)
         if mode == "lockstep":
-            take(tick + PATIENCE, inbox.owing(tick, awaited))
+            traffic.deliver(inbox, tick + PATIENCE, inbox.owing(tick, awaited))
         state = inbox.state()
         assert state is not None
         inputs = inbox.inputs(state, awaited)
@@ -181,7 +199,7 @@ def test_a_replay_takes_in_what_the_agent_took_in(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("quadriga.agents.inbox.inbox._HELD", held)
         patch.setattr("quadriga.agents.inbox.inbox.AHEAD_MS", 100)
-        log, taken = lived(mode, seed, late, skipped, second, early)
+        log, taken = simulate_walk(mode, seed, late, skipped, second, early)
         patch.undo()
         patch.setattr("quadriga.agents.inbox.inbox.AHEAD_MS", 100)
         steps = handed_over(mode, log)
@@ -191,7 +209,7 @@ def test_a_replay_takes_in_what_the_agent_took_in(
 
 
 def test_lock_step_without_trouble_needs_no_record_at_all() -> None:
-    log, taken = lived("lockstep", 1, 0.0, 0.0)
+    log, taken = simulate_walk("lockstep", 1, 0.0, 0.0)
     assert not log.records
     assert sum(len(found) for _, found in taken) > 50
 
@@ -209,7 +227,7 @@ def test_lock_step_without_trouble_needs_no_record_at_all() -> None:
 def test_what_the_recorder_lost_is_named_at_the_step_that_took_it_in(
     mode: str, source: Source, order: Order
 ) -> None:
-    log, taken = lived(mode, 2, 0.0, 0.0)
+    log, taken = simulate_walk(mode, 2, 0.0, 0.0)
     step = next(tick for tick, found in taken if (source, order) in found)
     del log.received[source][order]
     missing = [(step.tick, step.missing) for step in handed_over(mode, log) if step.missing]
@@ -217,7 +235,7 @@ def test_what_the_recorder_lost_is_named_at_the_step_that_took_it_in(
 
 
 def test_a_lost_state_and_a_lost_record_are_named() -> None:
-    log, _ = lived("realtime", 3, 0.0, 0.0)
+    log, _ = simulate_walk("realtime", 3, 0.0, 0.0)
     lost = log.records.pop(sorted(log.records)[7])
     before = sorted(log.records)[6]
     del log.states[400]

@@ -1,0 +1,83 @@
+"""The report on a walk: its summary, figures, page and pictures, from its recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from quadriga.pictures.render import render
+from quadriga.recordings.summary import RECORDING, summarise
+from quadriga.recordings.summary_table import print_summary
+from quadriga.recordings.traces import read_traces
+from quadriga.report.about import describe_missing
+from quadriga.report.figure_files import write_figures
+from quadriga.report.page import PAGE, write_page
+from quadriga.report.run import build_run, read_run
+from quadriga.shared.errors import ProcessError
+from quadriga.shared.recording.reader import Recording
+
+
+def report_folder(run_dir: Path, *, pictures: bool, console: Console) -> dict[str, Any]:
+    """Sum up the recording in `run_dir`, draw its figures, write its page, show its table.
+
+    Returns:
+        The summary.
+
+    Raises:
+        RecordingError: there is no recording, it is empty or foreign, or a file cannot be written.
+        ProcessError: the walk did not come to its end.
+    """
+    recording = Recording(run_dir / RECORDING)
+    traces = read_traces(recording)
+    summary = summarise(run_dir, traces)
+    run = build_run(recording, traces, summary)
+    write_figures(run, run_dir)
+    write_page(run, run_dir / PAGE)
+    if pictures:
+        with console.status("rendering"):
+            render(run_dir)
+    print_summary(summary, console)
+    console.print(f"run folder: {run_dir}", markup=False, highlight=False)
+    _check_end(summary)
+    return summary
+
+
+def report_file(path: Path, page: Path | None, *, console: Console) -> dict[str, Any]:
+    """Write the page of a recording that may have come from elsewhere, show its table.
+
+    Args:
+        path: the recording.
+        page: the file to write; by default beside the recording, with its name.
+        console: where to show the table.
+
+    Returns:
+        The summary.
+
+    Raises:
+        RecordingError: the recording is empty or foreign, or the page cannot be written.
+    """
+    run = read_run(path)
+    written = write_page(run, page or path.with_suffix(".html"))
+    print_summary(dict(run.summary), console)
+    for missing in describe_missing(run):
+        console.print(missing, style="yellow", markup=False, highlight=False)
+    console.print(f"page: {written}", markup=False, highlight=False)
+    return dict(run.summary)
+
+
+def has_failed(summary: dict[str, Any]) -> bool:
+    """Whether a robot of the summary fell, or stopped for a reason of its own before the end."""
+    return bool(summary["fell"] or summary["stop_reasons"])
+
+
+def _check_end(summary: dict[str, Any]) -> None:
+    end = summary["end"]
+    if not end or end.startswith("signal"):
+        raise ProcessError(
+            "the walk",
+            f"an end at {summary['duration']:.1f} s",
+            "world.seconds or a fall",
+            "the sim server was told to stop" if end else "the sim server or its link failed",
+        )
