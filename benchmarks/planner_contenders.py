@@ -10,6 +10,7 @@ import numpy as np
 
 from benchmarks.as_written import DeepcQp, PaperQp
 from benchmarks.planner_ticks import PlanningTick
+from quadriga.agents.planner.deepc_qp import build_model, select
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner
 from quadriga.agents.planner.planner_qp import (
@@ -21,7 +22,7 @@ from quadriga.agents.planner.planner_qp import (
 )
 from quadriga.agents.planner.qp_solver import SOLVERS, Solver
 from quadriga.agents.planner.team_planner import TeamPlanner, centralised
-from quadriga.agents.predictor.deepc import build_model, reduce, select
+from quadriga.agents.predictor.deepc import reduce
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config

@@ -8,12 +8,12 @@ from typing import Any, Final
 
 from quadriga.agents.agent import Inputs
 from quadriga.agents.planning.interface import NOTHING, Expected
-from quadriga.agents.planning.operator_references import AHEAD_MS, allowed
+from quadriga.agents.planning.operator_references import AHEAD_MS
+from quadriga.agents.plausibility import is_orientation, is_within_limits
 from quadriga.agents.time_grid import step_ms
-from quadriga.shared.bus.members import PLANNER
+from quadriga.shared.bus.members import OPERATOR, PLANNER, SIM
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.errors import MessageError
-from quadriga.shared.robot.a1 import Array
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import EStop, Event, Message, Plan, Reference, State, Truth
 from quadriga.shared.wire.topics import (
@@ -28,8 +28,6 @@ from quadriga.shared.wire.topics import (
     Topic,
 )
 
-OPERATOR: Final = "operator"
-WORLD: Final = "sim"
 Source = tuple[str, str]  # name of a topic, name of who sends it
 Order = tuple[int, int]  # a tick, or the step and exchange of a plan
 Wanted = tuple[Source, Order]  # a message of a source, and all before it
@@ -37,7 +35,6 @@ UNREADABLE: Final = "unreadable"  # reason of a stop whose message does not deco
 _NEVER: Final = (-1, 0)
 _HELD: Final = 256  # messages of one source beyond those of the stand; more can only be a flood
 _JUMP_MS: Final = 5000  # from one state to the next; longer than any silence the team survives
-_NORM: Final = (0.5, 2.0)  # |q|² of an orientation; far from 1 it is none
 
 
 class Inbox:
@@ -71,10 +68,10 @@ class Inbox:
             STATE.key(team, robot): (STATE, robot),
             REFERENCE.key(team): (REFERENCE, OPERATOR),
             ESTOP.key(team): (ESTOP, ""),
-            EVENT.key(team): (EVENT, WORLD),
+            EVENT.key(team): (EVENT, SIM),
         }
         if config.estimator.kind == "truth":
-            self.topics[TRUTH.key(team)] = (TRUTH, WORLD)
+            self.topics[TRUTH.key(team)] = (TRUTH, SIM)
         if central:
             self.topics[PLAN.key(team, robot)] = (PLAN, PLANNER)
         for peer in self._peers:
@@ -107,7 +104,7 @@ class Inbox:
             return
         topic, sender = row
         message = read(topic, payload)
-        if message is None or not _believable(message, self._robot):
+        if message is None or not _is_believable(message, self._robot):
             self.counters[f"dropped_{topic.name}"] += 1
             return
         if topic not in (ESTOP, EVENT) and self._ahead(message):
@@ -166,7 +163,7 @@ class Inbox:
             *((PLAN, name, awaited.plan) for name in self._planners),
             *((MEASUREMENT, name, _tick(awaited.measurement_tick)) for name in self._peers),
             (REFERENCE, OPERATOR, _tick(awaited.reference_tick)),
-            (TRUTH, WORLD, _tick(tick if awaited.truth else None)),
+            (TRUTH, SIM, _tick(tick if awaited.truth else None)),
         ]
         return [((topic.name, sender), due) for topic, sender, due in wanted if due is not None]
 
@@ -218,23 +215,21 @@ def read(topic: Topic, payload: bytes) -> Message | None:
         return EStop(0, 0, UNREADABLE) if topic is ESTOP else None
 
 
-def _believable(message: Message, robot: str) -> bool:
-    """Whether numbers that are finite can be meant, and for this robot.
+def _is_believable(message: Message, robot: str) -> bool:
+    """Whether finite numbers can be meant, and for this robot.
 
-    An orientation must be one, a reference be within limits, the world's word speak of the robot.
+    Orientations must be of unit length, references within limits, and the truth of this robot.
     """
     if isinstance(message, State):
-        return _orientation(message.imu_quat_wxyz)
+        return is_orientation(message.imu_quat_wxyz)
     if isinstance(message, Truth):
         names, quats = message.robots, message.base_quat_wxyz
-        return (
-            len(names) == len(quats) and robot in names and _orientation(quats[names.index(robot)])
-        )
-    return not isinstance(message, Reference) or allowed(message)
-
-
-def _orientation(quat_wxyz: Array) -> bool:
-    return _NORM[0] < float(quat_wxyz @ quat_wxyz) < _NORM[1]
+        if robot not in names or len(names) != len(quats):
+            return False
+        return is_orientation(quats[names.index(robot)])
+    if isinstance(message, Reference):
+        return is_within_limits(message)
+    return True
 
 
 def order_of(message: Message) -> Order:

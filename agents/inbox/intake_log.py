@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from typing import Final
 
 from quadriga.agents.agent import Inputs
-from quadriga.agents.inbox.inbox import OPERATOR, WORLD, Inbox, Order, Source, order_of
+from quadriga.agents.inbox.inbox import Inbox, Order, Source, order_of
 from quadriga.agents.planning.interface import NOTHING, Expected
+from quadriga.shared.bus.members import OPERATOR, SIM
 from quadriga.shared.config.sections import Config
 from quadriga.shared.wire.messages import Consumed, Message
 from quadriga.shared.wire.topics import (
@@ -103,7 +104,7 @@ def taken_in(inputs: Inputs) -> list[tuple[Source, Order]]:
     if inputs.estop is not None:
         found.append((ESTOP.name, ANYONE, inputs.estop))
     if inputs.truth is not None:
-        found.append((TRUTH.name, WORLD, inputs.truth))
+        found.append((TRUTH.name, SIM, inputs.truth))
     return [((topic, sender), order_of(message)) for topic, sender, message in found]
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from quadriga.agents.gait import NOMINAL_FORCES
 from quadriga.agents.planner.planner_qp import PlannerProblem
-from quadriga.agents.planner.plausible import OUTPUT_MAX
 from quadriga.agents.planner.qp_solver import ClosedForm, unconstrained
+from quadriga.agents.plausibility import OUTPUT_MAX
 from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.jit import compiled
 

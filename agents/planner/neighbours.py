@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.planner.plausible import plausible
+from quadriga.agents.plausibility import is_plausible
 from quadriga.agents.time_grid import horizon_stance, patience, sample_starts, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array, robot_names
@@ -142,7 +142,7 @@ class Neighbours:
 
         The order of arrival does not matter. A second message for the same tick or step, one of
         a robot that is no peer, one off the time grid or from the future, a plan of another
-        horizon and numbers that no robot can mean (`plausible`) are refused and counted.
+        horizon and numbers that no robot can mean (`is_plausible`) are refused and counted.
         """
         peers, refused = dict(memory.peers), memory.refused
         for robot, measurement in measurements:
@@ -151,7 +151,7 @@ class Neighbours:
             if (
                 history is not None
                 and self._on_grid(measurement.tick, SAMPLE_MS, tick)
-                and plausible(self._config.planner, measurement.u, measurement.y)
+                and is_plausible(self._config.planner, measurement.u, measurement.y)
             ):
                 oldest = tick - self._span_ms
                 kept = _inserted(history.measurements, measurement, oldest, _by_tick)
@@ -167,7 +167,7 @@ class Neighbours:
                 and self._on_grid(plan.tick, step_ms(self._config), tick)
                 and plan.step * step_ms(self._config) == plan.tick
                 and len(plan.u) == self._config.planner.N
-                and plausible(self._config.planner, plan.u, plan.y)
+                and is_plausible(self._config.planner, plan.u, plan.y)
             ):
                 oldest = (tick - self._span_ms) // step_ms(self._config)
                 kept_plans = _inserted(history.plans, plan, (oldest, 0), _by_serial)

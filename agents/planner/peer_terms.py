@@ -8,8 +8,8 @@ from dataclasses import field
 import numpy as np
 from numpy.typing import NDArray
 
+from quadriga.agents.planner.coupling import Coupling, fill_deviations
 from quadriga.agents.planner.neighbours import PeerData, Selection
-from quadriga.agents.predictor.coupling import Coupling, fill_deviations
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.shared.config.sections import Config

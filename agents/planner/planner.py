@@ -13,8 +13,8 @@ from quadriga.agents.planner.free_step import FreeStep
 from quadriga.agents.planner.neighbours import Selection
 from quadriga.agents.planner.peer_terms import Peers, PeerTerms
 from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem, unpack
-from quadriga.agents.planner.plausible import plausible_outputs
 from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS, Residuals, Solver, no_solution
+from quadriga.agents.plausibility import are_plausible_outputs
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.shared.config.sections import Config
@@ -112,7 +112,7 @@ class Planner:
     Args:
         config: the team's configuration.
         index: this agent's place in the team, 0-based.
-        predictor: fitted for this team (see `quadriga.agents.predictor.store.load`).
+        predictor: fitted for this team (see `checked_predictor.load_checked`).
 
     Raises:
         PredictorError: the predictor's sizes are not the configuration's.
@@ -180,7 +180,7 @@ class Planner:
         status = solution.status
         du, dy = unpack(problem, x, y_free)
         y, y_nominal = inputs.y_base + dy, inputs.y_base + y_free.reshape(dy.shape)
-        if not (plausible_outputs(y) and plausible_outputs(y_nominal)):
+        if not (are_plausible_outputs(y) and are_plausible_outputs(y_nominal)):
             # What cannot be foretold is taken to go as asked: the next best that can be told.
             du, y, y_nominal = np.zeros_like(du), inputs.y_des, inputs.y_des
             status = IMPLAUSIBLE if status == SOLVED else status

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces
+from quadriga.agents.planner.deepc_qp import select
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.planner_qp import (
     NO_BOUNDS,
@@ -20,7 +21,6 @@ from quadriga.agents.planner.planner_qp import (
     unpack,
 )
 from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS, Residuals, Solver
-from quadriga.agents.predictor.deepc import select
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
 from quadriga.shared.config.sections import Config
@@ -122,7 +122,7 @@ def deepc(config: Config, model: Condensed) -> TeamPlanner:
 
     Args:
         config: the team's configuration.
-        model: `quadriga.agents.predictor.deepc.build_model` of the team's data.
+        model: `quadriga.agents.planner.deepc_qp.build_model` of the team's data.
 
     Raises:
         ConfigError: output bounds, which the elimination of g does not allow.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from quadriga.agents.gait import nominal_forces
-from quadriga.agents.planner.plausible import plausible
+from quadriga.agents.plausibility import is_plausible
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.recursive import (
     Correction,
@@ -54,7 +54,7 @@ class Adapter:
         T_ini, gait = self._config.planner.T_ini, self._config.gait
         stance = np.array([sample.stance for sample in own]) > 0.5
         u, y = np.array([sample.u for sample in own]), np.array([sample.y for sample in own])
-        if not plausible(self._config.planner, u, y):
+        if not is_plausible(self._config.planner, u, y):
             return learned.refuse()
         du, dy = u - nominal_forces(stance), y - y_base
         z = np.zeros((self._predictor.meta.robots, self._predictor.meta.width))

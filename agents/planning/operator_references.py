@@ -8,24 +8,13 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.predictor.episode import output_base
-from quadriga.shared.config.sections import Config, ReferenceConfig
+from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.wire.messages import Reference
 from quadriga.shared.wire.topics import SAMPLE_MS
 
-# What an operator may ask for, whoever he is: the limits of the configuration's own reference.
-_LIMITS: Final = {
-    name: (key.metadata["low"], key.metadata["high"])
-    for name, key in ReferenceConfig.__dataclass_fields__.items()
-    if name in ("vx", "vy", "wz", "height")
-}
 AHEAD_MS: Final = 1000  # of the present: whoever speaks of later must be there to say it then
 _KEPT_MS = 2000  # long enough for the windows of the oldest plan that may still be used
-
-
-def allowed(reference: Reference) -> bool:
-    """Whether a reference is within the limits of `ReferenceConfig`."""
-    return all(low <= getattr(reference, name) <= high for name, (low, high) in _LIMITS.items())
 
 
 def remember_references(

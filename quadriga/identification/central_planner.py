@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from quadriga.agents.planner.deepc_qp import build_model
 from quadriga.agents.planner.team_planner import TeamPlanner, centralised, deepc
-from quadriga.agents.predictor.deepc import build_model, reduce
+from quadriga.agents.predictor.deepc import reduce
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.cache import data_path
 from quadriga.identification.dataset import read_data

@@ -13,16 +13,11 @@ from hypothesis import strategies as st
 from scipy import integrate, optimize
 
 from quadriga.agents.planner.best_response import best_response_map, best_response_radius
-from quadriga.agents.planner.gates import (
-    GateReport,
-    height_gains,
-    held_out_error,
-    physical_height,
-    run_gates,
-)
+from quadriga.agents.planner.gates import height_gains, held_out_error, physical_height, run_gates
 from quadriga.agents.planner.planner_qp import build_problem
 from quadriga.agents.predictor.episode import Y_SCALE
 from quadriga.agents.predictor.fits import fit_ridge
+from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
