@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.planner.team_planner import TeamPlanner
-from quadriga.agents.planning.local import REFUSED
+from quadriga.agents.planning.interface import REFUSED
 from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
 from quadriga.agents.plausibility import is_within_limits
 from quadriga.agents.rehearsal import rehearse_central

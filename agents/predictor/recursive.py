@@ -76,7 +76,9 @@ class Correction:
         return replace(self, refused=self.refused + 1)
 
 
-def begin(meta: PredictorMeta, robot: int, sources: Sequence[int], how: Forgetting) -> Correction:
+def begin_correction(
+    meta: PredictorMeta, robot: int, sources: Sequence[int], how: Forgetting
+) -> Correction:
     """No correction yet.
 
     Raises:
