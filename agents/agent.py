@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.controller.controller import Controller, ControllerOutputs, Task
+from quadriga.agents.controller.controller import Controller, ControllerOutputs
 from quadriga.agents.controller.estimator import trunk_from_truth
 from quadriga.agents.controller.memory import Memory
 from quadriga.agents.controller.schedule import Schedule
@@ -19,7 +19,6 @@ from quadriga.agents.controller.whole_body.problem import (
     WholeBodyProblem,
     WholeBodySolution,
 )
-from quadriga.agents.gait import half_cycle_stance, stance_progress
 from quadriga.agents.modes import (
     DAMPING,
     ESTOP,
@@ -36,14 +35,14 @@ from quadriga.agents.planning.interface import Expected, PlanningInputs, Plannin
 from quadriga.agents.planning.operator_references import reference_at, remember_references
 from quadriga.agents.planning.registry import build_planning
 from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.schedules import Schedules
+from quadriga.agents.tasks import Tasks
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array, robot_names
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.messages import Command, EStop, Measurement, Plan, Reference, State, Truth
 from quadriga.shared.wire.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
 
-_ZERO = np.zeros(12)
-_STANDING = Schedule(half_cycle_stance(-1).astype(float), 0.5, -1)
 _TRUTH_AGE_MS: Final = 20  # of the simulator's truth, where it stands in for an estimator
 _LONGEST_DT: Final = 0.02  # s, after a gap in the ticks the filters advance by no more than this
 NO_ESTIMATE: Final = "no-estimate"  # stop: the orientation is not a number
@@ -167,11 +166,10 @@ class Agent:
         self._by_truth = config.estimator.kind == "truth"
         self._stand_ms, self._stance_ms = config.gait.stand_ms, config.gait.stance_ms
         self._height = config.reference.height
-        self._schedules = _schedules(config, self.index)
+        self._schedules = Schedules(config, self.index)
+        self._tasks = Tasks(config)
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
         self._damping = config.controller.damping
-        self._feedforward = config.planner.interface == "feedforward"
-        self._planned_footholds = config.planner.footholds == "planned"
 
     @property
     def peers(self) -> tuple[str, ...]:
@@ -233,7 +231,7 @@ class Agent:
 
         course = self._course(state, tick)
         stops = _stops_on_arrival(inputs.estop, course, reference_age)
-        schedule = self._schedule(tick, resolve_stops(course, tick, stops))
+        schedule = self._schedules.at(tick, resolve_stops(course, tick, stops))
         sensed = self._sense(state, inputs, schedule, dt)
         if not sensed.upright >= self._fallen_cosine:
             stops.append(Stop(DAMPING, NO_ESTIMATE if math.isnan(sensed.upright) else FALL))
@@ -251,7 +249,9 @@ class Agent:
             stops.append(Stop(STOPPING, planned.stop_reason))
 
         mode = resolve_stops(course, tick, stops)
-        task = self._task(tick, mode, reference, planned, inputs.excitation, schedule.progress)
+        task = self._tasks.build(
+            tick, mode, reference, planned.setpoint, inputs.excitation, schedule.progress
+        )
         new_sample = tick // SAMPLE_MS != state.tick // SAMPLE_MS
         acted = self._controller.act(sensed, schedule, task, dt, new_sample=new_sample)
         failures = 0 if acted.solution.solved else state.failures + 1
@@ -277,11 +277,6 @@ class Agent:
         ends = (state.tick - stand_ms) // stance_ms != (tick - stand_ms) // stance_ms
         return step_mode(state.mode, tick, stand_ms, ends)
 
-    def _schedule(self, tick: int, mode: Mode) -> Schedule:
-        if mode.name not in (WALK, STOPPING):
-            return _STANDING
-        return self._schedules[(tick - self._stand_ms) % len(self._schedules)]
-
     def _sense(self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float) -> Sensed:
         truth = inputs.truth
         # One that is lost or late is bridged by the filter.
@@ -302,45 +297,8 @@ class Agent:
         begun = tick - SAMPLE_MS
         if tick % SAMPLE_MS != 0 or begun < 0 or begun > state.tick:
             return None
-        stance = self._schedule(begun, state.mode).stance
+        stance = self._schedules.at(begun, state.mode).stance
         return Measurement(tick, tick * 1_000_000, sensed.memory.mean_force, sensed.outputs, stance)
-
-    def _task(
-        self,
-        tick: int,
-        mode: Mode,
-        reference: Reference,
-        planned: PlanningOutputs,
-        excitation: Array | None,
-        progress: float,
-    ) -> Task:
-        """What the operator asks for, with what is planned."""
-        deviation, v_ref = planned.setpoint.deviation, planned.setpoint.v_ref
-        if excitation is not None:
-            deviation = deviation + excitation
-        if mode.name != WALK:
-            deviation = _ZERO
-        factor = mode.speed_factor(tick)
-        vx, vy = factor * reference.vx, factor * reference.vy
-        ahead = None
-        if v_ref is not None:
-            if not self._feedforward:
-                # Planned roll and pitch are not tracked: the reference would follow the error.
-                vx, vy = float(v_ref[0, 0]), float(v_ref[0, 1])
-            if self._planned_footholds:
-                ahead = self._velocity_ahead(v_ref, progress)
-        return Task(
-            vx, vy, factor * reference.wz, reference.height, deviation, self._feedforward, ahead
-        )
-
-    def _velocity_ahead(self, v_ref: Array, progress: float) -> Array:
-        """Mean planned velocity until the middle of the next stance, (2,), m/s.
-
-        Early in a swing the plan ends before that: then until its end.
-        """
-        samples = round((1.5 - progress) * self._stance_ms / SAMPLE_MS)
-        mean: Array = v_ref[: max(1, samples)].mean(axis=0)
-        return mean
 
     def _command(
         self, tick: int, solution: WholeBodySolution, last_tau: Array, mode: Mode
@@ -362,16 +320,6 @@ def _stops_on_arrival(estop: EStop | None, course: Mode, reference_age: int) -> 
     if course.name == WALK and reference_age > REFERENCE.max_age_ms:
         stops.append(Stop(STOPPING, REFERENCE_LOST))
     return stops
-
-
-def _schedules(config: Config, index: int) -> tuple[Schedule, ...]:
-    """A robot's gait at every tick of its period, the first one at the end of the stand."""
-    stances = [half_cycle_stance(half_cycle).astype(float) for half_cycle in (0, 1)]
-    schedules = []
-    for since in range(2 * config.gait.stance_ms):
-        progress, half_cycle = stance_progress(config, index, config.gait.stand_ms + since)
-        schedules.append(Schedule(stances[half_cycle], progress, half_cycle))
-    return tuple(schedules)
 
 
 def _count(

@@ -145,7 +145,7 @@ class _Shell:
             self._put[STATUS](encode(status))
 
     def _publish_intake(self, last: int, inputs: Inputs, expected: Expected) -> None:
-        """Publish what was taken in, where no rule tells it."""
+        """Publish what was taken in, where the rules do not determine it."""
         record = self._intake.record(last, inputs, expected)
         if record is not None:
             self._put[INPUTS](encode(record))

@@ -56,7 +56,7 @@ class Inbox:
         refused: whether a valid message that is no state was refused: too many were held, or it
             is of a time too far ahead.
         misfits: states since the newest one that were not newer, or too far ahead.
-        ended: whether the world has said that the walk is over.
+        ended: whether the world has announced the end of the walk.
     """
 
     def __init__(self, config: Config, robot: str, peers: Sequence[str]) -> None:

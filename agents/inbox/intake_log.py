@@ -1,4 +1,4 @@
-"""What an agent took in at which tick, recorded wherever no rule tells it."""
+"""What an agent took in at which tick, recorded wherever the rules do not determine it."""
 
 from __future__ import annotations
 

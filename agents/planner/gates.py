@@ -67,7 +67,7 @@ def held_out_error(
             continue
         z, dy = episode.windows(T_ini, N)
         n, _, windows = dy.shape
-        error = (_predicted(predictor, episode, z) - dy).reshape(n, N, N_OUTPUTS, windows)
+        error = (_predict_windows(predictor, episode, z) - dy).reshape(n, N, N_OUTPUTS, windows)
         squares += (error**2).sum(axis=(0, 1, 3))
         for start in range(windows):
             future = episode.y[start + T_ini : start + length]
@@ -86,7 +86,7 @@ def held_out_error(
     return count, rmse.tolist(), persistence.tolist(), float(ratio)
 
 
-def _predicted(predictor: Predictor, episode: Episode, z: Array) -> Array:
+def _predict_windows(predictor: Predictor, episode: Episode, z: Array) -> Array:
     """Predictions for all windows of an episode, each by the G of its phase. Shape (n, 6 N, C)."""
     meta = predictor.meta
     ends = episode.first_tick + SAMPLE_MS * (meta.T_ini - 1 + np.arange(z.shape[2]))
@@ -125,7 +125,9 @@ def height_gains(config: Config, predictor: Predictor) -> Array:
             share = (patterns / patterns.sum(axis=2, keepdims=True)).mean(axis=0)
             du = np.zeros((N, N_LEGS, 3))
             du[:, :, 2] = _GAIN_FORCE * share
-            z = (predictor.forced(robot, robot, phase) @ du.ravel()).reshape(N, N_OUTPUTS)[:, 0]
+            z = (predictor.future_block(robot, robot, phase) @ du.ravel()).reshape(N, N_OUTPUTS)[
+                :, 0
+            ]
             gains[k, robot] = z[rows] / physical[rows]
     worst = np.abs(gains - 1.0).argmax(axis=0)
     found: Array = np.take_along_axis(gains, worst[None], axis=0)[0]

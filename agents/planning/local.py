@@ -258,7 +258,7 @@ class LocalPlanning:
         return replace(state, planner=planner, plans=plans, newest=request.serial), outputs
 
     def _stop_without_plan(self, state: LocalState, inputs: PlanningInputs) -> str:
-        """Why to stop at a tick without a new plan, which would tell it; "" for no reason.
+        """Why to stop at a tick without a new plan; "" for no reason.
 
         Asked at every tick: the one of the planning step may itself be missing.
         """

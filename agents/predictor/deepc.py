@@ -7,7 +7,7 @@ determines, with ‖·‖² = aᵀ S_aa⁻¹ a, and one of free coordinates z:
     b + [σ; 0] = Φ a + M z,   Φ = S_ba S_aa⁻¹,   M Mᵀ = S_bb − S_ba S_aa⁻¹ S_ab
 
 At the optimum g has no part outside the span of the data's rows. g, σ and S belong to scaled
-deviations (`Episode.scaled`). `quadriga.agents.planner.deepc_qp` makes the QP of this.
+deviations (`Episode.scaled_deviations`). `quadriga.agents.planner.deepc_qp` makes the QP of this.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def reduce(episodes: Sequence[Episode], T_ini: int, N: int) -> Reduction:
     if len(robots) != 1:
         raise PredictorError("episodes", f"teams of {sorted(robots)} robots", "data of one team")
     n, L = robots.pop(), T_ini + N
-    S = gram([np.concatenate(episode.scaled(), axis=1) for episode in episodes], L)
+    S = gram([np.concatenate(episode.scaled_deviations(), axis=1) for episode in episodes], L)
     a, b = _rows(n, T_ini, N)
     S_aa, S_ab = S[np.ix_(a, a)], S[np.ix_(a, b)]
     floor = _RANK_TOLERANCE * float(np.linalg.norm(S_aa))

@@ -86,7 +86,7 @@ def written_out(
     n = len(case.stance)
     U, Y = (
         np.hstack([hankel(w, T_INI + N) for w in signals])
-        for signals in zip(*(episode.scaled() for episode in case.episodes), strict=True)
+        for signals in zip(*(episode.scaled_deviations() for episode in case.episodes), strict=True)
     )
     (U_p, U_f), (Y_p, Y_f) = (
         (by_robot(X[: T_INI * n * d], n, d), by_robot(X[T_INI * n * d :], n, d))

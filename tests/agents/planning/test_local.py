@@ -180,7 +180,7 @@ def test_a_plan_fades_out_beyond_the_range_of_the_data(
     nominal = nominal_forces(scheduled_stance(ALONE, 0, FIRST + 10 * np.arange(25)))
     np.testing.assert_allclose(faded.plan.u - nominal, share * (full.plan.u - nominal), atol=1e-6)
     # The predictor is linear: what a share of the forces does is that share of what they do.
-    G = simple_predictor(ALONE).forced(0, 0)
+    G = simple_predictor(ALONE).future_block(0, 0)
     effect = (G @ (full.plan.u - nominal).ravel()).reshape(25, 6)
     np.testing.assert_allclose(full.plan.y - faded.plan.y, (1.0 - share) * effect, atol=1e-6)
 
