@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.planner.team_planner import TeamPlanner
-from quadriga.agents.planning.local import REFUSED
-from quadriga.agents.planning.operator_references import allowed
+from quadriga.agents.planning.interface import REFUSED
 from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
+from quadriga.agents.plausibility import is_within_limits
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.agents.time_grid import step_ms
 from quadriga.shared.bus.barrier import meet
@@ -119,7 +119,7 @@ class _CentralShell:
                 self._ended = self._ended or decode(payload, Event).kind == "stop"
             else:
                 reference = decode(payload, Reference)
-                if not allowed(reference):
+                if not is_within_limits(reference):
                     self._counters[f"dropped_{REFERENCE.name}"] += 1
                     return
                 self._references.append(reference)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import GRAVITY, N_LEGS, TOTAL_MASS, Array
 
-# Diagonal pairs in the leg order FL FR RL RR: row 0 stands in the first half of the period.
+# Diagonal pairs in the leg order FL FR RL RR: row 0 stands in the first half cycle.
 _BITS = np.array([8, 4, 2, 1])
 _PAIRS = np.array([[True, False, False, True], [False, True, True, False]])
 
@@ -21,23 +21,23 @@ def phase_offset_ms(config: Config, index: int) -> int:
 def scheduled_stance(config: Config, index: int, ticks: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Scheduled stance of robot `index` (0-based) at each tick. Shape (len(ticks), 4)."""
     since = ticks - config.gait.stand_ms
-    half = ((since + phase_offset_ms(config, index)) // config.gait.stance_ms) % 2
-    return np.where((since < 0)[:, None], True, _PAIRS[half])
+    half_cycle = ((since + phase_offset_ms(config, index)) // config.gait.stance_ms) % 2
+    return np.where((since < 0)[:, None], True, _PAIRS[half_cycle])
 
 
 def stance_progress(config: Config, index: int, tick: int) -> tuple[float, int]:
-    """Progress of the present half period in [0, 1) and its number, 0 or 1.
+    """Progress of the present half cycle in [0, 1) and its number, 0 or 1.
 
-    Both halves last `stance_ms`: one diagonal pair stands while the other swings.
+    Both half cycles last `stance_ms`: one diagonal pair stands while the other swings.
     """
     since = tick - config.gait.stand_ms + phase_offset_ms(config, index)
-    half, within = divmod(since, config.gait.stance_ms)
-    return within / config.gait.stance_ms, half % 2
+    half_cycle, within = divmod(since, config.gait.stance_ms)
+    return within / config.gait.stance_ms, half_cycle % 2
 
 
-def stance_of_half(half: int) -> NDArray[np.bool_]:
-    """Scheduled stance during a half period; half −1 stands on all four legs. Shape (4,)."""
-    return np.ones(N_LEGS, dtype=np.bool_) if half < 0 else _PAIRS[half]
+def half_cycle_stance(half_cycle: int) -> NDArray[np.bool_]:
+    """Scheduled stance during a half cycle; number −1 stands on all four legs. Shape (4,)."""
+    return np.ones(N_LEGS, dtype=np.bool_) if half_cycle < 0 else _PAIRS[half_cycle]
 
 
 def nominal_forces(stance: NDArray[np.bool_]) -> Array:

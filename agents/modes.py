@@ -5,6 +5,7 @@ stand → walk → stopping → stand (for good); damping and estop are latched 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -16,6 +17,7 @@ STOPPING: Final = "stopping"
 DAMPING: Final = "damping"
 ESTOP: Final = "estop"
 
+PRECEDENCE: Final = (ESTOP, DAMPING, STOPPING)  # of the stops of one tick, the gravest first
 REASON_MOST: Final = 200  # characters of a reason; beyond 4096 no status could be read
 SLOW_DOWN_MS: Final = 500  # of a safe stop: speed goes to zero while the trot goes on
 
@@ -29,7 +31,7 @@ class Mode:
     reason: str = ""
 
     @property
-    def limp(self) -> bool:
+    def passive(self) -> bool:
         """Whether the joints are only damped."""
         return self.name in (DAMPING, ESTOP)
 
@@ -42,13 +44,37 @@ class Mode:
         return 0.0
 
 
-def step_mode(mode: Mode, tick: int, stand_ms: int, half_boundary: bool) -> Mode:
+@record
+class Stop:
+    """A cause to leave the normal course: the mode it asks for (of `PRECEDENCE`) and why."""
+
+    mode: str
+    reason: str
+
+
+def step_mode(mode: Mode, tick: int, stand_ms: int, half_cycle_ends: bool) -> Mode:
     """The mode's normal course: start walking, finish a safe stop at the end of a stance."""
     if mode.name == STAND and not mode.reason and tick >= stand_ms:
         return Mode(WALK, tick)
-    if mode.name == STOPPING and half_boundary and tick - mode.since >= SLOW_DOWN_MS:
+    if mode.name == STOPPING and half_cycle_ends and tick - mode.since >= SLOW_DOWN_MS:
         return replace(mode, name=STAND)
     return mode
+
+
+def resolve_stops(mode: Mode, tick: int, stops: Sequence[Stop]) -> Mode:
+    """The mode after all stops of one tick: the gravest counts, of equally grave ones the first.
+
+    Args:
+        mode: of the normal course, see `step_mode`.
+        tick: the present one.
+        stops: in the order in which they came up.
+    """
+    if not stops:
+        return mode
+    gravest = min(stops, key=lambda stop: PRECEDENCE.index(stop.mode))
+    if gravest.mode == STOPPING:
+        return stop_safely(mode, tick, gravest.reason)
+    return enter_passive(mode, tick, gravest.mode, gravest.reason)
 
 
 def stop_safely(mode: Mode, tick: int, reason: str) -> Mode:
@@ -60,11 +86,11 @@ def stop_safely(mode: Mode, tick: int, reason: str) -> Mode:
     return mode
 
 
-def go_limp(mode: Mode, tick: int, name: str, reason: str) -> Mode:
+def enter_passive(mode: Mode, tick: int, name: str, reason: str) -> Mode:
     """Damp the joints for good; an emergency stop outranks a fault, the first reason stays.
 
     Of a long reason, which anyone may send, the first `REASON_MOST` characters are kept.
     """
-    if mode.name == ESTOP or (mode.limp and name == DAMPING):
+    if mode.name == ESTOP or (mode.passive and name == DAMPING):
         return mode
     return Mode(name, tick, reason[:REASON_MOST])

@@ -50,14 +50,14 @@ def run(
     stopped = stopped or stop_on_signals()
     one_blas_thread()
     agent = Agent(config, robot, predictor, monotonic_ns)
-    arrivals = Inbox(config, robot, agent.peers)
+    inbox = Inbox(config, robot, agent.peers)
     with Bus.open(config.bus, config.team.name, robot, stopped) as bus:
-        for key in arrivals.keys:
+        for key in inbox.keys:
             bus.subscribe(key)
         if not meet(bus, config, stopped):
             return
         rehearse(config, Agent(config, robot, predictor))
-        shell = _Shell(config, agent, arrivals, bus)
+        shell = _Shell(config, agent, inbox, bus)
         gc.collect()
         gc.freeze()
         gc.disable()  # a collection in mid-step costs more than the step
@@ -69,26 +69,26 @@ def run(
 class _Shell:
     """The loop around `Agent.step`."""
 
-    def __init__(self, config: Config, agent: Agent, arrivals: Inbox, bus: Bus) -> None:
+    def __init__(self, config: Config, agent: Agent, inbox: Inbox, bus: Bus) -> None:
         team, realtime = config.team.name, config.world.mode == "realtime"
-        self._config, self._agent, self._arrivals, self._bus = config, agent, arrivals, bus
+        self._config, self._agent, self._inbox, self._bus = config, agent, inbox, bus
         self._lockstep = not realtime
         self._put = {
             topic: bus.publisher(topic.key(team, agent.robot), droppable=realtime)
             for topic in (COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS)
         }
         self._telemetry = Telemetry(config.estimator.kind, paced=realtime)
-        self._intake = Intake(config, arrivals)
-        # Since the last answer: how many there were when they were first noticed, and when.
+        self._intake = Intake(config, inbox)
+        # Since the last answer: how many misfits there were when first noticed, and when.
         self._misfits: tuple[int, float] | None = None
-        self._given_up: dict[Source, int] = {}  # what had been heard of whom when given up
+        self._given_up: dict[Source, int] = {}  # messages received of a source when given up
 
     def walk(self, stopped: Callable[[], bool]) -> None:
         """Answer every state until the walk is over."""
         memory = self._agent.initial()
-        while not (stopped() or self._arrivals.ended):
+        while not (stopped() or self._inbox.ended):
             self._receive(POLL)
-            state = self._arrivals.state()
+            state = self._inbox.pop_state()
             if state is not None:
                 memory = self._answer(memory, state)
                 self._misfits = None
@@ -99,7 +99,7 @@ class _Shell:
 
     def _check_clock(self, tick: int) -> None:
         """End where states go on coming but none is newer than `tick`: all would be ignored."""
-        count, now = self._arrivals.misfits, monotonic()
+        count, now = self._inbox.misfits, monotonic()
         if self._misfits is None:
             self._misfits = (count, now) if count else None
             return
@@ -117,22 +117,22 @@ class _Shell:
         first = self._bus.get(timeout)
         if first is None:
             return False
-        self._arrivals.take(*first)
+        self._inbox.take(*first)
         for packet in self._bus.drain():
-            self._arrivals.take(*packet)
+            self._inbox.take(*packet)
         return True
 
     def _answer(self, memory: AgentState, state: State) -> AgentState:
         begun = monotonic_ns()
-        self._telemetry.taken(state.tick, begun)
-        awaited = self._agent.awaited(state.tick)
-        inputs = self._complete(state, awaited)
+        self._telemetry.note_state(state.tick, begun)
+        expected = self._agent.expected(state.tick)
+        inputs = self._gather_inputs(state, expected)
         last = memory.tick
         memory, outputs = self._agent.step(memory, inputs)
         self._put[COMMAND](encode(outputs.command))
-        self._telemetry.note(outputs, monotonic_ns() - begun)
+        self._telemetry.note_step(outputs, monotonic_ns() - begun)
         self._publish_rest(state.tick, outputs)
-        self._publish_intake(last, inputs, awaited)
+        self._publish_intake(last, inputs, expected)
         return memory
 
     def _publish_rest(self, tick: int, outputs: Outputs) -> None:
@@ -140,37 +140,39 @@ class _Shell:
             self._put[MEASUREMENT](encode(outputs.measurement))
         if outputs.plan is not None:
             self._put[PLAN](encode(outputs.plan))
-        status = self._telemetry.status(tick, outputs, self._arrivals.counters)
+        status = self._telemetry.status(tick, outputs, self._inbox.counters)
         if status is not None:
             self._put[STATUS](encode(status))
 
-    def _publish_intake(self, last: int, inputs: Inputs, awaited: Expected) -> None:
-        """Tell the recorder what was taken in, where it could not tell by itself."""
-        record = self._intake.record(last, inputs, awaited)
+    def _publish_intake(self, last: int, inputs: Inputs, expected: Expected) -> None:
+        """Publish what was taken in, where the rules do not determine it."""
+        record = self._intake.record(last, inputs, expected)
         if record is not None:
             self._put[INPUTS](encode(record))
 
-    def _complete(self, state: State, awaited: Expected) -> Inputs:
-        """The inputs of a step; in lock-step once those who owe a message have sent it.
+    def _gather_inputs(self, state: State, expected: Expected) -> Inputs:
+        """The inputs of a step; in lock-step once all expected messages have come.
 
-        Who did not within the time-out is not waited for again until he has sent such a message.
+        A source that is silent for the time-out is not waited for again until it sends a message.
         """
-        if self._lockstep and awaited is not NOTHING:
+        if self._lockstep and expected is not NOTHING:
             deadline = monotonic() + self._config.planner.peer_timeout
-            while owing := self._owing(state.tick, awaited):
+            missing = self._missing_sources(state.tick, expected)
+            while missing:
                 left = deadline - monotonic()
                 if left <= 0.0:
-                    self._given_up |= {source: self._arrivals.heard[source] for source in owing}
-                    self._arrivals.counters["waits_given_up"] += 1
+                    self._given_up |= {source: self._inbox.received[source] for source in missing}
+                    self._inbox.counters["waits_given_up"] += 1
                     break
                 self._receive(min(left, POLL))
-        return self._arrivals.inputs(state, awaited)
+                missing = self._missing_sources(state.tick, expected)
+        return self._inbox.pop_inputs(state, expected)
 
-    def _owing(self, tick: int, awaited: Expected) -> set[Source]:
-        """Who still owes a message and is worth waiting for."""
-        heard, present = self._arrivals.heard, self._bus.present(HERE)
+    def _missing_sources(self, tick: int, expected: Expected) -> set[Source]:
+        """Sources that have not sent their message yet and are worth waiting for."""
+        received, present = self._inbox.received, self._bus.present(HERE)
         return {
             source
-            for source in self._arrivals.owing(tick, awaited)
-            if source[1] in present and self._given_up.get(source) != heard[source]
+            for source in self._inbox.missing_sources(tick, expected)
+            if source[1] in present and self._given_up.get(source) != received[source]
         }

@@ -9,9 +9,8 @@ import numpy as np
 
 from quadriga.agents.agent import Agent, AgentState, Inputs
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.planning.local import first_step
 from quadriga.agents.planning.team import Central, CentralState
-from quadriga.agents.time_grid import step_ms
+from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import (
     GRAVITY,

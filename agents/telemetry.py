@@ -29,14 +29,14 @@ class Telemetry:
         self._estimator, self._paced = estimator, paced
         self._jitter = Histogram(_BIN_MS)
         self._missed = 0
-        self._taken = (-1, 0)  # tick and wall-clock time of the newest state
+        self._newest_state = (-1, 0)  # tick and wall-clock time of the newest state
         self._mode = ("", "")
         self._planner_ms: list[float] = []
         self._tick_us: list[float] = []
         self._last = -PERIOD_MS
-        self._ages_ms: dict[str, float] = {}  # each as it was when last told
+        self._ages_ms: dict[str, float] = {}  # each as it was last
 
-    def note(self, outputs: Outputs, tick_ns: int) -> None:
+    def note_step(self, outputs: Outputs, tick_ns: int) -> None:
         """Add one tick.
 
         Args:
@@ -44,15 +44,16 @@ class Telemetry:
             tick_ns: wall-clock time from taking the state to having sent the command.
         """
         self._tick_us.append(1e-3 * tick_ns)
-        self._missed += self._paced and tick_ns > _TICK_MS * 1e6
+        if self._paced and tick_ns > _TICK_MS * 1e6:
+            self._missed += 1
         self._ages_ms.update(outputs.ages_ms)
         if outputs.planner_ns is not None:
             self._planner_ms.append(1e-6 * outputs.planner_ns)
 
-    def taken(self, tick: int, wall_ns: int) -> None:
-        """A state of world time `tick` has been taken at `wall_ns` of a steady clock."""
-        last, before = self._taken
-        self._taken = tick, wall_ns
+    def note_state(self, tick: int, wall_ns: int) -> None:
+        """Add a state of world time `tick`, received at `wall_ns` of a steady clock."""
+        last, before = self._newest_state
+        self._newest_state = tick, wall_ns
         if self._paced and last >= 0:
             self._jitter.add(abs(1e-6 * (wall_ns - before) - (tick - last)))
 

@@ -48,6 +48,18 @@ def place_in(cycle: range, step: int) -> int:
     return cycle.start + (step - cycle.start) % len(cycle) if step >= cycle.start else step
 
 
+def first_step(config: Config, begun: int = 0) -> int:
+    """The team's first planning step: it walks, and all windows can be complete.
+
+    Args:
+        config: the team's configuration.
+        begun: tick at which the first sample begins.
+    """
+    samples = config.planner.T_ini + config.planner.applied
+    ready_ms = max(config.gait.stand_ms, begun + SAMPLE_MS * samples)
+    return -(-ready_ms // step_ms(config))
+
+
 def patience(config: Config) -> int:
     """Planning steps for which a team does without a plan that ought to be there."""
     return config.planner.max_peer_age + config.planner.hold_steps

@@ -100,7 +100,7 @@ class DeepcQp:
     Args:
         config: T_ini, N, weights, friction, bounds.
         episodes: data of one team.
-        lambda_g, lambda_sigma: λ_g and λ_σ, on scaled deviations (`Episode.scaled`).
+        lambda_g, lambda_sigma: λ_g and λ_σ, on scaled deviations (`Episode.scaled_deviations`).
         settings: OSQP's.
     """
 
@@ -114,7 +114,7 @@ class DeepcQp:
     ) -> None:
         self._config, n = config, episodes[0].robots
         T_ini, N = config.T_ini, config.N
-        u, y = zip(*(episode.scaled() for episode in episodes), strict=True)
+        u, y = zip(*(episode.scaled_deviations() for episode in episodes), strict=True)
         data = split(u, y, T_ini, N)
         U_p, U_f = _robots_first(data.U_p, n, N_FORCES), _robots_first(data.U_f, n, N_FORCES)
         Y_p, Y_f = _robots_first(data.Y_p, n, N_OUTPUTS), _robots_first(data.Y_f, n, N_OUTPUTS)

@@ -10,6 +10,7 @@ import numpy as np
 
 from benchmarks.as_written import DeepcQp, PaperQp
 from benchmarks.planner_ticks import PlanningTick
+from quadriga.agents.planner.deepc_qp import build_model, select
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner
 from quadriga.agents.planner.planner_qp import (
@@ -20,8 +21,8 @@ from quadriga.agents.planner.planner_qp import (
     unpack,
 )
 from quadriga.agents.planner.qp_solver import SOLVERS, Solver
-from quadriga.agents.planner.team_planner import TeamPlanner, centralised
-from quadriga.agents.predictor.deepc import build_model, reduce, select
+from quadriga.agents.planner.team_planner import TeamPlanner, build_centralised
+from quadriga.agents.predictor.deepc import reduce
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
@@ -156,7 +157,7 @@ class Team:
         self._G_u = np.ascontiguousarray(G)
         G = np.block([[predictor.block(i, j)[:, :past] for j in robots] for i in robots])
         self._G_past = np.ascontiguousarray(G)
-        self._planner: TeamPlanner = centralised(config, predictor)
+        self._planner: TeamPlanner = build_centralised(config, predictor)
         self._problem = cache(self._build)
 
     def cases(self, tick: PlanningTick) -> list[Case]:
@@ -201,7 +202,7 @@ class Deepc:
         past, y_des = tick.past.ravel(), tick.y_des.ravel()
         y_free = problem.condensed.free(past, y_des)
         robots = tuple(range(len(tick.stance)))
-        return [Case(tick, robots, problem, problem.linear(past, y_des), y_free, y_des)]
+        return [Case(tick, robots, problem, problem.linear_term(past, y_des), y_free, y_des)]
 
     def contenders(self) -> list[Contender]:
         """Both with everything that depends on the tick."""
@@ -216,7 +217,7 @@ class Deepc:
             problem, solver = self._set_up(case.tick.stance.tobytes())
             past = case.tick.past.ravel()
             y_free = problem.condensed.free(past, case.y_des)
-            solution = solver.solve(problem.linear(past, case.y_des))
+            solution = solver.solve(problem.linear_term(past, case.y_des))
             return unpack(problem, solution.x, y_free)[0].ravel()
 
         return [Contender("eq. 5", AS_WRITTEN, as_written), Contender("eq. 5", "daqp", ours)]

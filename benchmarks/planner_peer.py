@@ -30,7 +30,7 @@ class CvxpyDeepc:
     def __init__(self, config: PlannerConfig, episodes: Sequence[Episode]) -> None:
         import cvxpy as cp
 
-        u, y = zip(*(episode.scaled() for episode in episodes), strict=True)
+        u, y = zip(*(episode.scaled_deviations() for episode in episodes), strict=True)
         data = split(u, y, config.T_ini, config.N)
         N, rows = config.N, len(data.Y_p)
         self._u_ini, self._y_ini = cp.Parameter(len(data.U_p)), cp.Parameter(rows)

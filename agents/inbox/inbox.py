@@ -8,12 +8,12 @@ from typing import Any, Final
 
 from quadriga.agents.agent import Inputs
 from quadriga.agents.planning.interface import NOTHING, Expected
-from quadriga.agents.planning.operator_references import AHEAD_MS, allowed
+from quadriga.agents.planning.operator_references import AHEAD_MS
+from quadriga.agents.plausibility import is_orientation, is_within_limits
 from quadriga.agents.time_grid import step_ms
-from quadriga.shared.bus.members import PLANNER
+from quadriga.shared.bus.members import OPERATOR, PLANNER, SIM
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.errors import MessageError
-from quadriga.shared.robot.a1 import Array
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import EStop, Event, Message, Plan, Reference, State, Truth
 from quadriga.shared.wire.topics import (
@@ -28,23 +28,20 @@ from quadriga.shared.wire.topics import (
     Topic,
 )
 
-OPERATOR: Final = "operator"
-WORLD: Final = "sim"
 Source = tuple[str, str]  # name of a topic, name of who sends it
 Order = tuple[int, int]  # a tick, or the step and exchange of a plan
-Wanted = tuple[Source, Order]  # a message of a source, and all before it
+Due = tuple[Source, Order]  # a message of a source, and all before it
 UNREADABLE: Final = "unreadable"  # reason of a stop whose message does not decode
 _NEVER: Final = (-1, 0)
 _HELD: Final = 256  # messages of one source beyond those of the stand; more can only be a flood
 _JUMP_MS: Final = 5000  # from one state to the next; longer than any silence the team survives
-_NORM: Final = (0.5, 2.0)  # |q|² of an orientation; far from 1 it is none
 
 
 class Inbox:
     """The messages that an agent subscribes to, between the bus and its next step.
 
-    In lock-step a message is handed over at the tick that awaits it, never earlier: then what an
-    agent knew at each tick does not depend on who was faster. In real time all that has come is
+    In lock-step a message is handed over at the tick that expects it, never earlier, so what an
+    agent knows at a tick does not depend on who was faster. In real time all that has come is
     handed over.
 
     Args:
@@ -55,11 +52,11 @@ class Inbox:
     Attributes:
         topics: row of the table and sender of every key that it subscribes to.
         counters: refused messages, states passed over and waits given up, by name.
-        heard: valid messages by topic and sender.
-        refused: whether a valid message but a state was refused: too many were held, or it is of
-            a time too far ahead.
+        received: valid messages by topic and sender.
+        refused: whether a valid message that is no state was refused: too many were held, or it
+            is of a time too far ahead.
         misfits: states since the newest one that were not newer, or too far ahead.
-        ended: whether the world has said that the walk is over.
+        ended: whether the world has announced the end of the walk.
     """
 
     def __init__(self, config: Config, robot: str, peers: Sequence[str]) -> None:
@@ -71,17 +68,17 @@ class Inbox:
             STATE.key(team, robot): (STATE, robot),
             REFERENCE.key(team): (REFERENCE, OPERATOR),
             ESTOP.key(team): (ESTOP, ""),
-            EVENT.key(team): (EVENT, WORLD),
+            EVENT.key(team): (EVENT, SIM),
         }
         if config.estimator.kind == "truth":
-            self.topics[TRUTH.key(team)] = (TRUTH, WORLD)
+            self.topics[TRUTH.key(team)] = (TRUTH, SIM)
         if central:
             self.topics[PLAN.key(team, robot)] = (PLAN, PLANNER)
         for peer in self._peers:
             self.topics[PLAN.key(team, peer)] = (PLAN, peer)
             self.topics[MEASUREMENT.key(team, peer)] = (MEASUREMENT, peer)
         self.counters: Counter[str] = Counter()
-        self.heard: Counter[Source] = Counter()
+        self.received: Counter[Source] = Counter()
         self.refused = self.ended = False
         self.misfits = 0
         self._newest: dict[Source, Order] = {}
@@ -106,26 +103,28 @@ class Inbox:
             self.counters["dropped_foreign"] += 1
             return
         topic, sender = row
-        message = read(topic, payload)
-        if message is None or not _believable(message, self._robot):
+        message = decode_packet(topic, payload)
+        if message is None or not _is_believable(message, self._robot):
             self.counters[f"dropped_{topic.name}"] += 1
             return
-        if topic not in (ESTOP, EVENT) and self._ahead(message):
+        if topic not in (ESTOP, EVENT) and self._is_ahead(message):
             self.counters[f"ahead_{topic.name}"] += 1
-            self.misfits += topic is STATE
-            self.refused |= topic is not STATE
+            if topic is STATE:
+                self.misfits += 1
+            else:
+                self.refused = True
             return
-        self.heard[topic.name, sender] += 1
+        self.received[topic.name, sender] += 1
         self._keep(topic, sender, message)
 
-    def _ahead(self, message: Message) -> bool:
-        """Whether a message is of a time that nobody in the team can have come to.
+    def _is_ahead(self, message: Message) -> bool:
+        """Whether a message is of a time that nobody in the team can have reached.
 
-        One such would be held for as long, and what is real would be late behind it. The first
-        state is believed: it says what time it is.
+        It would be held until then, and real messages would be late behind it. The first state is
+        believed: it tells the time.
         """
         if isinstance(message, State):
-            return 0 <= self._now < message.tick - _JUMP_MS
+            return self._now >= 0 and message.tick > self._now + _JUMP_MS
         tick = message.step * self._step_ms if isinstance(message, Plan) else message.tick
         return tick > max(self._now, 0) + AHEAD_MS
 
@@ -155,37 +154,39 @@ class Inbox:
         else:
             self._state, self._now, self.misfits = state, state.tick, 0
 
-    def state(self) -> State | None:
+    def pop_state(self) -> State | None:
         """The newest state, once; ticks only rise."""
         state, self._state = self._state, None
         return state
 
-    def wanted(self, tick: int, awaited: Expected) -> list[Wanted]:
-        """The last message of each source that the step of `tick` awaits."""
-        wanted: list[tuple[Topic, str, Order | None]] = [
-            *((PLAN, name, awaited.plan) for name in self._planners),
-            *((MEASUREMENT, name, _tick(awaited.measurement_tick)) for name in self._peers),
-            (REFERENCE, OPERATOR, _tick(awaited.reference_tick)),
-            (TRUTH, WORLD, _tick(tick if awaited.truth else None)),
+    def list_due(self, tick: int, expected: Expected) -> list[Due]:
+        """The last message of each source that the step of `tick` waits for."""
+        limits: list[tuple[Topic, str, Order | None]] = [
+            *((PLAN, name, expected.plan) for name in self._planners),
+            *((MEASUREMENT, name, _tick(expected.measurement_tick)) for name in self._peers),
+            (REFERENCE, OPERATOR, _tick(expected.reference_tick)),
+            (TRUTH, SIM, _tick(tick if expected.truth else None)),
         ]
-        return [((topic.name, sender), due) for topic, sender, due in wanted if due is not None]
+        return [
+            ((topic.name, sender), limit) for topic, sender, limit in limits if limit is not None
+        ]
 
-    def owing(self, tick: int, awaited: Expected) -> frozenset[Source]:
+    def missing_sources(self, tick: int, expected: Expected) -> frozenset[Source]:
         """Whose message, of which topic, for the step of `tick` has not come yet."""
         return frozenset(
             source
-            for source, due in self.wanted(tick, awaited)
-            if self._newest.get(source, _NEVER) < due
+            for source, limit in self.list_due(tick, expected)
+            if self._newest.get(source, _NEVER) < limit
         )
 
-    def inputs(self, state: State, awaited: Expected) -> Inputs:
-        """All that is due at the step of `state`, sorted by robot, then tick."""
-        if self._lockstep and awaited is NOTHING and self._estop is None:
+    def pop_inputs(self, state: State, expected: Expected) -> Inputs:
+        """All that is due at the step of `state`, sorted by robot, then tick; it is removed."""
+        if self._lockstep and expected is NOTHING and self._estop is None:
             return Inputs(state)
-        plans = self._due(PLAN, awaited.plan)
-        measurements = self._due(MEASUREMENT, _tick(awaited.measurement_tick))
-        references = self._due(REFERENCE, _tick(awaited.reference_tick))
-        truths = self._due(TRUTH, _tick(state.tick if awaited.truth else None))
+        plans = self._pop_due(PLAN, expected.plan)
+        measurements = self._pop_due(MEASUREMENT, _tick(expected.measurement_tick))
+        references = self._pop_due(REFERENCE, _tick(expected.reference_tick))
+        truths = self._pop_due(TRUTH, _tick(state.tick if expected.truth else None))
         estop, self._estop = self._estop, None
         return Inputs(
             state,
@@ -196,45 +197,43 @@ class Inbox:
             truths[-1][1] if truths else None,
         )
 
-    def _due(self, topic: Topic, limit: Order | None) -> list[tuple[str, Any]]:
+    def _pop_due(self, topic: Topic, limit: Order | None) -> list[tuple[str, Any]]:
         """Take out the held messages of a topic up to `limit`."""
-        if (self._lockstep and limit is None) or not (held := self._held.get(topic.name)):
+        held = self._held.get(topic.name)
+        if not held or (self._lockstep and limit is None):
             return []
-        due: list[tuple[str, Any]] = []
-        later: list[tuple[str, Any]] = []
-        for item in held:
-            on_time = not self._lockstep or limit is None or order_of(item[1]) <= limit
-            (due if on_time else later).append(item)
+        due, later = held, []
+        if self._lockstep and limit is not None:
+            due = [item for item in held if order_of(item[1]) <= limit]
+            later = [item for item in held if order_of(item[1]) > limit]
         self._held[topic.name] = later
         self._count.subtract((topic.name, sender) for sender, _ in due)
         return sorted(due, key=lambda item: (item[0], order_of(item[1])))
 
 
-def read(topic: Topic, payload: bytes) -> Message | None:
-    """The message in a packet; None if it is none. Whatever comes as an emergency stop is one."""
+def decode_packet(topic: Topic, payload: bytes) -> Message | None:
+    """The message in a packet, or None; whatever comes as an emergency stop is one."""
     try:
         return decode(payload, topic.type)
     except MessageError:
         return EStop(0, 0, UNREADABLE) if topic is ESTOP else None
 
 
-def _believable(message: Message, robot: str) -> bool:
-    """Whether numbers that are finite can be meant, and for this robot.
+def _is_believable(message: Message, robot: str) -> bool:
+    """Whether finite numbers can be meant, and for this robot.
 
-    An orientation must be one, a reference be within limits, the world's word speak of the robot.
+    Orientations must be of unit length, references within limits, and the truth of this robot.
     """
     if isinstance(message, State):
-        return _orientation(message.imu_quat_wxyz)
+        return is_orientation(message.imu_quat_wxyz)
     if isinstance(message, Truth):
         names, quats = message.robots, message.base_quat_wxyz
-        return (
-            len(names) == len(quats) and robot in names and _orientation(quats[names.index(robot)])
-        )
-    return not isinstance(message, Reference) or allowed(message)
-
-
-def _orientation(quat_wxyz: Array) -> bool:
-    return _NORM[0] < float(quat_wxyz @ quat_wxyz) < _NORM[1]
+        if robot not in names or len(names) != len(quats):
+            return False
+        return is_orientation(quats[names.index(robot)])
+    if isinstance(message, Reference):
+        return is_within_limits(message)
+    return True
 
 
 def order_of(message: Message) -> Order:

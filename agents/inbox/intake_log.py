@@ -1,4 +1,4 @@
-"""What an agent took in at which tick, told wherever it does not follow from the rules alone."""
+"""What an agent took in at which tick, recorded wherever the rules do not determine it."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from typing import Final
 
 from quadriga.agents.agent import Inputs
-from quadriga.agents.inbox.inbox import OPERATOR, WORLD, Inbox, Order, Source, order_of
+from quadriga.agents.inbox.inbox import Inbox, Order, Source, order_of
 from quadriga.agents.planning.interface import NOTHING, Expected
+from quadriga.shared.bus.members import OPERATOR, SIM
 from quadriga.shared.config.sections import Config
 from quadriga.shared.wire.messages import Consumed, Message
 from quadriga.shared.wire.topics import (
@@ -26,41 +27,41 @@ _FIRST: Final = (-1, 0)
 class Intake:
     """Decides at each step whether a `Consumed` is due.
 
-    In real time what an agent knew depends on who was faster: due is one at every step that took
-    in more than the state after the last one. In lock-step `Inbox` and `Agent.awaited` say what
-    is taken in at each tick: due is one when a message was owed, or came too late for the step that
-    awaited it, when a state was passed over, once a valid message was refused, and of what no rule
-    expects.
+    In real time what an agent knew depends on who was faster: one is due at every step that took
+    in more than the state after the last one. In lock-step `Inbox` and `Agent.expected` tell what
+    is taken in at each tick. One is due when a message was missing or came too late for the step
+    that expected it, when a state was passed over, once a valid message was refused, and for every
+    message that no rule expects.
 
     Args:
         config: the team's configuration.
-        arrivals: where the agent's inputs come from.
+        inbox: where the agent's inputs come from.
     """
 
-    def __init__(self, config: Config, arrivals: Inbox) -> None:
+    def __init__(self, config: Config, inbox: Inbox) -> None:
         self._lockstep = config.world.mode == "lockstep"
-        self._arrivals = arrivals
+        self._inbox = inbox
         self._number = 0
         self._handed_over: dict[Source, Order] = {}  # in lock-step: up to where
 
-    def record(self, last: int, inputs: Inputs, awaited: Expected) -> Consumed | None:
+    def record(self, last: int, inputs: Inputs, expected: Expected) -> Consumed | None:
         """The record of one step, if one is due.
 
         Args:
             last: tick of the step before, −1 before the first.
             inputs: what this step took in; nothing has been taken in since.
-            awaited: what it awaited.
+            expected: what it expected.
         """
         tick = inputs.state.tick
-        if tick == last + 1 and awaited is NOTHING and inputs.bare:
+        if tick == last + 1 and expected is NOTHING and inputs.bare:
             return None
-        taken, owed = taken_in(inputs), frozenset[Source]()
+        taken, owed = list_messages(inputs), frozenset[Source]()
         unusual = bool(taken)
         if self._lockstep:
-            unusual = self._arrivals.refused or not self._by_rule(taken)
-            if awaited != NOTHING:
-                owed = self._arrivals.owing(tick, awaited)
-                self._handed_over.update(self._arrivals.wanted(tick, awaited))
+            unusual = self._inbox.refused or not self._by_rule(taken)
+            if expected != NOTHING:
+                owed = self._inbox.missing_sources(tick, expected)
+                self._handed_over.update(self._inbox.list_due(tick, expected))
         if not (unusual or owed or tick != last + 1):
             return None
         record = Consumed(
@@ -68,7 +69,7 @@ class Intake:
             tick * 1_000_000,
             self._number,
             tick - last - 1,
-            tuple(reference_to(*item) for item in taken),
+            tuple(format_message_id(*item) for item in taken),
             tuple(sorted("/".join(source) for source in owed)),
         )
         self._number += 1
@@ -77,12 +78,12 @@ class Intake:
     def _by_rule(self, taken: Iterable[tuple[Source, Order]]) -> bool:
         """Whether all that was taken in was due now, and at no earlier step."""
         return all(
-            expected(source, order) and order > self._handed_over.get(source, _FIRST)
+            has_rule(source, order) and order > self._handed_over.get(source, _FIRST)
             for source, order in taken
         )
 
 
-def expected(source: Source, order: Order) -> bool:
+def has_rule(source: Source, order: Order) -> bool:
     """Whether the rules of lock-step speak of such a message.
 
     They know nothing of an emergency stop, nor of a second operator's words between those of the
@@ -93,7 +94,7 @@ def expected(source: Source, order: Order) -> bool:
     return source[0] != ESTOP.name
 
 
-def taken_in(inputs: Inputs) -> list[tuple[Source, Order]]:
+def list_messages(inputs: Inputs) -> list[tuple[Source, Order]]:
     """Source and order of every message of a step but the state."""
     found: list[tuple[str, str, Message]] = [
         *((PLAN.name, name, plan) for name, plan in inputs.plans),
@@ -103,19 +104,19 @@ def taken_in(inputs: Inputs) -> list[tuple[Source, Order]]:
     if inputs.estop is not None:
         found.append((ESTOP.name, ANYONE, inputs.estop))
     if inputs.truth is not None:
-        found.append((TRUTH.name, WORLD, inputs.truth))
+        found.append((TRUTH.name, SIM, inputs.truth))
     return [((topic, sender), order_of(message)) for topic, sender, message in found]
 
 
-def reference_to(source: Source, order: Order) -> str:
+def format_message_id(source: Source, order: Order) -> str:
     """How `Consumed` refers to a message: `plan:r1:12.0`, `measurement:r1:480`."""
     topic, sender = source
     serial = f"{order[0]}.{order[1]}" if topic == PLAN.name else str(order[0])
     return f"{topic}:{sender}:{serial}"
 
 
-def referred(text: str) -> tuple[Source, Order] | None:
-    """The inverse of `reference_to`; None for what it never writes."""
+def parse_message_id(text: str) -> tuple[Source, Order] | None:
+    """The inverse of `format_message_id`; None for what it never writes."""
     parts = text.split(":")
     serial = parts[-1].split(".")
     if len(parts) != 3 or len(serial) > 2 or not all(part.isdecimal() for part in serial):

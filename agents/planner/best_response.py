@@ -22,7 +22,7 @@ def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
     n, phase = predictor.meta.robots, phase_of(config, step, predictor.phases)
     problems = [
         build_problem(
-            config.planner, predictor.forced(i, i, phase), horizon_stance(config, i, step)
+            config.planner, predictor.future_block(i, i, phase), horizon_stance(config, i, step)
         )
         for i in range(n)
     ]
@@ -31,7 +31,7 @@ def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
         coupling = [
             np.zeros_like(problem.H)
             if i == j
-            else problem.gradient @ predictor.forced(i, j, phase)[:, problems[j].columns]
+            else problem.gradient @ predictor.future_block(i, j, phase)[:, problems[j].columns]
             for j in range(n)
         ]
         factor = linalg.cho_factor(problem.H)

@@ -1,20 +1,62 @@
 """A planning step whose optimum touches no bound, as one compiled call: most steps are such.
 
-Between two steps the processor's caches are lost, so that what a step costs is mostly how much
-code and memory it goes through. The same arithmetic as `Planner.step` goes through otherwise.
+Between two steps the processor's caches are lost, so a step costs mostly as much as the code and
+memory it goes through. The arithmetic is that of `Planner.step` with a solver.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import NOMINAL_FORCES
 from quadriga.agents.planner.planner_qp import PlannerProblem
-from quadriga.agents.planner.plausible import OUTPUT_MAX
-from quadriga.agents.planner.qp_solver import ClosedForm, unconstrained
+from quadriga.agents.planner.qp_solver import ClosedForm, minimise_freely
+from quadriga.agents.plausibility import OUTPUT_MAX
 from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.jit import compiled
+
+
+class OwnWindow(NamedTuple):
+    """What a step consumes of the agent itself; see `PlannerInputs`."""
+
+    u_ini: Array
+    y_ini: Array
+    stance_ini: NDArray[np.bool_]
+    y_base_ini: Array
+    y_base: Array
+    y_des: Array
+
+
+class _Prediction(NamedTuple):
+    """y = Y_past past + effect + Y_v v, v in `columns` of the forces."""
+
+    Y_past: Array
+    Y_v: Array
+    columns: NDArray[np.int64]
+    nominal: Array  # forces of the horizon, (N, 12), N
+    nominal_table: Array  # forces by stance pattern, (16, 12), N
+
+
+class _Minimiser(NamedTuple):
+    """v = −H⁻¹ G_uᵀ Q̄ (y_free − y_des), where it keeps to box and friction pyramid."""
+
+    gradient: Array
+    minus_inverse: Array
+    lower: Array
+    upper: Array
+    slope: float
+
+
+class FreePlan(NamedTuple):
+    """u, du, (N, 12), and y, y_nominal, (N, 6), of `PlanResult`."""
+
+    u: Array
+    du: Array
+    y: Array
+    y_nominal: Array
 
 
 class FreeStep:
@@ -29,74 +71,53 @@ class FreeStep:
     def __init__(self, problem: PlannerProblem, closed: ClosedForm, nominal: Array) -> None:
         self.residuals = closed.residuals
         condensed = problem.condensed
-        self._fixed = (
-            condensed.Y_past, problem.gradient, closed.minus_inverse, problem.lower, problem.upper,
-            problem.slope, condensed.Y_v, problem.columns, nominal, NOMINAL_FORCES,
-        )  # fmt: skip
-
-    def plan(
-        self,
-        u_ini: Array,
-        y_ini: Array,
-        stance_ini: NDArray[np.bool_],
-        y_base_ini: Array,
-        y_base: Array,
-        y_des: Array,
-        effect: Array | float,
-    ) -> tuple[Array, Array, Array, Array] | None:
-        """The plan of `PlannerInputs` and the effect of `PeerTerms`.
-
-        Returns:
-            u, du, y and y_nominal of `PlanResult`; None where a bound is active or an output is
-            implausible.
-        """
-        forces, outputs, inside = _free_step(
-            u_ini, y_ini, stance_ini, y_base_ini, y_base, y_des, effect, *self._fixed
+        self._prediction = _Prediction(
+            condensed.Y_past, condensed.Y_v, problem.columns, nominal, NOMINAL_FORCES
         )
-        return (forces[0], forces[1], outputs[0], outputs[1]) if inside else None
+        self._minimiser = _Minimiser(
+            problem.gradient, closed.minus_inverse, problem.lower, problem.upper, problem.slope
+        )
+
+    def plan(self, own: OwnWindow, effect: Array | float) -> FreePlan | None:
+        """The plan; None where a bound is active or an output is implausible.
+
+        Args:
+            own: what the step consumes of the agent itself.
+            effect: what the peers do to its outputs, see `PeerTerms`.
+        """
+        forces, outputs, usable = _free_step(own, effect, self._prediction, self._minimiser)
+        return FreePlan(forces[0], forces[1], outputs[0], outputs[1]) if usable else None
 
 
 @compiled
 def _free_step(
-    u_ini: Array,
-    y_ini: Array,
-    stance_ini: NDArray[np.bool_],
-    y_base_ini: Array,
-    y_base: Array,
-    y_des: Array,
-    effect: Array | float,
-    Y_past: Array,
-    gradient: Array,
-    minus_inverse: Array,
-    lower: Array,
-    upper: Array,
-    slope: float,
-    Y_v: Array,
-    columns: NDArray[np.int64],
-    nominal: Array,
-    nominal_table: Array,
+    own: OwnWindow, effect: Array | float, prediction: _Prediction, minimiser: _Minimiser
 ) -> tuple[Array, Array, bool]:
     """Forces u and du, (2, N, 12); outputs y and y_nominal, (2, N, 6); is the plan usable?"""
-    T_ini, N = len(u_ini), len(y_des)
+    T_ini, N = len(own.u_ini), len(own.y_des)
     past = np.empty(T_ini * (N_FORCES + N_OUTPUTS))
     for k in range(T_ini):
         pattern = 0
         for leg in range(4):
-            pattern = 2 * pattern + stance_ini[k, leg]
-        past[N_FORCES * k : N_FORCES * (k + 1)] = u_ini[k] - nominal_table[pattern]
+            pattern = 2 * pattern + own.stance_ini[k, leg]
+        nominal = prediction.nominal_table[pattern]
+        past[N_FORCES * k : N_FORCES * (k + 1)] = own.u_ini[k] - nominal
         at = N_FORCES * T_ini + N_OUTPUTS * k
-        past[at : at + N_OUTPUTS] = y_ini[k] - y_base_ini[k]
-    y_free = Y_past @ past + effect
-    error = y_free - (y_des - y_base).ravel()
-    x, inside = unconstrained(minus_inverse, gradient @ error, lower, upper, slope)
+        past[at : at + N_OUTPUTS] = own.y_ini[k] - own.y_base_ini[k]
+    y_free = prediction.Y_past @ past + effect
+    error = y_free - (own.y_des - own.y_base).ravel()
+    f = minimiser.gradient @ error
+    x, usable = minimise_freely(
+        minimiser.minus_inverse, f, minimiser.lower, minimiser.upper, minimiser.slope
+    )
     forces, outputs = np.zeros((2, N, N_FORCES)), np.empty((2, N, N_OUTPUTS))
     du = forces[1].ravel()
-    for i in range(len(columns)):
-        du[columns[i]] = x[i]
-    forces[0] = nominal + forces[1]
-    outputs[0] = y_base + (y_free + Y_v @ x).reshape(N, N_OUTPUTS)
-    outputs[1] = y_base + y_free.reshape(N, N_OUTPUTS)
+    for i in range(len(prediction.columns)):
+        du[prediction.columns[i]] = x[i]
+    forces[0] = prediction.nominal + forces[1]
+    outputs[0] = own.y_base + (y_free + prediction.Y_v @ x).reshape(N, N_OUTPUTS)
+    outputs[1] = own.y_base + y_free.reshape(N, N_OUTPUTS)
     for output in outputs.flat:
         if not abs(output) <= OUTPUT_MAX:
-            inside = False
-    return forces, outputs, inside
+            usable = False
+    return forces, outputs, usable

@@ -1,16 +1,15 @@
-"""What a predictor must show before a team may walk on it, and what else is said about it."""
+"""Measures what a predictor must show before a team may walk on it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 from scipy import linalg
 
 from quadriga.agents.planner.best_response import best_response_radius
 from quadriga.agents.predictor.episode import Y_SCALE, Episode
+from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.regression import scaled_blocks
 from quadriga.agents.time_grid import gait_phase, horizon_stance, phase_of, walking_steps
@@ -21,97 +20,6 @@ from quadriga.shared.wire.topics import SAMPLE_MS
 
 _GAIN_FORCE = 10.0  # N, on the robot looked at
 _GAIN_TIMES = (0.1, 0.25)  # s
-
-
-@dataclass(frozen=True, slots=True)
-class GateReport:
-    """Figures of a predictor and the limits they were held against.
-
-    Attributes:
-        windows: held-out windows predicted.
-        rmse: held-out error per output over the horizon, all robots [m, m/s, rad, rad/s].
-        rmse_persistence: the same for holding the last measured output.
-        error: scaled error of all outputs together over that of persistence; must be < 1.
-        gain_times: when the height response is looked at [s].
-        gains: predicted over physical height response, per robot and time, of the worst phase.
-        gain_limits: every gain must lie between these.
-        radius: spectral radius of the best-response map, the worst of all stance patterns
-            and phases.
-        radius_limit: must be below this.
-        Q, R: planner weights the radius belongs to.
-        condition: number of the regression, penalty included; None if it is not known.
-        coupling: norm of the scaled G_ij, the largest of all phases, per robot i and j.
-        size: of G, bytes.
-    """
-
-    windows: int
-    rmse: dict[str, float]
-    rmse_persistence: dict[str, float]
-    error: float
-    gain_times: tuple[float, ...]
-    gains: tuple[tuple[float, ...], ...]
-    gain_limits: tuple[float, ...]
-    radius: float
-    radius_limit: float
-    Q: tuple[float, ...]
-    R: tuple[float, ...]
-    condition: float | None = None
-    coupling: tuple[tuple[float, ...], ...] = ()
-    size: int = 0
-
-    def to_dict(self) -> dict[str, Any]:
-        """A form that JSON can carry."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, body: dict[str, Any]) -> GateReport:
-        """The inverse of `to_dict`, also after JSON has made lists of tuples.
-
-        Raises:
-            TypeError: fields are missing or unknown.
-        """
-        frozen: dict[str, Any] = {
-            k: tuple(v) if isinstance(v, list) else v for k, v in body.items()
-        }
-        for table in ("gains", "coupling"):
-            frozen[table] = tuple(tuple(row) for row in frozen.get(table, ()))
-        return cls(**frozen)
-
-    def check(self, kind: str = "distributed") -> None:
-        """Refuse the predictor if a figure is beyond its limit.
-
-        Args:
-            kind: of planner that will use it; only where agents answer each other's plans does
-                the radius matter.
-
-        Raises:
-            PredictorError: with the figure and the limit.
-        """
-        if not self.error < 1.0:
-            raise PredictorError(
-                "predictor: held-out error",
-                f"{self.error:.3f} of persistence",
-                "below 1",
-                "too little data, or a plant that the data do not show; collect more",
-            )
-        low, high = self.gain_limits
-        for robot, row in enumerate(self.gains, start=1):
-            for time, gain in zip(self.gain_times, row, strict=True):
-                if not low <= gain <= high:
-                    raise PredictorError(
-                        f"predictor: height gain of r{robot} at {time:g} s",
-                        f"{gain:.2f}",
-                        f"{low:g} … {high:g} of the physical response",
-                        "forces in the data that follow the outputs (feedback bias), "
-                        "or a controller stiffer than the interface assumes",
-                    )
-        if kind == "distributed" and not self.radius < self.radius_limit:
-            raise PredictorError(
-                "predictor: radius of the best-response map",
-                f"{self.radius:.3f}",
-                f"below {self.radius_limit:g}",
-                "the agents' plans would diverge; raise identification.block_weight",
-            )
 
 
 def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode]) -> GateReport:
@@ -159,7 +67,7 @@ def held_out_error(
             continue
         z, dy = episode.windows(T_ini, N)
         n, _, windows = dy.shape
-        error = (_predicted(predictor, episode, z) - dy).reshape(n, N, N_OUTPUTS, windows)
+        error = (_predict_windows(predictor, episode, z) - dy).reshape(n, N, N_OUTPUTS, windows)
         squares += (error**2).sum(axis=(0, 1, 3))
         for start in range(windows):
             future = episode.y[start + T_ini : start + length]
@@ -178,7 +86,7 @@ def held_out_error(
     return count, rmse.tolist(), persistence.tolist(), float(ratio)
 
 
-def _predicted(predictor: Predictor, episode: Episode, z: Array) -> Array:
+def _predict_windows(predictor: Predictor, episode: Episode, z: Array) -> Array:
     """Predictions for all windows of an episode, each by the G of its phase. Shape (n, 6 N, C)."""
     meta = predictor.meta
     ends = episode.first_tick + SAMPLE_MS * (meta.T_ini - 1 + np.arange(z.shape[2]))
@@ -217,7 +125,9 @@ def height_gains(config: Config, predictor: Predictor) -> Array:
             share = (patterns / patterns.sum(axis=2, keepdims=True)).mean(axis=0)
             du = np.zeros((N, N_LEGS, 3))
             du[:, :, 2] = _GAIN_FORCE * share
-            z = (predictor.forced(robot, robot, phase) @ du.ravel()).reshape(N, N_OUTPUTS)[:, 0]
+            z = (predictor.future_block(robot, robot, phase) @ du.ravel()).reshape(N, N_OUTPUTS)[
+                :, 0
+            ]
             gains[k, robot] = z[rows] / physical[rows]
     worst = np.abs(gains - 1.0).argmax(axis=0)
     found: Array = np.take_along_axis(gains, worst[None], axis=0)[0]

@@ -7,25 +7,20 @@ Pure: messages in, selection out; lost, repeated, late and foreign messages are 
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
-from typing import Final, TypeVar
+from collections.abc import Iterable
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.planner.plausible import plausible
+from quadriga.agents.planner.peer_memory import PeerHistory, PeerMemory, remember
 from quadriga.agents.time_grid import horizon_stance, patience, sample_starts, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array, robot_names
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.messages import Measurement, Message, Plan
+from quadriga.shared.wire.messages import Measurement, Plan
 from quadriga.shared.wire.topics import SAMPLE_MS
-
-M = TypeVar("M", bound=Message)
-K = TypeVar("K", int, tuple[int, int])
 
 FRESH: Final = "fresh"  # the newest plan that may be used: that of step k−1
 SHIFTED: Final = "shifted"  # an older one, shifted by its age
@@ -34,24 +29,8 @@ LOST: Final = "lost"  # held long enough: the team stops
 
 
 @record
-class PeerHistory:
-    """What is remembered of one peer: measurements by tick and plans by step, both ascending."""
-
-    measurements: tuple[Measurement, ...] = ()
-    plans: tuple[Plan, ...] = ()
-
-
-@record
-class PeerMemory:
-    """Recent messages of all peers by name, and how many were refused."""
-
-    peers: Mapping[str, PeerHistory]
-    refused: int = 0
-
-
-@record
 class PeerData:
-    """One peer's part of eq. 11 at planning step k, its window ending at step k−1 (or as told).
+    """One peer's part of eq. 11 at planning step k; its window ends at `Selection.window_step`.
 
     Attributes:
         robot: the peer's name.
@@ -124,8 +103,6 @@ class Neighbours:
             if (j != index if peers is None else j in peers)
         }
         self.names = tuple(self._indices)
-        kept_steps = patience(config) + 2
-        self._span_ms = SAMPLE_MS * config.planner.T_ini + step_ms(config) * kept_steps
 
     def initial(self) -> PeerMemory:
         """No messages yet."""
@@ -138,50 +115,10 @@ class Neighbours:
         measurements: Iterable[tuple[str, Measurement]] = (),
         plans: Iterable[tuple[str, Plan]] = (),
     ) -> PeerMemory:
-        """Add messages that have arrived by world time `tick`; forget what is too old to matter.
+        """See `peer_memory.remember`."""
+        return remember(self._config, memory, tick, measurements, plans)
 
-        The order of arrival does not matter. A second message for the same tick or step, one of
-        a robot that is no peer, one off the time grid or from the future, a plan of another
-        horizon and numbers that no robot can mean (`plausible`) are refused and counted.
-        """
-        peers, refused = dict(memory.peers), memory.refused
-        for robot, measurement in measurements:
-            history = peers.get(robot)
-            kept = None
-            if (
-                history is not None
-                and self._on_grid(measurement.tick, SAMPLE_MS, tick)
-                and plausible(self._config.planner, measurement.u, measurement.y)
-            ):
-                oldest = tick - self._span_ms
-                kept = _inserted(history.measurements, measurement, oldest, _by_tick)
-            if history is None or kept is None:
-                refused += 1
-            else:
-                peers[robot] = replace(history, measurements=kept)
-        for robot, plan in plans:
-            history = peers.get(robot)
-            kept_plans = None
-            if (
-                history is not None
-                and self._on_grid(plan.tick, step_ms(self._config), tick)
-                and plan.step * step_ms(self._config) == plan.tick
-                and len(plan.u) == self._config.planner.N
-                and plausible(self._config.planner, plan.u, plan.y)
-            ):
-                oldest = (tick - self._span_ms) // step_ms(self._config)
-                kept_plans = _inserted(history.plans, plan, (oldest, 0), _by_serial)
-            if history is None or kept_plans is None:
-                refused += 1
-            else:
-                peers[robot] = replace(history, plans=kept_plans)
-        return PeerMemory(peers, refused)
-
-    def _on_grid(self, of: int, grid_ms: int, now: int) -> bool:
-        # A peer's clock may lead by a little; one far ahead would push out all that is real.
-        return of % grid_ms == 0 and now - self._span_ms <= of <= now + step_ms(self._config)
-
-    def complete(self, memory: PeerMemory, serial: tuple[int, int]) -> bool:
+    def is_complete(self, memory: PeerMemory, serial: tuple[int, int]) -> bool:
         """Whether every peer's plan of this step and exchange is there, and its window before it.
 
         Args:
@@ -189,11 +126,12 @@ class Neighbours:
             serial: step and exchange, see `Plan.serial`.
         """
         end = serial[0] * step_ms(self._config)
-        return all(
-            bool(history.plans and history.plans[-1].serial >= serial)
-            and bool(history.measurements and history.measurements[-1].tick >= end)
-            for history in memory.peers.values()
-        )
+        for history in memory.peers.values():
+            if not history.plans or history.plans[-1].serial < serial:
+                return False
+            if not history.measurements or history.measurements[-1].tick < end:
+                return False
+        return True
 
     def select(
         self, memory: PeerMemory, last: int, first_step: int, *, window_step: int | None = None
@@ -212,11 +150,12 @@ class Neighbours:
         """
         end = last if window_step is None else window_step
         peers = [
-            self._of(name, memory.peers[name], last, end, first_step) for name in self._indices
+            self._select_peer(name, memory.peers[name], last, end, first_step)
+            for name in self._indices
         ]
         return Selection(tuple(peers), end)
 
-    def lost(self, memory: PeerMemory, last: int, first_step: int) -> tuple[str, ...]:
+    def lost_peers(self, memory: PeerMemory, last: int, first_step: int) -> tuple[str, ...]:
         """Names of the peers given up, those that `select` would call lost."""
         newest = {
             name: next((plan for plan in reversed(history.plans) if plan.step <= last), None)
@@ -236,7 +175,7 @@ class Neighbours:
             return HELD
         return FRESH if age <= 0 else SHIFTED
 
-    def _of(
+    def _select_peer(
         self, robot: str, history: PeerHistory, last: int, end: int, first_step: int
     ) -> PeerData:
         """The peer's data, plans up to step `last`, from step `end` on."""
@@ -262,12 +201,11 @@ class Neighbours:
         first_tick = end * step_ms(self._config) - SAMPLE_MS * (T_ini - 1)
         known = np.zeros(T_ini, dtype=np.bool_)
         du, y = np.zeros((T_ini, N_FORCES)), np.zeros((T_ini, N_OUTPUTS))
-        measured = {
-            place: sample
-            for sample in history.measurements
-            if sample.tick <= last * step_ms(self._config)
-            and 0 <= (place := (sample.tick - first_tick) // SAMPLE_MS) < T_ini
-        }
+        measured: dict[int, Measurement] = {}
+        for sample in history.measurements:
+            place = (sample.tick - first_tick) // SAMPLE_MS
+            if 0 <= place < T_ini and sample.tick <= last * step_ms(self._config):
+                measured[place] = sample
         if len(measured) < T_ini:
             ticks = sample_starts(first_tick - SAMPLE_MS, T_ini)
             nominal = nominal_forces(scheduled_stance(self._config, index, ticks))
@@ -290,22 +228,3 @@ class Neighbours:
 def _age(newest: Plan | None, last: int, first_step: int) -> int:
     """Steps from a peer's newest plan to `last`; before its first one from the last without any."""
     return last - (first_step - 1 if newest is None else newest.step)
-
-
-def _by_tick(measurement: Measurement) -> int:
-    return measurement.tick
-
-
-def _by_serial(plan: Plan) -> tuple[int, int]:
-    return plan.serial
-
-
-def _inserted(
-    held: tuple[M, ...], new: M, oldest: K, order: Callable[[M], K]
-) -> tuple[M, ...] | None:
-    """`held` with `new` in its place and without what is older; None if it is there already."""
-    place: int = bisect_left(held, order(new), key=order)
-    if place < len(held) and order(held[place]) == order(new):
-        return None
-    start: int = bisect_left(held, oldest, key=order)
-    return (*held[start:place], new, *held[place:])

@@ -8,8 +8,8 @@ from dataclasses import field
 import numpy as np
 from numpy.typing import NDArray
 
+from quadriga.agents.planner.coupling import Coupling, fill_deviations
 from quadriga.agents.planner.neighbours import PeerData, Selection
-from quadriga.agents.predictor.coupling import Coupling, fill_deviations
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.shared.config.sections import Config
@@ -23,8 +23,8 @@ class PeerTerms:
 
     Attributes:
         effect: Σ G_ij [u_ini; y_ini; u] over the peers, (6 N,).
-        deviations: [u_ini; y_ini; u] of each peer heard from, (18 T_ini + 12 N,).
-        held: share of the effect of each one that is silent, as it was at last, (6 N,).
+        deviations: [u_ini; y_ini; u] of each peer with a usable plan, (18 T_ini + 12 N,).
+        held: last share of the effect of each silent peer, (6 N,).
         steps: planning step, and step at which the peers' windows end.
         used: for each peer the step of the plan consumed.
         lost: peers given up; not empty means: stop.
@@ -64,7 +64,7 @@ class Peers:
                 self._coupling(step, step - steps)
 
     def terms(self, before: PeerTerms, selection: Selection, step: int, y_base: Array) -> PeerTerms:
-        """The peers' terms of eq. 11 for planning step `step`; what was last known of the silent.
+        """The peers' terms of eq. 11 for planning step `step`; of silent peers their last share.
 
         Args:
             before: terms of the step before.
@@ -74,13 +74,15 @@ class Peers:
         """
         if not selection.peers:
             return PeerTerms()
-        z, deviations = self._nothing(), {}
+        z, deviations = self._zero_deviations(), {}
         held: dict[str, Array] = {}
         for peer in selection.peers:
             if peer.usable:
                 part = deviations[peer.robot] = self._part(z, peer.index)
                 fill_deviations(part, peer.du_ini, peer.y_ini, y_base, peer.known, peer.du)
-            elif (share := self._held(before, peer)) is not None:
+                continue
+            share = self._last_share(before, peer)
+            if share is not None:
                 held[peer.robot] = share
         effect = self._coupling(step, selection.window_step).effect(z)
         for share in held.values():
@@ -89,19 +91,19 @@ class Peers:
         steps = step, selection.window_step
         return PeerTerms(effect, deviations, held, steps, selection.used, selection.lost, ages)
 
-    def _held(self, before: PeerTerms, peer: PeerData) -> Array | None:
-        """A silent peer's last share of the effect, (6 N,); None if it was never heard of.
+    def _last_share(self, before: PeerTerms, peer: PeerData) -> Array | None:
+        """A silent peer's last share of the effect, (6 N,); None if it never sent a plan.
 
-        Not made anew of its last deviations: those are of legs that stood then and swing now.
+        It belongs to the steps of its last deviations: legs that stood then swing now.
         """
         part = before.deviations.get(peer.robot)
         if part is None:
             return before.held.get(peer.robot)
-        z = self._nothing()
+        z = self._zero_deviations()
         self._part(z, peer.index)[:] = part
         return self._coupling(*before.steps).effect(z)
 
-    def _nothing(self) -> NDArray[np.float32]:
+    def _zero_deviations(self) -> NDArray[np.float32]:
         """No deviation of any peer."""
         return np.zeros(len(self._others) * self._predictor.meta.width, dtype=np.float32)
 
@@ -112,7 +114,7 @@ class Peers:
         return z[place : place + width]
 
     def _coupling(self, step: int, window_step: int) -> Coupling:
-        """What the peers do from planning step `step` on, told of by plans from another one on."""
+        """The coupling at planning step `step` to plans that begin at `window_step`."""
         place = place_in(self._cycle, step), place_in(self._cycle, window_step)
         found = self._couplings.get(place)
         if found is None:

@@ -9,12 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces
-from quadriga.agents.planner.free_step import FreeStep
+from quadriga.agents.planner.free_step import FreeStep, OwnWindow
 from quadriga.agents.planner.neighbours import Selection
 from quadriga.agents.planner.peer_terms import Peers, PeerTerms
 from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem, unpack
-from quadriga.agents.planner.plausible import plausible_outputs
-from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS, Residuals, Solver, no_solution
+from quadriga.agents.planner.qp_solver import (
+    SOLVED,
+    SOLVERS,
+    Residuals,
+    SolvedQp,
+    Solver,
+    no_solution,
+)
+from quadriga.agents.plausibility import are_plausible_outputs
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.shared.config.sections import Config
@@ -112,7 +119,7 @@ class Planner:
     Args:
         config: the team's configuration.
         index: this agent's place in the team, 0-based.
-        predictor: fitted for this team (see `quadriga.agents.predictor.store.load`).
+        predictor: fitted for this team (see `load_checked`).
 
     Raises:
         PredictorError: the predictor's sizes are not the configuration's.
@@ -152,36 +159,42 @@ class Planner:
             peers: what the others will do to it.
             G_ii: instead of the predictor's own block, which costs a new set-up.
         """
-        setup = self._setup(inputs.step) if G_ii is None else self._set_up(inputs.step, G_ii)
+        setup = self._setup(inputs.step, G_ii)
         if setup.free is not None and not peers.lost:
-            found = _unbounded(setup.free, inputs, peers)
-            if found is not None:
-                return PlannerState(inputs.step, found.du, state.solves + 1), found
-        # Whatever was measured: a number that overflows is told by the result, not on the way.
+            result = _plan_freely(setup.free, inputs, peers)
+            if result is not None:
+                return PlannerState(inputs.step, result.du, state.solves + 1), result
+        # Whatever was measured: a number that overflows shows in the result.
         with np.errstate(over="ignore", invalid="ignore"):
-            return self._solved(setup, state, inputs, peers)
+            return self._plan_by_solver(setup, state, inputs, peers)
 
-    def _solved(
+    def problem_of(
+        self, inputs: PlannerInputs, peers: PeerTerms, G_ii: Array | None = None
+    ) -> SolvedQp | None:
+        """The QP of `step` for the same arguments; None where there is none: a peer is lost."""
+        if peers.lost:
+            return None
+        setup = self._setup(inputs.step, G_ii)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return _solve(setup, inputs, _free_response(setup, inputs, peers))
+
+    def _plan_by_solver(
         self, setup: _Setup, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
     ) -> tuple[PlannerState, PlanResult]:
-        """The same where bounds are active, or there is no plan."""
+        """The plan where bounds are active, or the fallback where there is none."""
         problem = setup.problem
-        past, y_des = inputs.past(), (inputs.y_des - inputs.y_base).ravel()
-        y_free = problem.condensed.Y_past @ past + peers.effect
+        y_free = _free_response(setup, inputs, peers)
         if peers.lost:
             solution, solves = no_solution(problem, PEER_LOST), 0
         else:
-            error = y_free - y_des
-            f = problem.padded(problem.gradient @ error)
-            solution, solves = setup.solver.solve(f, *problem.bounds(error)), 1
-        x = solution.x
-        if self._config.planner.damping and solution.status == SOLVED:
-            x = self._damped(problem, x, state, inputs.step)
-        status = solution.status
+            solution, solves = _solve(setup, inputs, y_free).solution, 1
+        x, status = solution.x, solution.status
+        if self._config.planner.damping and status == SOLVED:
+            x = self._mix_with_last(problem, x, state, inputs.step)
         du, dy = unpack(problem, x, y_free)
         y, y_nominal = inputs.y_base + dy, inputs.y_base + y_free.reshape(dy.shape)
-        if not (plausible_outputs(y) and plausible_outputs(y_nominal)):
-            # What cannot be foretold is taken to go as asked: the next best that can be told.
+        if not (are_plausible_outputs(y) and are_plausible_outputs(y_nominal)):
+            # The outputs cannot be predicted: nominal forces, and the desired outputs as a guess.
             du, y, y_nominal = np.zeros_like(du), inputs.y_des, inputs.y_des
             status = IMPLAUSIBLE if status == SOLVED else status
         result = PlanResult(
@@ -197,7 +210,9 @@ class Planner:
         )
         return PlannerState(inputs.step, du, state.solves + solves), result
 
-    def _damped(self, problem: PlannerProblem, x: Array, state: PlannerState, step: int) -> Array:
+    def _mix_with_last(
+        self, problem: PlannerProblem, x: Array, state: PlannerState, step: int
+    ) -> Array:
         """A solution with a share of the last plan, whose forces past its end are nominal.
 
         Both satisfy the constraints on forces, which are convex, so their mixture does.
@@ -215,15 +230,18 @@ class Planner:
         """The contact phase of a planning step, which chooses the transition matrix."""
         return phase_of(self._config, step, self._predictor.phases)
 
-    def _setup(self, step: int) -> _Setup:
+    def _setup(self, step: int, G_ii: Array | None = None) -> _Setup:
+        """The set-up of a step: built anew for a `G_ii` that is given, else of the cycle's memo."""
+        if G_ii is not None:
+            return self._build_setup(step, G_ii)
         place = place_in(self._cycle, step)
-        found = self._setups.get(place)
-        if found is None:
-            G_ii = self._predictor.block(self._index, self._index, self.phase(place))
-            found = self._setups[place] = self._set_up(place, G_ii)
-        return found
+        setup = self._setups.get(place)
+        if setup is None:
+            own_block = self._predictor.block(self._index, self._index, self.phase(place))
+            setup = self._setups[place] = self._build_setup(place, own_block)
+        return setup
 
-    def _set_up(self, step: int, G_ii: Array) -> _Setup:
+    def _build_setup(self, step: int, G_ii: Array) -> _Setup:
         past = self._predictor.meta.past
         stance = horizon_stance(self._config, self._index, step)
         problem = build_problem(self._config.planner, G_ii[:, past:], stance, G_ii[:, :past])
@@ -233,17 +251,39 @@ class Planner:
         return _Setup(problem, solver, nominal, free)
 
 
-def _unbounded(free: FreeStep, inputs: PlannerInputs, peers: PeerTerms) -> PlanResult | None:
+def _plan_freely(free: FreeStep, inputs: PlannerInputs, peers: PeerTerms) -> PlanResult | None:
     """The plan if no bound is active at the optimum."""
-    plan = free.plan(
+    own = OwnWindow(
         inputs.u_ini,
         inputs.y_ini,
         inputs.stance_ini,
         inputs.y_base_ini,
         inputs.y_base,
         inputs.y_des,
-        peers.effect,
     )
+    plan = free.plan(own, peers.effect)
     if plan is None:
         return None
     return PlanResult(SOLVED, *plan, peers.used, peers.lost, free.residuals, 0)
+
+
+def _free_response(setup: _Setup, inputs: PlannerInputs, peers: PeerTerms) -> Array:
+    """Output deviations under nominal forces, y_free of eq. 11. Shape (6 N,)."""
+    y_free: Array = setup.problem.condensed.Y_past @ inputs.past() + peers.effect
+    return y_free
+
+
+def _solve(setup: _Setup, inputs: PlannerInputs, y_free: Array) -> SolvedQp:
+    """Solve the QP of a step with this free response."""
+    problem = setup.problem
+    error = y_free - (inputs.y_des - inputs.y_base).ravel()
+    f = problem.pad(problem.gradient @ error)
+    lower, upper = problem.bounds(error)
+    solution = setup.solver.solve(f, lower, upper)
+    return SolvedQp(
+        problem,
+        f,
+        problem.lower if lower is None else lower,
+        problem.upper if upper is None else upper,
+        solution,
+    )

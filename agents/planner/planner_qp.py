@@ -86,11 +86,11 @@ class PlannerProblem:
             raise ValueError("only a problem with a transition matrix has this gradient")
         return self.condensed.gradient
 
-    def linear(self, past: Array, y_des: Array) -> Array:
+    def linear_term(self, past: Array, y_des: Array) -> Array:
         """The linear term f of the cost, zero for slacks. Shape (nx,)."""
-        return self.padded(self.condensed.F_past @ past + self.condensed.F_des @ y_des)
+        return self.pad(self.condensed.F_past @ past + self.condensed.F_des @ y_des)
 
-    def padded(self, f: Array) -> Array:
+    def pad(self, f: Array) -> Array:
         """A linear term in v with zeros for the slacks. Shape (nx,)."""
         slacks = len(self.H) - len(f)
         return np.concatenate([f, np.zeros(slacks)]) if slacks else f
@@ -175,7 +175,7 @@ def constrain(
             lower.append(-limit[bounded])
             upper.append(limit[bounded])
         else:
-            H, A, bounded = _softened(config, H, A, rows, bounded)
+            H, A, bounded = _soften(config, H, A, rows, bounded)
             slacks = len(rows)
             lower.insert(1, np.zeros(slacks))
             upper.insert(1, np.full(slacks, np.inf))
@@ -187,7 +187,7 @@ def constrain(
     )
 
 
-def _softened(
+def _soften(
     config: PlannerConfig, H: Array, A: Array, rows: Array, bounded: NDArray[np.int64]
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """One slack s ≥ 0 per bounded output: rows v − s ≤ max, rows v + s ≥ −max, cost w s²."""

@@ -56,6 +56,24 @@ class QpSolution:
 
 
 @dataclass(frozen=True, slots=True)
+class SolvedQp:
+    """A QP of one step, min ½ xᵀ H x + fᵀ x, lower ≤ [x; A x] ≤ upper, with its answer.
+
+    Attributes:
+        problem: H and A of it.
+        f: linear term, shape (nx,).
+        lower, upper: bounds, shape (nx + m,).
+        solution: what the solver answered.
+    """
+
+    problem: PlannerProblem
+    f: Array
+    lower: Array
+    upper: Array
+    solution: QpSolution
+
+
+@dataclass(frozen=True, slots=True)
 class ClosedForm:
     """The optimum while no bound is active: x = −H⁻¹ f.
 
@@ -130,7 +148,7 @@ class DaqpSolver:
         high = self._problem.upper if upper is None else upper
         closed = self.closed_form
         if closed is not None:
-            x, inside = unconstrained(closed.minus_inverse, f, low, high, self._problem.slope)
+            x, inside = minimise_freely(closed.minus_inverse, f, low, high, self._problem.slope)
             if inside:
                 return QpSolution(SOLVED, x, self._free, closed.residuals, 0)
         if upper is None:
@@ -186,7 +204,7 @@ class OsqpSolver:
 
 
 @compiled
-def unconstrained(
+def minimise_freely(
     minus_inverse: Array, f: Array, lower: Array, upper: Array, slope: float
 ) -> tuple[Array, bool]:
     """The unconstrained minimiser x, and whether box and pyramid hold at it."""

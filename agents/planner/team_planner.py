@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces
+from quadriga.agents.planner.deepc_qp import select
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.planner_qp import (
     NO_BOUNDS,
@@ -20,7 +21,6 @@ from quadriga.agents.planner.planner_qp import (
     unpack,
 )
 from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS, Residuals, Solver
-from quadriga.agents.predictor.deepc import select
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
 from quadriga.shared.config.sections import Config
@@ -76,7 +76,7 @@ class TeamPlanner:
         base = np.concatenate([robot.y_base for robot in inputs])
         y_des = np.concatenate([robot.y_des for robot in inputs]).ravel() - base.ravel()
         y_free = problem.condensed.free(past, y_des)
-        solution = solver.solve(problem.linear(past, y_des), *problem.bounds(y_free - y_des))
+        solution = solver.solve(problem.linear_term(past, y_des), *problem.bounds(y_free - y_des))
         du, dy = unpack(problem, solution.x, y_free)
         return TeamResult(
             SOLVED if solution.status == SOLVED else f"nominal:{solution.status}",
@@ -100,7 +100,7 @@ class TeamPlanner:
         return found
 
 
-def centralised(config: Config, predictor: Predictor) -> TeamPlanner:
+def build_centralised(config: Config, predictor: Predictor) -> TeamPlanner:
     """The planner of eq. 7: the transition matrix of the whole team.
 
     Raises:
@@ -111,18 +111,18 @@ def centralised(config: Config, predictor: Predictor) -> TeamPlanner:
 
     def formulation(phase: int, stance: NDArray[np.bool_]) -> Condensed:
         G = predictor.G[phase]
-        G_past, G_u = (np.concatenate([*part], axis=1) for part in _columns(G, past))
+        G_past, G_u = (np.concatenate([*part], axis=1) for part in _stack_columns(G, past))
         return condense(config.planner, G_past, G_u, stance)
 
     return TeamPlanner(config, formulation, predictor.phases)
 
 
-def deepc(config: Config, model: Condensed) -> TeamPlanner:
+def build_deepc(config: Config, model: Condensed) -> TeamPlanner:
     """The planner of eq. 5 with g and σ eliminated.
 
     Args:
         config: the team's configuration.
-        model: `quadriga.agents.predictor.deepc.build_model` of the team's data.
+        model: `quadriga.agents.planner.deepc_qp.build_model` of the team's data.
 
     Raises:
         ConfigError: output bounds, which the elimination of g does not allow.
@@ -137,7 +137,7 @@ def deepc(config: Config, model: Condensed) -> TeamPlanner:
     return TeamPlanner(config, lambda _, stance: select(model, stance_columns(stance)))
 
 
-def _columns(G: Array, past: int) -> tuple[list[Array], list[Array]]:
+def _stack_columns(G: Array, past: int) -> tuple[list[Array], list[Array]]:
     """Blocks (n, n, p, w) as columns of robot j over the rows of all robots, past and future."""
     tall = [np.concatenate([*G[:, j]]) for j in range(G.shape[1])]
     return [column[:, :past] for column in tall], [column[:, past:] for column in tall]

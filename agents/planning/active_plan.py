@@ -1,4 +1,4 @@
-"""Plans in force: what is applied at a tick, from when on, and how it fades out."""
+"""Plans in force: which of them is applied at a tick, and from which sample on."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from dataclasses import field
 
 import numpy as np
 
-from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.topics import SAMPLE_MS
@@ -45,36 +44,22 @@ class Setpoint:
     v_ref: Array | None = None
 
 
-_NOTHING = Setpoint()
+_NO_SETPOINT = Setpoint()
 
 
-def launched(flights: tuple[ActivePlan, ...], new: ActivePlan) -> tuple[ActivePlan, ...]:
+def add_plan(plans: tuple[ActivePlan, ...], new: ActivePlan) -> tuple[ActivePlan, ...]:
     """Add a plan; of those before it only what is still needed stays."""
-    current = [flight for flight in flights if flight.start <= new.plan_tick][-1:]
-    waiting = [flight for flight in flights if new.plan_tick < flight.start < new.start]
+    current = [plan for plan in plans if plan.start <= new.plan_tick][-1:]
+    waiting = [plan for plan in plans if new.plan_tick < plan.start < new.start]
     return (*current, *waiting, new)
 
 
-def present(flights: tuple[ActivePlan, ...], tick: int) -> Setpoint:
+def setpoint_at(plans: tuple[ActivePlan, ...], tick: int) -> Setpoint:
     """What the newest plan in force says for this tick; nothing once it has run out."""
-    for flight in reversed(flights):
-        if flight.start <= tick:
-            sample = (tick - flight.plan_tick) // SAMPLE_MS
-            if not 0 <= sample < len(flight.deviation):
-                break
-            return Setpoint(flight.deviation[sample], flight.outputs[sample:, 1:3])
-    return _NOTHING
-
-
-def fading(config: PlannerConfig, error: Array) -> float:
-    """Share of a plan to apply: 1 inside the range of the data, falling to 0 at twice that range.
-
-    An error that is no number is out of every range.
-
-    Args:
-        config: the range.
-        error: present outputs less the desired ones, shape (6,).
-    """
-    ranges = np.array(config.fade)[[0, 1, 1, 2, 2, 3]]
-    share = float(np.clip(2.0 - np.max(np.abs(error) / ranges), 0.0, 1.0))
-    return share if share > 0.0 else 0.0
+    for plan in reversed(plans):
+        if plan.start <= tick:
+            sample = (tick - plan.plan_tick) // SAMPLE_MS
+            if 0 <= sample < len(plan.deviation):
+                return Setpoint(plan.deviation[sample], plan.outputs[sample:, 1:3])
+            break
+    return _NO_SETPOINT

@@ -1,40 +1,19 @@
-"""What the planning part of an agent is given, gives and remembers, whoever does the planning."""
+"""What the planning part of an agent is given and gives, whoever does the planning."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Final, Protocol
+from typing import Final, Protocol, TypeVar
 
 from quadriga.agents.modes import Mode
-from quadriga.agents.planner.neighbours import PeerMemory
-from quadriga.agents.planner.peer_terms import PeerTerms
-from quadriga.agents.planner.planner import PlannerInputs, PlannerState
-from quadriga.agents.planning.active_plan import ActivePlan, Setpoint
-from quadriga.agents.predictor.recursive import Correction
+from quadriga.agents.planner.qp_solver import SolvedQp
+from quadriga.agents.planning.active_plan import Setpoint
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.messages import Measurement, Plan, Reference
 
-
-@record
-class PlanningOutputs:
-    """What one tick of planning gives.
-
-    Attributes:
-        plan: a new plan to publish, if one was made.
-        present: what to apply now.
-        stop_reason: why the robot must stop, or "".
-        planner_ns: time that the planner took by the agent's clock; None: no QP was solved.
-        ages_ms: age of each plan in use.
-        unusual: names of counters of what was out of the ordinary.
-    """
-
-    plan: Plan | None = None
-    present: Setpoint = field(default_factory=Setpoint)
-    stop_reason: str = ""
-    planner_ns: int | None = None
-    ages_ms: Mapping[str, float] = field(default_factory=dict)
-    unusual: tuple[str, ...] = ()
+S = TypeVar("S")
+REFUSED: Final = "refused_by_planner"  # counter: messages whose content cannot be meant
 
 
 @record
@@ -42,7 +21,7 @@ class PlanningInputs:
     """What one tick brings to the planning part.
 
     Attributes:
-        tick: world time.
+        tick: world time, ms.
         mode: what the robot is doing.
         references: what the operator asked for lately.
         measurement: the agent's own sample, if one is due at this tick.
@@ -55,6 +34,27 @@ class PlanningInputs:
     measurement: Measurement | None = None
     measurements: tuple[tuple[str, Measurement], ...] = ()
     plans: tuple[tuple[str, Plan], ...] = ()
+
+
+@record
+class PlanningOutputs:
+    """What one tick of planning gives.
+
+    Attributes:
+        plan: a new plan to publish, if one was made.
+        setpoint: what to apply now.
+        stop_reason: why the robot must stop, or "".
+        planner_ns: time that the planner took by the agent's clock; None: no QP was solved.
+        ages_ms: age of each plan in use.
+        unusual: names of the counters to increase.
+    """
+
+    plan: Plan | None = None
+    setpoint: Setpoint = field(default_factory=Setpoint)
+    stop_reason: str = ""
+    planner_ns: int | None = None
+    ages_ms: Mapping[str, float] = field(default_factory=dict)
+    unusual: tuple[str, ...] = ()
 
 
 @record
@@ -75,49 +75,31 @@ class Expected:
 
 
 NOTHING: Final = Expected()
-NO_OUTPUTS: Final = PlanningOutputs()
 
 
-@record
-class PlanningState:
-    """What the planning part remembers.
+class PlanningInterface(Protocol[S]):
+    """The planning part of an agent, with a state of type S that only it looks into.
 
-    Attributes:
-        own: the agent's last samples, T_ini or, if it adapts, T_ini + N of them.
-        flights: plans in force or waiting for their start.
-        newest: step and exchange of the newest plan.
-        memory: peers' messages.
-        terms: what the peers will do, for the planning step and exchange `terms_for`.
-        inputs: what the plan of the present step was made of.
-        planner: what the planner remembers.
-        learned: how the plant differs from the predictor's, if the agent adapts.
+    Its functions depend on their arguments alone.
     """
-
-    own: tuple[Measurement, ...] = ()
-    flights: tuple[ActivePlan, ...] = ()
-    newest: tuple[int, int] = (-1, 0)
-    memory: PeerMemory | None = None
-    terms: PeerTerms = field(default_factory=PeerTerms)
-    terms_for: int = -1
-    inputs: PlannerInputs | None = None
-    planner: PlannerState = field(default_factory=PlannerState)
-    learned: Correction | None = None
-
-
-class PlanningInterface(Protocol):
-    """The planning part of an agent: `step` is a function of its arguments alone."""
 
     @property
     def peers(self) -> tuple[str, ...]:
         """Robots whose plans and measurements it takes in."""
         ...
 
-    def awaited(self, tick: int) -> Expected:
+    def initial(self) -> S:
+        """Its state before the first tick."""
+        ...
+
+    def expected(self, tick: int) -> Expected:
         """What lock-step waits for before the step of `tick`."""
         ...
 
-    def step(
-        self, state: PlanningState, heard: PlanningInputs
-    ) -> tuple[PlanningState, PlanningOutputs]:
+    def step(self, state: S, inputs: PlanningInputs) -> tuple[S, PlanningOutputs]:
         """Take in what arrived, plan if it is time to, say what to apply now."""
+        ...
+
+    def problem_of(self, state: S, inputs: PlanningInputs) -> SolvedQp | None:
+        """The QP that `step` solves for these arguments; None if it solves none."""
         ...

@@ -8,30 +8,19 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.predictor.episode import output_base
-from quadriga.shared.config.sections import Config, ReferenceConfig
+from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.wire.messages import Reference
 from quadriga.shared.wire.topics import SAMPLE_MS
 
-# What an operator may ask for, whoever he is: the limits of the configuration's own reference.
-_LIMITS: Final = {
-    name: (key.metadata["low"], key.metadata["high"])
-    for name, key in ReferenceConfig.__dataclass_fields__.items()
-    if name in ("vx", "vy", "wz", "height")
-}
-AHEAD_MS: Final = 1000  # of the present: whoever speaks of later must be there to say it then
+AHEAD_MS: Final = 1000  # how far ahead of the present a message may speak
 _KEPT_MS = 2000  # long enough for the windows of the oldest plan that may still be used
-
-
-def allowed(reference: Reference) -> bool:
-    """Whether a reference is within the limits of `ReferenceConfig`."""
-    return all(low <= getattr(reference, name) <= high for name, (low, high) in _LIMITS.items())
 
 
 def remember_references(
     known: tuple[Reference, ...], new: Iterable[Reference], tick: int
 ) -> tuple[Reference, ...]:
-    """The references worth keeping at `tick`, one per tick (the first heard), oldest first."""
+    """The references worth keeping at `tick`, one per tick (the first to come), oldest first."""
     fresh = tuple(new)
     if not fresh:
         return known
@@ -42,7 +31,9 @@ def remember_references(
     return tuple(ordered[max(0, first - 1) :])
 
 
-def in_force(references: tuple[Reference, ...], tick: int, height: float) -> tuple[Reference, int]:
+def reference_at(
+    references: tuple[Reference, ...], tick: int, height: float
+) -> tuple[Reference, int]:
     """The reference in force at `tick` and its age [ms]; standing still before the first."""
     for item in reversed(references):
         if item.tick <= tick:
@@ -67,7 +58,7 @@ def base_of_samples(
     interface, height = config.planner.interface, config.reference.height
     ticks = range(end - SAMPLE_MS * (count - 1), end + 1, SAMPLE_MS)
     known = [tick if now is None else min(tick, now) for tick in ticks]
-    first, last = (in_force(references, tick, height)[0] for tick in (known[0], known[-1]))
+    first, last = (reference_at(references, tick, height)[0] for tick in (known[0], known[-1]))
     if first is last:  # as nearly always
         return np.tile(output_base(interface, last), (len(known), 1))
-    return np.array([output_base(interface, in_force(references, t, height)[0]) for t in known])
+    return np.array([output_base(interface, reference_at(references, t, height)[0]) for t in known])

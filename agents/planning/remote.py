@@ -9,29 +9,45 @@ import numpy as np
 
 from quadriga.agents.gait import nominal_forces
 from quadriga.agents.modes import WALK
-from quadriga.agents.planning.active_plan import ActivePlan, fading, launched, present
+from quadriga.agents.planning.active_plan import ActivePlan, add_plan, setpoint_at
+from quadriga.agents.planning.fade import FADED, fade_factor
 from quadriga.agents.planning.interface import (
     NOTHING,
+    REFUSED,
     Expected,
     PlanningInputs,
     PlanningOutputs,
-    PlanningState,
 )
-from quadriga.agents.planning.local import FADED, REFUSED, first_step
-from quadriga.agents.planning.operator_references import in_force
+from quadriga.agents.planning.operator_references import reference_at
 from quadriga.agents.predictor.episode import commanded_outputs
-from quadriga.agents.time_grid import horizon_stance, step_ms
+from quadriga.agents.time_grid import first_step, horizon_stance, patience, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import N_LEGS, Array
-from quadriga.shared.wire.messages import Plan
+from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.messages import Measurement, Plan
 from quadriga.shared.wire.topics import SAMPLE_MS
 
-LOST: Final = "planner-lost"
+LOST: Final = "planner-lost"  # stop: no plan came for as long as a team waits for one
 # A planner's own plans keep to deviation_max: the share and N on top are for its solver.
 # With forces far beyond it a single message would drive all joints to their limits.
 _SHARE: Final = 1.5
 _MARGIN: Final = 1.0  # N
 _FARTHEST: Final = 10.0  # m, m/s, rad, rad/s: no trunk gets there, whatever is predicted
+
+
+@record
+class RemoteState:
+    """What an agent remembers that follows a central planner.
+
+    Attributes:
+        newest_sample: the agent's own newest sample.
+        plans: those in force or waiting for their start.
+        newest: step and exchange of the newest plan.
+    """
+
+    newest_sample: Measurement | None = None
+    plans: tuple[ActivePlan, ...] = ()
+    newest: tuple[int, int] = (-1, 0)
 
 
 class RemotePlanning:
@@ -53,47 +69,57 @@ class RemotePlanning:
         """None: the central planner knows them."""
         return ()
 
-    def awaited(self, tick: int) -> Expected:
+    def initial(self) -> RemoteState:
+        """No plan yet."""
+        return RemoteState()
+
+    def expected(self, tick: int) -> Expected:
         """The plan of a step, the configured latency after its data."""
         step, rest = divmod(tick - self._latency, self._step_ms)
         due = rest == 0 and step >= self._first_step
         return Expected(plan=(step, 0)) if due else NOTHING
 
     def step(
-        self, state: PlanningState, heard: PlanningInputs
-    ) -> tuple[PlanningState, PlanningOutputs]:
+        self, state: RemoteState, inputs: PlanningInputs
+    ) -> tuple[RemoteState, PlanningOutputs]:
         """Take the newest plan into force; say what to apply now."""
-        tick, planner = heard.tick, self._config.planner
-        if heard.measurement is not None:
-            state = replace(state, own=(heard.measurement,))
+        tick = inputs.tick
+        if inputs.measurement is not None:
+            state = replace(state, newest_sample=inputs.measurement)
         unusual: list[str] = []
-        for _, plan in heard.plans:
-            if not self._usable(plan, tick):
+        for _, plan in inputs.plans:
+            if not self._is_usable(plan, tick):
                 unusual.append(REFUSED)
             elif state.newest < plan.serial:
-                state, factor = self._take(state, plan, heard)
+                state, factor = self._take(state, plan, inputs)
                 unusual += [f"plan_{FADED}"] if factor < 1.0 else []
-        if heard.mode.name != WALK:
+        if inputs.mode.name != WALK:
             return state, PlanningOutputs(unusual=tuple(unusual))
+        newest_step = state.newest[0]
         due = (tick - self._latency) // self._step_ms
-        age = due - max(state.newest[0], self._first_step - 1)
-        planned = self._step_ms * state.newest[0]
-        lost = age > planner.max_peer_age + planner.hold_steps
+        age = due - max(newest_step, self._first_step - 1)
+        plan_tick = self._step_ms * newest_step
         return state, PlanningOutputs(
-            present=present(state.flights, tick),
-            stop_reason=LOST if lost else "",
-            ages_ms={"plan": float(tick - planned)} if planned >= 0 else {},
+            setpoint=setpoint_at(state.plans, tick),
+            stop_reason=LOST if age > patience(self._config) else "",
+            ages_ms={"plan": float(tick - plan_tick)} if newest_step >= 0 else {},
             unusual=tuple(unusual),
         )
 
-    def _usable(self, plan: Plan, tick: int) -> bool:
+    def problem_of(self, state: RemoteState, inputs: PlanningInputs) -> None:
+        """None: the QP is the central planner's."""
+        return
+
+    def _is_usable(self, plan: Plan, tick: int) -> bool:
         """Whether a plan is one of this team's at this time: else it is foreign, or forged."""
         samples = self._config.planner.N
-        begun = plan.tick == plan.step * self._step_ms
-        timely = begun and 0 <= tick - plan.tick < SAMPLE_MS * samples
-        return timely and len(plan.u) == samples and self._plausible(plan)
+        if plan.tick != plan.step * self._step_ms or len(plan.u) != samples:
+            return False
+        if plan.tick > tick or tick >= plan.tick + SAMPLE_MS * samples:
+            return False
+        return self._is_possible(plan)
 
-    def _plausible(self, plan: Plan) -> bool:
+    def _is_possible(self, plan: Plan) -> bool:
         """Whether forces and outputs are such as a planner of this configuration may plan."""
         possible = np.abs(self._deviation(plan)) <= self._most
         return bool(possible.all() and (np.abs(plan.y) <= _FARTHEST).all())
@@ -104,19 +130,19 @@ class RemotePlanning:
         return du
 
     def _take(
-        self, state: PlanningState, plan: Plan, heard: PlanningInputs
-    ) -> tuple[PlanningState, float]:
+        self, state: RemoteState, plan: Plan, inputs: PlanningInputs
+    ) -> tuple[RemoteState, float]:
         """Take a plan into force; with the share of it that is applied."""
         factor, outputs = 1.0, plan.y
-        if state.own:
-            now, _ = in_force(heard.references, heard.tick, self._config.reference.height)
-            asked = commanded_outputs(now)
-            factor = fading(self._config.planner, state.own[0].y - asked)
-            # What the outputs come to without the plan's forces is not in the plan: the speeds of
-            # one that fades out give way to those asked for.
-            outputs = asked + factor * (plan.y - asked)
-        flight = ActivePlan(heard.tick, plan.tick, factor * self._deviation(plan), outputs)
-        state = replace(state, flights=launched(state.flights, flight), newest=plan.serial)
+        if state.newest_sample is not None:
+            now, _ = reference_at(inputs.references, inputs.tick, self._config.reference.height)
+            y_des = commanded_outputs(now)
+            factor = fade_factor(self._config.planner, state.newest_sample.y - y_des)
+            # The plan does not tell the outputs without its forces: as it fades out, the desired
+            # speeds take over.
+            outputs = y_des + factor * (plan.y - y_des)
+        active = ActivePlan(inputs.tick, plan.tick, factor * self._deviation(plan), outputs)
+        state = replace(state, plans=add_plan(state.plans, active), newest=plan.serial)
         return state, factor
 
 

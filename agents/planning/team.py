@@ -6,19 +6,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-import numpy as np
-
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.team_planner import TeamPlanner
-from quadriga.agents.planning.local import first_step
-from quadriga.agents.planning.operator_references import (
-    AHEAD_MS,
-    base_of_window,
-    in_force,
-    remember_references,
-)
-from quadriga.agents.predictor.episode import commanded_outputs, output_base
-from quadriga.agents.time_grid import step_ms
+from quadriga.agents.planning.operator_references import AHEAD_MS, remember_references
+from quadriga.agents.planning.window import build_planner_inputs
+from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.wire.messages import Measurement, Plan, Reference
@@ -117,15 +109,15 @@ class Central:
             claimed.pop(name, None)
             windows[name] = (*windows.get(name, ()), sample)[-self._kept :]
         now = max((self._newest(windows, name) for name in windows), default=0)
-        heard = tuple(references)
-        timely = tuple(item for item in heard if item.tick <= now + AHEAD_MS)
+        arrived = tuple(references)
+        timely = tuple(item for item in arrived if item.tick <= now + AHEAD_MS)
         known = remember_references(state.references, timely, now)
         return replace(
             state,
             windows=windows,
             references=known,
             claimed=claimed,
-            refused=refused + len(heard) - len(timely),
+            refused=refused + len(arrived) - len(timely),
         )
 
     def _team_time(self, windows: Windows, claimed: Mapping[str, int]) -> int:
@@ -153,18 +145,9 @@ class Central:
     def _inputs(
         self, state: CentralState, window: tuple[Measurement, ...], step: int
     ) -> PlannerInputs:
-        end, planner = step * self._step_ms, self._config.planner
-        samples = _window(window, end, planner.T_ini)
-        now, _ = in_force(state.references, end, self._config.reference.height)
-        return PlannerInputs(
-            step=step,
-            u_ini=np.array([sample.u for sample in samples]),
-            y_ini=np.array([sample.y for sample in samples]),
-            stance_ini=np.array([sample.stance for sample in samples]) > 0.5,
-            y_base_ini=base_of_window(self._config, end, state.references),
-            y_base=np.tile(output_base(planner.interface, now), (planner.N, 1)),
-            y_des=np.tile(commanded_outputs(now), (planner.N, 1)),
-        )
+        end = step * self._step_ms
+        samples = _window(window, end, self._config.planner.T_ini)
+        return build_planner_inputs(self._config, step, end, samples, state.references)
 
     @staticmethod
     def _newest(windows: Windows, name: str) -> int:

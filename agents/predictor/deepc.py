@@ -1,7 +1,4 @@
-"""DeePC of the whole team (eq. 5) with g, σ and y eliminated exactly: a QP in the forces alone.
-
-    min Σ ‖y − y_des‖²_Q + ‖u‖²_R + λ_g ‖g‖² + λ_σ ‖σ‖²
-    s.t. [U_p; Y_p; U_f; Y_f] g + [0; σ; 0; 0] = [u_ini; y_ini; u; y],   u in its set
+"""What a team's data say for DeePC (eq. 5), before any weight is chosen.
 
 The data enter through their Gram matrix S alone. With a = [u_ini; u] and b = [y_ini; y] its
 Cholesky factor, forces first, gives every g that matters as two orthogonal parts: one that a
@@ -9,16 +6,8 @@ determines, with ‖·‖² = aᵀ S_aa⁻¹ a, and one of free coordinates z:
 
     b + [σ; 0] = Φ a + M z,   Φ = S_ba S_aa⁻¹,   M Mᵀ = S_bb − S_ba S_aa⁻¹ S_ab
 
-What is outside the span of the data's rows is zero at the optimum. z is unconstrained, so it is
-a linear map of t = [y_ini; y_des] − Φ a, and with Ω = diag(λ_σ, Q) what remains is
-
-    tᵀ Λ t + λ_g aᵀ S_aa⁻¹ a + ‖u‖²_R,   Λ = Ω − Ω M (λ_g I + Mᵀ Ω M)⁻¹ Mᵀ Ω
-
-which holds as well for data without noise, whose M has only as many columns as the plant states.
-A small λ_g lets z answer any wish and the forces do nothing; a large one draws them, through
-aᵀ S_aa⁻¹ a, towards those that followed such a past in the data. Both are eq. 5's own.
-g, σ and S belong to scaled deviations (`Episode.scaled`), all else is in N, m, m/s, rad, rad/s.
-Bounds on y would keep z from being free: with them this is no longer the paper's problem.
+At the optimum g has no part outside the span of the data's rows. g, σ and S belong to scaled
+deviations (`Episode.scaled_deviations`). `quadriga.agents.planner.deepc_qp` makes the QP of this.
 """
 
 from __future__ import annotations
@@ -31,11 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from quadriga.agents.planner.planner_qp import Condensed
-from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
+from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.hankel import gram
-from quadriga.shared.config.sections import PlannerConfig
-from quadriga.shared.errors import ConfigError, PredictorError
+from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
 
 Index = NDArray[np.int64]
@@ -81,7 +68,7 @@ def reduce(episodes: Sequence[Episode], T_ini: int, N: int) -> Reduction:
     if len(robots) != 1:
         raise PredictorError("episodes", f"teams of {sorted(robots)} robots", "data of one team")
     n, L = robots.pop(), T_ini + N
-    S = gram([np.concatenate(episode.scaled(), axis=1) for episode in episodes], L)
+    S = gram([np.concatenate(episode.scaled_deviations(), axis=1) for episode in episodes], L)
     a, b = _rows(n, T_ini, N)
     S_aa, S_ab = S[np.ix_(a, a)], S[np.ix_(a, b)]
     floor = _RANK_TOLERANCE * float(np.linalg.norm(S_aa))
@@ -108,86 +95,6 @@ def reduce(episodes: Sequence[Episode], T_ini: int, N: int) -> Reduction:
     )
 
 
-def build_model(
-    reduction: Reduction, config: PlannerConfig, lambda_g: float, lambda_sigma: float
-) -> Condensed:
-    """Eliminate g, σ and y for one choice of weights.
-
-    Past and y stack robots, rows and columns within each are a `Predictor`'s. That y leans
-    towards y_des is eq. 5's own: its g may choose among what the data allow.
-
-    Args:
-        reduction: of the team's data.
-        config: Q and R.
-        lambda_g: λ_g of eq. 5.
-        lambda_sigma: λ_σ of eq. 5.
-
-    Returns:
-        The problem in all 12 n N forces of the team; `select` leaves those that may be non-zero.
-
-    Raises:
-        ConfigError: a weight that is not positive.
-    """
-    for name, weight in (("lambda_g", lambda_g), ("lambda_sigma", lambda_sigma)):
-        if not weight > 0.0:
-            raise ConfigError(name, f"{weight:g}", "a positive weight")
-    n, T_ini, N, M = reduction.robots, reduction.T_ini, reduction.N, reduction.spread
-    m_p, p_p = n * N_FORCES * T_ini, n * N_OUTPUTS * T_ini
-    y_scale = np.tile(Y_SCALE, n * N)
-    root = np.sqrt(
-        np.concatenate([np.full(p_p, lambda_sigma), np.tile(config.Q, n * N) * y_scale**2])
-    )
-
-    # z = C⁻ᵀ Z √Ω t and Λ = √Ω (I − Zᵀ Z) √Ω with C Cᵀ = λ_g I + Mᵀ Ω M and Z = C⁻¹ Mᵀ √Ω.
-    weighted = root[:, None] * M
-    C = linalg.cholesky(lambda_g * np.eye(M.shape[1]) + weighted.T @ weighted, lower=True)
-    Z = linalg.solve_triangular(C, weighted.T, lower=True)
-    chosen = linalg.solve_triangular(C, M[p_p:].T, lower=True).T @ Z * root  # [0 I] M z = chosen t
-    Lambda = root[:, None] * (np.eye(len(root)) - Z.T @ Z) * root
-
-    T_past, T_des, B = _residual(reduction)
-    effort = lambda_g / U_SCALE**2 * reduction.inverse[m_p:]
-    gradient = B.T @ Lambda
-    H = gradient @ B + effort[:, m_p:]
-    H.flat[:: len(H) + 1] += np.tile(config.R, len(H) // 3)
-    past_u, _ = _past_columns(n, T_ini)
-    F_past, Y_past = -gradient @ T_past, chosen @ T_past
-    F_past[:, past_u] += effort[:, :m_p]
-    Y_past[:, past_u] += reduction.response[p_p:, :m_p] / U_SCALE
-    return Condensed(
-        H=0.5 * (H + H.T),
-        F_past=F_past,
-        F_des=-gradient @ T_des,
-        Y_v=y_scale[:, None] * (B[p_p:] - chosen @ B),
-        Y_past=y_scale[:, None] * Y_past,
-        Y_des=y_scale[:, None] * (chosen @ T_des),
-    )
-
-
-def select(model: Condensed, columns: Index) -> Condensed:
-    """The same problem with all forces but `columns` zero: exact for legs that swing."""
-    return Condensed(
-        H=model.H[np.ix_(columns, columns)],
-        F_past=model.F_past[columns],
-        F_des=model.F_des[columns],
-        Y_v=np.ascontiguousarray(model.Y_v[:, columns]),
-        Y_past=model.Y_past,
-        Y_des=model.Y_des,
-    )
-
-
-def _residual(reduction: Reduction) -> tuple[Array, Array, Array]:
-    """T = T_past @ past + T_des @ y_des − B u: scaled t, physical past, y_des and u."""
-    n, T_ini, N = reduction.robots, reduction.T_ini, reduction.N
-    m_p, p_p, p_f = n * N_FORCES * T_ini, n * N_OUTPUTS * T_ini, n * N_OUTPUTS * N
-    past_u, past_y = _past_columns(n, T_ini)
-    T_past, T_des = np.zeros((p_p + p_f, m_p + p_p)), np.zeros((p_p + p_f, p_f))
-    T_past[:, past_u] = -reduction.response[:, :m_p] / U_SCALE
-    T_past[np.arange(p_p), past_y] = 1.0 / np.tile(Y_SCALE, n * T_ini)
-    T_des[p_p:] = np.diag(1.0 / np.tile(Y_SCALE, n * N))
-    return T_past, T_des, reduction.response[:, m_p:] / U_SCALE
-
-
 def _rows(n: int, T_ini: int, N: int) -> tuple[Index, Index]:
     """Rows of the samples' Gram matrix that hold the forces and the outputs, past before future."""
     width = n * (N_FORCES + N_OUTPUTS)
@@ -196,9 +103,3 @@ def _rows(n: int, T_ini: int, N: int) -> tuple[Index, Index]:
     y = index[:, n * N_FORCES :].reshape(-1, n, N_OUTPUTS).transpose(1, 0, 2)
     a, b = (np.concatenate([x[:, :T_ini].ravel(), x[:, T_ini:].ravel()]) for x in (u, y))
     return a, b
-
-
-def _past_columns(n: int, T_ini: int) -> tuple[Index, Index]:
-    """Places of all robots' u_ini and of their y_ini in past."""
-    index = np.arange(n * (N_FORCES + N_OUTPUTS) * T_ini).reshape(n, -1)
-    return index[:, : N_FORCES * T_ini].ravel(), index[:, N_FORCES * T_ini :].ravel()

@@ -26,7 +26,7 @@ class Episode:
         u_nominal: forces that deviations are counted from, shape (T, n, 12), N.
         y: outputs z, vx, vy, roll, pitch, wz, shape (T, n, 6), m, m/s, rad, rad/s.
         y_base: outputs that deviations are counted from (see `output_base`), shape (T, n, 6).
-        first_tick: world tick at the end of sample 0, which tells the gait's phase, ms.
+        first_tick: world tick at the end of sample 0, which determines the gait's phase, ms.
 
     Raises:
         PredictorError: shapes that do not belong together, or numbers that are not finite.
@@ -64,7 +64,7 @@ class Episode:
         """Deviations u − u_nominal, shape (T, n, 12), and y − y_base, shape (T, n, 6)."""
         return self.u - self.u_nominal, self.y - self.y_base
 
-    def scaled(self) -> tuple[Array, Array]:
+    def scaled_deviations(self) -> tuple[Array, Array]:
         """Deviations over their scales, robots stacked: shapes (T, 12 n) and (T, 6 n)."""
         du, dy = self.deviations()
         return ((du / U_SCALE).reshape(self.samples, -1), (dy / Y_SCALE).reshape(self.samples, -1))

@@ -14,11 +14,11 @@ from quadriga.agents.predictor.hankel import split
 from quadriga.agents.predictor.least_squares import solve_gamma, solve_pinv
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.regression import (
-    by_phase,
-    check,
+    check_episodes,
     normal_equations,
-    physical,
+    normal_equations_by_phase,
     robots_first,
+    to_physical,
 )
 from quadriga.agents.predictor.ridge import Solutions, members_of, solve_causal, solve_ridge
 from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS
@@ -42,7 +42,7 @@ def fit_pinv(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
         PredictorError: no data, too little, or of another team.
     """
     found = solve_pinv(normal_equations(episodes, meta), meta)
-    return _one_phase(found, _unpenalised(meta, "pinv"))
+    return _one_phase(found, _without_penalty(meta, "pinv"))
 
 
 def fit_ridge(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
@@ -66,7 +66,7 @@ def fit_gamma(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
         PredictorError: no data, too little, of another team, or forces that do not excite.
     """
     found = solve_gamma(normal_equations(episodes, meta), meta)
-    return _one_phase(found, _unpenalised(meta, "gamma"))
+    return _one_phase(found, _without_penalty(meta, "gamma"))
 
 
 def fit_causal(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
@@ -88,7 +88,7 @@ def fit_arx(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
     """
-    check(episodes, meta)
+    check_episodes(episodes, meta)
     one_step = replace(meta, N=1)
     found = solve_ridge(normal_equations(episodes, one_step), one_step, meta.ridge)
     x = roll_out(found.x, meta)
@@ -110,14 +110,14 @@ def fit_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     """
     pooled = solve_ridge(normal_equations(episodes, meta), meta, meta.ridge).x
     blocks, condition = [], 0.0
-    for regression in by_phase(episodes, meta):
+    for regression in normal_equations_by_phase(episodes, meta):
         if regression.windows == 0:
-            blocks.append(physical(pooled, meta))
+            blocks.append(to_physical(pooled, meta))
             continue
         explained = np.einsum("ab,ibk->aik", regression.zz, pooled, optimize=True)
         left = replace(regression, zy=regression.zy - explained)
         found = solve_ridge(left, meta, meta.phase_ridge)
-        blocks.append(physical(pooled + found.x, meta))
+        blocks.append(to_physical(pooled + found.x, meta))
         condition = max(condition, found.condition)
     return Predictor(replace(meta, kind="phase"), np.stack(blocks), condition)
 
@@ -130,8 +130,8 @@ def fit_hankel(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, or of another team.
     """
-    check(episodes, meta)
-    u, y = zip(*(episode.scaled() for episode in episodes), strict=True)
+    check_episodes(episodes, meta)
+    u, y = zip(*(episode.scaled_deviations() for episode in episodes), strict=True)
     parts = split(u, y, meta.T_ini, meta.N)
     Z = np.concatenate([parts.U_p, parts.Y_p, parts.U_f])
     G = parts.Y_f @ np.linalg.pinv(Z)
@@ -144,7 +144,7 @@ def fit_hankel(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     ).ravel()
     rows_of = robots_first(np.arange(len(G)), n, p)
     x = G[rows_of[:, None, :], columns_of[:, None]]
-    return _one_phase(Solutions(x, float(np.linalg.cond(Z)) ** 2), _unpenalised(meta, "pinv"))
+    return _one_phase(Solutions(x, float(np.linalg.cond(Z)) ** 2), _without_penalty(meta, "pinv"))
 
 
 FITS: Final[Mapping[str, Fit]] = {
@@ -158,8 +158,8 @@ FITS: Final[Mapping[str, Fit]] = {
 
 
 def _one_phase(found: Solutions, meta: PredictorMeta) -> Predictor:
-    return Predictor(meta, physical(found.x, meta)[None], found.condition)
+    return Predictor(meta, to_physical(found.x, meta)[None], found.condition)
 
 
-def _unpenalised(meta: PredictorMeta, kind: str) -> PredictorMeta:
+def _without_penalty(meta: PredictorMeta, kind: str) -> PredictorMeta:
     return replace(meta, kind=kind, phases=1, ridge=0.0, block_weight=1.0)

@@ -14,8 +14,8 @@ from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.a1 import N_OUTPUTS, Array
 
 # Rounding leaves the Gram matrix eigenvalues of up to 1e-16 · (number of rows) of the largest
-# where there should be none: below 1e-12, which is 1e-6 in singular values of the data, nothing
-# can be told from nothing.
+# where there should be none. Below 1e-12, which is 1e-6 in singular values of the data, they are
+# taken for zero.
 RANK_TOLERANCE = 1e-12
 
 Solve = Callable[[Array, Array], tuple[Array, float]]
@@ -23,7 +23,7 @@ Solve = Callable[[Array, Array], tuple[Array, float]]
 
 def solve_pinv(regression: Regression, meta: PredictorMeta) -> Solutions:
     """Y_f Z† = (Σ y zᵀ)(Σ z zᵀ)†, the solution of least norm where several are best."""
-    return _solve_groups(regression, meta, _least_norm)
+    return _solve_groups(regression, meta, _solve_least_norm)
 
 
 def solve_gamma(regression: Regression, meta: PredictorMeta) -> Solutions:
@@ -68,7 +68,7 @@ def solve_gamma(regression: Regression, meta: PredictorMeta) -> Solutions:
     return _solve_groups(regression, meta, solve)
 
 
-def _least_norm(A: Array, b: Array) -> tuple[Array, float]:
+def _solve_least_norm(A: Array, b: Array) -> tuple[Array, float]:
     floor = RANK_TOLERANCE * float(np.linalg.norm(A))
     norm = float(np.linalg.norm(A, 1))
     try:  # every eigenvalue above the floor: a Cholesky factor says so long before they do

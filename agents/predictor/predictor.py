@@ -22,7 +22,7 @@ class PredictorMeta:
 
     Attributes:
         kind: name of the fit, a key of `quadriga.agents.predictor.fits.FITS`.
-        phases: parts of the gait's period with a G of their own (see `horizon.gait_phase`).
+        phases: parts of the gait's period with a G of their own (see `time_grid.gait_phase`).
         neighbours: "all", or "yoked": G_ij is zero unless i and j are yoked.
     """
 
@@ -118,7 +118,7 @@ class Predictor:
 
     @property
     def phases(self) -> int:
-        """P, the number of phases with a G of their own; `horizon.phase_of` says which is due."""
+        """P, the number of phases with a G of their own; `time_grid.phase_of` chooses."""
         return self.meta.phases
 
     def block(self, i: int, j: int, phase: int = 0) -> Array:
@@ -126,10 +126,10 @@ class Predictor:
         block: Array = self.G[phase, i, j]
         return block
 
-    def forced(self, i: int, j: int, phase: int = 0) -> Array:
+    def future_block(self, i: int, j: int, phase: int = 0) -> Array:
         """The columns of G_ij that multiply the future forces. Shape (6 N, 12 N)."""
-        forced: Array = self.G[phase, i, j, :, self.meta.past :]
-        return forced
+        block: Array = self.G[phase, i, j, :, self.meta.past :]
+        return block
 
     def predict(self, z: Array, phase: int = 0) -> Array:
         """Predicted output deviations of the whole team.

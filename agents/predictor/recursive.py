@@ -4,7 +4,7 @@ Forgets only along the directions that new windows speak about (Kulhavý's direc
 with the plain kind a team that stands or trots evenly would forget all that it does not excite,
 and its covariance would grow as λ^−k.
 
-A changed plant (a load nobody told of) shows in what the predictor leaves unexplained. That is
+A changed plant (an unknown load) shows in what the predictor leaves unexplained. That is
 regressed on the robot's own [u_ini; y_ini; u], which corrects G_ii, or on those of all robots.
 The same correction serves every phase. All in scaled deviations, so that one prior fits all.
 """
@@ -59,7 +59,7 @@ class Correction:
         D: scaled correction [ΔG_ij …], shape (6 N, k), k = (18 T_ini + 12 N) · sources.
         P: covariance over the noise variance, shape (k, k), exactly symmetric.
         updates: windows that were taken in.
-        skipped: windows that told nothing new.
+        skipped: windows without new information.
         refused: windows that were implausible themselves, or would have made D so.
     """
 
@@ -76,7 +76,9 @@ class Correction:
         return replace(self, refused=self.refused + 1)
 
 
-def begin(meta: PredictorMeta, robot: int, sources: Sequence[int], how: Forgetting) -> Correction:
+def begin_correction(
+    meta: PredictorMeta, robot: int, sources: Sequence[int], how: Forgetting
+) -> Correction:
     """No correction yet.
 
     Raises:

@@ -41,13 +41,15 @@ def normal_equations(episodes: Sequence[Episode], meta: PredictorMeta) -> Regres
     Raises:
         PredictorError: no data, too little, or of another team.
     """
-    check(episodes, meta)
+    check_episodes(episodes, meta)
     L = meta.T_ini + meta.N
-    samples = [np.concatenate(episode.scaled(), axis=1) for episode in episodes]
-    return _robots_apart(gram(samples, L), meta, columns(samples, L))
+    samples = [np.concatenate(episode.scaled_deviations(), axis=1) for episode in episodes]
+    return _split_by_robot(gram(samples, L), meta, columns(samples, L))
 
 
-def by_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Iterator[Regression]:
+def normal_equations_by_phase(
+    episodes: Sequence[Episode], meta: PredictorMeta
+) -> Iterator[Regression]:
     """The regression over the windows of each phase of the gait in turn.
 
     A window's phase is that of the end of its [u_ini; y_ini], where a plan would begin.
@@ -55,7 +57,7 @@ def by_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Iterator[Regre
     Raises:
         PredictorError: no data, too little, or of another team.
     """
-    check(episodes, meta)
+    check_episodes(episodes, meta)
     L = meta.T_ini + meta.N
     period = np.lcm(2 * meta.stance_ms, SAMPLE_MS) // SAMPLE_MS
     starts = np.array([e.first_tick + SAMPLE_MS * (meta.T_ini - 1) for e in episodes])
@@ -73,12 +75,12 @@ def by_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Iterator[Regre
         ]
     )
     places = ((starts - origin) // SAMPLE_MS) % period
-    samples = [np.concatenate(episode.scaled(), axis=1) for episode in episodes]
+    samples = [np.concatenate(episode.scaled_deviations(), axis=1) for episode in episodes]
     for windows, S in cyclic_grams(samples, places.tolist(), L, part_of):
-        yield _robots_apart(S, meta, windows)
+        yield _split_by_robot(S, meta, windows)
 
 
-def check(episodes: Sequence[Episode], meta: PredictorMeta) -> None:
+def check_episodes(episodes: Sequence[Episode], meta: PredictorMeta) -> None:
     """Refuse data that no fit for `meta` can use.
 
     Raises:
@@ -100,7 +102,7 @@ def check(episodes: Sequence[Episode], meta: PredictorMeta) -> None:
             )
 
 
-def physical(x: Array, meta: PredictorMeta) -> Array:
+def to_physical(x: Array, meta: PredictorMeta) -> Array:
     """Blocks in physical units, (n, n, 6 N, W), from scaled solutions (n, n W, 6 N)."""
     n = meta.robots
     blocks = x.reshape(n, n, meta.width, -1).transpose(0, 1, 3, 2)
@@ -138,7 +140,7 @@ def robots_first(index: Index, n: int, dim: int) -> Index:
     return index.reshape(-1, n, dim).transpose(1, 0, 2).reshape(n, -1)
 
 
-def _robots_apart(S: Array, meta: PredictorMeta, windows: int) -> Regression:
+def _split_by_robot(S: Array, meta: PredictorMeta, windows: int) -> Regression:
     """Cut the Gram matrix of windows of [u of all; y of all] into the robots' parts."""
     n, m, p = meta.robots, N_FORCES, N_OUTPUTS
     index = np.arange((meta.T_ini + meta.N) * n * (m + p)).reshape(-1, n * (m + p))

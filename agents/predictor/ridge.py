@@ -44,14 +44,14 @@ def solve_ridge(regression: Regression, meta: PredictorMeta, ridge: float) -> So
     light, heavy = penalties(regression, meta, ridge)
     everyone = all(len(members_of(meta, i)) == n for i in range(n))
     if everyone:
-        A = _penalised(regression.zz, np.where(np.arange(n * W) < W, light, heavy))
+        A = _add_penalty(regression.zz, np.where(np.arange(n * W) < W, light, heavy))
         condition = condition_number(_norm(A), factorise(A))
         return Solutions(_solve_each(regression.zz, regression.zy, W, light, heavy), condition)
     x, condition = np.zeros((n, n * W, N_OUTPUTS * meta.N)), 0.0
     for i in range(n):
         members = members_of(meta, i)
         rows = (np.array(members)[:, None] * W + np.arange(W)).ravel()
-        A = _penalised(regression.zz[np.ix_(rows, rows)], np.where(rows // W == i, light, heavy))
+        A = _add_penalty(regression.zz[np.ix_(rows, rows)], np.where(rows // W == i, light, heavy))
         norm, factor = _norm(A), factorise(A)
         x[i, rows] = linalg.cho_solve((factor, True), regression.zy[rows, i], check_finite=False)
         condition = max(condition, condition_number(norm, factor))
@@ -74,7 +74,7 @@ def solve_causal(regression: Regression, meta: PredictorMeta, ridge: float) -> S
     for i in range(n):
         members = members_of(meta, i)
         rows = past_first(meta, members)
-        A = _penalised(regression.zz[np.ix_(rows, rows)], np.where(rows // W == i, light, heavy))
+        A = _add_penalty(regression.zz[np.ix_(rows, rows)], np.where(rows // W == i, light, heavy))
         norm, factor = _norm(A), factorise(A)
         half = linalg.solve_triangular(
             factor, regression.zy[rows, i], lower=True, check_finite=False
@@ -122,7 +122,7 @@ def _norm(A: Array) -> float:
     return float(np.linalg.norm(A, 1))
 
 
-def _penalised(A: Array, penalty: Array | float) -> Array:
+def _add_penalty(A: Array, penalty: Array | float) -> Array:
     """A copy of `A` in LAPACK's order with a penalty on its diagonal."""
     copy: Array = A.T.copy(order="F")  # symmetric: the transpose is the same and copies faster
     copy.flat[:: len(A) + 1] += penalty
@@ -148,12 +148,12 @@ def _solve_each(A: Array, b: Array, W: int, light: float, heavy: float) -> Array
     """
     n, k = len(A) // W, b.shape[2]
     if n == 1:
-        factor = factorise(_penalised(A, light))
+        factor = factorise(_add_penalty(A, light))
         return linalg.cho_solve((factor, True), b[:, 0], check_finite=False)[None]
     x = np.empty((n, n * W, k))
     for kept, gone in ((slice(0, n // 2), slice(n // 2, n)), (slice(n // 2, n), slice(0, n // 2))):
         K, D = (slice(s.start * W, s.stop * W) for s in (kept, gone))
-        factor = factorise(_penalised(A[D, D], heavy))
+        factor = factorise(_add_penalty(A[D, D], heavy))
         X, R = (
             linalg.solve_triangular(factor, rhs, lower=True, check_finite=False)
             for rhs in (A[D, K], b[D, kept].reshape(D.stop - D.start, -1))

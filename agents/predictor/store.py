@@ -7,26 +7,21 @@ import json
 import platform
 import zipfile
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.planner.best_response import best_response_radius
-from quadriga.agents.planner.gates import GateReport
+from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorFileError
 from quadriga.shared.runtime.atomic import atomic_write
 
 FORMAT: Final = 2
 _PACKAGES: Final = ("quadriga", "numpy", "scipy", "mujoco", "pin", "daqp")
-_REMEDY: Final = "fit one with `quadriga fit`"
-_MATCHED: Final = (
-    "robots", "stance_ms", "alternate_phase", "yokes", "interface", "N", "T_ini",
-)  # fmt: skip
+REMEDY: Final = "fit one with `quadriga fit`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,31 +98,6 @@ def save(path: Path, predictor: Predictor, provenance: Provenance) -> str:
     return digest
 
 
-def load(path: Path, config: Config) -> tuple[Predictor, Provenance]:
-    """Read a predictor and refuse any that is not for this team or has not passed its gates.
-
-    The gates are held against the limits of `config`; with other weights Q, R than those the
-    radius was computed for, it is computed anew.
-
-    Raises:
-        PredictorFileError: no such file, not a predictor, corrupt, fitted for another team, gait,
-            horizon, interface or low level.
-        PredictorError: beyond a gate's limit.
-    """
-    predictor, provenance = read(path)
-    _check_meta(path, predictor.meta, PredictorMeta.of(config))
-    gates, planner = provenance.gates, config.planner
-    weights = (tuple(planner.Q), tuple(planner.R))
-    if weights != (gates.Q, gates.R):
-        gates = replace(
-            gates, radius=best_response_radius(config, predictor), Q=planner.Q, R=planner.R
-        )
-    limits = config.identification
-    gates = replace(gates, gain_limits=tuple(limits.gain_range), radius_limit=limits.max_radius)
-    gates.check(planner.kind)
-    return predictor, replace(provenance, gates=gates)
-
-
 def read(path: Path) -> tuple[Predictor, Provenance]:
     """Read a predictor file whatever it was fitted for (to show what is in it).
 
@@ -140,13 +110,13 @@ def read(path: Path) -> tuple[Predictor, Provenance]:
             G, document = archive["G"], json.loads(str(archive["document"]))
         if document["format"] != FORMAT:
             raise PredictorFileError(
-                f"predictor {path}", f"format {document['format']}", f"format {FORMAT}", _REMEDY
+                f"predictor {path}", f"format {document['format']}", f"format {FORMAT}", REMEDY
             )
         meta = PredictorMeta.from_dict(document["meta"])
         provenance = Provenance.from_dict(document["provenance"])
         predictor = Predictor(meta, np.asarray(G, dtype=np.float64), provenance.gates.condition)
     except FileNotFoundError:
-        raise PredictorFileError(f"predictor {path}", "no such file", "a file", _REMEDY) from None
+        raise PredictorFileError(f"predictor {path}", "no such file", "a file", REMEDY) from None
     except (
         OSError,
         ValueError,
@@ -160,27 +130,13 @@ def read(path: Path) -> tuple[Predictor, Provenance]:
             f"predictor {path}",
             f"something else ({type(error).__name__})",
             "a predictor that quadriga wrote",
-            f"truncated or not a predictor: delete it; {_REMEDY}",
+            f"truncated or not a predictor: delete it; {REMEDY}",
         ) from None
     if document["sha256"] != predictor_sha256(predictor):
         raise PredictorFileError(
             f"predictor {path}",
             "content that its digest does not match",
             "an unchanged file",
-            f"corrupt: delete it; {_REMEDY}",
+            f"corrupt: delete it; {REMEDY}",
         )
     return predictor, provenance
-
-
-def _check_meta(path: Path, got: PredictorMeta, expected: PredictorMeta) -> None:
-    pairs = [(name, getattr(got, name), getattr(expected, name)) for name in _MATCHED]
-    fitted = dict(got.controller)
-    pairs += [(f"controller.{k}", fitted.get(k), wanted) for k, wanted in expected.controller]
-    for name, found, wanted in pairs:
-        if found != wanted:
-            raise PredictorFileError(
-                f"predictor {path}: {name}",
-                repr(found),
-                f"{wanted!r} as configured",
-                f"fitted for another setting; {_REMEDY}",
-            )

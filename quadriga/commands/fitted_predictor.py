@@ -17,13 +17,13 @@ def load_predictor(config: Config, arguments: argparse.Namespace) -> Predictor:
     Raises:
         PredictorError: there is none after `--wait` seconds, or it is not of this team.
     """
-    from quadriga.agents.predictor.store import load
+    from quadriga.agents.planner.checked_predictor import load_checked
     from quadriga.identification.cache import await_predictor, predictor_path
 
     path = arguments.predictor or predictor_path(config)
     if arguments.wait:
         await_predictor(path, arguments.wait)
-    return load(path, config)[0]
+    return load_checked(path, config)[0]
 
 
 def fitted_sha256(config: Config, wait: float) -> str:
@@ -34,10 +34,11 @@ def fitted_sha256(config: Config, wait: float) -> str:
     """
     if config.planner.kind == "none":
         return ""
-    from quadriga.agents.predictor.store import load, predictor_sha256
+    from quadriga.agents.planner.checked_predictor import load_checked
+    from quadriga.agents.predictor.store import predictor_sha256
     from quadriga.identification.cache import await_predictor, predictor_path
 
     path = predictor_path(config)
     if wait:
         await_predictor(path, wait)
-    return predictor_sha256(load(path, config)[0]) if path.is_file() else ""
+    return predictor_sha256(load_checked(path, config)[0]) if path.is_file() else ""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from quadriga.agents.planner.team_planner import TeamPlanner, centralised, deepc
-from quadriga.agents.predictor.deepc import build_model, reduce
+from quadriga.agents.planner.deepc_qp import build_model
+from quadriga.agents.planner.team_planner import TeamPlanner, build_centralised, build_deepc
+from quadriga.agents.predictor.deepc import reduce
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.cache import data_path
 from quadriga.identification.dataset import read_data
@@ -25,7 +26,9 @@ def build_central_planner(
     """
     one_blas_thread()
     if config.planner.kind == "centralised":
-        return centralised(config, predictor)
+        return build_centralised(config, predictor)
     planner = config.planner
     reduction = reduce(read_data(data or data_path(config)).training, planner.T_ini, planner.N)
-    return deepc(config, build_model(reduction, planner, planner.lambda_g, planner.lambda_sigma))
+    return build_deepc(
+        config, build_model(reduction, planner, planner.lambda_g, planner.lambda_sigma)
+    )

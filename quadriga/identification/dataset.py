@@ -47,7 +47,7 @@ def check_excitation(config: Config, training: Sequence[Episode]) -> None:
             f"at least {required} by (m+1)(T_ini+N+n)−1",
             "collect more: identification.seconds, or fewer falls",
         )
-    found = excitation([episode.scaled()[0] for episode in training], length + order)
+    found = excitation([episode.scaled_deviations()[0] for episode in training], length + order)
     if not found.persistent:
         raise PredictorError(
             "collected data",

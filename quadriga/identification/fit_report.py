@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.agents.planner.gates import GateReport
 from quadriga.agents.predictor.episode import Episode
+from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance
 from quadriga.agents.time_grid import gait_phase

@@ -8,10 +8,12 @@ from pathlib import Path
 
 from rich.console import Console
 
-from quadriga.agents.planner.gates import GateReport, run_gates
+from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.planner.gates import run_gates
 from quadriga.agents.predictor.fits import fit as fit_predictor
+from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.store import Provenance, load, save, versions
+from quadriga.agents.predictor.store import Provenance, save, versions
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.collect import collect, training_seconds
 from quadriga.identification.dataset import Dataset, check_excitation, read_data, write_data
@@ -29,7 +31,7 @@ def ensure_predictor(config: Config, console: Console) -> Path:
     """
     path = predictor_path(config)
     if path.is_file():
-        load(path, config)
+        load_checked(path, config)
         return path
     dataset = ensure_data(config, console)
     fit(config, dataset, path, console)
@@ -96,6 +98,6 @@ def load_predictor(path: Path, config: Config) -> Predictor:
     """The predictor in a file, if it is for this team and passes its gates.
 
     Raises:
-        PredictorError: see `quadriga.agents.predictor.store.load`.
+        PredictorError: see `quadriga.agents.planner.checked_predictor.load_checked`.
     """
-    return load(path, config)[0]
+    return load_checked(path, config)[0]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.inbox.inbox import Inbox, Order, Source, order_of, read
+from quadriga.agents.inbox.inbox import Inbox, Order, Source, decode_packet, order_of
 from quadriga.agents.inbox.intake_log import ANYONE
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.errors import RecordingError
@@ -101,7 +101,7 @@ def _build_handlers(
         log.last = max(log.last, entry.tick)
 
     def keep_record(entry: ChunkEntry) -> None:
-        record = read(INPUTS, entry.payload)
+        record = decode_packet(INPUTS, entry.payload)
         if isinstance(record, Consumed):
             log.records[record.tick] = record
             log.last = max(log.last, record.tick)
@@ -125,7 +125,7 @@ def _keep_received(log: AgentLog, topic: Topic, sender: str) -> Callable[[ChunkE
     by_order = log.received[topic.name, sender]
 
     def keep(entry: ChunkEntry) -> None:
-        message = read(topic, entry.payload)
+        message = decode_packet(topic, entry.payload)
         if message is not None:  # what is not valid, the agent dropped
             by_order[order_of(message)].append((entry.key, entry.payload))
 
@@ -134,7 +134,7 @@ def _keep_received(log: AgentLog, topic: Topic, sender: str) -> Callable[[ChunkE
 
 def _keep_sent(log: AgentLog, topic: Topic) -> Callable[[ChunkEntry], None]:
     def keep(entry: ChunkEntry) -> None:
-        message = read(topic, entry.payload)
+        message = decode_packet(topic, entry.payload)
         order = (entry.tick, 0) if message is None else order_of(message)
         log.sent[topic.name, *order].append(entry.payload)
 

@@ -19,7 +19,7 @@ from quadriga.replay.figure import Curves, draw
 from quadriga.replay.outcome import ReplayOutcome, format_inputs
 from quadriga.replay.recorded_inputs import RecordedInputs
 from quadriga.replay.recorded_predictor import find_predictor
-from quadriga.replay.saved_qp import PLANNER, WHOLE_BODY, captured, save
+from quadriga.replay.saved_qp import PLANNER, WHOLE_BODY, problems_of, save
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.recording.config import recorded_config
@@ -171,8 +171,8 @@ def _save_problem(job: ReplayJob, agent: Agent, verdict: ReplayVerdict) -> tuple
     """The problem behind the first difference, if one was solved."""
     if verdict.first is None or verdict.step is None:
         return ()
-    with captured(f"{job.robot} at tick {verdict.first.tick}") as found:
-        agent.step(verdict.step.before, verdict.step.inputs)
+    about = f"{job.robot} at tick {verdict.first.tick}"
+    found = problems_of(agent, verdict.step.before, verdict.step.inputs, about)
     kind = PLANNER if verdict.first.name == PLAN.name else WHOLE_BODY
     if kind not in found:
         return ()

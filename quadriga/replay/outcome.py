@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from quadriga.agents.inbox.intake_log import taken_in
+from quadriga.agents.inbox.intake_log import list_messages
 from quadriga.replay.comparison import COMPARED, ReplayedStep, ReplayVerdict
 
 _SHOWN: Final = 3  # messages missing from the recording that are named
@@ -44,7 +44,7 @@ class ReplayOutcome:
 def format_inputs(step: ReplayedStep) -> str:
     """What a step took in: serials of each source."""
     by_source: dict[str, list[str]] = defaultdict(list)
-    for (topic, sender), (first, second) in taken_in(step.inputs):
+    for (topic, sender), (first, second) in list_messages(step.inputs):
         by_source[f"{topic} of {sender}"].append(f"{first}.{second}" if second else str(first))
     state = step.inputs.state
     passed = state.tick - step.before.tick - 1

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from quadriga.agents.agent import Agent, Inputs
-from quadriga.agents.inbox.inbox import Inbox, Order, Source, Wanted
-from quadriga.agents.inbox.intake_log import expected, reference_to, referred
+from quadriga.agents.inbox.inbox import Due, Inbox, Order, Source
+from quadriga.agents.inbox.intake_log import format_message_id, has_rule, parse_message_id
 from quadriga.agents.planning.interface import NOTHING
 from quadriga.replay.agent_log import AgentLog, Packet
 from quadriga.shared.config.sections import Config
@@ -49,7 +49,7 @@ class RecordedInputs:
         self._state_key = STATE.key(config.team.name, agent.robot)
         self._after = {r.tick - r.passed - 1: r.tick for r in log.records.values()}
         self._lost = _find_lost_records(log.records, agent.robot)
-        references = (referred(text) for r in log.records.values() for text in r.taken)
+        references = (parse_message_id(text) for r in log.records.values() for text in r.taken)
         self._claimed = {reference for reference in references if reference}
         self._queues = {source: sorted(packets) for source, packets in log.received.items()}
         self._due: dict[Source, Order] = {}  # in lock-step: up to where all has been awaited
@@ -68,8 +68,8 @@ class RecordedInputs:
         record = self._log.records.get(tick)
         missing = list(self._lost.get(tick, ()))
         state = self._take_state(tick)  # first: it sets the time, see `Inbox`
-        awaited = self._agent.awaited(tick) if self._lockstep else NOTHING
-        wanted = [] if awaited == NOTHING else self._inbox.wanted(tick, awaited)
+        awaited = self._agent.expected(tick) if self._lockstep else NOTHING
+        wanted = [] if awaited == NOTHING else self._inbox.list_due(tick, awaited)
         if record is not None:
             missing += self._take_listed(record)
             self._pass_over(wanted)
@@ -79,13 +79,13 @@ class RecordedInputs:
         if state is None:
             missing.append(f"state of {self._agent.robot} at tick {tick}")
             return StepInputs(tick, None, tuple(missing))
-        return StepInputs(tick, self._inbox.inputs(state, awaited), tuple(missing))
+        return StepInputs(tick, self._inbox.pop_inputs(state, awaited), tuple(missing))
 
     def _take_state(self, tick: int) -> State | None:
         """The first valid state of a tick: the agent would not have stepped at a second one."""
         for payload in self._log.states.pop(tick, ()):
             self._inbox.take(self._state_key, payload)
-            state = self._inbox.state()
+            state = self._inbox.pop_state()
             if state is not None:
                 return state
         return None
@@ -103,13 +103,13 @@ class RecordedInputs:
 
     def _find_packets(self, text: str) -> list[Packet]:
         """The recorded packets that a record refers to, without those already handed over."""
-        reference = referred(text)
+        reference = parse_message_id(text)
         if reference is None:
             return []
         source, order = reference
         return self._log.received.get(source, {}).get(order, [])
 
-    def _pass_over(self, wanted: list[Wanted]) -> None:
+    def _pass_over(self, wanted: list[Due]) -> None:
         """Drop what a step with a record awaited and did not get: the agent never got it later."""
         for source, due in wanted:
             queue = self._queues.get(source, [])
@@ -123,11 +123,11 @@ class RecordedInputs:
         missing = self._missing_samples(source, due) + ([] if due in received else [due])
         while queue and queue[0] <= due:
             order = queue.pop(0)
-            if expected(source, order) and (source, order) not in self._claimed:
+            if has_rule(source, order) and (source, order) not in self._claimed:
                 for packet in received[order]:
                     self._inbox.take(*packet)
         self._due[source] = due
-        return [reference_to(source, order) for order in missing]
+        return [format_message_id(source, order) for order in missing]
 
     def _missing_samples(self, source: Source, due: Order) -> list[Order]:
         """A peer's samples before the last one, at ticks at which it gave a command."""

@@ -15,19 +15,15 @@ from __future__ import annotations
 
 import sys
 import zipfile
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import daqp
 import numpy as np
 
-from quadriga.agents.controller.controller import Controller, ControllerOutputs
-from quadriga.agents.controller.sensed import Sensed
-from quadriga.agents.planner.free_step import FreeStep
-from quadriga.agents.planner.qp_solver import SOLVERS
+from quadriga.agents.agent import Agent, AgentState, Inputs, StepProblems
+from quadriga.agents.planner.qp_solver import SolvedQp
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.robot.a1 import TORQUE_LIMIT, Array
 
@@ -97,74 +93,47 @@ def load(path: Path) -> SavedQp:
         raise RecordingError(str(path), str(error) or "another file", "a saved problem") from None
 
 
-@contextmanager
-def captured(about: str) -> Iterator[dict[str, SavedQp]]:
-    """Collect the problems solved within the block, the last of each kind, by topic.
+def problems_of(agent: Agent, before: AgentState, inputs: Inputs, about: str) -> dict[str, SavedQp]:
+    """The problems behind one step of an agent, by the topic that is made of each.
 
-    For making one step again, never for walking: it stands in for the solvers' functions.
+    Args:
+        agent: whose step it is.
+        before: what it remembered.
+        inputs: what it took in.
+        about: which step this is, in words.
     """
-    found: dict[str, SavedQp] = {}
-
-    def whole_body(act: Callable[..., ControllerOutputs]) -> Callable[..., ControllerOutputs]:
-        def observed(
-            low_level: Controller, seen: Sensed, *arguments: Any, **named: Any
-        ) -> ControllerOutputs:
-            acted = act(low_level, seen, *arguments, **named)
-            problem = low_level.problem(seen, acted.memory, acted.goal)
-            box = np.full(len(problem.H), TORQUE_LIMIT)
-            found[WHOLE_BODY] = SavedQp(
-                problem.H,
-                problem.g,
-                problem.C,
-                np.concatenate([-box, problem.c]),
-                np.concatenate([box, np.full(len(problem.c), _FAR)]),
-                acted.solution.tau,
-                f"whole-body QP of {about}, {acted.solution.status}: x is the torques [N·m]",
-            )
-            return acted
-
-        return observed
-
-    def planner(solve: Callable[..., Any]) -> Callable[..., Any]:
-        def observed(
-            solver: Any, f: Array, lower: Array | None = None, upper: Array | None = None
-        ) -> Any:
-            answer, problem = solve(solver, f, lower, upper), solver._problem
-            low = problem.lower if lower is None else lower
-            high = problem.upper if upper is None else upper
-            found[PLANNER] = SavedQp(
-                problem.H,
-                f,
-                problem.A,
-                np.maximum(low, -_FAR),
-                np.minimum(high, _FAR),
-                answer.x,
-                f"planner's QP of {about}, {answer.status}: x is the force deviations of the "
-                "stance legs over the horizon [N], then slacks",
-            )
-            return answer
-
-        return observed
-
-    with ExitStack() as stack:
-        stack.enter_context(_instead(Controller, "act", whole_body))
-        # Every step through a solver, also those that need none.
-        stack.enter_context(_instead(FreeStep, "plan", lambda _: lambda *_: None))
-        for kind in SOLVERS.values():
-            stack.enter_context(_instead(kind, "solve", planner))
-        yield found
+    problems = agent.problems_of(before, inputs)
+    found = {WHOLE_BODY: _save_whole_body(problems, about)}
+    if problems.planner is not None:
+        found[PLANNER] = _save_planner(problems.planner, about)
+    return found
 
 
-@contextmanager
-def _instead(
-    owner: Any, name: str, wrapped: Callable[[Callable[..., Any]], Callable[..., Any]]
-) -> Iterator[None]:
-    original = getattr(owner, name)
-    setattr(owner, name, wrapped(original))
-    try:
-        yield
-    finally:
-        setattr(owner, name, original)
+def _save_whole_body(problems: StepProblems, about: str) -> SavedQp:
+    qp, answer = problems.whole_body, problems.whole_body_solution
+    box = np.full(len(qp.H), TORQUE_LIMIT)
+    return SavedQp(
+        qp.H,
+        qp.g,
+        qp.C,
+        np.concatenate([-box, qp.c]),
+        np.concatenate([box, np.full(len(qp.c), _FAR)]),
+        answer.tau,
+        f"whole-body QP of {about}, {answer.status}: x is the torques [N·m]",
+    )
+
+
+def _save_planner(qp: SolvedQp, about: str) -> SavedQp:
+    return SavedQp(
+        qp.problem.H,
+        qp.f,
+        qp.problem.A,
+        np.maximum(qp.lower, -_FAR),
+        np.minimum(qp.upper, _FAR),
+        qp.solution.x,
+        f"planner's QP of {about}, {qp.solution.status}: x is the force deviations of the "
+        "stance legs over the horizon [N], then slacks",
+    )
 
 
 def main(path: Path) -> None:

@@ -8,7 +8,8 @@ from typing import Final
 
 from rich.console import Console
 
-from quadriga.agents.predictor.store import load, predictor_sha256
+from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.replay.recorded_predictor import copy_predictor
 from quadriga.shared.config.reference_trace import trace_of
@@ -48,7 +49,7 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
     predictor, sha256 = None, ""
     if config.planner.kind != "none":
         predictor = ensure_predictor(config, console)
-        sha256 = predictor_sha256(load(predictor, config)[0])
+        sha256 = predictor_sha256(load_checked(predictor, config)[0])
         copy_predictor(predictor, run_dir)
     (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
     rows = process_table(config, run_dir, predictor, sha256)

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import linalg
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.planner.gates import run_gates
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.fits import fit_ridge
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.store import Provenance, save, versions
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import TOTAL_MASS, Array
 
@@ -107,3 +110,24 @@ def predictor(small: Config) -> Predictor:
     """Of a team of two, as good as exact."""
     meta = replace(PredictorMeta.of(small), ridge=1e-10, block_weight=1.0)
     return fit_ridge([LinearTeam(2).episode(1500, 1)], meta)
+
+
+@pytest.fixture(scope="module")
+def plant(small: Config) -> Config:
+    return replace(small, controller=replace(small.controller, ki_z=0.0))
+
+
+@pytest.fixture(scope="module")
+def fitted(plant: Config) -> tuple[Predictor, Provenance]:
+    """A predictor that passes its gates, and what is known about it."""
+    team = LinearTeam(2)
+    predictor = fit_ridge([team.episode(900, 1)], PredictorMeta.of(plant))
+    report = run_gates(plant, predictor, [team.episode(100, 2)])
+    return predictor, Provenance("abc", (1,), (900,), (100,), versions(), report)
+
+
+@pytest.fixture
+def stored(tmp_path: Path, fitted: tuple[Predictor, Provenance]) -> Path:
+    path = tmp_path / "cache" / "predictor.npz"
+    save(path, *fitted)
+    return path

@@ -143,17 +143,17 @@ def test_a_plan_is_sent_every_forty_ticks_and_uses_the_peers_last_one(duet: Reco
 
 def test_awaited_names_what_lock_step_must_have_received() -> None:
     agent = Agent(CONFIG, "r1", simple_predictor(CONFIG))
-    assert agent.awaited(0) == Expected(reference_tick=0)
-    assert agent.awaited(301) == Expected()
+    assert agent.expected(0) == Expected(reference_tick=0)
+    assert agent.expected(301) == Expected()
     # Half a step after each planning step its plans, and the samples they were made of.
-    assert agent.awaited(FIRST_PLAN - 20) == Expected(None, FIRST_PLAN - 40, 300)
-    assert agent.awaited(FIRST_PLAN) == Expected()
-    assert agent.awaited(340) == Expected((8, 0), 320)
-    assert agent.awaited(380) == Expected((9, 0), 360)
-    assert agent.awaited(400) == Expected(reference_tick=400)
-    assert Agent(CONFIG, "r1", None).awaited(400) == Expected(reference_tick=400)
+    assert agent.expected(FIRST_PLAN - 20) == Expected(None, FIRST_PLAN - 40, 300)
+    assert agent.expected(FIRST_PLAN) == Expected()
+    assert agent.expected(340) == Expected((8, 0), 320)
+    assert agent.expected(380) == Expected((9, 0), 360)
+    assert agent.expected(400) == Expected(reference_tick=400)
+    assert Agent(CONFIG, "r1", None).expected(400) == Expected(reference_tick=400)
     truthful = replace(CONFIG, estimator=replace(CONFIG.estimator, kind="truth"))
-    assert Agent(truthful, "r1", None).awaited(401) == Expected(truth=True)
+    assert Agent(truthful, "r1", None).expected(401) == Expected(truth=True)
 
 
 def test_excitation_is_added_on_the_stance_feet_while_walking() -> None:

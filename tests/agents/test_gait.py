@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.agents.gait import (
+    half_cycle_stance,
     nominal_forces,
     phase_offset_ms,
     scheduled_stance,
-    stance_of_half,
     stance_progress,
 )
 from quadriga.shared.config.sections import Config, GaitConfig
@@ -71,11 +71,11 @@ def test_progress_and_half_say_the_same_as_the_schedule(
     progress, half = stance_progress(config, index, tick)
     assert progress == (since % gait.stance_ms) / gait.stance_ms
     expected = scheduled_stance(config, index, np.array([tick]))[0]
-    np.testing.assert_array_equal(stance_of_half(half), expected)
+    np.testing.assert_array_equal(half_cycle_stance(half), expected)
 
 
 def test_standing_is_half_minus_one() -> None:
-    assert stance_of_half(-1).all()
+    assert half_cycle_stance(-1).all()
 
 
 @pytest.mark.parametrize("legs", range(1, 16))

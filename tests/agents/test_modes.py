@@ -14,7 +14,9 @@ from quadriga.agents.modes import (
     STOPPING,
     WALK,
     Mode,
-    go_limp,
+    Stop,
+    enter_passive,
+    resolve_stops,
     step_mode,
     stop_safely,
 )
@@ -25,13 +27,13 @@ STAND_MS = 300
 def test_a_robot_stands_then_walks() -> None:
     mode = Mode(STAND, 0)
     for tick in range(STAND_MS):
-        mode = step_mode(mode, tick, STAND_MS, half_boundary=True)
+        mode = step_mode(mode, tick, STAND_MS, half_cycle_ends=True)
         assert mode == Mode(STAND, 0)
         assert mode.speed_factor(tick) == 0.0
-    mode = step_mode(mode, STAND_MS, STAND_MS, half_boundary=True)
+    mode = step_mode(mode, STAND_MS, STAND_MS, half_cycle_ends=True)
     assert mode == Mode(WALK, STAND_MS)
     assert mode.speed_factor(10**6) == 1.0
-    assert step_mode(mode, 10**6, STAND_MS, half_boundary=True) is mode
+    assert step_mode(mode, 10**6, STAND_MS, half_cycle_ends=True) is mode
 
 
 def test_a_safe_stop_slows_down_and_stands_at_the_end_of_a_stance_for_good() -> None:
@@ -42,17 +44,17 @@ def test_a_safe_stop_slows_down_and_stands_at_the_end_of_a_stance_for_good() -> 
     assert factors == sorted(factors, reverse=True)
     assert factors[-1] == 0.0
     early, done = 1050 + SLOW_DOWN_MS - 1, 1050 + SLOW_DOWN_MS
-    assert step_mode(mode, early, STAND_MS, half_boundary=True) is mode
-    assert step_mode(mode, done, STAND_MS, half_boundary=False) is mode
-    stood = step_mode(mode, done, STAND_MS, half_boundary=True)
+    assert step_mode(mode, early, STAND_MS, half_cycle_ends=True) is mode
+    assert step_mode(mode, done, STAND_MS, half_cycle_ends=False) is mode
+    stood = step_mode(mode, done, STAND_MS, half_cycle_ends=True)
     assert (stood.name, stood.reason) == (STAND, "reference-lost")
-    assert step_mode(stood, 10**6, STAND_MS, half_boundary=True) is stood
+    assert step_mode(stood, 10**6, STAND_MS, half_cycle_ends=True) is stood
 
 
 def test_a_stop_before_walking_keeps_the_robot_standing() -> None:
     mode = stop_safely(Mode(STAND, 0), 100, "peer-lost:r2")
     assert mode == Mode(STAND, 100, "peer-lost:r2")
-    assert step_mode(mode, STAND_MS, STAND_MS, half_boundary=True) is mode
+    assert step_mode(mode, STAND_MS, STAND_MS, half_cycle_ends=True) is mode
 
 
 @pytest.mark.parametrize(
@@ -65,21 +67,21 @@ def test_a_later_reason_to_stop_does_not_replace_the_first(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", [Mode(STAND, 0), Mode(WALK, 1), Mode(STOPPING, 2, "a")])
 @pytest.mark.parametrize("name", [DAMPING, ESTOP])
-def test_any_mode_can_go_limp(mode: Mode, name: str) -> None:
-    limp = go_limp(mode, 7, name, "why")
-    assert limp == Mode(name, 7, "why")
-    assert limp.limp
-    assert not mode.limp
-    assert limp.speed_factor(7) == 0.0
+def test_any_mode_can_enter_passive(mode: Mode, name: str) -> None:
+    passive = enter_passive(mode, 7, name, "why")
+    assert passive == Mode(name, 7, "why")
+    assert passive.passive
+    assert not mode.passive
+    assert passive.speed_factor(7) == 0.0
 
 
 def test_an_emergency_stop_outranks_a_fault_and_the_first_of_each_stays() -> None:
-    fault = go_limp(Mode(WALK, 0), 1, DAMPING, "fall")
-    assert go_limp(fault, 2, DAMPING, "qp") is fault
-    stopped = go_limp(fault, 3, ESTOP, "operator")
+    fault = enter_passive(Mode(WALK, 0), 1, DAMPING, "fall")
+    assert enter_passive(fault, 2, DAMPING, "qp") is fault
+    stopped = enter_passive(fault, 3, ESTOP, "operator")
     assert stopped == Mode(ESTOP, 3, "operator")
-    assert go_limp(stopped, 4, DAMPING, "fall") is stopped
-    assert go_limp(stopped, 5, ESTOP, "another") is stopped
+    assert enter_passive(stopped, 4, DAMPING, "fall") is stopped
+    assert enter_passive(stopped, 5, ESTOP, "another") is stopped
 
 
 EVENTS = st.lists(
@@ -91,7 +93,7 @@ EVENTS = st.lists(
 
 
 @given(EVENTS)
-def test_whatever_happens_limp_is_for_good_and_ranks_only_rise(
+def test_whatever_happens_passive_is_for_good_and_ranks_only_rise(
     events: list[tuple[str, int, bool]],
 ) -> None:
     rank = {STAND: 0, WALK: 0, STOPPING: 0, DAMPING: 1, ESTOP: 2}
@@ -104,8 +106,40 @@ def test_whatever_happens_limp_is_for_good_and_ranks_only_rise(
         elif kind == "stop":
             mode = stop_safely(mode, tick, "why")
         else:
-            mode = go_limp(mode, tick, kind, kind)
+            mode = enter_passive(mode, tick, kind, kind)
         assert rank[mode.name] >= rank[before.name]
         if before.reason and rank[mode.name] == rank[before.name]:
             assert mode.reason == before.reason
             assert mode.name != WALK
+
+
+CAUSES = st.lists(
+    st.builds(Stop, st.sampled_from([STOPPING, DAMPING, ESTOP]), st.sampled_from(["a", "b", "c"])),
+    max_size=5,
+)
+MODES = st.builds(
+    Mode, st.sampled_from([STAND, WALK, STOPPING, DAMPING, ESTOP]), st.just(3), st.just("before")
+) | st.sampled_from([Mode(STAND, 3), Mode(WALK, 3)])
+
+
+@given(MODES, CAUSES)
+def test_stops_of_one_tick_come_to_the_same_as_one_after_the_other(
+    mode: Mode, stops: list[Stop]
+) -> None:
+    one_by_one = mode
+    for stop in stops:
+        if stop.mode == STOPPING:
+            one_by_one = stop_safely(one_by_one, 7, stop.reason)
+        else:
+            one_by_one = enter_passive(one_by_one, 7, stop.mode, stop.reason)
+    assert resolve_stops(mode, 7, stops) == one_by_one
+
+
+def test_of_the_stops_of_one_tick_the_gravest_counts_and_of_equals_the_first() -> None:
+    lost, fall = Stop(STOPPING, "reference-lost"), Stop(DAMPING, "fall")
+    qp, estop = Stop(DAMPING, "qp-failed"), Stop(ESTOP, "estop:operator")
+    walking = Mode(WALK, 1)
+    assert resolve_stops(walking, 7, []) is walking
+    assert resolve_stops(walking, 7, [lost]) == Mode(STOPPING, 7, "reference-lost")
+    assert resolve_stops(walking, 7, [lost, fall, qp]) == Mode(DAMPING, 7, "fall")
+    assert resolve_stops(walking, 7, [lost, fall, estop]) == Mode(ESTOP, 7, "estop:operator")

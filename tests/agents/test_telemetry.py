@@ -25,7 +25,7 @@ def test_status_at_10_hz_and_on_change_of_mode() -> None:
     sent = []
     for tick, mode in modes.items():
         planned = 2_000_000 if tick % 40 == 0 else None
-        telemetry.note(outputs(mode, planned), tick_ns=500_000)
+        telemetry.note_step(outputs(mode, planned), tick_ns=500_000)
         status = telemetry.status(tick, outputs(mode), {"dropped_state": 2})
         if status is not None:
             sent.append(status)
@@ -41,8 +41,8 @@ def test_status_at_10_hz_and_on_change_of_mode() -> None:
 def test_an_age_told_between_two_status_messages_is_not_lost() -> None:
     telemetry = Telemetry("kalman")
     planned = replace(outputs("walk"), ages_ms={"plan.r1": 40.0})
-    telemetry.note(planned, 0)
-    telemetry.note(outputs("walk"), 0)
+    telemetry.note_step(planned, 0)
+    telemetry.note_step(outputs("walk"), 0)
     status = telemetry.status(0, outputs("walk"), {})
     assert status is not None
     assert status.ages_ms == {"plan.r1": 40.0, "reference": 3.0}
@@ -58,8 +58,8 @@ def test_in_real_time_missed_deadlines_and_jitter_are_told() -> None:
     telemetry = Telemetry("kalman", paced=True)
     for tick in range(100):
         late_ns = 700_000 if tick == 50 else 0
-        telemetry.taken(tick, 1_000_000 * tick + late_ns)
-        telemetry.note(outputs("walk"), 1_500_000 if tick % 10 == 0 else 300_000)
+        telemetry.note_state(tick, 1_000_000 * tick + late_ns)
+        telemetry.note_step(outputs("walk"), 1_500_000 if tick % 10 == 0 else 300_000)
     status = telemetry.status(100, outputs("walk"), {})
     assert status is not None
     assert status.counters["deadlines_missed"] == 10
@@ -70,7 +70,7 @@ def test_in_real_time_missed_deadlines_and_jitter_are_told() -> None:
 def test_a_state_passed_over_is_no_jitter() -> None:
     telemetry = Telemetry("kalman", paced=True)
     for tick in (0, 1, 4, 5):
-        telemetry.taken(tick, 1_000_000 * tick)
+        telemetry.note_state(tick, 1_000_000 * tick)
     status = telemetry.status(5, outputs("walk"), {})
     assert status is not None
     assert status.ages_ms["jitter.max"] == pytest.approx(0.0, abs=1e-9)

@@ -21,8 +21,9 @@ import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 from rich.console import Console
 
+from quadriga.agents.planner.checked_predictor import load_checked
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.predictor.store import load, predictor_sha256, save
+from quadriga.agents.predictor.store import predictor_sha256, save
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.load import load as load_config
@@ -74,7 +75,7 @@ def main() -> int:
 def fit(path: Path) -> None:
     """Fit the predictor and write it with less digits, which makes it a quarter of the size."""
     config = load_config(None, scenario.FITTED_FOR)
-    fitted, provenance = load(ensure_predictor(config, Console(stderr=True)), config)
+    fitted, provenance = load_checked(ensure_predictor(config, Console(stderr=True)), config)
     predictor = Predictor(fitted.meta, rounded(fitted.G), fitted.condition)
     with tempfile.TemporaryDirectory() as folder:
         plain = Path(folder) / "plain.npz"
@@ -82,7 +83,7 @@ def fit(path: Path) -> None:
         with np.load(plain, allow_pickle=False) as archive:
             # As float32, which holds these digits exactly; what is read from it is float64 again.
             np.savez_compressed(path, G=archive["G"].astype("<f4"), document=archive["document"])
-    load(path, config)
+    load_checked(path, config)
 
 
 def rounded(values: Array) -> Array:
@@ -101,7 +102,7 @@ def renew(to: Path, predictor_file: Path) -> None:
     """
     config = scenario.config()
     try:
-        predictor, _ = load(predictor_file, config)
+        predictor, _ = load_checked(predictor_file, config)
     except PredictorError as error:
         raise PredictorError(error.name, error.got, error.expected, "try --fit") from None
     with atomic_write(to) as partial:

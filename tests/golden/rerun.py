@@ -32,10 +32,10 @@ def rerun(
         for entry in packets:
             if entry.key in arrivals.keys:
                 arrivals.take(entry.key, entry.payload)
-        state = arrivals.state()
+        state = arrivals.pop_state()
         if state is None:
             continue
-        inputs = arrivals.inputs(state, agent.awaited(state.tick))
+        inputs = arrivals.pop_inputs(state, agent.expected(state.tick))
         memory, out = agent.step(memory, inputs)
         for topic, message in zip(OUTPUTS, (out.command, out.measurement, out.plan), strict=True):
             if message is not None:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadriga.agents.predictor.store import load
+from quadriga.agents.planner.checked_predictor import load_checked
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.reader import ChunkEntry, Recording
 from quadriga.shared.wire.codec import decode, encode
@@ -37,7 +37,7 @@ def entries() -> list[ChunkEntry]:
 
 
 def heard_again(entries: list[ChunkEntry], robot: str, config: Config = CONFIG) -> Sent:
-    return rerun(entries, config, robot, load(scenario.PREDICTOR, CONFIG)[0])
+    return rerun(entries, config, robot, load_checked(scenario.PREDICTOR, CONFIG)[0])
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
@@ -138,7 +138,7 @@ def test_on_a_processor_of_2008_the_walk_is_the_same_within_the_tolerance() -> N
 
 
 def test_renewing_gives_the_same_file_and_keeps_every_reason(tmp_path: Path) -> None:
-    predictor, _ = load(scenario.PREDICTOR, CONFIG)
+    predictor, _ = load_checked(scenario.PREDICTOR, CONFIG)
     for name in ("first", "second"):
         write(tmp_path / name, CONFIG, predictor)
     assert (tmp_path / "first").read_bytes() == (tmp_path / "second").read_bytes()

@@ -9,9 +9,8 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from quadriga.agents.planning.local import first_step
-from quadriga.agents.predictor.store import load as load_predictor
-from quadriga.agents.time_grid import step_ms
+from quadriga.agents.planner.checked_predictor import load_checked as load_predictor
+from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.identification.central_planner import build_central_planner
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.identification.rollout import Rollout

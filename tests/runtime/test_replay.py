@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from quadriga.agents.predictor.store import load as load_predictor
+from quadriga.agents.planner.checked_predictor import load_checked as load_predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.commands.parser import main
 from quadriga.identification.predictors import ensure_predictor

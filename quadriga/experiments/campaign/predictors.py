@@ -9,7 +9,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from quadriga.agents.predictor.store import load, predictor_sha256
+from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.fit_report import reason
 from quadriga.identification.predictors import ensure_predictor
@@ -68,7 +69,7 @@ def file_sha256(path: Path) -> str:
 def _made(config: Config, console: Console) -> Fitted:
     try:
         path = ensure_predictor(config, console)
-        sha256 = predictor_sha256(load(path, config)[0])
+        sha256 = predictor_sha256(load_checked(path, config)[0])
     except PredictorFileError:
         raise  # of which no other predictor is to blame
     except PredictorError as error:

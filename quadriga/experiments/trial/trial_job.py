@@ -6,9 +6,9 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
+from quadriga.agents.planner.checked_predictor import load_checked
 from quadriga.agents.planner.team_planner import TeamPlanner
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.predictor.store import load
 from quadriga.experiments.trial.trial import Figures, figures
 from quadriga.experiments.trial.trial_walk import roll_out
 from quadriga.identification.central_planner import build_central_planner
@@ -36,7 +36,7 @@ def walked(config: Config, predictor: Path | None, data: Path | None = None) -> 
 
 @lru_cache(maxsize=4)
 def _predictor(config: Config, path: Path) -> Predictor:
-    return load(path, config)[0]
+    return load_checked(path, config)[0]
 
 
 @lru_cache(maxsize=2)

@@ -73,8 +73,8 @@ def test_malformed_messages_on_any_key_are_dropped_and_counted(
     refused = 3 if topic.per_robot else topic is not ESTOP  # which whoever sends there wants
     assert sum(box.counters.values()) == refused
     assert all(name in (f"dropped_{topic.name}", "dropped_foreign") for name in box.counters)
-    assert box.state() is None
-    inputs = box.inputs(standing(0), Expected((0, 0), 0, 0, True))
+    assert box.pop_state() is None
+    inputs = box.pop_inputs(standing(0), Expected((0, 0), 0, 0, True))
     assert (inputs.plans, inputs.measurements, inputs.references) == ((), (), ())
     assert inputs.estop == (EStop(0, 0, "unreadable") if topic is ESTOP else None)
     assert inputs.truth is None
@@ -83,23 +83,23 @@ def test_malformed_messages_on_any_key_are_dropped_and_counted(
 def test_the_newest_state_counts_and_the_others_are_counted() -> None:
     box = arrivals()
     feed(box, *(("r2/state", standing(tick)) for tick in (1, 2, 3)))
-    state = box.state()
+    state = box.pop_state()
     assert state is not None
     assert state.tick == 3
     assert box.counters["states_passed_over"] == 2
-    assert box.state() is None
+    assert box.pop_state() is None
 
 
 def test_of_states_in_any_order_the_newest_counts_and_none_before_it() -> None:
     for order in permutations((4, 5, 6)):
         box = arrivals()
         feed(box, *(("r2/state", standing(tick)) for tick in order))
-        state = box.state()
+        state = box.pop_state()
         assert state is not None
         assert state.tick == 6
         assert box.counters["states_passed_over"] == 2
         feed(box, ("r2/state", standing(5)), ("r2/state", standing(6)))
-        assert box.state() is None
+        assert box.pop_state() is None
         assert box.misfits == 2 + (order[-1] != 6) + (order[0] == 6)
 
 
@@ -107,13 +107,13 @@ def test_a_state_of_years_ahead_does_not_make_the_real_ones_late() -> None:
     box = arrivals()
     for tick, wrong in ((7, 1 << 41), (8, 8 + 5001)):
         feed(box, ("r2/state", standing(tick)), ("r2/state", standing(wrong)))
-        state = box.state()
+        state = box.pop_state()
         assert state is not None
         assert state.tick == tick
         assert box.misfits == 1
     assert box.counters["ahead_state"] == 2
     feed(box, ("r2/state", standing(8 + 5000)))
-    assert box.state() is not None, "a process may have been stopped for so long"
+    assert box.pop_state() is not None, "a process may have been stopped for so long"
     assert box.misfits == 0
 
 
@@ -134,9 +134,9 @@ def test_what_is_of_a_time_far_ahead_is_refused_and_nobody_is_taken_to_have_spok
     named = {"plan": 800, "measurement": 400, "reference": 400, "sim/truth": 400}
     assert box.counters == {f"ahead_{name}": count for name, count in named.items()}
     assert box.refused
-    assert not box.heard["plan", "r1"]
-    awaited = Expected((50, 0), 2000, 2000, True)
-    assert len(box.owing(2000, awaited)) == 6
+    assert not box.received["plan", "r1"]
+    expected = Expected((50, 0), 2000, 2000, True)
+    assert len(box.missing_sources(2000, expected)) == 6
     feed(
         box,
         ("r1/plan", plan(50)),
@@ -144,7 +144,7 @@ def test_what_is_of_a_time_far_ahead_is_refused_and_nobody_is_taken_to_have_spok
         ("reference", reference(2000)),
         ("reference", reference(3000)),
     )
-    inputs = box.inputs(standing(2000), awaited)
+    inputs = box.pop_inputs(standing(2000), expected)
     assert [found.step for _, found in inputs.plans] == [50]
     assert [sample.tick for _, sample in inputs.measurements] == [2000]
     due = [2000] if mode == "lockstep" else [2000, 3000]
@@ -160,7 +160,7 @@ def test_the_order_of_arrival_does_not_matter() -> None:
     for order in permutations(messages):
         box = arrivals()
         feed(box, *order, ("r1/measurement", measurement(20)))
-        inputs = box.inputs(standing(80), Expected(plan=(1, 0), measurement_tick=40))
+        inputs = box.pop_inputs(standing(80), Expected(plan=(1, 0), measurement_tick=40))
         seen.append([(name, message.tick) for name, message in inputs.measurements])
         assert [name for name, _ in inputs.plans] == ["r1", "r3"]
     assert seen == [[("r1", 10), ("r1", 20), ("r3", 10)]] * len(seen)
@@ -176,12 +176,12 @@ def test_lock_step_hands_over_at_the_tick_that_awaits_and_never_earlier() -> Non
         ("reference", reference(0)),
         ("reference", reference(100)),
     )
-    assert box.inputs(standing(41), NOTHING).plans == ()
-    inputs = box.inputs(standing(80), Expected((1, 0), 40, 0))
+    assert box.pop_inputs(standing(41), NOTHING).plans == ()
+    inputs = box.pop_inputs(standing(80), Expected((1, 0), 40, 0))
     assert [p.step for _, p in inputs.plans] == [1]
     assert inputs.measurements == ()
     assert [r.tick for r in inputs.references] == [0]
-    inputs = box.inputs(standing(120), Expected((2, 0), 80, 100))
+    inputs = box.pop_inputs(standing(120), Expected((2, 0), 80, 100))
     assert [p.step for _, p in inputs.plans] == [2]
     assert [m.tick for _, m in inputs.measurements] == [80]
     assert [r.tick for r in inputs.references] == [100]
@@ -190,14 +190,14 @@ def test_lock_step_hands_over_at_the_tick_that_awaits_and_never_earlier() -> Non
 def test_real_time_hands_over_all_that_has_come_once() -> None:
     box = arrivals("realtime")
     feed(box, ("r1/plan", plan(9)), ("r3/measurement", measurement(990)))
-    inputs = box.inputs(standing(7), NOTHING)
+    inputs = box.pop_inputs(standing(7), NOTHING)
     assert (len(inputs.plans), len(inputs.measurements)) == (1, 1)
-    assert box.inputs(standing(8), NOTHING).plans == ()
+    assert box.pop_inputs(standing(8), NOTHING).plans == ()
 
 
 def test_who_owes_what() -> None:
     box = arrivals(estimator="truth")
-    awaited = Expected(plan=(1, 0), measurement_tick=40, reference_tick=0, truth=True)
+    expected = Expected(plan=(1, 0), measurement_tick=40, reference_tick=0, truth=True)
     everyone = {
         ("plan", "r1"),
         ("plan", "r3"),
@@ -206,8 +206,8 @@ def test_who_owes_what() -> None:
         ("reference", "operator"),
         ("sim/truth", "sim"),
     }
-    assert box.owing(80, awaited) == everyone
-    assert box.owing(80, NOTHING) == frozenset()
+    assert box.missing_sources(80, expected) == everyone
+    assert box.missing_sources(80, NOTHING) == frozenset()
     feed(
         box,
         ("r1/plan", plan(1)),
@@ -216,14 +216,18 @@ def test_who_owes_what() -> None:
         ("r3/measurement", measurement(30)),
         ("reference", reference(0)),
     )
-    assert box.owing(80, awaited) == {("plan", "r3"), ("measurement", "r3"), ("sim/truth", "sim")}
+    assert box.missing_sources(80, expected) == {
+        ("plan", "r3"),
+        ("measurement", "r3"),
+        ("sim/truth", "sim"),
+    }
 
 
 def test_an_emergency_stop_and_the_end_are_never_held_back() -> None:
     box = arrivals()
     feed(box, ("estop", EStop(5, 5, "tripped")), ("sim/event", Event(5, 5, "push", "r1", "")))
     assert not box.ended
-    estop = box.inputs(standing(6), NOTHING).estop
+    estop = box.pop_inputs(standing(6), NOTHING).estop
     assert estop is not None
     assert estop.reason == "tripped"
     feed(
@@ -239,9 +243,9 @@ def test_a_flood_is_bounded_and_counted() -> None:
     most = 256 + 300 // 10  # what is measured while the team stands belongs to no flood
     assert box.counters["flooded_measurement"] == 1000 - most
     feed(box, ("r3/measurement", measurement(0)))
-    assert box.heard["measurement", "r3"] == 1
+    assert box.received["measurement", "r3"] == 1
     assert box.counters["flooded_measurement"] == 1000 - most, "nobody pays for another's flood"
-    taken = box.inputs(standing(5000), Expected(measurement_tick=10**6))
+    taken = box.pop_inputs(standing(5000), Expected(measurement_tick=10**6))
     assert len(taken.measurements) == most + 1
     feed(box, *(("r1/measurement", measurement(10 * k)) for k in range(1000, 1000 + most)))
     assert box.counters["flooded_measurement"] == 1000 - most, "there is room again"
@@ -257,7 +261,7 @@ def test_nothing_that_is_measured_during_the_stand_is_refused(robots: int, stand
     for peer in peers:
         feed(box, *((f"{peer}/measurement", measurement(t)) for t in range(10, last + 1, 10)))
     assert not box.refused
-    assert not box.owing(last, Expected(measurement_tick=last))
+    assert not box.missing_sources(last, Expected(measurement_tick=last))
 
 
 @pytest.mark.parametrize(
@@ -269,7 +273,7 @@ def test_a_reference_that_nobody_may_configure_is_dropped(change: dict[str, Any]
     assert box.counters["dropped_reference"] == 1
     feed(box, ("reference", replace(reference(0), vx=1.2, vy=0.5, wz=-1.0, height=0.32)))
     assert box.counters["dropped_reference"] == 1
-    assert len(box.inputs(standing(0), Expected(reference_tick=0)).references) == 1
+    assert len(box.pop_inputs(standing(0), Expected(reference_tick=0)).references) == 1
 
 
 def truth(robots: tuple[str, ...], rows: int, quat: float = 0.5) -> Truth:
@@ -300,17 +304,17 @@ def truth(robots: tuple[str, ...], rows: int, quat: float = 0.5) -> Truth:
     ],
 )
 def test_a_truth_that_says_nothing_of_the_robot_is_dropped(wrong: Truth) -> None:
-    box, awaited = arrivals(estimator="truth"), Expected(truth=True)
+    box, expected = arrivals(estimator="truth"), Expected(truth=True)
     feed(box, ("sim/truth", wrong))
     assert box.counters["dropped_sim/truth"] == 1
-    assert box.inputs(standing(0), awaited).truth is None
+    assert box.pop_inputs(standing(0), expected).truth is None
     feed(box, ("sim/truth", truth(("r1", "r2", "r3"), 3)))
-    assert box.inputs(standing(0), awaited).truth is not None
+    assert box.pop_inputs(standing(0), expected).truth is not None
 
 
 @pytest.mark.parametrize("quat", [np.zeros(4), np.full(4, 1e-3), np.full(4, 10.0)])
 def test_a_state_with_an_orientation_that_is_none_is_dropped(quat: Array) -> None:
     box = arrivals()
     feed(box, ("r2/state", replace(standing(5), imu_quat_wxyz=quat)))
-    assert box.state() is None
+    assert box.pop_state() is None
     assert box.counters["dropped_state"] == 1

@@ -8,7 +8,12 @@ from hypothesis import strategies as st
 
 from quadriga.agents.agent import Inputs
 from quadriga.agents.inbox.inbox import Inbox
-from quadriga.agents.inbox.intake_log import Intake, reference_to, referred, taken_in
+from quadriga.agents.inbox.intake_log import (
+    Intake,
+    format_message_id,
+    list_messages,
+    parse_message_id,
+)
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.rehearsal import standing
 from quadriga.shared.config.load import load
@@ -41,12 +46,12 @@ def full(tick: int) -> Inputs:
 )
 def test_references_lead_back(topic: str, sender: str, first: int, second: int) -> None:
     order = (first, second if topic == "plan" else 0)
-    assert referred(reference_to((topic, sender), order)) == ((topic, sender), order)
+    assert parse_message_id(format_message_id((topic, sender), order)) == ((topic, sender), order)
 
 
 @given(text=st.text(max_size=20))
 def test_foreign_references_are_no_error(text: str) -> None:
-    found = referred(text)
+    found = parse_message_id(text)
     assert found is None or len(found) == 2
 
 
@@ -60,7 +65,7 @@ def test_in_real_time_all_that_was_taken_in_is_listed() -> None:
         ("plan:r1:12.1", "measurement:r1:480", "reference:operator:500", "estop:anyone:7"),
         (),
     )
-    assert len(taken_in(full(541))) == 4
+    assert len(list_messages(full(541))) == 4
 
 
 def test_a_step_that_took_in_the_next_state_alone_needs_no_record() -> None:
@@ -78,10 +83,10 @@ def test_lock_step_tells_only_the_unusual() -> None:
     arrivals, box = intake("lockstep")
     arrivals.take("team/r1/plan", encode(PLAN))
     arrivals.take("team/r1/measurement", encode(SAMPLE))
-    awaited = Expected((12, 1), 480)
-    usual = arrivals.inputs(standing(520), awaited)
-    assert len(taken_in(usual)) == 2
-    assert box.record(519, usual, awaited) is None
+    expected = Expected((12, 1), 480)
+    usual = arrivals.pop_inputs(standing(520), expected)
+    assert len(list_messages(usual)) == 2
+    assert box.record(519, usual, expected) is None
     # The same message once more would be a late one: it had been due before.
     late = box.record(520, Inputs(standing(521), plans=(("r1", PLAN),)), NOTHING)
     assert late is not None

@@ -10,11 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.agents.gait import nominal_forces
-from quadriga.agents.planner.free_step import FreeStep
+from quadriga.agents.planner.free_step import FreeStep, OwnWindow
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.planner_qp import build_problem, unpack
 from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS
 from quadriga.shared.config.sections import PlannerConfig
+from quadriga.shared.robot.a1 import Array
 
 T_INI, N = 3, 5
 CONFIG = replace(PlannerConfig(), T_ini=T_INI, N=N)
@@ -48,6 +49,23 @@ def inputs_of(seed: int, size: float) -> PlannerInputs:
     )
 
 
+def own_window(inputs: PlannerInputs) -> OwnWindow:
+    return OwnWindow(
+        inputs.u_ini,
+        inputs.y_ini,
+        inputs.stance_ini,
+        inputs.y_base_ini,
+        inputs.y_base,
+        inputs.y_des,
+    )
+
+
+def still(y_base: Array, y_des: Array) -> OwnWindow:
+    """A window without any deviation."""
+    zero, stance = np.zeros((T_INI, 6)), STANCE[:T_INI]
+    return OwnWindow(nominal_forces(stance), zero, stance, zero, y_base, y_des)
+
+
 @given(seed=st.integers(0, 2**32 - 1), size=st.floats(0.0, 2.0))
 def test_both_ways_lead_to_the_same_plan(free: FreeStep, seed: int, size: float) -> None:
     inputs = inputs_of(seed, size)
@@ -56,15 +74,7 @@ def test_both_ways_lead_to_the_same_plan(free: FreeStep, seed: int, size: float)
     y_free = PROBLEM.condensed.Y_past @ inputs.past() + effect
     f = PROBLEM.gradient @ (y_free - (inputs.y_des - inputs.y_base).ravel())
     solution = SOLVER.solve(f)
-    plan = free.plan(
-        inputs.u_ini,
-        inputs.y_ini,
-        inputs.stance_ini,
-        inputs.y_base_ini,
-        inputs.y_base,
-        inputs.y_des,
-        effect,
-    )
+    plan = free.plan(own_window(inputs), effect)
     assert solution.status == SOLVED
     if plan is None:  # a bound is active
         assert solution.iterations > 0
@@ -80,15 +90,7 @@ def test_small_errors_are_free_and_large_ones_are_not(free: FreeStep) -> None:
     """The comparison above sees both sides."""
     zero = np.zeros((N, 6))
     for size, is_free in ((1e-6, True), (10.0, False)):
-        plan = free.plan(
-            nominal_forces(STANCE[:T_INI]),
-            zero[:T_INI],
-            STANCE[:T_INI],
-            zero[:T_INI],
-            zero,
-            np.full((N, 6), size),
-            np.zeros(6 * N),
-        )
+        plan = free.plan(still(zero, np.full((N, 6), size)), np.zeros(6 * N))
         assert (plan is not None) is is_free
 
 
@@ -96,31 +98,12 @@ def test_a_number_that_is_not_finite_is_left_to_the_solver(free: FreeStep) -> No
     inputs = inputs_of(1, 0.01)
     for bad in (np.nan, np.inf):
         effect = np.full(6 * N, bad)
-        assert (
-            free.plan(
-                inputs.u_ini,
-                inputs.y_ini,
-                inputs.stance_ini,
-                inputs.y_base_ini,
-                inputs.y_base,
-                inputs.y_des,
-                effect,
-            )
-            is None
-        )
+        assert free.plan(own_window(inputs), effect) is None
 
 
 def test_outputs_that_no_robot_reaches_are_no_plan(free: FreeStep) -> None:
     """Even where no force is asked for: the error is zero."""
     zero = np.zeros((N, 6))
     for height, is_plan in ((99.0, True), (101.0, False), (np.nan, False)):
-        plan = free.plan(
-            nominal_forces(STANCE[:T_INI]),
-            zero[:T_INI],
-            STANCE[:T_INI],
-            zero[:T_INI],
-            zero + height,
-            zero + height,
-            np.zeros(6 * N),
-        )
+        plan = free.plan(still(zero + height, zero + height), np.zeros(6 * N))
         assert (plan is not None) == is_plan

@@ -13,16 +13,11 @@ from hypothesis import strategies as st
 from scipy import integrate, optimize
 
 from quadriga.agents.planner.best_response import best_response_map, best_response_radius
-from quadriga.agents.planner.gates import (
-    GateReport,
-    height_gains,
-    held_out_error,
-    physical_height,
-    run_gates,
-)
+from quadriga.agents.planner.gates import height_gains, held_out_error, physical_height, run_gates
 from quadriga.agents.planner.planner_qp import build_problem
 from quadriga.agents.predictor.episode import Y_SCALE
 from quadriga.agents.predictor.fits import fit_ridge
+from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
@@ -179,7 +174,7 @@ def test_the_best_response_is_the_planners_own(plant: Config) -> None:
     """U_0 that minimises agent 0's cost of eq. 12, by hand, for plans of agent 1."""
     predictor, step = coupled(plant, seed=2, strength=1.0), 20
     problems = [
-        build_problem(plant.planner, predictor.forced(i, i), horizon_stance(plant, i, step))
+        build_problem(plant.planner, predictor.future_block(i, i), horizon_stance(plant, i, step))
         for i in range(2)
     ]
     first = len(problems[0].columns)
@@ -188,8 +183,8 @@ def test_the_best_response_is_the_planners_own(plant: Config) -> None:
     du[problems[1].columns] = U[first:]
     Q = np.diag(np.tile(plant.planner.Q, plant.planner.N))
     R = np.diag(np.tile(plant.planner.R, first // 3))
-    G = predictor.forced(0, 0)[:, problems[0].columns]
-    best = -np.linalg.solve(G.T @ Q @ G + R, G.T @ Q @ predictor.forced(0, 1) @ du)
+    G = predictor.future_block(0, 0)[:, problems[0].columns]
+    best = -np.linalg.solve(G.T @ Q @ G + R, G.T @ Q @ predictor.future_block(0, 1) @ du)
     answer = best_response_map(plant, predictor, step) @ U
     np.testing.assert_allclose(answer[:first], best, atol=1e-9)
 

@@ -11,15 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.planner.neighbours import (
-    FRESH,
-    HELD,
-    LOST,
-    SHIFTED,
-    Neighbours,
-    PeerData,
-    PeerMemory,
-)
+from quadriga.agents.planner.neighbours import FRESH, HELD, LOST, SHIFTED, Neighbours, PeerData
+from quadriga.agents.planner.peer_memory import PeerMemory
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
@@ -299,11 +292,11 @@ def test_of_one_step_the_last_exchange_counts_whatever_the_order() -> None:
 
 def test_complete_means_every_peer_s_plan_and_the_samples_before_it() -> None:
     memory = remember(19, [19], window_ticks(20))
-    assert not NEIGHBOURS.complete(memory, (19, 0)), "r3 has said nothing"
+    assert not NEIGHBOURS.is_complete(memory, (19, 0)), "r3 has said nothing"
     r3 = [("r3", measurement("r3", tick)) for tick in window_ticks(20)]
     both = NEIGHBOURS.remember(memory, 780, r3, [("r3", plan("r3", 19))])
-    assert NEIGHBOURS.complete(both, (19, 0))
-    assert not NEIGHBOURS.complete(both, (19, 1))
-    assert not NEIGHBOURS.complete(both, (20, 0))
+    assert NEIGHBOURS.is_complete(both, (19, 0))
+    assert not NEIGHBOURS.is_complete(both, (19, 1))
+    assert not NEIGHBOURS.is_complete(both, (20, 0))
     without = NEIGHBOURS.remember(memory, 780, r3[:-1], [("r3", plan("r3", 19))])
-    assert not NEIGHBOURS.complete(without, (19, 0))
+    assert not NEIGHBOURS.is_complete(without, (19, 0))

@@ -201,7 +201,7 @@ def test_damping_mixes_in_the_last_plan_brought_forward(
     np.testing.assert_allclose(mixed.du, (1 - share) * free.du + share * forward, atol=1e-9)
     _, again = planner.step(PlannerState(STEP, free.du, 1), inputs, NOTHING)
     np.testing.assert_allclose(again.du, free.du, atol=1e-9)
-    effect = predictor.forced(0, 0) @ (mixed.du - free.du).ravel()
+    effect = predictor.future_block(0, 0) @ (mixed.du - free.du).ravel()
     np.testing.assert_allclose(mixed.y - free.y, effect.reshape(8, 6), atol=1e-9)
 
 

@@ -13,7 +13,7 @@ from scipy import optimize
 from quadriga.agents.gait import nominal_forces
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs
-from quadriga.agents.planner.team_planner import centralised
+from quadriga.agents.planner.team_planner import build_centralised
 from quadriga.agents.predictor.fits import fit_ridge
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance
@@ -68,7 +68,7 @@ def test_no_feasible_change_of_the_forces_is_better(
 ) -> None:
     """Projected steps down the numerical slope of eq. 7 lead nowhere."""
     inputs = disturbed(small, seed, size)
-    result = centralised(small, predictor).step(inputs)
+    result = build_centralised(small, predictor).step(inputs)
     assert result.status == "solved"
     stance = np.stack([horizon_stance(small, i, STEP) for i in range(2)])
     du = result.u - nominal_forces(stance)
@@ -91,7 +91,7 @@ def test_without_active_limits_it_is_the_least_squares_solution(
     small: Config, predictor: Predictor
 ) -> None:
     inputs = disturbed(small, 3, 0.05)
-    result = centralised(small, predictor).step(inputs)
+    result = build_centralised(small, predictor).step(inputs)
     stance = np.stack([horizon_stance(small, i, STEP) for i in range(2)])
     columns = np.flatnonzero(np.repeat(stance, 3, axis=2))
     du = np.zeros(stance.shape[0] * stance.shape[1] * 12)
@@ -121,7 +121,7 @@ def test_robots_that_do_not_influence_each_other_plan_as_if_alone(
     apart[:, 0, 1] = apart[:, 1, 0] = 0.0
     uncoupled = Predictor(predictor.meta, apart)
     inputs = disturbed(small, 4)
-    together = centralised(small, uncoupled).step(inputs)
+    together = build_centralised(small, uncoupled).step(inputs)
     for i, own in enumerate(inputs):
         planner = Planner(small, i, uncoupled)
         alone = planner.step(planner.initial(), own, PeerTerms())[1]
@@ -141,7 +141,7 @@ def test_the_plan_is_what_the_team_will_do(
         replace(own, u_ini=nominal_forces(stance) + past[-T_ini:, i], y_ini=y[-T_ini:, i])
         for i, own in enumerate(disturbed(small, 6))
     ]
-    result = centralised(small, predictor).step(inputs)
+    result = build_centralised(small, predictor).step(inputs)
     planned = np.stack([horizon_stance(small, i, STEP) for i in range(2)])
     du = (result.u - nominal_forces(planned)).transpose(1, 0, 2)
     happened = BASE + team.respond(np.concatenate([past, du]))[40:]
@@ -154,7 +154,7 @@ def test_a_broken_measurement_gives_nominal_forces_for_all(
     inputs = disturbed(small, 7)
     broken = inputs[1].y_ini.copy()
     broken[0, 0] = np.nan
-    result = centralised(small, predictor).step([inputs[0], replace(inputs[1], y_ini=broken)])
+    result = build_centralised(small, predictor).step([inputs[0], replace(inputs[1], y_ini=broken)])
     assert result.status == "nominal:not-finite"
     for i in range(2):
         np.testing.assert_array_equal(result.u[i], nominal_forces(horizon_stance(small, i, STEP)))
@@ -162,4 +162,4 @@ def test_a_broken_measurement_gives_nominal_forces_for_all(
 
 def test_a_predictor_of_another_team_is_refused(small: Config, predictor: Predictor) -> None:
     with pytest.raises(PredictorError, match=r"got \(robots, N, T_ini\)"):
-        centralised(replace(small, team=replace(small.team, robots=3)), predictor)
+        build_centralised(replace(small, team=replace(small.team, robots=3)), predictor)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quadriga.agents.planning.active_plan import ActivePlan, launched, present
+from quadriga.agents.planning.active_plan import ActivePlan, add_plan, setpoint_at
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ConfigError
 
@@ -16,12 +16,12 @@ def test_the_latest_permitted_plan_is_in_force_until_the_next(
 ) -> None:
     keys = {"planner.latency_ms": latency_ms, "planner.N": N, "planner.applied": applied}
     every, plan = 10 * applied, (np.ones((N, 12)), np.zeros((N, 6)))
-    flights: tuple[ActivePlan, ...] = ()
+    plans: tuple[ActivePlan, ...] = ()
     gaps = 0
     for tick in range(30 * every):
         if tick % every == 0:
-            flights = launched(flights, ActivePlan(tick + latency_ms, tick, *plan))
-        gaps += tick >= latency_ms and present(flights, tick).v_ref is None
+            plans = add_plan(plans, ActivePlan(tick + latency_ms, tick, *plan))
+        gaps += tick >= latency_ms and setpoint_at(plans, tick).v_ref is None
     if gaps:
         with pytest.raises(ConfigError, match=r"planner\.latency_ms"):
             load(None, keys)

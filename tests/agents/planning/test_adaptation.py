@@ -10,8 +10,8 @@ import pytest
 from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.agents.modes import WALK, Mode
 from quadriga.agents.planning.adaptation import Adapter
-from quadriga.agents.planning.interface import PlanningInputs, PlanningState
-from quadriga.agents.planning.local import LocalPlanning
+from quadriga.agents.planning.interface import PlanningInputs
+from quadriga.agents.planning.local import LocalPlanning, LocalState
 from quadriga.agents.predictor.recursive import Correction
 from quadriga.shared.config.sections import Config, TeamConfig
 from quadriga.shared.robot.a1 import Array
@@ -83,41 +83,42 @@ def test_a_plant_that_is_as_predicted_is_left_alone() -> None:
     np.testing.assert_allclose(adapter.block(state, 0), PREDICTOR.block(0, 0), atol=1e-9)
 
 
-def fly(config: Config, samples: list[Measurement]) -> tuple[PlanningState, list[Array]]:
-    """A pilot that is handed a walk; its state and its plans' forces."""
-    pilot, state, plans = LocalPlanning(config, 0, PREDICTOR, lambda: 0), PlanningState(), []
+def walk_with(config: Config, samples: list[Measurement]) -> tuple[LocalState, list[Array]]:
+    """A planning part on a walk: its state and its plans' forces."""
+    planning, plans = LocalPlanning(config, 0, PREDICTOR, lambda: 0), []
+    state = planning.initial()
     for sample in samples:
-        heard = PlanningInputs(sample.tick, Mode(WALK, 300), (asked(0.3),), sample)
-        state, planned = pilot.step(state, heard)
-        if planned.plan is not None:
-            assert planned.plan.status in ("solved", "faded")
-            plans.append(planned.plan.u)
+        arrived = PlanningInputs(sample.tick, Mode(WALK, 300), (asked(0.3),), sample)
+        state, outputs = planning.step(state, arrived)
+        if outputs.plan is not None:
+            assert outputs.plan.status in ("solved", "faded")
+            plans.append(outputs.plan.u)
     return state, plans
 
 
-def test_a_pilot_learns_at_every_step_whose_window_is_whole_and_plans_otherwise_then() -> None:
+def test_an_agent_learns_at_every_step_whose_window_is_whole_and_plans_otherwise_then() -> None:
     samples = walk(75, 0.6)
-    fixed, plain = fly(ALONE, samples)
-    adapted, learning = fly(ADAPTING, samples)
-    assert fixed.learned is None
-    assert adapted.learned is not None
+    fixed, plain = walk_with(ALONE, samples)
+    adapted, learning = walk_with(ADAPTING, samples)
+    assert fixed.correction is None
+    assert adapted.correction is not None
     whole = [s.tick for s in samples[34:] if s.tick % 40 == 0]
-    assert adapted.learned.updates == len(whole)
+    assert adapted.correction.updates == len(whole)
     early = len(plain) - len(whole)
     for one, other in zip(plain[:early], learning[:early], strict=True):
         np.testing.assert_array_equal(one, other)
     assert np.abs(plain[-1] - learning[-1]).max() > 1e-3
-    _, again = fly(ADAPTING, samples)
+    _, again = walk_with(ADAPTING, samples)
     assert [u.tobytes() for u in again] == [u.tobytes() for u in learning]
 
 
 def test_a_gap_in_the_samples_teaches_nothing_until_it_has_passed() -> None:
     samples = walk(100, 0.6)
-    state, _ = fly(ADAPTING, samples[:60] + samples[61:])
+    state, _ = walk_with(ADAPTING, samples[:60] + samples[61:])
     whole = [s.tick for s in samples[34:60] if s.tick % 40 == 0]
     later = [s.tick for s in samples[61 + 34 :] if s.tick % 40 == 0]
-    assert state.learned is not None
-    assert state.learned.updates == len(whole) + len(later)
+    assert state.correction is not None
+    assert state.correction.updates == len(whole) + len(later)
 
 
 @pytest.mark.parametrize("absurd", [1e4, 1e170, np.nan])
@@ -137,17 +138,19 @@ def test_a_sample_that_no_robot_can_mean_is_not_learnt_from(absurd: float, name:
 def test_without_a_finite_correction_the_predictors_own_part_counts() -> None:
     """And windows with an absurd sample are counted as long as it is among the last 35."""
     samples = walk(75, 0.6)
-    state, _ = fly(ADAPTING, samples[:62])
-    assert state.learned is not None
-    spoilt = replace(state, learned=replace(state.learned, D=np.full_like(state.learned.D, np.inf)))
+    state, _ = walk_with(ADAPTING, samples[:62])
+    assert state.correction is not None
+    spoilt = replace(
+        state, correction=replace(state.correction, D=np.full_like(state.correction.D, np.inf))
+    )
     wrong = replace(samples[62], u=np.full(12, 1e6))
     plans = []
     for config, start in ((ADAPTING, spoilt), (ALONE, state)):
-        pilot = LocalPlanning(config, 0, PREDICTOR, lambda: 0)
+        planning = LocalPlanning(config, 0, PREDICTOR, lambda: 0)
         for sample in (wrong, *samples[63:66]):
-            heard = PlanningInputs(sample.tick, Mode(WALK, 300), (asked(0.3),), sample)
-            start, planned = pilot.step(start, heard)
-        assert planned.plan is not None
-        assert planned.unusual == (("window_not_learnt",) if config is ADAPTING else ())
-        plans.append(planned.plan)
+            arrived = PlanningInputs(sample.tick, Mode(WALK, 300), (asked(0.3),), sample)
+            start, outputs = planning.step(start, arrived)
+        assert outputs.plan is not None
+        assert outputs.unusual == (("window_not_learnt",) if config is ADAPTING else ())
+        plans.append(outputs.plan)
     np.testing.assert_array_equal(plans[0].u, plans[1].u)

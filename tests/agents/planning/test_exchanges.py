@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quadriga.agents.planning.active_plan import ActivePlan, launched, present
+from quadriga.agents.planning.active_plan import ActivePlan, add_plan, setpoint_at
 from quadriga.agents.planning.interface import Expected
 from quadriga.agents.planning.local import LocalPlanning
 from quadriga.agents.predictor.predictor import Predictor
@@ -53,8 +53,8 @@ def test_every_step_has_its_plan_and_its_answers_each_with_what_it_used() -> Non
 
 
 def test_awaited_are_the_peer_s_answers_in_turn() -> None:
-    pilot = LocalPlanning(ANSWERING, 0, coupled(ANSWERING), lambda: 0)
-    due = {tick: pilot.awaited(tick) for tick in range(360, 400)}
+    planning = LocalPlanning(ANSWERING, 0, coupled(ANSWERING), lambda: 0)
+    due = {tick: planning.expected(tick) for tick in range(360, 400)}
     assert {tick: item for tick, item in due.items() if item != Expected()} == {
         370: Expected((9, 0), 360),
         380: Expected((9, 1), 360),
@@ -77,28 +77,28 @@ def test_a_late_answer_is_skipped_and_not_waited_for() -> None:
     assert {(10, 1), (10, 2), (12, 0), (12, 1), (12, 2)} <= set(made)
 
 
-def flight(start: int, plan_tick: int, value: float, samples: int = 25) -> ActivePlan:
+def plan_at(start: int, plan_tick: int, value: float, samples: int = 25) -> ActivePlan:
     deviation: Array = np.full((samples, 12), value) + np.arange(samples)[:, None] * 0.01
     return ActivePlan(start, plan_tick, deviation, np.full((samples, 6), value))
 
 
 def test_a_plan_with_latency_takes_over_from_the_one_before_and_stays_aligned() -> None:
-    flights: tuple[ActivePlan, ...] = ()
+    plans: tuple[ActivePlan, ...] = ()
     seen: dict[int, float] = {}
     for tick in range(320, 480):
         if tick % 40 == 0:
-            flights = launched(flights, flight(tick + 16, tick, float(tick // 40)))
-        seen[tick] = float(present(flights, tick).deviation[0])
+            plans = add_plan(plans, plan_at(tick + 16, tick, float(tick // 40)))
+        seen[tick] = float(setpoint_at(plans, tick).deviation[0])
     assert seen[335] == 0.0
     assert seen[336] == pytest.approx(8.01)  # its second sample: the first is over
     assert seen[375] == pytest.approx(8.05)
     assert seen[376] == pytest.approx(9.01)
-    assert len(flights) <= 3
+    assert len(plans) <= 3
 
 
 def test_planned_speeds_are_handed_on_from_the_present_sample_on() -> None:
     outputs = np.arange(150.0).reshape(25, 6)
-    flights = (ActivePlan(320, 320, np.zeros((25, 12)), outputs),)
-    np.testing.assert_array_equal(present(flights, 339).v_ref, outputs[1:, 1:3])
-    np.testing.assert_array_equal(present(flights, 569).v_ref, outputs[24:, 1:3])
-    assert present(flights, 570).v_ref is None
+    plans = (ActivePlan(320, 320, np.zeros((25, 12)), outputs),)
+    np.testing.assert_array_equal(setpoint_at(plans, 339).v_ref, outputs[1:, 1:3])
+    np.testing.assert_array_equal(setpoint_at(plans, 569).v_ref, outputs[24:, 1:3])
+    assert setpoint_at(plans, 570).v_ref is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.agents.planning.operator_references import in_force, remember_references
+from quadriga.agents.planning.operator_references import reference_at, remember_references
 from quadriga.shared.wire.messages import Reference
 
 HEIGHT = 0.26
@@ -16,17 +16,17 @@ def reference(tick: int, vx: float = 0.0) -> Reference:
 
 
 def test_before_the_first_reference_the_robot_is_asked_to_stand() -> None:
-    found, age = in_force((), 250, HEIGHT)
+    found, age = reference_at((), 250, HEIGHT)
     assert (found.vx, found.vy, found.wz, found.height) == (0.0, 0.0, 0.0, HEIGHT)
     assert age == 250
 
 
 def test_a_reference_is_in_force_from_its_tick_until_the_next() -> None:
     known = remember_references((), (reference(100, 0.1), reference(200, 0.2)), 50)
-    assert in_force(known, 99, HEIGHT)[0].vx == 0.0
-    assert in_force(known, 100, HEIGHT) == (reference(100, 0.1), 0)
-    assert in_force(known, 199, HEIGHT) == (reference(100, 0.1), 99)
-    assert in_force(known, 200, HEIGHT) == (reference(200, 0.2), 0)
+    assert reference_at(known, 99, HEIGHT)[0].vx == 0.0
+    assert reference_at(known, 100, HEIGHT) == (reference(100, 0.1), 0)
+    assert reference_at(known, 199, HEIGHT) == (reference(100, 0.1), 99)
+    assert reference_at(known, 200, HEIGHT) == (reference(200, 0.2), 0)
 
 
 def test_of_two_references_of_one_tick_the_first_heard_stays() -> None:
@@ -54,7 +54,7 @@ def test_forgetting_changes_nothing_within_two_seconds(epochs: list[int], batch:
         assert ordered == sorted(set(ordered))
         for past in range(max(0, tick - 1900), tick + 1, 100):
             due = [heard[t] for t in sorted(heard) if t <= past]
-            assert in_force(known, past, HEIGHT)[0] == (due[-1] if due else reference(0))
+            assert reference_at(known, past, HEIGHT)[0] == (due[-1] if due else reference(0))
 
 
 def test_the_memory_does_not_grow() -> None:

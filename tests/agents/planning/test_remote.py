@@ -10,13 +10,8 @@ import pytest
 
 from quadriga.agents.gait import nominal_forces
 from quadriga.agents.modes import STAND, WALK, Mode
-from quadriga.agents.planning.interface import (
-    Expected,
-    PlanningInputs,
-    PlanningOutputs,
-    PlanningState,
-)
-from quadriga.agents.planning.remote import RemotePlanning
+from quadriga.agents.planning.interface import Expected, PlanningInputs, PlanningOutputs
+from quadriga.agents.planning.remote import RemotePlanning, RemoteState
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.config.timing import max_ages
@@ -38,41 +33,41 @@ def plan_of(step: int, *, exchange: int = 0) -> Plan:
     return Plan(40 * step, 0, step, u, np.tile(ON_COURSE, (N, 1)), "solved", {}, exchange)
 
 
-def measured(tick: int, y: Array = ON_COURSE) -> Measurement:
+def sample_at(tick: int, y: Array = ON_COURSE) -> Measurement:
     return Measurement(tick, 0, np.zeros(12), y, np.ones(4))
 
 
 def follow(
     follower: RemotePlanning,
-    state: PlanningState,
+    state: RemoteState,
     tick: int,
     *plans: Plan,
     y: Array = ON_COURSE,
     mode: Mode = WALKING,
-) -> tuple[PlanningState, PlanningOutputs]:
-    heard = PlanningInputs(
-        tick, mode, (REFERENCE,), measured(tick, y), (), tuple(("planner", p) for p in plans)
+) -> tuple[RemoteState, PlanningOutputs]:
+    arrived = PlanningInputs(
+        tick, mode, (REFERENCE,), sample_at(tick, y), (), tuple(("planner", p) for p in plans)
     )
-    return follower.step(state, heard)
+    return follower.step(state, arrived)
 
 
 def test_a_plan_is_in_force_from_its_arrival_on_and_aligned_with_its_own_time() -> None:
     follower = RemotePlanning(CONFIG, 1)
-    state, before = follow(follower, PlanningState(), 320)
-    assert not before.present.deviation.any()
+    state, before = follow(follower, RemoteState(), 320)
+    assert not before.setpoint.deviation.any()
     state, at = follow(follower, state, 323, plan_of(8))
-    assert at.present.deviation.max() == pytest.approx(8.0)
+    assert at.setpoint.deviation.max() == pytest.approx(8.0)
     state, later = follow(follower, state, 320 + 35)
-    assert later.present.deviation.max() == pytest.approx(8.03)
+    assert later.setpoint.deviation.max() == pytest.approx(8.03)
     assert later.plan is None
     assert later.planner_ns is None
 
 
 def test_lock_step_awaits_a_plan_its_latency_after_its_data() -> None:
-    assert RemotePlanning(CONFIG, 1).awaited(321) == Expected(plan=(8, 0))
-    assert RemotePlanning(CONFIG, 1).awaited(320) == Expected()
+    assert RemotePlanning(CONFIG, 1).expected(321) == Expected(plan=(8, 0))
+    assert RemotePlanning(CONFIG, 1).expected(320) == Expected()
     late = replace(CONFIG, planner=replace(CONFIG.planner, latency_ms=16))
-    assert [t for t in range(300, 420) if RemotePlanning(late, 1).awaited(t).plan] == [
+    assert [t for t in range(300, 420) if RemotePlanning(late, 1).expected(t).plan] == [
         336,
         376,
         416,
@@ -81,11 +76,11 @@ def test_lock_step_awaits_a_plan_its_latency_after_its_data() -> None:
 
 def test_older_and_repeated_plans_and_those_of_another_horizon_are_passed_over() -> None:
     follower = RemotePlanning(CONFIG, 1)
-    state, _ = follow(follower, PlanningState(), 361, plan_of(9))
+    state, _ = follow(follower, RemoteState(), 361, plan_of(9))
     short = replace(plan_of(10), u=np.zeros((5, 12)))
     for stale in (plan_of(8), plan_of(9), short):
-        state, planned = follow(follower, state, 362, stale)
-        assert planned.present.deviation.max() == pytest.approx(9.0)
+        state, outputs = follow(follower, state, 362, stale)
+        assert outputs.setpoint.deviation.max() == pytest.approx(9.0)
 
 
 @pytest.mark.parametrize(
@@ -93,12 +88,12 @@ def test_older_and_repeated_plans_and_those_of_another_horizon_are_passed_over()
 )
 def test_a_plan_from_another_time_is_not_used_and_blocks_none(change: dict[str, Any]) -> None:
     follower = RemotePlanning(CONFIG, 1)
-    state, planned = follow(follower, PlanningState(), 365, replace(plan_of(8), **change))
-    assert not planned.present.deviation.any()
-    assert planned.unusual == ("refused_by_planner",)
-    _, planned = follow(follower, state, 366, plan_of(9))
-    assert planned.present.deviation.max() == pytest.approx(9.0)
-    assert planned.unusual == ()
+    state, outputs = follow(follower, RemoteState(), 365, replace(plan_of(8), **change))
+    assert not outputs.setpoint.deviation.any()
+    assert outputs.unusual == ("refused_by_planner",)
+    _, outputs = follow(follower, state, 366, plan_of(9))
+    assert outputs.setpoint.deviation.max() == pytest.approx(9.0)
+    assert outputs.unusual == ()
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
@@ -110,11 +105,11 @@ def test_a_plan_that_no_planner_makes_is_not_used_and_blocks_none(
     follower, wild = RemotePlanning(CONFIG, 1), plan_of(9)
     values = getattr(wild, name).copy()
     values[3, 5] += sign * size
-    state, planned = follow(follower, PlanningState(), 365, replace(wild, **{name: values}))
-    assert not planned.present.deviation.any()
-    assert planned.unusual == ("refused_by_planner",)
-    _, planned = follow(follower, state, 366, plan_of(9))
-    assert planned.present.deviation.max() == pytest.approx(9.0)
+    state, outputs = follow(follower, RemoteState(), 365, replace(wild, **{name: values}))
+    assert not outputs.setpoint.deviation.any()
+    assert outputs.unusual == ("refused_by_planner",)
+    _, outputs = follow(follower, state, 366, plan_of(9))
+    assert outputs.setpoint.deviation.max() == pytest.approx(9.0)
 
 
 @pytest.mark.parametrize("largest", [(20.0, 20.0, 60.0), (0.0, 0.0, 0.0)])
@@ -123,23 +118,23 @@ def test_a_plan_at_the_bounds_of_its_planner_is_used(largest: tuple[float, ...])
     stance = horizon_stance(config, 1, 9)
     du = np.repeat(stance, 3, axis=1) * np.tile(largest, 4)
     full = replace(plan_of(9), u=nominal_forces(stance) - (1.0 + 1e-6) * du)
-    state, planned = follow(RemotePlanning(config, 1), PlanningState(), 365, full)
-    assert planned.unusual == ()
+    state, outputs = follow(RemotePlanning(config, 1), RemoteState(), 365, full)
+    assert outputs.unusual == ()
     assert state.newest == (9, 0)
 
 
 def test_the_age_of_the_plan_in_use_is_told_at_every_tick() -> None:
     follower = RemotePlanning(CONFIG, 1)
-    state, _ = follow(follower, PlanningState(), 321, plan_of(8))
+    state, _ = follow(follower, RemoteState(), 321, plan_of(8))
     for tick in (330, 401, 600):
         assert follow(follower, state, tick)[1].ages_ms == {"plan": tick - 320.0}
 
 
 def test_a_plan_fades_out_beyond_the_range_of_the_data() -> None:
     far = ON_COURSE + np.array([0.0, 1.5 * CONFIG.planner.fade[1], 0.0, 0.0, 0.0, 0.0])
-    _, planned = follow(RemotePlanning(CONFIG, 1), PlanningState(), 321, plan_of(8), y=far)
-    assert planned.present.deviation.max() == pytest.approx(4.0)
-    assert planned.unusual == ("plan_faded",)
+    _, outputs = follow(RemotePlanning(CONFIG, 1), RemoteState(), 321, plan_of(8), y=far)
+    assert outputs.setpoint.deviation.max() == pytest.approx(4.0)
+    assert outputs.unusual == ("plan_faded",)
 
 
 def test_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for() -> None:
@@ -147,8 +142,8 @@ def test_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for() -> None:
     faster = replace(faster, y=faster.y + np.array([0.0, 0.2, 0.1, 0.0, 0.0, 0.0]))
     off = np.array([0.0, CONFIG.planner.fade[1], 0.0, 0.0, 0.0, 0.0])
     for times, share in ((0.0, 1.0), (1.5, 0.5), (2.0, 0.0)):
-        _, planned = follow(follower, PlanningState(), 321, faster, y=ON_COURSE + times * off)
-        v_ref = planned.present.v_ref
+        _, outputs = follow(follower, RemoteState(), 321, faster, y=ON_COURSE + times * off)
+        v_ref = outputs.setpoint.v_ref
         assert v_ref is not None
         expected = np.tile([0.3 + 0.2 * share, 0.1 * share], (N, 1))
         np.testing.assert_allclose(v_ref, expected, atol=1e-12)
@@ -157,7 +152,7 @@ def test_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for() -> None:
 def test_no_plan_is_used_that_is_older_than_check_allows() -> None:
     late = replace(CONFIG, planner=replace(CONFIG.planner, latency_ms=16))
     follower, limit = RemotePlanning(late, 1), max_ages(late)["plan"]
-    state, _ = follow(follower, PlanningState(), 336, plan_of(8))
+    state, _ = follow(follower, RemoteState(), 336, plan_of(8))
     _, used = follow(follower, state, 320 + limit - 1)
     _, given_up = follow(follower, state, 320 + limit)
     assert (used.stop_reason, given_up.stop_reason) == ("", "planner-lost")
@@ -165,21 +160,21 @@ def test_no_plan_is_used_that_is_older_than_check_allows() -> None:
 
 def test_without_plans_the_robot_stops_with_a_name_for_it() -> None:
     follower, planner = RemotePlanning(CONFIG, 1), CONFIG.planner
-    state, planned = follow(follower, PlanningState(), 321, plan_of(8))
-    assert planned.stop_reason == ""
+    state, outputs = follow(follower, RemoteState(), 321, plan_of(8))
+    assert outputs.stop_reason == ""
     reasons = {}
     for step in range(9, 25):
-        state, planned = follow(follower, state, 40 * step + 1)
-        reasons[step] = planned.stop_reason
+        state, outputs = follow(follower, state, 40 * step + 1)
+        reasons[step] = outputs.stop_reason
         if step - 8 >= planner.N // planner.applied + 1:
-            assert not planned.present.deviation.any(), "a plan that has run out says nothing"
+            assert not outputs.setpoint.deviation.any(), "a plan that has run out says nothing"
     patience = planner.max_peer_age + planner.hold_steps
     assert next(step for step, why in reasons.items() if why) == 8 + patience + 1
     assert set(reasons.values()) == {"", "planner-lost"}
 
 
 def test_nothing_is_applied_unless_walking() -> None:
-    _, planned = follow(
-        RemotePlanning(CONFIG, 1), PlanningState(), 321, plan_of(8), mode=Mode(STAND, 0)
+    _, outputs = follow(
+        RemotePlanning(CONFIG, 1), RemoteState(), 321, plan_of(8), mode=Mode(STAND, 0)
     )
-    assert not planned.present.deviation.any()
+    assert not outputs.setpoint.deviation.any()

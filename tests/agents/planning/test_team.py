@@ -10,7 +10,7 @@ import pytest
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.agents.modes import DAMPING, STOPPING, Mode
-from quadriga.agents.planner.team_planner import centralised
+from quadriga.agents.planner.team_planner import build_centralised
 from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.identification.rollout import Rollout
@@ -19,7 +19,7 @@ from quadriga.shared.wire.messages import Measurement
 from tests.agents.duet import asked, every_100_ms, fingerprint, simple_predictor
 
 CONFIG = Config(team=TeamConfig(robots=2), planner=PlannerConfig(kind="centralised"))
-CENTRAL = Central(CONFIG, centralised(CONFIG, simple_predictor(CONFIG)))
+CENTRAL = Central(CONFIG, build_centralised(CONFIG, simple_predictor(CONFIG)))
 ON_COURSE = np.array([0.26, 0.3, 0.0, 0.0, 0.0, 0.0])
 
 
@@ -90,7 +90,9 @@ def test_the_order_of_arrival_does_not_matter_and_strangers_do_not_count() -> No
 
 def test_the_clock_is_only_told() -> None:
     ticking = iter(range(0, 1000, 7))
-    timed = Central(CONFIG, centralised(CONFIG, simple_predictor(CONFIG)), lambda: next(ticking))
+    timed = Central(
+        CONFIG, build_centralised(CONFIG, simple_predictor(CONFIG)), lambda: next(ticking)
+    )
     _, outputs = timed.step(heard(320))
     _, untimed = CENTRAL.step(heard(320))
     assert (outputs.planner_ns, untimed.planner_ns) == (7, 0)
@@ -107,7 +109,7 @@ def test_a_rehearsal_plans_two_steps_of_standing() -> None:
             planned.extend(plan.step for _, plan in outputs.plans)
             return after, outputs
 
-    rehearse_central(CONFIG, Watched(CONFIG, centralised(CONFIG, simple_predictor(CONFIG))))
+    rehearse_central(CONFIG, Watched(CONFIG, build_centralised(CONFIG, simple_predictor(CONFIG))))
     assert planned == [8, 8, 9, 9]
 
 
@@ -127,7 +129,7 @@ def test_a_sample_of_a_time_far_ahead_is_refused_and_makes_none_late(name: str, 
 @pytest.mark.parametrize("robots", [1, 2, 3, 4])
 def test_after_a_silence_of_all_the_team_plans_again(robots: int) -> None:
     config = replace(CONFIG, team=TeamConfig(robots=robots))
-    central = Central(config, centralised(config, simple_predictor(config)))
+    central = Central(config, build_centralised(config, simple_predictor(config)))
     state, names = CentralState(), [f"r{k + 1}" for k in range(robots)]
     for tick in (*range(10, 350, 10), *range(5000, 5400, 10)):
         state = central.remember(state, [sample(name, tick) for name in names], ())
@@ -137,7 +139,10 @@ def test_after_a_silence_of_all_the_team_plans_again(robots: int) -> None:
 
 def test_a_third_robot_that_claims_another_time_stops_nobody_else() -> None:
     config = replace(CONFIG, team=TeamConfig(robots=3))
-    central, state = Central(config, centralised(config, simple_predictor(config))), CentralState()
+    central, state = (
+        Central(config, build_centralised(config, simple_predictor(config))),
+        CentralState(),
+    )
     for tick in range(10, 600, 10):
         both = [sample("r1", tick), sample("r2", tick)]
         wrong = sample("r3", 10**6 + tick if tick > 300 else tick)
@@ -166,7 +171,7 @@ def test_nobody_is_planned_for_once_a_robot_stands_where_it_should_walk(name: st
 
 def test_the_stand_before_the_first_step_is_none() -> None:
     config = replace(CONFIG, gait=replace(CONFIG.gait, stand_ms=320))
-    central = Central(config, centralised(config, simple_predictor(config)))
+    central = Central(config, build_centralised(config, simple_predictor(config)))
     state = CentralState()
     for tick in range(10, 330, 10):
         pair = [standing("r1", tick), standing("r2", tick)]
@@ -177,7 +182,7 @@ def test_the_stand_before_the_first_step_is_none() -> None:
 @pytest.mark.parametrize("mode", [Mode(DAMPING, 400, "fall"), Mode(STOPPING, 400, "peer")])
 def test_when_one_robot_has_stopped_the_other_does_not_go_on(mode: Mode) -> None:
     config = replace(CONFIG, planner=replace(CONFIG.planner, latency_ms=0))
-    planner = centralised(config, simple_predictor(config))
+    planner = build_centralised(config, simple_predictor(config))
     rollout = Rollout(config, None, every_100_ms, planner=planner)
     for _ in range(400):
         before = rollout.step().outputs["r2"]

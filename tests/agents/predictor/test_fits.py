@@ -24,7 +24,12 @@ from quadriga.agents.predictor.fits import (
 )
 from quadriga.agents.predictor.hankel import mosaic
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.regression import by_phase, normal_equations, physical, scaled_blocks
+from quadriga.agents.predictor.regression import (
+    normal_equations,
+    normal_equations_by_phase,
+    scaled_blocks,
+    to_physical,
+)
 from quadriga.agents.predictor.ridge import solve_ridge
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
@@ -110,7 +115,7 @@ def assert_same(first: Predictor, second: Predictor, atol: float) -> None:
 def test_every_fit_reproduces_the_true_response(seed: int, robots: int) -> None:
     data = [random_walk(robots, 120 + 130 * robots, seed, data=k) for k in (1, 2)]
     # The fundamental lemma holds of these data: rank = m (T_ini + N) + order.
-    H = mosaic([np.concatenate(episode.scaled(), axis=1) for episode in data], T_INI + N)
+    H = mosaic([np.concatenate(episode.scaled_deviations(), axis=1) for episode in data], T_INI + N)
     assert np.linalg.matrix_rank(H) == 12 * robots * (T_INI + N) + 4 * robots
     unseen = random_walk(robots, 60, seed, data=3)
     for kind in FITS:
@@ -158,11 +163,11 @@ def test_the_causal_fit_lets_no_force_act_before_its_time() -> None:
     causal, free = fit_causal(data, meta), fit_ridge(data, meta)
     for i in range(2):
         for j in range(2):
-            forced = causal.forced(i, j).reshape(N, 6, N, 12)
+            forced = causal.future_block(i, j).reshape(N, 6, N, 12)
             for t in range(N):
                 assert not forced[t, :, t + 1 :].any()
                 assert forced[t, :, t].any()  # direct feedthrough
-            assert free.forced(i, j).reshape(N, 6, N, 12)[0, :, 1:].any()
+            assert free.future_block(i, j).reshape(N, 6, N, 12)[0, :, 1:].any()
 
 
 def test_each_sample_of_the_causal_fit_is_its_own_regression() -> None:
@@ -190,7 +195,7 @@ def test_the_regressions_of_all_phases_add_up_to_the_whole() -> None:
     data = [replace(e, first_tick=310 + 70 * k) for k, e in enumerate(data)]
     for phases in (1, 3, 10, 40):
         meta = meta_for(1, kind="phase", phases=phases)
-        parts = list(by_phase(data[:1] + data[2:], meta))
+        parts = list(normal_equations_by_phase(data[:1] + data[2:], meta))
         whole = normal_equations(data[:1] + data[2:], meta)
         assert len(parts) == phases
         assert sum(part.windows for part in parts) == whole.windows
@@ -204,7 +209,7 @@ def test_the_regression_of_a_phase_is_of_the_windows_that_end_their_past_in_it()
     z, _ = data.windows(T_INI, N)
     z = z[0] / np.r_[np.full(36, 10.0), np.tile(Y_SCALE, T_INI), np.full(48, 10.0)][:, None]
     ends = 350 + 10 * (T_INI - 1 + np.arange(z.shape[1]))
-    for phase, part in enumerate(by_phase([data], meta)):
+    for phase, part in enumerate(normal_equations_by_phase([data], meta)):
         mine = z[:, (ends - 300) % 400 // 100 == phase]
         assert part.windows == mine.shape[1]
         np.testing.assert_allclose(part.zz, mine @ mine.T, atol=1e-9)
@@ -292,7 +297,7 @@ def test_data_that_no_fit_can_use_are_refused_by_name(kind: str) -> None:
 def test_blocks_scale_back_and_forth() -> None:
     meta = meta_for(2)
     x = np.random.default_rng(0).normal(size=(2, 2 * meta.width, 6 * N))
-    back = scaled_blocks(physical(x, meta), meta)
+    back = scaled_blocks(to_physical(x, meta), meta)
     np.testing.assert_allclose(
         back, x.reshape(2, 2, meta.width, 6 * N).transpose(0, 1, 3, 2), rtol=1e-14
     )

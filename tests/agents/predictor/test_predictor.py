@@ -59,7 +59,7 @@ def test_the_response_to_a_pulse_is_the_plants(small: Config, linear_team: Team)
         true = team.respond(du)
         assert abs(true[0, j, 0]) > 1e-6
         for i in range(2):
-            predicted = predictor.forced(i, j) @ du[:, j].ravel()
+            predicted = predictor.future_block(i, j) @ du[:, j].ravel()
             error = (predicted.reshape(-1, 6) - true[:, i]) / Y_SCALE
             assert np.abs(error).max() < 1e-6
 
@@ -70,7 +70,7 @@ def test_the_blocks_sum_to_the_full_G(small: Config, linear_team: Team) -> None:
     data = team.episode(700, 3, noise=0.3)
     predictor = fit_pinv([data], meta_of(small))
     T_ini, N = predictor.meta.T_ini, predictor.meta.N
-    u, y = data.scaled()
+    u, y = data.scaled_deviations()
     parts = split([u], [y], T_ini, N)
     G = parts.Y_f @ np.linalg.pinv(np.vstack([parts.U_p, parts.Y_p, parts.U_f]))
     du, dy = data.deviations()
@@ -112,8 +112,12 @@ def test_block_weight_weakens_the_coupling_it_penalises(small: Config, linear_te
     data = [team.episode(600, 5, noise=0.5)]
     plain = fit_ridge(data, meta_of(small, block_weight=1.0))
     weighted = fit_ridge(data, meta_of(small, block_weight=50.0))
-    assert np.linalg.norm(weighted.forced(0, 1)) < 0.5 * np.linalg.norm(plain.forced(0, 1))
-    assert np.linalg.norm(weighted.forced(0, 0)) > 0.8 * np.linalg.norm(plain.forced(0, 0))
+    assert np.linalg.norm(weighted.future_block(0, 1)) < 0.5 * np.linalg.norm(
+        plain.future_block(0, 1)
+    )
+    assert np.linalg.norm(weighted.future_block(0, 0)) > 0.8 * np.linalg.norm(
+        plain.future_block(0, 0)
+    )
 
 
 def test_fits_are_reproducible_and_read_only(small: Config, linear_team: Team) -> None:

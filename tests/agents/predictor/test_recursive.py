@@ -14,7 +14,7 @@ from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.recursive import (
     Correction,
     Forgetting,
-    begin,
+    begin_correction,
     block_correction,
     take_in,
     update,
@@ -107,7 +107,7 @@ def test_a_heavier_robot_is_followed(
 ) -> None:
     team, how = linear_team(2), Forgetting(factor=0.9995, prior=1e-2, bound=0.1)
     z, y = heavier(team, 21, 1200, 0.6).windows(predictor.meta.T_ini, predictor.meta.N)
-    state = begin(predictor.meta, 0, sources, how)
+    state = begin_correction(predictor.meta, 0, sources, how)
     for k in range(z.shape[2]):
         state = take_in(state, predictor, z[:, :, k], y[0, :, k], 0, how)
     unseen = heavier(team, 22, 200, 0.6)
@@ -122,7 +122,7 @@ def test_a_heavier_robot_is_followed(
 def test_a_plant_that_did_not_change_is_left_alone(predictor: Predictor, linear_team: Team) -> None:
     how = Forgetting()
     z, y = linear_team(2).episode(600, 23).windows(predictor.meta.T_ini, predictor.meta.N)
-    state = begin(predictor.meta, 1, (1,), how)
+    state = begin_correction(predictor.meta, 1, (1,), how)
     for k in range(z.shape[2]):
         state = take_in(state, predictor, z[:, :, k], y[1, :, k], 0, how)
     assert np.abs(state.D).max() < 1e-6
@@ -185,14 +185,14 @@ def test_a_window_that_would_spoil_the_correction_is_refused_and_counted(absurd:
 
 def test_windows_that_do_not_fit_are_refused_by_name(predictor: Predictor) -> None:
     meta, how = predictor.meta, Forgetting()
-    state = begin(meta, 0, (0,), how)
+    state = begin_correction(meta, 0, (0,), how)
     z, y = np.zeros((2, meta.width)), np.zeros(6 * meta.N)
     with pytest.raises(PredictorError, match="window: got NaN"):
         take_in(state, predictor, z * np.nan, y, 0, how)
     with pytest.raises(PredictorError, match="window: got shapes"):
         take_in(state, predictor, z[:1], y, 0, how)
     with pytest.raises(PredictorError, match="robots of the correction"):
-        begin(meta, 2, (0,), how)
+        begin_correction(meta, 2, (0,), how)
     with pytest.raises(PredictorError, match=r"forgetting\.factor"):
         Forgetting(factor=1.5)
     with pytest.raises(PredictorError, match=r"forgetting\.prior"):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox, Order, Source, order_of
-from quadriga.agents.inbox.intake_log import Intake, reference_to, taken_in
+from quadriga.agents.inbox.intake_log import Intake, format_message_id, list_messages
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.rehearsal import standing
 from quadriga.replay.agent_log import AgentLog
@@ -145,19 +145,19 @@ def simulate_walk(
         log.states[tick].append(encode(standing(tick)))
         if rng.random() < skipped:
             continue
-        awaited = agent.awaited(tick)
+        awaited = agent.expected(tick)
         inbox.take("team/r2/state", log.states[tick][0])
         traffic.deliver(inbox, tick)
         if mode == "lockstep":
-            traffic.deliver(inbox, tick + PATIENCE, inbox.owing(tick, awaited))
-        state = inbox.state()
+            traffic.deliver(inbox, tick + PATIENCE, inbox.missing_sources(tick, awaited))
+        state = inbox.pop_state()
         assert state is not None
-        inputs = inbox.inputs(state, awaited)
+        inputs = inbox.pop_inputs(state, awaited)
         record = intake.record(last, inputs, awaited)
         if record is not None:
             log.records[tick] = record
         last = log.last = tick
-        taken.append((tick, taken_in(inputs)))
+        taken.append((tick, list_messages(inputs)))
     for peer in agent.peers:
         log.peers_awake[peer].update(range(0, TICKS, 10))
     return log, taken
@@ -204,7 +204,7 @@ def test_a_replay_takes_in_what_the_agent_took_in(
         patch.setattr("quadriga.agents.inbox.inbox.AHEAD_MS", 100)
         steps = handed_over(mode, log)
     assert not [step.missing for step in steps if step.missing]
-    again = [(step.tick, taken_in(step.inputs)) for step in steps if step.inputs is not None]
+    again = [(step.tick, list_messages(step.inputs)) for step in steps if step.inputs is not None]
     assert again == taken
 
 
@@ -231,7 +231,7 @@ def test_what_the_recorder_lost_is_named_at_the_step_that_took_it_in(
     step = next(tick for tick, found in taken if (source, order) in found)
     del log.received[source][order]
     missing = [(step.tick, step.missing) for step in handed_over(mode, log) if step.missing]
-    assert missing == [(step, (reference_to(source, order),))]
+    assert missing == [(step, (format_message_id(source, order),))]
 
 
 def test_a_lost_state_and_a_lost_record_are_named() -> None:

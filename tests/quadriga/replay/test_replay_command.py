@@ -12,7 +12,7 @@ from rich.console import Console
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
 from quadriga.agents.inbox.intake_log import Intake
-from quadriga.agents.planner.gates import GateReport
+from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, predictor_sha256, save
 from quadriga.agents.rehearsal import standing
@@ -134,7 +134,7 @@ def test_a_stop_that_could_not_be_read_is_handed_over_where_it_was_taken_in(tmp_
             if tick == 3:
                 arrivals.take("team/estop", b"stop!")
                 to.write("team/estop", b"stop!", 3)
-            inputs = arrivals.inputs(standing(tick), awaited := agent.awaited(tick))
+            inputs = arrivals.pop_inputs(standing(tick), awaited := agent.expected(tick))
             if record := intake.record(tick - 1, inputs, awaited):
                 to.write("team/r1/inputs", encode(record), tick)
             memory, outputs = agent.step(memory, inputs)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from quadriga.agents.predictor.store import load
+from quadriga.agents.planner.checked_predictor import load_checked
 from quadriga.experiments.trial.trial import Figures, figures
 from quadriga.experiments.trial.trial_walk import over_the_bus, roll_out
 from quadriga.identification.predictors import fit
@@ -53,7 +53,7 @@ def test_over_the_bus_a_trial_comes_to_the_same(tmp_path: Path) -> None:
                 if (message := getattr(out, topic)) is not None:
                     sent[f"team/{name}/{topic}"].append(encode(message))
 
-    alone = figures(roll_out(config, load(path, config)[0], None, watch))
+    alone = figures(roll_out(config, load_checked(path, config)[0], None, watch))
     assert alone.cost is not None
     assert alone.plans
     together = figures(over_the_bus(config, run_dir, path, sha256))

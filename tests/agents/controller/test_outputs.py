@@ -1,4 +1,4 @@
-"""Samples: outputs in the yaw frame, and what a measurement holds."""
+"""Outputs are those of the yaw frame."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from quadriga.agents.controller.estimator import Estimate
 from quadriga.agents.controller.sensing import outputs_at
-from quadriga.agents.sampling import measured
 from quadriga.shared.robot.a1 import Array
-from tests.agents.controller.poses import random_pose, standing_pose
+from tests.agents.controller.poses import random_pose
 
 
 def outputs_of(estimate: Estimate, ground: float) -> Array:
@@ -33,11 +32,3 @@ def test_turning_the_world_does_not_change_the_outputs() -> None:
     estimate, Z = random_pose(np.random.default_rng(2)).estimate, pin.utils.rotate("z", 2.0)
     other = estimate._replace(R=Z @ estimate.R, velocity=Z @ estimate.velocity)
     np.testing.assert_allclose(outputs_of(other, 0.0), outputs_of(estimate, 0.0), atol=1e-12)
-
-
-def test_a_sample_says_when_it_ends() -> None:
-    y, force = outputs_of(standing_pose().estimate, 0.0), np.arange(12.0)
-    sample = measured(420, force, y, np.ones(4))
-    assert (sample.tick, sample.stamp_ns) == (420, 420_000_000)
-    assert sample.y is y
-    assert sample.u is force

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.agents.predictor.coupling import Coupling, fill_deviations
+from quadriga.agents.planner.coupling import Coupling, fill_deviations
 
 T_INI, N, PAST = 3, 4, 18 * 3
 

@@ -1,0 +1,55 @@
+"""A predictor for a team: out of its file, of this team's kind, and within the gates' limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from quadriga.agents.planner.best_response import best_response_radius
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.store import REMEDY, Provenance, read
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import PredictorFileError
+
+# Fields of the meta that must be as configured, beside the controller's keys.
+_MATCHED: Final = ("robots", "stance_ms", "alternate_phase", "yokes", "interface", "N", "T_ini")
+
+
+def load_checked(path: Path, config: Config) -> tuple[Predictor, Provenance]:
+    """Read a predictor and refuse any that is not for this team or has not passed its gates.
+
+    The gates are held against the limits of `config`; with other weights Q, R than those the
+    radius was computed for, it is computed anew.
+
+    Raises:
+        PredictorFileError: no such file, not a predictor, corrupt, fitted for another team, gait,
+            horizon, interface or low level.
+        PredictorError: beyond a gate's limit.
+    """
+    predictor, provenance = read(path)
+    _check_meta(path, predictor.meta, PredictorMeta.of(config))
+    gates, planner = provenance.gates, config.planner
+    weights = (tuple(planner.Q), tuple(planner.R))
+    if weights != (gates.Q, gates.R):
+        gates = replace(
+            gates, radius=best_response_radius(config, predictor), Q=planner.Q, R=planner.R
+        )
+    limits = config.identification
+    gates = replace(gates, gain_limits=tuple(limits.gain_range), radius_limit=limits.max_radius)
+    gates.check(planner.kind)
+    return predictor, replace(provenance, gates=gates)
+
+
+def _check_meta(path: Path, got: PredictorMeta, expected: PredictorMeta) -> None:
+    pairs = [(name, getattr(got, name), getattr(expected, name)) for name in _MATCHED]
+    fitted = dict(got.controller)
+    pairs += [(f"controller.{k}", fitted.get(k), wanted) for k, wanted in expected.controller]
+    for name, found, wanted in pairs:
+        if found != wanted:
+            raise PredictorFileError(
+                f"predictor {path}: {name}",
+                repr(found),
+                f"{wanted!r} as configured",
+                f"fitted for another setting; {REMEDY}",
+            )
