@@ -12,20 +12,14 @@ import pyarrow.parquet as pq
 import pytest
 
 from quadriga.commands.parser import main
-from quadriga.experiments.campaign.job import TrialJob, origin, walk
+from quadriga.experiments.campaign.job import TrialJob, code_and_libraries, walk_trial
 from quadriga.experiments.campaign.ledger import read_manifest, read_rows
-from quadriga.experiments.campaign.outcome import TrialOutcome
-from quadriga.experiments.campaign.plan import Group
-from quadriga.experiments.campaign.predictors import Fitted
+from quadriga.experiments.plan import Group
+from quadriga.experiments.predictors import Fitted
+from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ProcessError
-from tests.quadriga.experiments.campaign.processes import (
-    await_gone,
-    await_true,
-    children,
-    finished,
-    start,
-)
+from tests.quadriga.experiments.processes import await_gone, await_true, children, finished, start
 
 Said = pytest.CaptureFixture[str]
 SOFT = "soft:planner.kind=none;controller.kp_tilt=500.0"
@@ -91,10 +85,10 @@ def test_a_campaign_survives_ctrl_c_and_kill_and_walks_nothing_twice(
         assert len(list(csv.DictReader(file))) == 12
     config = load(out / "configs" / "steps-soft.toml")
     assert config.controller.kp_tilt == 500.0
-    job = TrialJob(Group("steps", "soft", ()), 5, config, Fitted(), origin())
-    assert untimed(walk(job)) == done[job.group, 5], "as walked in this process"
+    job = TrialJob(Group("steps", "soft", ()), 5, config, Fitted(), code_and_libraries())
+    assert untimed(walk_trial(job)) == done[job.group, 5], "as walked in this process"
     with pytest.raises(ProcessError, match="a worker's code and libraries: got python"):
-        walk(replace(job, versions="code 0"))
+        walk_trial(replace(job, versions="code 0"))
     table = pq.read_table(out / "trials.parquet").to_pylist()
     assert {(row["variant"], row["seed"]): row["energy_j"] for row in table} == {
         (group.variant, seed): row.energy_j for (group, seed), row in done.items()

@@ -9,13 +9,7 @@ from pathlib import Path
 import pytest
 
 from quadriga.commands.parser import main
-from tests.quadriga.experiments.campaign.processes import (
-    await_gone,
-    await_true,
-    children,
-    finished,
-    start,
-)
+from tests.quadriga.experiments.processes import await_gone, await_true, children, finished, start
 from tests.quadriga.experiments.published.made import checkout
 
 Said = pytest.CaptureFixture[str]
