@@ -116,6 +116,23 @@ def test_trials_of_another_configuration_or_code_are_not_mixed(
     assert sorted(seed for _, seed in rows_of(out)) == [0, 1]
 
 
+def test_over_the_bus_a_campaign_comes_to_the_same_and_keeps_recordings(
+    capsys: Said, scenario: Path, tmp_path: Path
+) -> None:
+    words = ["campaign", str(scenario), "--planners", "none", "--seconds", "1.4", "--seeds", "3"]
+    alone, bus = tmp_path / "alone", tmp_path / "bus"
+    assert main([*words, "--jobs", "1", "--out", str(alone)]) == 0
+    half = bus / "recordings" / "steps-none-3" / "run.mcap"  # of a walk that was interrupted
+    half.parent.mkdir(parents=True)
+    half.write_bytes(b"")
+    assert main([*words, "--bus", "--out", str(bus)]) == 0, capsys.readouterr().err
+    (row,), (same,) = rows_of(alone).values(), rows_of(bus).values()
+    assert replace(row, energy_j=None, cost_of_transport=None) == same
+    assert 'href="recordings/steps-none-3/report.html"' in (bus / "report.html").read_text()
+    assert main([*words, "--bus", "--dask", "--out", str(bus)]) == 2
+    assert "--bus: got --dask beside it" in capsys.readouterr().err
+
+
 def test_a_fall_ends_a_trial_and_its_recording_falls_too(
     capsys: Said, scenario: Path, tmp_path: Path
 ) -> None:

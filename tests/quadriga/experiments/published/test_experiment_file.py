@@ -159,6 +159,14 @@ def test_every_experiment_of_the_project_can_be_walked(name: str) -> None:
     assert len(set(configs)) == len(configs), "no variant is another by another name"
 
 
+def test_what_is_promised_can_be_walked_and_is_not_published() -> None:
+    found = read_experiment(CHECKOUT / "deploy" / "acceptance.toml")
+    assert found.name not in list_names()
+    trials = [trial for _, plan in build_plans(found) for trial in plan.trials()]
+    assert len(trials) == 3 * len(found.groups()) == 21
+    assert {one.measure for one in found.requirements} >= {"success", "slowest", "max-z"}
+
+
 def test_all_that_are_promised_are_there_in_order() -> None:
     assert list_names() == (
         "paper",

@@ -83,6 +83,15 @@ def test_a_look_is_shown_and_not_published(capsys: Said, experiment: Path, tmp_p
     assert len(finished(runs / "looks" / "tiny")) == 2
     assert [path.name for path in into.iterdir()] == ["README.md"]
     assert not (runs / "tiny").exists()
+    assert main([*words, "--jobs", "1", "--seeds", "7", "--require"]) == 0, "all is met"
+    text = experiment.read_text(encoding="utf-8")
+    strict = text.replace('"success"\nleast = 97', '"max-roll"\nmost = 0')
+    experiment.write_text(strict, encoding="utf-8")
+    assert main([*words, "--jobs", "1", "--seeds", "7"]) == 0
+    assert main([*words, "--jobs", "1", "--seeds", "7", "--require"]) == 1
+    assert "missed" in capsys.readouterr().out
+    experiment.write_text(f"{strict}moonshot = true\n", encoding="utf-8")
+    assert main([*words, "--jobs", "1", "--seeds", "7", "--require"]) == 0, "it is hoped for"
 
 
 def test_ctrl_c_stops_at_once_and_keeps_what_is_done(experiment: Path, tmp_path: Path) -> None:
