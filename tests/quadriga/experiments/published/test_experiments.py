@@ -63,8 +63,9 @@ def test_walked_published_and_gone_on_with(capsys: Said, experiment: Path, tmp_p
     capsys.readouterr()
     assert main([*words, "--jobs", "1"]) == 2, "trials of other code"
     assert "use a new folder" in capsys.readouterr().err
-    packed = into / "docs/results/trials/tiny/campaign.json.gz"
-    packed.write_bytes(gzip.compress(manifest.read_bytes()))
+    for packed in (into / "docs/results/trials/tiny").iterdir():
+        body = gzip.decompress(packed.read_bytes()).replace(b"quadriga 0", b"quadriga 9")
+        packed.write_bytes(gzip.compress(body))
     anew = ["--out", str(tmp_path / "anew"), "--from-published", "--jobs", "1"]
     assert main([*words, *anew]) == 2, "published trials of other code"
     complaint = capsys.readouterr().err
@@ -89,7 +90,7 @@ def test_a_look_is_shown_and_not_published(capsys: Said, experiment: Path, tmp_p
     experiment.write_text(strict, encoding="utf-8")
     assert main([*words, "--jobs", "1", "--seeds", "7"]) == 0
     assert main([*words, "--jobs", "1", "--seeds", "7", "--require"]) == 1
-    assert "missed" in capsys.readouterr().out
+    assert "open" in capsys.readouterr().out, "nobody walked steadily"
     experiment.write_text(f"{strict}moonshot = true\n", encoding="utf-8")
     assert main([*words, "--jobs", "1", "--seeds", "7", "--require"]) == 0, "it is hoped for"
 
