@@ -10,12 +10,13 @@ from typing import Final
 
 from quadriga.commands import (
     agent,
+    campaign,
     check,
     collect,
-    compare,
     config,
     echo,
     estop,
+    experiments,
     export,
     fit,
     hz,
@@ -35,10 +36,8 @@ from quadriga.commands import (
     version,
     walk,
 )
-from quadriga.commands.campaign_options import add_campaign
 from quadriga.commands.command import Run
 from quadriga.commands.config_options import build_config_options, read_config
-from quadriga.commands.experiments_options import add_experiments
 from quadriga.shared.errors import ConfigError, ProcessError, QuadrigaError
 from quadriga.shared.runtime.signals import die_with_parent, interrupt_on_sigterm
 
@@ -50,8 +49,8 @@ INTERRUPTED: Final = 130
 _COMMANDS: Final = (
     walk.add, scenarios.add, sim.add, agent.add, plan.add, record.add, report.add, play.add,
     resim.add, export.add, info.add, recover.add, check.add, echo.add, hz.add, replay.add,
-    router.add, prepare.add, operate.add, collect.add, fit.add, compare.add, add_campaign,
-    add_experiments, estop.add, config.add, version.add,
+    router.add, prepare.add, operate.add, collect.add, fit.add, campaign.add, experiments.add,
+    estop.add, config.add, version.add,
 )  # fmt: skip
 
 

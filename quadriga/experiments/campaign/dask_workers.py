@@ -14,9 +14,9 @@ from typing import Any, Final
 import distributed
 from distributed import Client, LocalCluster, WorkerPlugin
 
-from quadriga.experiments.campaign.job import TrialJob, walk
-from quadriga.experiments.campaign.outcome import TrialOutcome
-from quadriga.experiments.campaign.predictors import file_sha256
+from quadriga.experiments.campaign.job import TrialJob, walk_trial
+from quadriga.experiments.predictors import file_sha256
+from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.shared.errors import ConfigError, ProcessError
 from quadriga.shared.runtime.places import cache_dir
 from quadriga.shared.runtime.signals import interrupts_held
@@ -27,7 +27,7 @@ _ARRIVE: Final = 120.0  # s, until the first worker must be there
 _ONE_WALK: Final = Lock()  # of this process: planners keep memory of their own
 
 
-class Shipped(WorkerPlugin):
+class FileShipment(WorkerPlugin):
     """Brings files to every worker, also to one that joins later: they are named by content."""
 
     def __init__(self, files: Iterable[Path]) -> None:
@@ -66,7 +66,7 @@ def each_done(
         client = _client(stack, jobs, address)
         paths = dict.fromkeys(path for job in todo for path in job.fitted.files)
         names = {path: f"{file_sha256(path)}{path.suffix}" for path in paths}
-        client.register_plugin(Shipped(paths))
+        client.register_plugin(FileShipment(paths))
         futures = {}
         for job in todo:
             fitted = job.fitted
@@ -76,7 +76,7 @@ def each_done(
                 data=fitted.data and Path(names[fitted.data]),
             )
             # Not pure: equal jobs of two campaigns are two, whatever the scheduler remembers.
-            future = client.submit(walk_there, replace(job, fitted=there), pure=False)
+            future = client.submit(walk_on_worker, replace(job, fitted=there), pure=False)
             futures[future] = job
         try:
             for future in distributed.as_completed(list(futures)):
@@ -100,12 +100,12 @@ def each_done(
                 client.cancel(list(futures))
 
 
-def walk_there(job: TrialJob) -> TrialOutcome:
+def walk_on_worker(job: TrialJob) -> TrialOutcome:
     """Walk a job on a worker of Dask, which may have several threads: one walk at a time."""
     fitted = job.fitted
     here = replace(fitted, path=_here(fitted.path), data=_here(fitted.data))
     with _ONE_WALK:
-        return walk(replace(job, fitted=here))
+        return walk_trial(replace(job, fitted=here))
 
 
 def _client(stack: ExitStack, jobs: int, address: str) -> Client:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import version
 
 from quadriga.agents.predictor.store import versions
-from quadriga.experiments.campaign.outcome import TrialOutcome, outcome
-from quadriga.experiments.campaign.plan import Group, seeded
-from quadriga.experiments.campaign.predictors import Fitted
-from quadriga.experiments.trial.trial_job import walked
+from quadriga.experiments.plan import Group, with_seed
+from quadriga.experiments.predictors import Fitted
+from quadriga.experiments.trial.evaluate import evaluate
+from quadriga.experiments.trial.figures_of_merit import Figures
+from quadriga.experiments.trial.outcome import TrialOutcome, build_outcome
 from quadriga.identification.cache import trial_code
 from quadriga.identification.fit_report import reason
 from quadriga.shared.config.reference_trace import trace_sha256
@@ -38,22 +40,24 @@ class TrialJob:
 
 
 @lru_cache(maxsize=1)
-def origin() -> str:
+def code_and_libraries() -> str:
     """Code and libraries of this process, as every row names them."""
     more = {name: version(name) for name in ("numba", "example-robot-data")}
     found = {**versions(), **more, "code": trial_code()}
     return ", ".join(f"{name} {version}" for name, version in found.items())
 
 
-def walk(job: TrialJob) -> TrialOutcome:
-    """Walk a trial in this process, to its end or to the first fall.
+def walk_trial(
+    job: TrialJob, walk: Callable[[Config, Fitted], Figures] | None = None
+) -> TrialOutcome:
+    """Walk a trial to its end or to the first fall, in this process unless `walk` does it.
 
     Raises:
         ProcessError: this process has other code, libraries or trace than the campaign.
         ConfigError: the configuration cannot be walked.
         PredictorFileError: the predictor's file, or that of its data, is gone or damaged.
     """
-    mine = origin()
+    mine = code_and_libraries()
     if mine != job.versions:
         raise ProcessError(
             "a worker's code and libraries", mine, job.versions, "install the same version there"
@@ -65,12 +69,16 @@ def walk(job: TrialJob) -> TrialOutcome:
             "the campaign's",
             "install the same version there",
         )
-    config, begun = seeded(job.config, job.seed), monotonic()
+    config, begun = with_seed(job.config, job.seed), monotonic()
     try:
-        found = job.fitted.refused or walked(config, job.fitted.path, job.fitted.data)
+        found = job.fitted.refused or (walk or _evaluate)(config, job.fitted)
     except PredictorFileError:
         raise  # a row would be kept, and the trial never be walked
     except PredictorError as error:
         found = reason(error)
     shas = (config_sha256(config), job.fitted.sha256)
-    return outcome(job.group, job.seed, shas, found, monotonic() - begun, mine)
+    return build_outcome(job.group, job.seed, shas, found, monotonic() - begun, mine)
+
+
+def _evaluate(config: Config, fitted: Fitted) -> Figures:
+    return evaluate(config, fitted.path, fitted.data)

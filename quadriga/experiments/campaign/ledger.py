@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from quadriga.experiments.campaign.manifest import FILE, Manifest
-from quadriga.experiments.campaign.outcome import TrialOutcome, columns, from_cells, to_cells
+from quadriga.experiments.trial.outcome import TrialOutcome, column_names, from_cells, to_cells
 from quadriga.shared.errors import ConfigError
 
 ROWS: Final = "trials.csv"
@@ -133,7 +133,7 @@ def rows_of(text: bytes, name: str, manifest: Manifest) -> list[TrialOutcome]:
     try:
         for cells in lines:
             if lines.line_num == 1:
-                if cells != columns([sweep.key for sweep in manifest.sweeps]):
+                if cells != column_names([sweep.key for sweep in manifest.sweeps]):
                     raise ValueError("other columns")
                 continue
             row = from_cells(cells)
@@ -159,7 +159,7 @@ def rows_text(rows: Sequence[TrialOutcome], manifest: Manifest) -> str:
 
 
 @contextmanager
-def kept_in(folder: Path) -> Iterator[None]:
+def explain_write_errors(folder: Path) -> Iterator[None]:
     """What cannot be written into a campaign's folder is one error; what was written is kept.
 
     Raises:
@@ -200,7 +200,7 @@ def _mend(path: Path, manifest: Manifest) -> None:
 
 
 def _head(manifest: Manifest) -> str:
-    return _line(columns([sweep.key for sweep in manifest.sweeps]))
+    return _line(column_names([sweep.key for sweep in manifest.sweeps]))
 
 
 def _line(cells: Sequence[str]) -> str:

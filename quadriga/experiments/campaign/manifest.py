@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from quadriga.experiments.campaign.plan import Group
+from quadriga.experiments.plan import Group
 from quadriga.shared.errors import ConfigError
 
 FILE: Final = "campaign.json"

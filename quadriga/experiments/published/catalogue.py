@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.experiments.published.experiment import Experiment
-from quadriga.experiments.published.read import read
+from quadriga.experiments.published.experiment_file import read_experiment
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.places import SOURCE
 
@@ -18,13 +18,13 @@ _ORDER: Final = ("paper", "hard", "low-level", "ideas", "central", "beyond", "te
 _SUFFIX: Final = ".toml"
 
 
-def names() -> tuple[str, ...]:
+def list_names() -> tuple[str, ...]:
     """The experiments there are, in the order of the page; new ones at its end."""
     found = sorted(file.stem for file in FOLDER.glob(f"*{_SUFFIX}"))
     return tuple(sorted(found, key=lambda n: _ORDER.index(n) if n in _ORDER else len(_ORDER)))
 
 
-def load(given: Sequence[str]) -> tuple[list[Experiment], list[str]]:
+def load_experiments(given: Sequence[str]) -> tuple[list[Experiment], list[str]]:
     """Every experiment of the page, and the names of those asked for, in the order asked for.
 
     Args:
@@ -33,7 +33,7 @@ def load(given: Sequence[str]) -> tuple[list[Experiment], list[str]]:
     Raises:
         ConfigError: there is no such experiment, a file is wrong, or one stands in for another.
     """
-    known = names()
+    known = list_names()
     files = {name: FOLDER / f"{name}{_SUFFIX}" for name in known}
     asked: dict[str, None] = {}
     for word in given or known:
@@ -63,4 +63,4 @@ def load(given: Sequence[str]) -> tuple[list[Experiment], list[str]]:
             f"files in {FOLDER}",
             "they are part of a checkout, not of an installed package",
         )
-    return [read(file) for file in files.values()], list(asked)
+    return [read_experiment(file) for file in files.values()], list(asked)

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
-from quadriga.experiments.campaign.choice import Sweep, Variant
-from quadriga.experiments.campaign.plan import Group
+from quadriga.experiments.plan import Group
+from quadriga.experiments.results import World
+from quadriga.experiments.sweep import Sweep
+from quadriga.experiments.variants import Variant
 from quadriga.team.scenarios import label
 
 Bound = Literal["value", "lower", "upper"]
@@ -38,7 +40,7 @@ class Part:
         """As a campaign takes them."""
         return () if self.sweep is None else (self.sweep,)
 
-    def worlds(self) -> Iterator[tuple[str, ...]]:
+    def worlds(self) -> Iterator[World]:
         """Scenario, and swept value if any, in their order."""
         for scenario in map(label, self.scenarios):
             if self.sweep is None:
@@ -121,7 +123,7 @@ class Experiment:
         """The folder of one of its campaigns, where `within` has one for each experiment."""
         return within / self.name / part.folder
 
-    def worlds(self) -> list[tuple[str, ...]]:
+    def worlds(self) -> list[World]:
         """Every world, scenario by scenario."""
         return [world for part in self.parts for world in part.worlds()]
 
@@ -132,7 +134,3 @@ class Experiment:
             for world in self.worlds()
             for variant in self.variants
         ]
-
-    def others(self) -> list[str]:
-        """The variants that are compared with the baseline."""
-        return [variant.name for variant in self.variants if variant.name != self.baseline]

@@ -6,14 +6,25 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from quadriga.experiments.campaign.bar import duration
-from quadriga.experiments.campaign.report import span
-from quadriga.experiments.campaign.sheets import POOLED_NOTE, unbroken
+from quadriga.experiments.campaign.progress import format_duration
+from quadriga.experiments.measures import keep_together
 from quadriga.experiments.published.experiment import Experiment
-from quadriga.experiments.published.results import Results
-from quadriga.experiments.published.sheets import asked, finding_text, sheets, word_text
-from quadriga.experiments.published.summarise import POOLED, done
-from quadriga.experiments.published.verdict import RequirementVerdict, verdicts
+from quadriga.experiments.published.requirement_table import (
+    build_requirement_table,
+    format_finding,
+    format_requirement,
+    format_word,
+)
+from quadriga.experiments.published.summarise_experiment import count_trials
+from quadriga.experiments.published.verdicts import RequirementVerdict, judge_requirements
+from quadriga.experiments.results import POOLED, Results
+from quadriga.experiments.seeds import format_seeds
+from quadriga.experiments.tables import (
+    POOLED_NOTE,
+    build_falls_table,
+    build_ratios_table,
+    build_walks_table,
+)
 from quadriga.tables import NOTHING, Table
 
 BEGIN: Final = "<!-- results:begin -->"
@@ -49,15 +60,15 @@ class PageEntry:
     figures: Sequence[str] = ()
 
 
-def page(entries: Sequence[PageEntry]) -> str:
+def build_page(entries: Sequence[PageEntry]) -> str:
     """`docs/results.md`."""
-    parts = [_MADE, "# Results", f"{_READ}\n{POOLED_NOTE}", overview(entries, "#")]
+    parts = [_MADE, "# Results", f"{_READ}\n{POOLED_NOTE}", build_overview(entries, "#")]
     for entry in entries:
         parts += _section(entry)
     return "\n\n".join(parts) + "\n"
 
 
-def overview(entries: Sequence[PageEntry], link: str) -> str:
+def build_overview(entries: Sequence[PageEntry], link: str) -> str:
     """A row for each requirement: what was found, where it stands worst, and whether it is met.
 
     Args:
@@ -67,34 +78,46 @@ def overview(entries: Sequence[PageEntry], link: str) -> str:
     rows = []
     for entry in entries:
         experiment = entry.experiment
-        have, of = done(experiment, entry.results)
+        have, of = count_trials(experiment, entry.results)
         head = (f"[{experiment.name}]({link}{experiment.name})", _count(have, of))
-        found = verdicts(experiment, entry.results)
+        found = judge_requirements(experiment, entry.results)
         for k, verdict in enumerate(found):
             rows.append(
                 (
                     *(head if not k else ("", "")),
-                    asked(verdict, experiment),
-                    _found(verdict),
-                    word_text(verdict),
+                    format_requirement(verdict, experiment),
+                    _format_findings(verdict),
+                    format_word(verdict),
                 )
             )
         if not found:
             rows.append((*head, "nothing: a comparison", NOTHING, NOTHING))
     columns = ("experiment", "trials", "required", "found, and where it stands worst", "verdict")
-    return table(Table("", columns, tuple(rows)), left=len(columns))
+    return format_table(Table("", columns, tuple(rows)), left=len(columns))
 
 
-def fragment(entries: Sequence[PageEntry]) -> str:
+def build_readme_table(entries: Sequence[PageEntry]) -> str:
     """What stands between the markers of the README."""
-    return f"{BEGIN}\n{overview(entries, 'docs/results.md#')}\n{END}"
+    return f"{BEGIN}\n{build_overview(entries, 'docs/results.md#')}\n{END}"
 
 
-def table(sheet: Table, left: int = 1) -> str:
-    """A sheet without its title; so many columns at the left are text."""
-    head, _, *body = sheet.to_markdown().partition("\n\n")[2].strip().split("\n")
-    rule = [":--"] * left + ["--:"] * (len(sheet.columns) - left)
+def format_table(table: Table, left: int = 1) -> str:
+    """A table without its title; so many columns at the left are text."""
+    head, _, *body = table.to_markdown().partition("\n\n")[2].strip().split("\n")
+    rule = [":--"] * left + ["--:"] * (len(table.columns) - left)
     return "\n".join([head, f"| {' | '.join(rule)} |", *body])
+
+
+def build_tables(experiment: Experiment, results: Results) -> list[Table]:
+    """Every table that is published of an experiment and that has a row."""
+    published, found = experiment.published, [build_requirement_table(experiment, results)]
+    if published.outcome:
+        found.append(build_walks_table(results, published.outcome))
+    if published.falls:
+        found.append(build_falls_table(results))
+    if published.ratios:
+        found.append(build_ratios_table(results, published.ratios))
+    return [table for table in found if table.rows]
 
 
 def _section(entry: PageEntry) -> Iterator[str]:
@@ -107,20 +130,21 @@ def _section(entry: PageEntry) -> Iterator[str]:
         return
     for figure in entry.figures:
         yield f"![{experiment.title}]({figure})"
-    for sheet in sheets(experiment, results):
-        left = sheet.columns.index("variant") + 1 if "variant" in sheet.columns else 2
-        notes = "".join(f"\n\n{note}" for note in sheet.notes)
-        yield f"### {sheet.title}\n\n{table(replace(sheet, notes=()), left)}{notes}"
+    for table in build_tables(experiment, results):
+        left = table.columns.index("variant") + 1 if "variant" in table.columns else 2
+        notes = "".join(f"\n\n{note}" for note in table.notes)
+        yield f"### {table.title}\n\n{format_table(replace(table, notes=()), left)}{notes}"
 
 
 def _facts(entry: PageEntry) -> str:
     experiment, results = entry.experiment, entry.results
-    have, of = done(experiment, results)
-    spent = sum(line.wall_s for line in results.lines if line.world != POOLED)
+    have, of = count_trials(experiment, results)
+    walked = format_seeds(results.seeds) or "none"
     lines = [
         f"- command: `quadriga experiments {experiment.name}`",
-        f"- seeds: {span(experiment.seeds)}; walked: {results.seeds or 'none'}",
-        f"- trials: **{_count(have, of)}**" + (f", {duration(spent)} on one core" if have else ""),
+        f"- seeds: {format_seeds(experiment.seeds)}; walked: {walked}",
+        f"- trials: **{_count(have, of)}**"
+        + (f", {format_duration(results.wall_s)} on one core" if have else ""),
         f"- baseline: {experiment.baseline}",
     ]
     lines += [f"- code and libraries: {versions}" for versions in results.versions]
@@ -136,7 +160,7 @@ def _variants(experiment: Experiment) -> str:
         )
         for variant in experiment.variants
     )
-    text = table(Table("", ("variant", "keys"), rows), left=2)
+    text = format_table(Table("", ("variant", "keys"), rows), left=2)
     for part in experiment.parts:
         if part.sweep is not None:
             labels = ", ".join(label for label, _ in part.sweep.values)
@@ -150,25 +174,25 @@ def _key(key: str, value: Any) -> str:
 
 
 def _count(have: int, of: int) -> str:
-    return unbroken(f"{have:,} of {of:,}")
+    return keep_together(f"{have:,} of {of:,}")
 
 
-def _found(verdict: RequirementVerdict) -> str:
+def _format_findings(verdict: RequirementVerdict) -> str:
     """What was found in all worlds together, if that is asked, and where it stands worst."""
     worst = verdict.worst
     if worst is None:
         return NOTHING
     if len(verdict.findings) == 1:
-        return finding_text(verdict, worst)
+        return format_finding(verdict, worst)
     pooled = [one for one in verdict.findings if one.world == POOLED and one.margin is not None]
     shown = dict.fromkeys((*pooled, worst))
-    return "; ".join(f"{' · '.join(one.world)}: {finding_text(verdict, one)}" for one in shown)
+    return "; ".join(f"{' · '.join(one.world)}: {format_finding(verdict, one)}" for one in shown)
 
 
-def replaced(text: str, fragment: str) -> str | None:
+def replace_results(text: str, table: str) -> str | None:
     """A text with what stands between the markers replaced; None unless both stand there once."""
     if text.count(BEGIN) != 1 or text.count(END) != 1:
         return None
     head, _, rest = text.partition(BEGIN)
     _, found, tail = rest.partition(END)
-    return f"{head}{fragment}{tail}" if found else None
+    return f"{head}{table}{tail}" if found else None

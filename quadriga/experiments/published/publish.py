@@ -1,4 +1,4 @@
-"""SHELL of publishing: results from runs, or as published before, to data, figures and pages."""
+"""SHELL of publishing: trials of runs, or as published before, to figures and pages."""
 
 from __future__ import annotations
 
@@ -9,16 +9,26 @@ from typing import Final
 from quadriga.experiments.campaign.ledger import read_manifest, read_rows, write_text
 from quadriga.experiments.campaign.manifest import FILE
 from quadriga.experiments.published.experiment import Experiment, Part
-from quadriga.experiments.published.figures import draw
-from quadriga.experiments.published.page import BEGIN, END, PageEntry, fragment, page, replaced
-from quadriga.experiments.published.published_trials import keep, outnumbered
-from quadriga.experiments.published.results import Results, from_json, to_json
-from quadriga.experiments.published.summarise import Walked, fitting, summarise
+from quadriga.experiments.published.figures import draw_figure
+from quadriga.experiments.published.page import (
+    BEGIN,
+    END,
+    PageEntry,
+    build_page,
+    build_readme_table,
+    replace_results,
+)
+from quadriga.experiments.published.published_trials import (
+    has_more_published,
+    pack_trials,
+    read_published_trials,
+)
+from quadriga.experiments.published.summarise_experiment import CampaignTrials, summarise_experiment
+from quadriga.experiments.results import Results
 from quadriga.shared.errors import ConfigError
 
 README: Final = "README.md"
 PAGE: Final = Path("docs/results.md")
-KEPT: Final = Path("docs/results")
 FIGURES: Final = Path("docs/figures")
 Say = Callable[[str], None]
 
@@ -39,16 +49,18 @@ def publish(
         ConfigError: a campaign's folder or published results cannot be read, something cannot be
             written, or the README has no place for results.
     """
-    readme = checked(into)
+    readme = read_readme(into)
     entries = []
     try:
         for experiment in experiments:
             if experiment.name in renewed:
-                renew(experiment, runs, into, say)
-            results = published(experiment, into)
-            entries.append(PageEntry(experiment, results, _drawn(experiment, results, into)))
-        write_text(into / PAGE, page(entries))
-        write_text(into / README, replaced(readme, fragment(entries)) or readme)
+                _renew(experiment, runs, into, say)
+            published = read_published_trials(experiment, into)
+            results = summarise_experiment(experiment, list(published.values()))
+            figures = _draw_figures(experiment, results, into)
+            entries.append(PageEntry(experiment, results, figures))
+        write_text(into / PAGE, build_page(entries))
+        write_text(into / README, replace_results(readme, build_readme_table(entries)) or readme)
     except OSError as error:
         raise ConfigError(
             str(error.filename or into),
@@ -58,7 +70,7 @@ def publish(
     return entries
 
 
-def checked(into: Path) -> str:
+def read_readme(into: Path) -> str:
     """The README, known to have a place for results.
 
     Raises:
@@ -72,55 +84,34 @@ def checked(into: Path) -> str:
         raise ConfigError(
             str(path), reason, "a README to publish in", "--into says of which checkout"
         ) from None
-    if replaced(text, "") is None:
+    if replace_results(text, "") is None:
         raise ConfigError(
             str(path), "no place for results", f"{BEGIN} and, after it, {END}, each once"
         )
     return text
 
 
-def renew(experiment: Experiment, runs: Path, into: Path, say: Say) -> None:
-    """Publish what came of an experiment's runs, if there are any and they are not the fewer.
-
-    Raises:
-        ConfigError: a folder or a file is not what was written there.
-        OSError: a file cannot be written.
-    """
-    campaigns = walked(experiment, runs)
-    found = summarise(experiment, list(campaigns.values()))
-    if not found.lines:
+def _renew(experiment: Experiment, runs: Path, into: Path, say: Say) -> None:
+    """Publish the trials of an experiment's runs, if there are any and they are not the fewer."""
+    campaigns = read_campaigns(experiment, runs)
+    if not summarise_experiment(experiment, list(campaigns.values())).lines:
         return
-    if outnumbered(experiment, campaigns, into):
+    if has_more_published(experiment, campaigns, into):
         say(
             f"{experiment.name}: what is published stays; it has more trials, of the same code, "
             f"than {runs / experiment.name}"
         )
         return
-    kept = into / KEPT / f"{experiment.name}.json"
-    kept.parent.mkdir(parents=True, exist_ok=True)
-    write_text(kept, to_json(found))
-    keep(experiment, campaigns, into)
+    pack_trials(experiment, campaigns, into)
 
 
-def published(experiment: Experiment, into: Path) -> Results:
-    """What is published of an experiment, with the digits that it is published with.
-
-    Raises:
-        ConfigError: the file is not what was written there.
-    """
-    kept = into / KEPT / f"{experiment.name}.json"
-    if not kept.is_file():
-        return Results()
-    return fitting(experiment, from_json(kept.read_bytes().decode(errors="replace"), str(kept)))
-
-
-def walked(experiment: Experiment, runs: Path) -> dict[Part, Walked]:
+def read_campaigns(experiment: Experiment, runs: Path) -> dict[Part, CampaignTrials]:
     """The campaigns that there are of an experiment.
 
     Raises:
         ConfigError: a folder is not what was written there.
     """
-    found: dict[Part, Walked] = {}
+    found: dict[Part, CampaignTrials] = {}
     for part in experiment.parts:
         folder = experiment.folder(runs, part)
         if (folder / FILE).is_file():
@@ -129,14 +120,14 @@ def walked(experiment: Experiment, runs: Path) -> dict[Part, Walked]:
     return found
 
 
-def _drawn(experiment: Experiment, results: Results, into: Path) -> list[str]:
+def _draw_figures(experiment: Experiment, results: Results, into: Path) -> list[str]:
     """Figures that there is something to draw in, as paths from the page."""
     found = []
     (into / FIGURES).mkdir(parents=True, exist_ok=True)
     for name in experiment.published.figures:
         path = into / FIGURES / f"{experiment.name}-{name}.png"
         partial = path.with_name(f"{path.name}.partial")
-        if draw(name, experiment, results, partial):
+        if draw_figure(name, experiment, results, partial):
             partial.replace(path)
             found.append(path.relative_to(into / PAGE.parent).as_posix())
     return found

@@ -11,7 +11,7 @@ from typing import Final
 
 from quadriga.experiments.campaign.ledger import (
     ROWS,
-    kept_in,
+    explain_write_errors,
     manifest_of,
     manifest_text,
     read_manifest,
@@ -21,16 +21,16 @@ from quadriga.experiments.campaign.ledger import (
     write_bytes,
 )
 from quadriga.experiments.campaign.manifest import FILE, Manifest
-from quadriga.experiments.campaign.outcome import TrialOutcome
 from quadriga.experiments.published.experiment import Experiment, Part
-from quadriga.experiments.published.summarise import Walked
+from quadriga.experiments.published.summarise_experiment import CampaignTrials
+from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.shared.errors import ConfigError
 
 TRIALS: Final = Path("docs/results/trials")
-Campaigns = Mapping[Part, Walked]
+Campaigns = Mapping[Part, CampaignTrials]
 
 
-def keep(experiment: Experiment, campaigns: Campaigns, into: Path) -> None:
+def pack_trials(experiment: Experiment, campaigns: Campaigns, into: Path) -> None:
     """Pack an experiment's campaigns, instead of those packed before.
 
     Equal trials give equal files, whatever was typed and in which order they were walked.
@@ -56,13 +56,13 @@ def keep(experiment: Experiment, campaigns: Campaigns, into: Path) -> None:
             path.unlink()
 
 
-def kept(experiment: Experiment, into: Path) -> Campaigns:
+def read_published_trials(experiment: Experiment, into: Path) -> Campaigns:
     """An experiment's campaigns as they are kept; none that nobody has published.
 
     Raises:
         ConfigError: a file is not what was written there.
     """
-    found = {part: manifest_kept(experiment, part, into) for part in experiment.parts}
+    found = {part: read_published_manifest(experiment, part, into) for part in experiment.parts}
     return {
         part: (manifest, _rows(experiment, part, into, manifest))
         for part, manifest in found.items()
@@ -70,20 +70,20 @@ def kept(experiment: Experiment, into: Path) -> Campaigns:
     }
 
 
-def outnumbered(experiment: Experiment, campaigns: Campaigns, into: Path) -> bool:
+def has_more_published(experiment: Experiment, campaigns: Campaigns, into: Path) -> bool:
     """Whether more trials than these are published, of the same code and libraries.
 
     Raises:
         ConfigError: a file is not what was written there.
     """
-    manifests = [manifest_kept(experiment, part, into) for part in experiment.parts]
+    manifests = [read_published_manifest(experiment, part, into) for part in experiment.parts]
     old = {manifest.versions for manifest in manifests if manifest is not None}
     if not old or old != {manifest.versions for manifest, _ in campaigns.values()}:
         return False
-    return _count(kept(experiment, into)) > _count(campaigns)
+    return _count(read_published_trials(experiment, into)) > _count(campaigns)
 
 
-def unpack(experiment: Experiment, part: Part, into: Path, runs: Path) -> int:
+def unpack_trials(experiment: Experiment, part: Part, into: Path, runs: Path) -> int:
     """Make the folder of one of an experiment's published campaigns, unless it is there.
 
     Returns:
@@ -92,7 +92,7 @@ def unpack(experiment: Experiment, part: Part, into: Path, runs: Path) -> int:
     Raises:
         ConfigError: the folder lacks some of them, cannot be written, or nothing is published.
     """
-    manifest = manifest_kept(experiment, part, into)
+    manifest = read_published_manifest(experiment, part, into)
     if manifest is None:
         raise ConfigError(f"--from-published: {experiment.name}", "nothing", "published trials")
     folder, rows = experiment.folder(runs, part), _rows(experiment, part, into, manifest)
@@ -107,14 +107,14 @@ def unpack(experiment: Experiment, part: Part, into: Path, runs: Path) -> int:
                 "--out names another",
             )
         return 0
-    with kept_in(folder):
+    with explain_write_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
         write_bytes(folder / ROWS, rows_text(rows, manifest).encode("utf-8"))
         write_bytes(folder / FILE, manifest_text(manifest).encode("utf-8"))
     return len(rows)
 
 
-def manifest_kept(experiment: Experiment, part: Part, into: Path) -> Manifest | None:
+def read_published_manifest(experiment: Experiment, part: Part, into: Path) -> Manifest | None:
     """What one of an experiment's campaigns consists of as it is published, if it is.
 
     Raises:

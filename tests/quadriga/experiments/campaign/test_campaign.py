@@ -12,20 +12,14 @@ import pyarrow.parquet as pq
 import pytest
 
 from quadriga.commands.parser import main
-from quadriga.experiments.campaign.job import TrialJob, origin, walk
+from quadriga.experiments.campaign.job import TrialJob, code_and_libraries, walk_trial
 from quadriga.experiments.campaign.ledger import read_manifest, read_rows
-from quadriga.experiments.campaign.outcome import TrialOutcome
-from quadriga.experiments.campaign.plan import Group
-from quadriga.experiments.campaign.predictors import Fitted
+from quadriga.experiments.plan import Group
+from quadriga.experiments.predictors import Fitted
+from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ProcessError
-from tests.quadriga.experiments.campaign.processes import (
-    await_gone,
-    await_true,
-    children,
-    finished,
-    start,
-)
+from tests.quadriga.experiments.processes import await_gone, await_true, children, finished, start
 
 Said = pytest.CaptureFixture[str]
 SOFT = "soft:planner.kind=none;controller.kp_tilt=500.0"
@@ -91,10 +85,10 @@ def test_a_campaign_survives_ctrl_c_and_kill_and_walks_nothing_twice(
         assert len(list(csv.DictReader(file))) == 12
     config = load(out / "configs" / "steps-soft.toml")
     assert config.controller.kp_tilt == 500.0
-    job = TrialJob(Group("steps", "soft", ()), 5, config, Fitted(), origin())
-    assert untimed(walk(job)) == done[job.group, 5], "as walked in this process"
+    job = TrialJob(Group("steps", "soft", ()), 5, config, Fitted(), code_and_libraries())
+    assert untimed(walk_trial(job)) == done[job.group, 5], "as walked in this process"
     with pytest.raises(ProcessError, match="a worker's code and libraries: got python"):
-        walk(replace(job, versions="code 0"))
+        walk_trial(replace(job, versions="code 0"))
     table = pq.read_table(out / "trials.parquet").to_pylist()
     assert {(row["variant"], row["seed"]): row["energy_j"] for row in table} == {
         (group.variant, seed): row.energy_j for (group, seed), row in done.items()
@@ -120,6 +114,23 @@ def test_trials_of_another_configuration_or_code_are_not_mixed(
     manifest.write_text(json.dumps(body), encoding="utf-8")
     assert main([*words, "--seeds", "0:2"]) == 0
     assert sorted(seed for _, seed in rows_of(out)) == [0, 1]
+
+
+def test_over_the_bus_a_campaign_comes_to_the_same_and_keeps_recordings(
+    capsys: Said, scenario: Path, tmp_path: Path
+) -> None:
+    words = ["campaign", str(scenario), "--planners", "none", "--seconds", "1.4", "--seeds", "3"]
+    alone, bus = tmp_path / "alone", tmp_path / "bus"
+    assert main([*words, "--jobs", "1", "--out", str(alone)]) == 0
+    half = bus / "recordings" / "steps-none-3" / "run.mcap"  # of a walk that was interrupted
+    half.parent.mkdir(parents=True)
+    half.write_bytes(b"")
+    assert main([*words, "--bus", "--out", str(bus)]) == 0, capsys.readouterr().err
+    (row,), (same,) = rows_of(alone).values(), rows_of(bus).values()
+    assert replace(row, energy_j=None, cost_of_transport=None) == same
+    assert 'href="recordings/steps-none-3/report.html"' in (bus / "report.html").read_text()
+    assert main([*words, "--bus", "--dask", "--out", str(bus)]) == 2
+    assert "--bus: got --dask beside it" in capsys.readouterr().err
 
 
 def test_a_fall_ends_a_trial_and_its_recording_falls_too(

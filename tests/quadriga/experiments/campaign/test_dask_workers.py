@@ -17,11 +17,11 @@ from typing import Any
 import pytest
 
 from quadriga.commands.parser import main
-from quadriga.experiments.campaign import run as campaign_run
+from quadriga.experiments.campaign import walk_trials
 from quadriga.experiments.campaign.ledger import read_manifest, read_rows
-from quadriga.experiments.campaign.outcome import TrialOutcome
+from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.shared.runtime.clock import monotonic, sleep
-from tests.quadriga.experiments.campaign.processes import LONGEST, await_true, finished, start
+from tests.quadriga.experiments.processes import LONGEST, await_true, finished, start
 from tests.quadriga.linear_data import arguments, put_data
 
 Said = pytest.CaptureFixture[str]
@@ -133,7 +133,7 @@ def test_without_the_extra_or_a_scheduler_it_costs_one_line(
 
     options = ["campaign", *words, "--planners", "plain:planner.kind=none", "--out", str(tmp_path)]
     with monkeypatch.context() as patch:
-        patch.setattr(campaign_run, "import_module", missing)
+        patch.setattr(walk_trials, "import_module", missing)
         assert main([*options, "--dask"]) == 2
     told = capsys.readouterr().err
     assert "--dask: got no package 'distributed', expected the extra 'campaign'" in told

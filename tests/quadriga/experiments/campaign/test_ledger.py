@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.experiments.campaign.ledger import ROWS, Ledger, read_manifest, read_rows
-from quadriga.experiments.campaign.outcome import columns, from_cells, outcome, to_cells
-from quadriga.experiments.campaign.plan import Group
+from quadriga.experiments.plan import Group
+from quadriga.experiments.trial.outcome import build_outcome, column_names, from_cells, to_cells
 from quadriga.shared.errors import ConfigError
-from tests.quadriga.experiments.campaign.rows import manifest, row
+from tests.quadriga.experiments.rows import manifest, row
 
 TEXT = st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=20)
 NUMBER = st.none() | st.floats(allow_nan=False)
@@ -28,11 +28,13 @@ def test_a_row_is_read_back_as_it_was(
 ) -> None:
     mine = row(name, stopped=reason, control_cost=cost, wall_s=wall, success=success, swept=(name,))
     assert from_cells(to_cells(mine)) == mine
-    assert len(to_cells(mine)) == len(columns(["world.payload"]))
+    assert len(to_cells(mine)) == len(column_names(["world.payload"]))
 
 
 def test_a_refused_trial_is_a_row_without_figures() -> None:
-    found = outcome(Group("steps", "deepc", ("3",)), 4, ("ab", ""), "no\n data", 0.1, "code 1")
+    found = build_outcome(
+        Group("steps", "deepc", ("3",)), 4, ("ab", ""), "no\n data", 0.1, "code 1"
+    )
     assert (found.refused, found.success, found.fell, found.rmse_z) == (
         "no data",
         False,
@@ -60,7 +62,7 @@ def test_rows_are_there_after_every_kill(tmp_path: Path) -> None:
         again = read_rows(tmp_path, read_manifest(tmp_path))
         assert [r.seed for r in again] == [*[0, 0][:kept], 7]
     with path.open(encoding="utf-8", newline="") as file:
-        assert next(csv.reader(file)) == columns([])
+        assert next(csv.reader(file)) == column_names([])
 
 
 def test_a_folder_is_one_campaigns_at_a_time(tmp_path: Path) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from quadriga.experiments.campaign.choice import sweep_of
 from quadriga.experiments.published.experiment import Experiment, Part, Published
+from quadriga.experiments.sweep import parse_sweep
 from tests.quadriga.experiments.published.made import experiment_of
 
 
@@ -34,7 +34,7 @@ def experiments() -> list[Experiment]:
             ("success", "falls", "ratios"),
         ),
     )
-    swept = Part("steps", ("steps",), sweep_of("world.terrain_height=0.04,0.1"), "height [m]")
+    swept = Part("steps", ("steps",), parse_sweep("world.terrain_height=0.04,0.1"), "height [m]")
     sweeps = experiment_of(
         "steps",
         name="swept",

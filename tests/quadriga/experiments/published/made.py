@@ -7,15 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from quadriga.experiments.campaign.choice import Variant
 from quadriga.experiments.campaign.ledger import Ledger
 from quadriga.experiments.campaign.manifest import GroupEntry, Manifest, SweepEntry
-from quadriga.experiments.campaign.outcome import TrialOutcome
-from quadriga.experiments.campaign.plan import Group
+from quadriga.experiments.plan import Group
 from quadriga.experiments.published.experiment import Experiment, Part, Published, Requirement
 from quadriga.experiments.published.page import PageEntry
 from quadriga.experiments.published.publish import publish
-from tests.quadriga.experiments.campaign.rows import row
+from quadriga.experiments.trial.outcome import TrialOutcome
+from quadriga.experiments.variants import Variant
+from tests.quadriga.experiments.rows import row
 
 Fate = Callable[[Group, int], dict[str, Any]]  # changes of the row of a trial
 

@@ -9,13 +9,7 @@ from pathlib import Path
 import pytest
 
 from quadriga.commands.parser import main
-from tests.quadriga.experiments.campaign.processes import (
-    await_gone,
-    await_true,
-    children,
-    finished,
-    start,
-)
+from tests.quadriga.experiments.processes import await_gone, await_true, children, finished, start
 from tests.quadriga.experiments.published.made import checkout
 
 Said = pytest.CaptureFixture[str]
@@ -69,8 +63,9 @@ def test_walked_published_and_gone_on_with(capsys: Said, experiment: Path, tmp_p
     capsys.readouterr()
     assert main([*words, "--jobs", "1"]) == 2, "trials of other code"
     assert "use a new folder" in capsys.readouterr().err
-    packed = into / "docs/results/trials/tiny/campaign.json.gz"
-    packed.write_bytes(gzip.compress(manifest.read_bytes()))
+    for packed in (into / "docs/results/trials/tiny").iterdir():
+        body = gzip.decompress(packed.read_bytes()).replace(b"quadriga 0", b"quadriga 9")
+        packed.write_bytes(gzip.compress(body))
     anew = ["--out", str(tmp_path / "anew"), "--from-published", "--jobs", "1"]
     assert main([*words, *anew]) == 2, "published trials of other code"
     complaint = capsys.readouterr().err
@@ -89,6 +84,15 @@ def test_a_look_is_shown_and_not_published(capsys: Said, experiment: Path, tmp_p
     assert len(finished(runs / "looks" / "tiny")) == 2
     assert [path.name for path in into.iterdir()] == ["README.md"]
     assert not (runs / "tiny").exists()
+    assert main([*words, "--jobs", "1", "--seeds", "7", "--require"]) == 0, "all is met"
+    text = experiment.read_text(encoding="utf-8")
+    strict = text.replace('"success"\nleast = 97', '"max-roll"\nmost = 0')
+    experiment.write_text(strict, encoding="utf-8")
+    assert main([*words, "--jobs", "1", "--seeds", "7"]) == 0
+    assert main([*words, "--jobs", "1", "--seeds", "7", "--require"]) == 1
+    assert "open" in capsys.readouterr().out, "nobody walked steadily"
+    experiment.write_text(f"{strict}moonshot = true\n", encoding="utf-8")
+    assert main([*words, "--jobs", "1", "--seeds", "7", "--require"]) == 0, "it is hoped for"
 
 
 def test_ctrl_c_stops_at_once_and_keeps_what_is_done(experiment: Path, tmp_path: Path) -> None:

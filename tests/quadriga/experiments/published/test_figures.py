@@ -9,7 +9,7 @@ from matplotlib.text import Text
 
 from quadriga.experiments.published.figures import FIGURES
 from tests.quadriga.experiments.published.made import experiment_of, upright
-from tests.quadriga.experiments.published.test_summarise import of
+from tests.quadriga.experiments.published.test_summarise_experiment import of
 
 
 @pytest.mark.parametrize("count", [5, 6, 9, 12])

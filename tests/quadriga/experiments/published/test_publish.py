@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from matplotlib import image
 
-from quadriga.experiments.published.catalogue import CHECKOUT, load
+from quadriga.experiments.measures import MEASURES
+from quadriga.experiments.published.catalogue import CHECKOUT, load_experiments
 from quadriga.experiments.published.experiment import Experiment, Requirement
-from quadriga.experiments.published.measures import MEASURES
-from quadriga.experiments.published.page import BEGIN, END, overview, replaced
+from quadriga.experiments.published.page import BEGIN, END, build_overview, replace_results
 from quadriga.experiments.published.publish import PAGE
 from quadriga.shared.errors import ConfigError
 from tests.quadriga.experiments.published.made import (
@@ -23,7 +23,7 @@ from tests.quadriga.experiments.published.made import (
     upright,
     write_runs,
 )
-from tests.quadriga.experiments.published.test_summarise import fate
+from tests.quadriga.experiments.published.test_summarise_experiment import fate
 
 
 def test_the_same_bytes_again_and_from_what_is_published_alone(
@@ -37,8 +37,6 @@ def test_the_same_bytes_again_and_from_what_is_published_alone(
     assert set(first) == {
         "README.md",
         "docs/results.md",
-        "docs/results/small.json",
-        "docs/results/swept.json",
         "docs/figures/small-success.png",
         "docs/figures/small-falls.png",
         "docs/figures/small-ratios.png",
@@ -101,13 +99,13 @@ def test_all_worlds_together_are_told_beside_the_worst(tmp_path: Path) -> None:
     experiment = experiment_of("steps", "ice", requirements=(asked,))
     write_runs(experiment, tmp_path / "runs", range(7), fate)
     (entry,) = publish_all([experiment], tmp_path / "runs", checkout(tmp_path / "here"))
-    text = overview([entry], "#").replace("\N{NO-BREAK SPACE}", " ")
+    text = build_overview([entry], "#").replace("\N{NO-BREAK SPACE}", " ")
     assert "| all worlds: 92.9 [68.5, 98.7] **missed** by 4.1; steps: 85.7 [48.7, 97.4]" in text
     assert "**missed** in 2 of 3 so far" in text
     alone = replace(
         entry, experiment=replace(experiment, requirements=(replace(asked, each=False),))
     )
-    assert "| 92.9 [68.5, 98.7] **missed** by 4.1 |" in overview([alone], "#").replace(
+    assert "| 92.9 [68.5, 98.7] **missed** by 4.1 |" in build_overview([alone], "#").replace(
         "\N{NO-BREAK SPACE}", " "
     )
 
@@ -129,8 +127,8 @@ def test_what_cannot_be_written_is_one_error(tmp_path: Path) -> None:
 
 
 def test_only_what_stands_between_the_markers_is_replaced() -> None:
-    assert replaced(f"a{BEGIN}x{END}b", "new") == "anewb"
-    assert replaced(f"a{BEGIN}xb", "new") is None
+    assert replace_results(f"a{BEGIN}x{END}b", "new") == "anewb"
+    assert replace_results(f"a{BEGIN}xb", "new") is None
 
 
 def test_every_measure_is_told_of_a_line_that_has_it(tmp_path: Path) -> None:
@@ -147,12 +145,12 @@ def test_every_measure_is_told_of_a_line_that_has_it(tmp_path: Path) -> None:
     for name, measure in MEASURES.items():
         found = measure.of(line)
         assert found is not None, name
-        assert measure.shown(found)
+        assert measure.format_interval(found)
 
 
 def test_what_the_project_publishes_is_what_its_files_give(tmp_path: Path) -> None:
     """`make figures ARGS=--only-publish` after a change of an experiment, or of how it is told."""
-    every, _ = load([])
+    every, _ = load_experiments([])
     into = tmp_path / "clone"
     shutil.copytree(CHECKOUT / "docs", into / "docs")
     shutil.copy(CHECKOUT / "README.md", into / "README.md")

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from quadriga.experiments.campaign.choice import sweep_of
 from quadriga.experiments.published import published_trials
-from quadriga.experiments.published.catalogue import CHECKOUT, load
+from quadriga.experiments.published.catalogue import CHECKOUT, load_experiments
 from quadriga.experiments.published.experiment import Experiment, Part
-from quadriga.experiments.published.publish import KEPT, publish
-from quadriga.experiments.published.results import to_json
-from quadriga.experiments.published.summarise import summarise
+from quadriga.experiments.published.publish import publish
+from quadriga.experiments.published.summarise_experiment import summarise_experiment
+from quadriga.experiments.sweep import parse_sweep
 from quadriga.shared.errors import ConfigError
 from tests.quadriga.experiments.published.made import (
     checkout,
@@ -23,7 +22,7 @@ from tests.quadriga.experiments.published.made import (
     upright,
     write_runs,
 )
-from tests.quadriga.experiments.published.test_summarise import fate
+from tests.quadriga.experiments.published.test_summarise_experiment import fate
 
 
 def test_runs_win_over_what_is_published(tmp_path: Path) -> None:
@@ -69,7 +68,7 @@ def test_what_nobody_asks_for_stays_as_published(tmp_path: Path) -> None:
 def test_parts_that_were_not_walked_with_the_others_are_published_no_more(tmp_path: Path) -> None:
     """Results and trials are of the same campaigns, whatever was published before."""
     parts = tuple(
-        Part(name, (name,), sweep_of("world.terrain_height=0.04,0.1"), "height [m]")
+        Part(name, (name,), parse_sweep("world.terrain_height=0.04,0.1"), "height [m]")
         for name in ("ice", "steps")
     )
     experiment, into = experiment_of("ice", "steps", parts=parts), checkout(tmp_path / "here")
@@ -78,19 +77,17 @@ def test_parts_that_were_not_walked_with_the_others_are_published_no_more(tmp_pa
     write_runs(
         replace(experiment, parts=parts[:1]), tmp_path / "new", range(3), upright, versions="code 2"
     )
-    publish_all([experiment], tmp_path / "new", into)
-    campaigns = published_trials.kept(experiment, into)
+    (entry,) = publish_all([experiment], tmp_path / "new", into)
+    campaigns = published_trials.read_published_trials(experiment, into)
     assert list(campaigns) == [parts[0]]
-    told = (into / KEPT / "small.json").read_text(encoding="utf-8")
-    assert to_json(summarise(experiment, list(campaigns.values()))) == told
+    assert {line.world[0] for line in entry.results.lines} == {"ice"}
+    assert entry.results == summarise_experiment(experiment, list(campaigns.values()))
 
 
-def test_what_is_published_follows_from_the_published_trials() -> None:
-    every, _ = load([])
+def test_published_trials_do_not_name_folders_of_one_machine() -> None:
+    every, _ = load_experiments([])
     for experiment in every:
-        if campaigns := published_trials.kept(experiment, CHECKOUT):
-            told = (CHECKOUT / KEPT / f"{experiment.name}.json").read_text(encoding="utf-8")
-            assert to_json(summarise(experiment, list(campaigns.values()))) == told, experiment.name
+        if campaigns := published_trials.read_published_trials(experiment, CHECKOUT):
             assert all(not manifest.typed for manifest, _ in campaigns.values())
 
 
@@ -104,16 +101,18 @@ def test_published_trials_are_taken_up_and_gone_on_with(
     first = files(into)
     for experiment in experiments[:2]:
         (part,) = experiment.parts
-        assert published_trials.unpack(experiment, part, into, later) == 12
-        assert not published_trials.unpack(experiment, part, into, later), "it is there"
-    assert set(published_trials.kept(experiments[0], into)) == set(experiments[0].parts)
+        assert published_trials.unpack_trials(experiment, part, into, later) == 12
+        assert not published_trials.unpack_trials(experiment, part, into, later), "it is there"
+    assert set(published_trials.read_published_trials(experiments[0], into)) == set(
+        experiments[0].parts
+    )
     publish_all(experiments, later, into)
     assert files(into) == first
     write_runs(experiments[0], later, range(3, 5), fate)
     (entry, *_) = publish_all(experiments, later, into)
     assert {line.done for line in entry.results.lines} == {5, 10}
     with pytest.raises(ConfigError, match="got a folder without 8 of the published trials"):
-        published_trials.unpack(experiments[0], experiments[0].parts[0], into, runs)
+        published_trials.unpack_trials(experiments[0], experiments[0].parts[0], into, runs)
 
 
 def test_the_order_of_walking_does_not_show_in_what_is_published(tmp_path: Path) -> None:
@@ -142,5 +141,5 @@ def test_damaged_published_trials_are_one_error(tmp_path: Path, harm: str) -> No
     body = packed.read_bytes()
     packed.write_bytes(body[:-20] if harm == "cut" else body[:40] + b"\xff" * 40 + body[80:])
     with pytest.raises(ConfigError, match=r"trials\.csv\.gz: got .*expected published trials"):
-        published_trials.unpack(experiment, experiment.parts[0], into, tmp_path / "later")
+        published_trials.unpack_trials(experiment, experiment.parts[0], into, tmp_path / "later")
     assert not (tmp_path / "later").exists()

@@ -1,0 +1,171 @@
+"""SHELL of a campaign: predictors, then trials side by side, each row on the disk at once."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Final
+
+from rich.console import Console
+
+from quadriga.experiments.campaign.configs import write_configs
+from quadriga.experiments.campaign.job import TrialJob, code_and_libraries, walk_trial
+from quadriga.experiments.campaign.ledger import Ledger, explain_write_errors, read_manifest
+from quadriga.experiments.campaign.manifest import FILE, GroupEntry, Manifest, SweepEntry
+from quadriga.experiments.campaign.progress import TrialProgress
+from quadriga.experiments.campaign.recordings import record_trial, run_dir_of
+from quadriga.experiments.plan import CampaignPlan
+from quadriga.experiments.predictors import Fitted, prepare_predictors
+from quadriga.experiments.trial.figures_of_merit import Figures
+from quadriga.experiments.trial.outcome import TrialOutcome, to_columns
+from quadriga.shared.config.reference_trace import trace_sha256
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import config_sha256
+from quadriga.shared.errors import ConfigError
+from quadriga.warm_up import warm_up
+from quadriga.workers import run_each
+
+Outcomes = Generator[tuple[TrialJob, TrialOutcome], None, None]
+
+PARQUET: Final = "trials.parquet"
+
+
+@dataclass(frozen=True, slots=True)
+class Workers:
+    """Who walks the trials.
+
+    Attributes:
+        jobs: processes that walk side by side.
+        dask: address of a scheduler whose workers walk instead; None for this machine's processes.
+        bus: walk each trial as processes of its own over the bus, one trial after the other.
+    """
+
+    jobs: int = 1
+    dask: str | None = None
+    bus: bool = False
+
+
+def walk_campaign(
+    plan: CampaignPlan, out: Path, *, workers: Workers, typed: str, console: Console
+) -> None:
+    """Walk every trial of a plan that the folder does not hold yet.
+
+    Args:
+        plan: what to walk.
+        out: a new folder, or one of a campaign to go on with.
+        workers: who walks.
+        typed: the command, for the report.
+        console: for progress.
+
+    Raises:
+        ConfigError: the folder is in use, cannot be written to, or holds trials that do not belong
+            to these.
+        PredictorFileError: a predictor's file, or that of its data, is gone or damaged.
+        ProcessError: a worker died, or is not of this version.
+    """
+    walk = _choose_workers(workers, out)
+    if (out / FILE).is_file():  # before anything is collected and fitted with other code
+        read_manifest(out).check_versions(code_and_libraries(), out)
+    warm_up(next(iter(plan.configs.values())), console)
+    fitted = prepare_predictors(plan.configs.values(), console)
+    manifest = build_manifest(plan, fitted, typed)
+    with Ledger(out, manifest) as ledger, explain_write_errors(out):
+        write_configs(out, plan.configs)
+        done = {(row.group, row.seed) for row in ledger.rows}
+        traces = {group: trace_sha256(config) for group, config in plan.configs.items()}
+        todo = [
+            TrialJob(
+                group,
+                seed,
+                plan.configs[group],
+                fitted[plan.configs[group]],
+                manifest.versions,
+                traces[group],
+            )
+            for group, seed in plan.trials()
+            if (group, seed) not in done
+        ]
+        wanted = len(plan.seeds) * len(plan.configs)
+        if todo:
+            with (
+                TrialProgress(console, wanted, wanted - len(todo)) as progress,
+                closing(walk(todo)) as found,
+            ):
+                for _, row in found:
+                    ledger.append(row)
+                    progress.advance(row)
+        write_parquet(out / PARQUET, ledger.rows, ledger.manifest)
+
+
+def write_parquet(path: Path, rows: Sequence[TrialOutcome], manifest: Manifest) -> None:
+    """The rows as Parquet too, where pyarrow is installed; sorted, so that equal rows are equal."""
+    try:
+        arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
+    except ImportError:
+        return
+    ordered = sorted(rows, key=lambda row: (row.group, row.seed))
+    table = arrow.table(to_columns(ordered, [sweep.key for sweep in manifest.sweeps]))
+    partial = path.with_name(f"{path.name}.partial")
+    parquet.write_table(table, partial, compression="zstd")
+    partial.replace(path)
+
+
+def build_manifest(plan: CampaignPlan, fitted: Mapping[Config, Fitted], typed: str) -> Manifest:
+    """What a campaign of this plan consists of, walked with these predictors by this code."""
+    return Manifest(
+        typed=(typed,),
+        baseline=plan.baseline,
+        variants={variant.name: dict(variant.keys) for variant in plan.variants},
+        sweeps=tuple(SweepEntry(sweep.key, sweep.name) for sweep in plan.sweeps),
+        groups=tuple(
+            GroupEntry(
+                group.scenario,
+                group.variant,
+                group.swept,
+                _digest(config),
+                fitted[config].sha256,
+                tuple(sorted(plan.seeds)),
+            )
+            for group, config in plan.configs.items()
+        ),
+        versions=code_and_libraries(),
+    )
+
+
+def _digest(config: Config) -> str:
+    """Of the configuration, and of the trace that it names."""
+    trace = trace_sha256(config)
+    mine = config_sha256(config)
+    return mine if not trace else hashlib.sha256(f"{mine}{trace}".encode()).hexdigest()
+
+
+def _choose_workers(workers: Workers, out: Path) -> Callable[[Sequence[TrialJob]], Outcomes]:
+    """A function that walks jobs and yields each with its outcome, in the order they are done."""
+    if workers.bus:
+        return lambda todo: _walk_over_bus(todo, out)
+    if workers.dask is None:
+        return lambda todo: run_each(walk_trial, todo, min(workers.jobs, len(todo)))
+    try:
+        dask = import_module("quadriga.experiments.campaign.dask_workers")
+    except ModuleNotFoundError as error:
+        raise ConfigError(
+            "--dask",
+            f"no package {error.name!r}",
+            "the extra 'campaign'",
+            "pip install -e '.[campaign]' in the checkout, or leave --dask out",
+        ) from None
+    return lambda todo: dask.each_done(todo, min(workers.jobs, len(todo)), workers.dask)
+
+
+def _walk_over_bus(todo: Sequence[TrialJob], out: Path) -> Outcomes:
+    for job in todo:
+        run_dir = run_dir_of(out, job.group, job.seed)
+
+        def record(config: Config, fitted: Fitted, run_dir: Path = run_dir) -> Figures:
+            return record_trial(config, run_dir, fitted)
+
+        yield job, walk_trial(job, record)

@@ -1,0 +1,233 @@
+"""Figures of results, each with 95 % intervals: the same results give the same bytes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from quadriga.experiments.measures import MEASURES, Interval, name_ratio
+from quadriga.experiments.results import COST, POOLED, Results, World
+from quadriga.experiments.sweep import to_number
+
+_COLOURS: Final = (
+    "#1f77b4",
+    "#d62728",
+    "#2ca02c",
+    "#9467bd",
+    "#ff7f0e",
+    "#17becf",
+    "#8c564b",
+    "#e377c2",
+    "#7f7f7f",
+    "#bcbd22",
+    "#000000",
+)
+_WIDTH: Final = 10.0  # inch
+_ABREAST: Final = 6  # panels of rows whose titles have room beside each other
+_CURVES_ABREAST: Final = 4  # panels of curves that have room beside each other
+
+Limits = Callable[[str, str, World], Iterable[float]]  # required: variant, measure and world
+
+
+@dataclass(frozen=True, slots=True)
+class SweepPanel:
+    """A panel of success against swept values.
+
+    Attributes:
+        title, axis: what stands above and below it.
+        points: swept values, as text, and their worlds.
+    """
+
+    title: str
+    axis: str
+    points: Sequence[tuple[str, World]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Point:
+    """An estimate of a variant in a row of a panel."""
+
+    row: str
+    variant: str
+    measure: str
+    estimate: Interval
+
+
+def _no_limits(_variant: str, _measure: str, _world: World) -> Iterable[float]:
+    return ()
+
+
+def draw_success(results: Results, limits: Limits = _no_limits) -> Figure | None:
+    """For each world a row for each variant: its rate of success. None without any trial."""
+    panels = _collect_points(results, ["success"], results.variants)
+    return _draw_rows(panels, "success [%]", results, limits)
+
+
+def draw_falls(results: Results, limits: Limits = _no_limits) -> Figure | None:
+    """For each world a row for each variant: its fall rate less that of the baseline."""
+    panels = _collect_points(results, ["fall-difference"], results.others)
+    across = f"fall rate less that of {results.baseline} [points]"
+    return _draw_rows(panels, across, results, limits, at=0.0)
+
+
+def draw_ratios(
+    results: Results, names: Sequence[str], limits: Limits = _no_limits
+) -> Figure | None:
+    """For each world rows of errors over those of the baseline, of every other variant.
+
+    Args:
+        results: what to draw.
+        names: of errors, `COST` and some of `ERRORS`.
+        limits: what is required.
+    """
+    panels = _collect_points(results, [name_ratio(name) for name in names], results.others)
+    what = "RMSE, or control cost," if COST in names else "RMSE"
+    return _draw_rows(panels, f"{what} over that of {results.baseline}", results, limits, at=1.0)
+
+
+def draw_sweeps(results: Results, panels: Sequence[SweepPanel]) -> Figure | None:
+    """Success of every variant against what is swept, in each panel. None without any trial."""
+    lines = math.ceil(max(len(panels), 1) / _CURVES_ABREAST)
+    columns = math.ceil(max(len(panels), 1) / lines)
+    figure = Figure(figsize=(_WIDTH, 3.3 * lines), layout="constrained")
+    grid = figure.subplots(lines, columns, squeeze=False, sharey=True)
+    axes = list(grid.flat)
+    for panel in axes[len(panels) :] if panels else []:
+        panel.remove()
+    drawn = [_draw_curves(axis, panel, results) for axis, panel in zip(axes, panels, strict=False)]
+    for row in grid:
+        row[0].set_ylabel("success [%]")
+    if not any(drawn):
+        return None
+    legends = [axis.get_legend_handles_labels() for axis in axes[: len(panels)]]
+    handles, labels = max(legends, key=lambda legend: len(legend[1]))
+    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels), frameon=False)
+    return figure
+
+
+def _draw_curves(axes: Axes, panel: SweepPanel, results: Results) -> bool:
+    """Curves of one panel; whether there is any."""
+    values = [to_number(value) for value, _ in panel.points]
+    step = 0.012 * (max(values) - min(values))  # beside each other, so that none hides another
+    drawn = False
+    for place, (name, colour) in enumerate(_colours(results).items()):
+        aside = step * (place - (len(results.variants) - 1) / 2)
+        points = []
+        for value, world in panel.points:
+            line = results.find(world, name)
+            found = None if line is None else MEASURES["success"].of(line)
+            if found is not None:
+                points.append((to_number(value) + aside, found))
+        if points:
+            drawn = True
+            axes.errorbar(
+                [x for x, _ in points],
+                [e.value for _, e in points],
+                yerr=list(zip(*(_reach(e) for _, e in points), strict=True)),
+                color=colour,
+                label=name,
+                marker="o",
+                markersize=4,
+                linewidth=1.3,
+                capsize=2,
+            )
+    axes.set_title(panel.title, loc="left", fontsize="medium")
+    axes.set_xlabel(panel.axis)
+    axes.set_ylim(-3.0, 103.0)
+    _clean(axes, "both")
+    return drawn
+
+
+def _collect_points(
+    results: Results, measures: Sequence[str], names: Sequence[str]
+) -> dict[World, list[_Point]]:
+    """Of each world what there is to draw; rows are variants, or measures if there are several."""
+    found: dict[World, list[_Point]] = {}
+    for world in (*results.worlds, POOLED):
+        for measure in measures:
+            for name in names:
+                line = results.find(world, name)
+                estimate = None if line is None else MEASURES[measure].of(line)
+                if estimate is None:
+                    continue
+                if len(measures) > 1:
+                    row = measure.removeprefix("ratio-")
+                    row = row if len(names) == 1 else f"{row}  {name}"
+                else:
+                    row = name
+                found.setdefault(world, []).append(_Point(row, name, measure, estimate))
+    return found
+
+
+def _draw_rows(
+    panels: Mapping[World, Sequence[_Point]],
+    across: str,
+    results: Results,
+    limits: Limits,
+    at: float | None = None,
+) -> Figure | None:
+    """Panels that share their rows; a line at `at`, a dotted one at each limit."""
+    if not panels:
+        return None
+    rows = list(dict.fromkeys(point.row for points in panels.values() for point in points))
+    lines = math.ceil(len(panels) / _ABREAST)
+    height = 0.4 + lines * (0.6 + 0.24 * max(len(rows), 2))
+    figure = Figure(figsize=(_WIDTH, height), layout="constrained")
+    columns = math.ceil(len(panels) / lines)
+    grid = list(figure.subplots(lines, columns, squeeze=False, sharey=True, sharex=True).flat)
+    axes, empty = grid[: len(panels)], grid[len(panels) :]
+    for panel in empty:
+        panel.remove()
+    for panel in axes[-columns:]:
+        panel.tick_params(labelbottom=True)  # also above an empty place
+    colours = _colours(results)
+    required = False
+    for (world, points), panel in zip(panels.items(), axes, strict=True):
+        if at is not None:
+            panel.axvline(at, color="0.6", linewidth=0.8)
+        for point in points:
+            place = rows.index(point.row)
+            for limit in limits(point.variant, point.measure, world):
+                required = True
+                panel.plot([limit, limit], [place - 0.45, place + 0.45], color="0.1", ls=":")
+            below, above = _reach(point.estimate)
+            panel.errorbar(
+                [point.estimate.value],
+                [place],
+                xerr=[[below], [above]],
+                color=colours[point.variant],
+                marker="o",
+                markersize=4,
+                linewidth=1.3,
+                capsize=2,
+            )
+        panel.set_title(" · ".join(world), loc="left", fontsize="medium")
+        _clean(panel, "x")
+    axes[0].set_yticks(range(len(rows)), rows)
+    axes[0].set_ylim(len(rows) - 0.5, -0.5)
+    dots = "; dotted: required" if required else ""
+    figure.supxlabel(f"{across}, with 95 % intervals{dots}", fontsize="medium")
+    return figure
+
+
+def _reach(found: Interval) -> tuple[float, float]:
+    """How far the interval reaches below and above."""
+    low = found.value if found.low is None else found.low
+    high = found.value if found.high is None else found.high
+    return max(0.0, found.value - low), max(0.0, high - found.value)
+
+
+def _colours(results: Results) -> dict[str, str]:
+    """Of each variant the colour that it has in every figure."""
+    return {name: _COLOURS[k % len(_COLOURS)] for k, name in enumerate(results.variants)}
+
+
+def _clean(panel: Axes, axis: str) -> None:
+    panel.grid(axis="both" if axis == "both" else "x", color="0.9", linewidth=0.6)
+    panel.set_axisbelow(True)
+    panel.spines[["top", "right"]].set_visible(False)

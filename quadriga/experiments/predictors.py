@@ -1,0 +1,77 @@
+"""The predictors of a campaign: collected for and fitted once each, before anybody walks."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.predictor.store import predictor_sha256
+from quadriga.identification.cache import data_path, predictor_path
+from quadriga.identification.fit_report import reason
+from quadriga.identification.predictors import ensure_predictor
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import PredictorError, PredictorFileError
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """The predictor of a group, or why there is none.
+
+    Attributes:
+        path: its file; None without a planner, or if it is refused.
+        sha256: its digest; empty without one.
+        data: the file of what it was fitted to, if the planner needs that too.
+        refused: why it must not walk; empty if it may.
+    """
+
+    path: Path | None = None
+    sha256: str = ""
+    data: Path | None = None
+    refused: str = ""
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What a worker needs."""
+        return tuple(file for file in (self.path, self.data) if file is not None)
+
+
+def prepare_predictors(configs: Iterable[Config], console: Console) -> dict[Config, Fitted]:
+    """The predictor of each configuration, from the cache or made now.
+
+    Raises:
+        PredictorFileError: a file cannot be read or written; all else refuses a predictor alone.
+    """
+    found: dict[Config, Fitted] = {}
+    made: dict[tuple[Path, str], Fitted] = {}
+    for config in configs:
+        if config.planner.kind == "none":
+            found[config] = Fitted()
+            continue
+        # Gates are those of the kind of planner, and their limits and Q, R of the configuration.
+        limits = (config.planner.Q, config.planner.R, config.identification, config.planner.kind)
+        key = (predictor_path(config), repr(limits))
+        if key not in made:
+            made[key] = _prepare(config, console)
+        found[config] = made[key]
+    return found
+
+
+def file_sha256(path: Path) -> str:
+    """Digest of a file's bytes."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _prepare(config: Config, console: Console) -> Fitted:
+    try:
+        path = ensure_predictor(config, console)
+        sha256 = predictor_sha256(load_checked(path, config)[0])
+    except PredictorFileError:
+        raise  # of which no other predictor is to blame
+    except PredictorError as error:
+        return Fitted(refused=reason(error))
+    return Fitted(path, sha256, data_path(config) if config.planner.kind == "deepc" else None)

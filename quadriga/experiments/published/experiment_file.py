@@ -1,0 +1,284 @@
+"""An experiment's TOML file, checked once: everything that is wrong with it is one error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Final
+
+from quadriga.experiments.measures import MEASURES
+from quadriga.experiments.published.experiment import (
+    BOUNDS,
+    SENSES,
+    Experiment,
+    Part,
+    Published,
+    Requirement,
+)
+from quadriga.experiments.published.figures import FIGURES
+from quadriga.experiments.results import COST
+from quadriga.experiments.seeds import parse_seeds
+from quadriga.experiments.sweep import parse_sweep
+from quadriga.experiments.tables import COLUMNS
+from quadriga.experiments.variants import (
+    Variant,
+    combine_with_predictors,
+    parse_variants,
+    read_keys,
+)
+from quadriga.recordings.traces import ERRORS
+from quadriga.shared.config.load import flatten, read_toml
+from quadriga.shared.errors import ConfigError
+from quadriga.team import scenarios
+
+_KEYS: Final = (
+    "title",
+    "question",
+    "scenarios",
+    "planners",
+    "predictors",
+    "baseline",
+    "seeds",
+    "common",
+    "variants",
+    "sweep",
+    "publish",
+    "requirements",
+)
+_TABLES: Final = ("outcome", "falls", "ratios", "figures")
+_ASKED: Final = ("measure", *SENSES, "bound", "variants", "scenarios", "over", "moonshot")
+_OVER: Final = ("each", "all")
+_OUTCOME: Final = ("trials", "success", "falls", "transport", "cost", "p50", "p99")
+_RATIOS: Final = (COST, *ERRORS)
+
+
+def read_experiment(path: Path) -> Experiment:
+    """The experiment of a file.
+
+    Raises:
+        ConfigError: the file cannot be read, or says something that is none.
+    """
+    table = _TomlTable(str(path), read_toml(path), _KEYS)
+    variants = _variants(table)
+    known = [variant.name for variant in variants]
+    baseline = table.text("baseline", "none" if "none" in known else known[0])
+    table.check_one("baseline", baseline, known)
+    names = _scenarios(table)
+    labels = [scenarios.label(name) for name in names]
+    published = _published(table.table("publish", _TABLES), compared=len(variants) > 1)
+    return Experiment(
+        name=path.stem,
+        title=table.text("title"),
+        question=table.text("question"),
+        parts=_parts(table, names),
+        variants=variants,
+        baseline=baseline,
+        seeds=parse_seeds(f"{path}: seeds", table.text("seeds")),
+        published=published,
+        requirements=tuple(
+            requirement
+            for asked in table.tables("requirements", _ASKED)
+            for requirement in _requirements(
+                asked, known, baseline, labels, poolable=len(labels) > 1 and not table.has("sweep")
+            )
+        ),
+    )
+
+
+class _TomlTable:
+    """A table of a file, whose keys are all known."""
+
+    def __init__(self, where: str, body: Any, known: Collection[str]) -> None:
+        self.where, self._body = where, body
+        if not isinstance(body, dict):
+            raise ConfigError(where, repr(body), "a table")
+        for name in body:
+            self.check_one("a key", name, known)
+
+    def check_one(self, what: str, got: Any, known: Collection[str]) -> None:
+        """Refuse what is not among the known ones."""
+        if got not in known:
+            close = get_close_matches(str(got), known, 1)
+            hint = f"did you mean {close[0]!r}?" if close else ""
+            raise ConfigError(
+                f"{self.where}: {what}", repr(got), f"one of {', '.join(known)}", hint
+            )
+
+    def has(self, name: str) -> bool:
+        return name in self._body
+
+    def text(self, name: str, default: str | None = None) -> str:
+        return str(
+            self._get(name, default, lambda v: isinstance(v, str) and bool(v.strip()), "text")
+        )
+
+    def yes(self, name: str, default: bool) -> bool:
+        return bool(self._get(name, default, lambda v: isinstance(v, bool), "true or false"))
+
+    def number(self, name: str) -> float:
+        return float(self._get(name, None, lambda v: type(v) in (int, float), "a number"))
+
+    def texts(
+        self, name: str, default: tuple[str, ...], known: Collection[str] = ()
+    ) -> tuple[str, ...]:
+        """Several texts, each once, or one of them alone."""
+        value = self._body.get(name, default)
+        found = [value] if isinstance(value, str) else value
+        if not isinstance(found, (list, tuple)) or not all(isinstance(v, str) for v in found):
+            raise ConfigError(f"{self.where}: {name}", repr(value), "a list of texts")
+        for one in found if known else ():
+            self.check_one(name, one, known)
+        if len(set(found)) < len(found):
+            raise ConfigError(f"{self.where}: {name}", repr(value), "each once")
+        return tuple(found)
+
+    def table(self, name: str, known: Collection[str]) -> _TomlTable:
+        return _TomlTable(f"{self.where}: {name}", self._body.get(name, {}), known)
+
+    def tables(self, name: str, known: Collection[str]) -> list[_TomlTable]:
+        value = self._body.get(name, [])
+        if not isinstance(value, list):
+            raise ConfigError(f"{self.where}: {name}", "no list", f"tables headed [[{name}]]")
+        return [
+            _TomlTable(f"{self.where}: {name}, the {k}.", v, known) for k, v in enumerate(value, 1)
+        ]
+
+    def mapping(self, name: str) -> Mapping[str, Any]:
+        return dict(
+            self._get(name, {}, lambda v: isinstance(v, dict), f"a table, written [{name}]")
+        )
+
+    def _get(self, name: str, default: Any, right: Callable[[Any], bool], what: str) -> Any:
+        value = self._body.get(name, default)
+        if value is None or not right(value):
+            raise ConfigError(
+                f"{self.where}: {name}", "nothing" if value is None else repr(value), what
+            )
+        return value
+
+
+def _variants(table: _TomlTable) -> tuple[Variant, ...]:
+    """Planners by name, then the tables; each on top of what all have in common."""
+    common = flatten(table.mapping("common"))
+    planners = table.texts("planners", ())
+    with _name_file_in_errors(table, "planners"):
+        found = list(parse_variants([",".join(planners)], None)) if planners else []
+    with _name_file_in_errors(table, "predictors"):
+        found = list(combine_with_predictors(found, table.texts("predictors", ())))
+    for name, keys in read_keys(table.mapping("variants"), f"{table.where}: variants").items():
+        found.append(Variant(name, keys))
+    names = [variant.name for variant in found]
+    if not names or len(set(names)) < len(names):
+        raise ConfigError(
+            f"{table.where}: planners and variants",
+            ", ".join(names) or "none",
+            "at least one, of different names",
+        )
+    return tuple(Variant(variant.name, {**common, **variant.keys}) for variant in found)
+
+
+@contextmanager
+def _name_file_in_errors(table: _TomlTable, name: str) -> Iterator[None]:
+    """Have what reads the command line name the file instead."""
+    try:
+        yield
+    except ConfigError as error:
+        raise ConfigError(
+            f"{table.where}: {name}", error.got, error.expected, error.cause
+        ) from None
+
+
+def _scenarios(table: _TomlTable) -> tuple[str, ...]:
+    names = table.texts("scenarios", ())
+    if not names:
+        raise ConfigError(f"{table.where}: scenarios", "none", "a list of names or TOML files")
+    for name in names:
+        if name not in scenarios.names() and not name.endswith(".toml"):
+            table.check_one("scenarios", name, scenarios.names())
+    return names
+
+
+def _parts(table: _TomlTable, names: tuple[str, ...]) -> tuple[Part, ...]:
+    """One campaign; with something swept one for each scenario, which has its own."""
+    if not table.has("sweep"):
+        return (Part("", names),)
+    labels = {scenarios.label(name): name for name in names}
+    swept = table.table("sweep", labels)
+    found = []
+    for label, name in labels.items():
+        mine = swept.table(label, ("keys", "axis"))
+        keys = mine.text("keys")
+        with _name_file_in_errors(mine, "keys"):
+            sweep = parse_sweep(keys)
+        found.append(Part(label, (name,), sweep, mine.text("axis", sweep.name)))
+    return tuple(found)
+
+
+def _published(table: _TomlTable, *, compared: bool) -> Published:
+    return Published(
+        outcome=table.texts("outcome", _OUTCOME, COLUMNS),
+        falls=table.yes("falls", compared),
+        ratios=table.texts("ratios", _RATIOS if compared else (), _RATIOS),
+        figures=table.texts("figures", ("success",), FIGURES),
+    )
+
+
+def _requirements(
+    table: _TomlTable, variants: list[str], baseline: str, labels: list[str], *, poolable: bool
+) -> list[Requirement]:
+    """Those of a table: one for each of its measures."""
+    senses = [sense for sense in SENSES if table.has(sense)]
+    if len(senses) != 1:
+        raise ConfigError(
+            table.where, ", ".join(senses) or "no limit", f"one of {', '.join(SENSES)}"
+        )
+    bound = table.text("bound", "value")
+    table.check_one("bound", bound, BOUNDS)
+    over = table.texts("over", ("each",), _OVER)
+    measures = table.texts("measure", (), MEASURES)
+    if not measures or not over:
+        raise ConfigError(f"{table.where}: measure and over", "nothing", "at least one of each")
+    others = tuple(variant for variant in variants if variant != baseline)
+    chosen = table.texts("variants", (), variants) or others or (baseline,)
+    _check_measures(table, measures, bound, paired=baseline not in chosen)
+    if "all" in over and not poolable:
+        raise ConfigError(
+            f"{table.where}: over",
+            "all",
+            "each",
+            "pooled are several scenarios, of which none sweeps",
+        )
+    return [
+        Requirement(
+            measure=measure,
+            sense=senses[0],
+            limit=table.number(senses[0]),
+            bound=next(known for known in BOUNDS if known == bound),
+            variants=chosen,
+            scenarios=table.texts("scenarios", (), labels),
+            each="each" in over,
+            pooled="all" in over,
+            moonshot=table.yes("moonshot", False),
+        )
+        for measure in measures
+    ]
+
+
+def _check_measures(
+    table: _TomlTable, measures: tuple[str, ...], bound: str, *, paired: bool
+) -> None:
+    """Refuse what no trial could ever answer."""
+    for name in measures:
+        if MEASURES[name].paired and not paired:
+            raise ConfigError(
+                f"{table.where}: measure",
+                repr(name),
+                "one of a variant alone",
+                "it compares with the baseline, of which it is asked",
+            )
+        if bound != "value" and not MEASURES[name].interval:
+            raise ConfigError(
+                f"{table.where}: bound", repr(bound), "none", f"{name} has no interval"
+            )

@@ -1,0 +1,179 @@
+"""The figures of merit of one closed-loop trial, from what was seen of the walk."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadriga.agents.gait import nominal_forces
+from quadriga.recordings.summary import FALL_HEIGHT, FALL_TILT, steady_from
+from quadriga.recordings.traces import ERRORS, FELT, Traces, felt_height_errors, in_force
+from quadriga.recordings.truth import distance
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import GRAVITY, N_LEGS, OUTPUTS, TOTAL_MASS, Array
+from quadriga.shared.wire.messages import Measurement
+
+_SHORTEST: Final = 0.5  # m; over a shorter way a cost of transport is that of starting
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """What was seen of a walk.
+
+    Attributes:
+        traces: truth, references, statuses and events.
+        samples: what each robot measured, with the forces it applied.
+        plans: how many plans had which status, all robots together.
+        work: what all motors did or took up, ∑ |τ q̇| dt, J; None of a recording, whose torques and
+            rates are those of noisy sensors.
+    """
+
+    traces: Traces
+    samples: Mapping[str, tuple[Measurement, ...]]
+    plans: Mapping[str, int]
+    work: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """Figures of merit; None where the walk was too short for a steady part.
+
+    The steady part is from `quadriga.recordings.summary.steady_from` to the end, or to the first
+    fall.
+
+    Attributes:
+        seconds: world time of the last sample seen, or of the first fall, s.
+        fallen: when each robot that fell did so, s.
+        stopped: why each robot that stopped for another reason did so.
+        mean: of each output over the steady part, all robots; m, m/s, rad, rad/s.
+        rmse: the same, of each of `quadriga.recordings.traces.ERRORS`.
+        cost: mean of ‖y − y_des‖²_Q + ‖u − u_nominal‖²_R over samples of 10 ms and robots, where
+            the height is that over the felt ground.
+        cost_outputs, cost_forces: its two parts.
+        planner_ms_median, planner_ms_p99: time of one planning step, ms.
+        solves: planning steps timed.
+        plans: how many plans had which status.
+        distance: length of the way, mean over the robots, m.
+        work: of all motors, ∑ |τ q̇| dt over the whole walk, J.
+        cost_of_transport: work over weight (robots and payload) and distance.
+    """
+
+    seconds: float
+    fallen: Mapping[str, float]
+    stopped: Mapping[str, str]
+    mean: Mapping[str, float | None]
+    rmse: Mapping[str, float | None]
+    cost: float | None
+    cost_outputs: float | None
+    cost_forces: float | None
+    planner_ms_median: float | None
+    planner_ms_p99: float | None
+    solves: int
+    plans: Mapping[str, int]
+    distance: float | None = None
+    work: float | None = None
+    cost_of_transport: float | None = None
+
+
+def compute_figures(walk: Walk) -> Figures:
+    """The figures of merit of a walk."""
+    traces, truth = walk.traces, walk.traces.truth
+    config, fallen = traces.config, _find_falls(traces)
+    planner = config.planner
+    end = round(1000 * min(fallen.values())) if fallen else int(truth.tick.max(initial=0))
+    begin = steady_from(traces)
+    reference = in_force(traces.references, truth.tick)
+    steady = _within(truth.tick, begin, end) & np.isfinite(reference).all(axis=1)
+    demanded = np.zeros((len(truth.tick), 1, len(OUTPUTS)))
+    demanded[:, 0, [1, 2, 5, 0]] = reference
+    y, error = truth.y[steady], (truth.y - demanded)[steady]
+    squares = {name: _mean(error[..., i] ** 2) for i, name in enumerate(OUTPUTS)}
+    squares[FELT] = _height_squares(traces, begin, end)
+    outputs = _output_cost(planner.Q, squares)
+    forces = _mean(_force_cost(walk, begin, end, np.tile(planner.R, N_LEGS)))
+    every = [status for found in traces.statuses.values() for status in found]
+    planner_ms = np.concatenate([np.zeros(0), *(status.planner_ms for status in every)])
+    return Figures(
+        seconds=end / 1000.0,
+        fallen=fallen,
+        stopped=_find_stops(traces, fallen),
+        mean={name: _mean(y[..., i]) for i, name in enumerate(OUTPUTS)},
+        rmse={name: None if (of := squares[name]) is None else of**0.5 for name in ERRORS},
+        cost=None if outputs is None or forces is None else outputs + forces,
+        cost_outputs=outputs,
+        cost_forces=forces,
+        planner_ms_median=_quantile(planner_ms, 0.5),
+        planner_ms_p99=_quantile(planner_ms, 0.99),
+        solves=len(planner_ms),
+        plans=dict(sorted(walk.plans.items())),
+        distance=(way := distance(truth, 2 * config.gait.stance_ms, end if fallen else None)),
+        work=walk.work,
+        cost_of_transport=_cost_of_transport(config, walk.work, way),
+    )
+
+
+def _cost_of_transport(config: Config, work: float | None, way: float | None) -> float | None:
+    if work is None or way is None or way < _SHORTEST:
+        return None
+    mass = config.team.robots * TOTAL_MASS + config.world.payload
+    return work / (mass * GRAVITY * way)
+
+
+def _find_falls(traces: Traces) -> dict[str, float]:
+    """When each robot fell: what the world says, and what its truth shows, whichever is first."""
+    truth = traces.truth
+    times = {e.robot: e.tick / 1000.0 for e in reversed(traces.events) if e.kind == "fall"}
+    down = (truth.tilt > FALL_TILT) | (truth.y[..., 0] < FALL_HEIGHT)
+    for i in np.flatnonzero(down.any(axis=0)):
+        robot, seen = traces.robots[i], float(truth.tick[down[:, i].argmax()]) / 1000.0
+        times[robot] = min(seen, times.get(robot, seen))
+    return dict(sorted(times.items()))
+
+
+def _find_stops(traces: Traces, fallen: Mapping[str, float]) -> dict[str, str]:
+    last = {robot: found[-1] for robot, found in traces.statuses.items() if found}
+    return {r: s.reason for r, s in last.items() if s.reason and r not in fallen}
+
+
+def _height_squares(traces: Traces, begin: int, end: int) -> float | None:
+    """Mean square of the height over the felt ground less the one asked for, m²."""
+    parts = [np.zeros(0)]
+    for robot in traces.robots:
+        tick, error = felt_height_errors(traces, robot)
+        parts.append(error[_within(tick, begin, end)])
+    return _mean(np.concatenate(parts) ** 2)
+
+
+def _output_cost(Q: Sequence[float], squares: Mapping[str, float | None]) -> float | None:
+    """∑ q e², with the height over the felt ground: what the planner can do something about."""
+    found = [squares[FELT], *(squares[name] for name in OUTPUTS[1:])]
+    terms = [q * square for q, square in zip(Q, found, strict=True) if square is not None]
+    return sum(terms) if len(terms) == len(OUTPUTS) else None
+
+
+def _force_cost(walk: Walk, begin: int, end: int, R: Array) -> Array:
+    """‖u − u_nominal‖²_R of every sample of every robot within the steady part."""
+    parts = [np.zeros(0)]
+    for samples in walk.samples.values():
+        kept = [sample for sample in samples if begin <= sample.tick <= end]
+        if kept:
+            u = np.array([sample.u for sample in kept])
+            stance = np.array([sample.stance for sample in kept]) > 0.5
+            parts.append((u - nominal_forces(stance)) ** 2 @ R)
+    return np.concatenate(parts)
+
+
+def _within(tick: NDArray[np.int64], begin: int, end: int) -> NDArray[np.bool_]:
+    return (tick >= begin) & (tick <= end)
+
+
+def _mean(values: Array) -> float | None:
+    return float(values.mean()) if values.size else None
+
+
+def _quantile(values: Array, q: float) -> float | None:
+    return float(np.quantile(values, q)) if values.size else None

@@ -1,0 +1,171 @@
+"""A trial's walk in this process, without a bus: the same code and the same bytes as over it."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from quadriga.agents.agent import Agent
+from quadriga.agents.planner.planner import PlannerInputs
+from quadriga.agents.planner.team_planner import TeamPlanner, TeamResult
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.experiments.trial.figures_of_merit import Walk
+from quadriga.identification.rollout import Rollout, Tick
+from quadriga.recordings.traces import MeasurementTrace, Traces
+from quadriga.recordings.truth import build_truth_trace, ticks_of
+from quadriga.shared.bus.members import PLANNER
+from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.runtime.clock import monotonic_ns
+from quadriga.shared.wire.messages import Event, Measurement, Reference, Status, Truth
+from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
+from quadriga.sim_server.world.layout import NV
+from quadriga.sim_server.world.world import World
+from quadriga.team.operator import reference_at
+
+
+def roll_out(
+    config: Config,
+    predictor: Predictor | None,
+    planner: TeamPlanner | None,
+    watch: Callable[[Tick], None] | None = None,
+) -> Walk:
+    """Walk in this process, until `world.seconds` are over or a robot has fallen.
+
+    Args:
+        config: the team's configuration.
+        predictor: None without a planner.
+        planner: of the whole team, for the kinds of planner that are one process.
+        watch: shown every tick.
+    """
+    timed = None if planner is None else _TimedPlanner(planner)
+    rollout = Rollout(config, None, lambda tick: _reference(config, tick), planner=timed)
+    if config.planner.kind not in (*CENTRAL, "none"):
+        rollout.agents = {n: Agent(config, n, predictor, monotonic_ns) for n in rollout.agents}
+    log, meter = _WalkLog(config), _WorkMeter(rollout.world)
+    last = round(1000 * config.world.seconds)
+    while rollout.world.tick < last and not rollout.world.fallen():
+        if rollout.world.tick % SAMPLE_MS == 0:
+            log.truth.append(rollout.world.truth())
+        tick = rollout.step()
+        log.add(tick)
+        meter.add_tick()
+        if watch is not None:
+            watch(tick)
+    if timed is not None:
+        log.planner_ms[PLANNER] = timed.ms
+        log.plans += timed.plans
+    return replace(log.build_walk(), work=meter.work)
+
+
+def _reference(config: Config, tick: int) -> Reference | None:
+    """The reference as the operator sends it."""
+    return reference_at(config, tick) if tick % REFERENCE_EPOCH_MS == 0 else None
+
+
+class _TimedPlanner(TeamPlanner):
+    """A team's planner that notes how long each step took and what came of it."""
+
+    def __init__(self, planner: TeamPlanner) -> None:
+        self._planner = planner
+        self.ms: list[float] = []
+        self.plans: Counter[str] = Counter()
+
+    def step(self, inputs: Sequence[PlannerInputs]) -> TeamResult:
+        begun = monotonic_ns()
+        result = self._planner.step(inputs)
+        self.ms.append(1e-6 * (monotonic_ns() - begun))
+        self.plans[result.status] += len(inputs)
+        return result
+
+
+class _WorkMeter:
+    """Sums up what the motors do.
+
+    A tick moves the joints by their rates at its end under the torques that acted in it, so that
+    the sum is the work itself, not an approximation of it.
+    """
+
+    def __init__(self, world: World) -> None:
+        n, physics = len(world.names), world.physics
+        # Views of MuJoCo's own memory.
+        self._torque = physics.qfrc_applied[: n * NV].reshape(n, NV)[:, 6:]
+        self._rate = physics.qvel[: n * NV].reshape(n, NV)[:, 6:]
+        self.work = 0.0
+
+    def add_tick(self) -> None:
+        """Add the tick that has just been walked."""
+        self.work += 1e-3 * float(np.abs(self._torque * self._rate).sum())
+
+
+class _WalkLog:
+    """What is seen of a walk in this process."""
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self.truth: list[Truth] = []
+        self.events: list[Event] = []
+        self.samples: defaultdict[str, list[Measurement]] = defaultdict(list)
+        self.planner_ms: defaultdict[str, list[float]] = defaultdict(list)
+        self.plans: Counter[str] = Counter()
+        self._last: Tick | None = None
+
+    def add(self, tick: Tick) -> None:
+        """Add one tick."""
+        self._last = tick
+        self.events += tick.events
+        for name, out in tick.outputs.items():
+            if out.measurement is not None:
+                self.samples[name].append(out.measurement)
+            if out.plan is not None:
+                self.plans[out.plan.status] += 1
+            if out.planner_ns is not None:
+                self.planner_ms[name].append(1e-6 * out.planner_ns)
+
+    def build_walk(self) -> Walk:
+        """All of it, in the form that a recording is read in."""
+        config = self._config
+        names = robot_names(config.team.robots)
+        references = [
+            reference_at(config, tick)
+            for tick in range(0, self.truth[-1].tick + 1, REFERENCE_EPOCH_MS)
+        ]
+        samples = {name: tuple(self.samples[name]) for name in names}
+        traces = Traces(
+            config=config,
+            metadata={},
+            robots=names,
+            cut="",
+            messages={},
+            invalid={},
+            ticks={},
+            log_times=None,
+            truth=build_truth_trace(self.truth, config),
+            references=(
+                ticks_of(references),
+                np.array([[r.vx, r.vy, r.wz, r.height] for r in references]),
+            ),
+            measurements={
+                name: MeasurementTrace(ticks_of(found), np.array([s.y for s in found]))
+                for name, found in samples.items()
+            },
+            plans={name: () for name in names},
+            statuses=self._statuses(),
+            events=tuple(self.events),
+        )
+        return Walk(traces, samples, self.plans)
+
+    def _statuses(self) -> dict[str, tuple[Status, ...]]:
+        """One status of each process, as of the end."""
+        found: dict[str, tuple[Status, ...]] = {}
+        for name in (*robot_names(self._config.team.robots), PLANNER):
+            out = None if self._last is None else self._last.outputs.get(name)
+            mode, reason = ("", "") if out is None else (out.mode, out.reason)
+            ms = np.array(self.planner_ms[name])
+            found[name] = (
+                Status(0, 0, mode, reason, self._config.estimator.kind, {}, {}, ms, np.zeros(0)),
+            )
+        return found

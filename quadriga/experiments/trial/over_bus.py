@@ -1,0 +1,58 @@
+"""A trial as processes of its own over the bus, and the walk that a recording holds."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from quadriga.experiments.trial.figures_of_merit import Walk
+from quadriga.recordings.summary import RECORDING
+from quadriga.recordings.traces import read_traces
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.wire.messages import Measurement
+from quadriga.shared.wire.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS, TRUTH
+from quadriga.team.endpoint import free_endpoint
+from quadriga.team.launch import Launch, process_table
+from quadriga.team.run_folder import CONFIG, make_run_dir
+
+_NEEDED: Final = {topic.name for topic in (TRUTH, REFERENCE, MEASUREMENT, PLAN, STATUS, EVENT)}
+
+
+def walk_over_bus(config: Config, run_dir: Path, predictor: Path | None, sha256: str) -> Walk:
+    """Walk as processes of their own, as `quadriga walk` does, and read what they recorded.
+
+    Args:
+        config: the team's configuration.
+        run_dir: a new folder for the recording and the processes' logs.
+        predictor: its file; None without a planner.
+        sha256: the predictor's digest, for the recording.
+
+    Raises:
+        ProcessError: a process failed or left too early.
+        RecordingError: nothing was recorded.
+        ConfigError: the folder holds a recording.
+    """
+    bus = replace(config.bus, endpoint=free_endpoint())
+    config = replace(config, bus=bus, recorder=replace(config.recorder, enabled=True))
+    make_run_dir(run_dir)
+    (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
+    with Launch(process_table(config, run_dir, predictor, sha256), run_dir / "logs") as launch:
+        launch.watch(lambda: False)
+    return read_walk(run_dir / RECORDING)
+
+
+def read_walk(path: Path) -> Walk:
+    """The walk in a recording.
+
+    Raises:
+        RecordingError: there is none, or it is empty or foreign.
+    """
+    recording = Recording(path)
+    traces = read_traces(recording, _NEEDED)
+    samples = {r: tuple(recording.messages(Measurement, r)) for r in traces.robots}
+    plans = Counter(plan.status for found in traces.plans.values() for plan in found)
+    return Walk(traces, samples, plans)

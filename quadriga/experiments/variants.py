@@ -1,0 +1,153 @@
+"""Variants that walk in the same worlds: planners and predictors by name, or any set of keys."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from quadriga.agents.predictor.fits import FITS
+from quadriga.shared.config.load import flatten, parse_assignment, read_toml
+from quadriga.shared.errors import ConfigError
+
+Keys = Mapping[str, Any]  # values by section.key
+
+_NAME: Final = re.compile(r"[A-Za-z0-9_.+-]{1,40}")
+_CLOSING: Final = {"[": "]", "{": "}", '"': '"', "'": "'"}
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """A named set of keys that is compared with others: a planner, or any other change."""
+
+    name: str
+    keys: Keys
+
+
+def _planner(
+    kind: str, compensation: bool = False, damping: float = 0.0, exchanges: int = 0
+) -> Keys:
+    return {
+        "planner.kind": kind,
+        "planner.compensation": compensation,
+        "planner.damping": damping,
+        "planner.exchanges": exchanges,
+    }
+
+
+PLANNERS: Final[Mapping[str, Keys]] = {
+    "none": _planner("none"),
+    "decentralised": _planner("decentralised"),
+    "distributed": _planner("distributed"),
+    "compensated": _planner("distributed", compensation=True),
+    "damped": _planner("distributed", damping=0.5),
+    "exchanged": _planner("distributed", exchanges=2),
+    "centralised": _planner("centralised"),
+    "deepc": _planner("deepc"),
+    "configured": {},  # the planner of the configuration, whatever it is
+}
+# The plain ones are let through a gate that refuses them: without block weights the distributed
+# scheme iterates with a radius above 1, and what then happens is worth seeing.
+PREDICTORS: Final[Mapping[str, Keys]] = {
+    **{kind: {"identification.predictor": kind} for kind in FITS},
+    "plain": {
+        "identification.predictor": "ridge",
+        "identification.block_weight": 1.0,
+        "identification.max_radius": 10.0,
+    },
+    "paper": {"identification.predictor": "pinv", "identification.max_radius": 10.0},
+}
+
+
+def parse_variants(options: Sequence[str], file: Path | None) -> tuple[Variant, ...]:
+    """Variants by `--planners`, those of `--variants` included.
+
+    Args:
+        options: texts such as `none,distributed,stiff:controller.kp_z=800;controller.kd_z=60`;
+            none takes every variant of the file.
+        file: TOML with one table of keys for each variant, or None.
+
+    Raises:
+        ConfigError: a name that nothing explains or that is given twice, or none at all.
+    """
+    from_file = {} if file is None else read_keys(read_toml(file), str(file))
+    known: dict[str, Keys] = {**PLANNERS, **from_file}
+    found: dict[str, Keys] = {}
+    for text in [part for o in options for part in split_outside_brackets(o, ",")] or from_file:
+        name, colon, keys = text.partition(":")
+        if colon and not _NAME.fullmatch(name):
+            raise ConfigError("--planners", repr(name), "a name of up to 40 letters, digits, _.+-")
+        if not colon and name not in known:
+            raise ConfigError(
+                "--planners",
+                repr(name),
+                f"names of {', '.join(known)}",
+                "or name:section.key=value;section.key=value",
+            )
+        if name in found:
+            raise ConfigError("--planners", f"{name} twice", "different names")
+        found[name] = _parse_keys(keys) if colon else known[name]
+    if not found:
+        raise ConfigError("--planners", "none", f"at least one of {', '.join(known)}")
+    return tuple(Variant(name, keys) for name, keys in found.items())
+
+
+def combine_with_predictors(
+    variants: Sequence[Variant], predictors: Sequence[str]
+) -> tuple[Variant, ...]:
+    """Each variant with each predictor, as `planner+predictor`; one without a planner as it is.
+
+    Raises:
+        ConfigError: a name is none of `PREDICTORS`, or stands there twice.
+    """
+    for name in predictors:
+        if name not in PREDICTORS:
+            raise ConfigError("--predictors", repr(name), f"names of {', '.join(PREDICTORS)}")
+    if len(set(predictors)) < len(predictors):
+        raise ConfigError("--predictors", ", ".join(predictors), "each once")
+    found: list[Variant] = []
+    for variant in variants:
+        if not predictors or variant.keys.get("planner.kind") == "none":
+            found.append(variant)
+            continue
+        for name in predictors:
+            keys = {**variant.keys, **PREDICTORS[name]}
+            found.append(Variant(f"{variant.name}+{name}", keys))
+    return tuple(found)
+
+
+def read_keys(tables: Mapping[str, Any], where: str) -> dict[str, Keys]:
+    """Values by `section.key` of each table of a file.
+
+    Raises:
+        ConfigError: what has a name is no table, or the name is not a plain one; `where` it stands.
+    """
+    for name, keys in tables.items():
+        if not _NAME.fullmatch(name) or not isinstance(keys, dict):
+            raise ConfigError(f"{where}: {name}", "no table of a plain name", "[name] and its keys")
+    return {name: flatten(keys) for name, keys in tables.items()}
+
+
+def split_outside_brackets(text: str, mark: str) -> list[str]:
+    """Parts between marks that stand in no bracket and no quotation; empty ones are left out."""
+    return [part.strip() for part in _split(text, mark) if part.strip()]
+
+
+def _parse_keys(text: str) -> Keys:
+    parts = split_outside_brackets(text, ";")
+    return dict(parse_assignment(part, "--planners") for part in parts)
+
+
+def _split(text: str, mark: str) -> Iterator[str]:
+    begin, closing = 0, ""
+    for k, letter in enumerate(text):
+        if closing:
+            closing = "" if letter == closing else closing
+        elif letter in _CLOSING:
+            closing = _CLOSING[letter]
+        elif letter == mark:
+            yield text[begin:k]
+            begin = k + 1
+    yield text[begin:]
