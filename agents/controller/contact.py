@@ -107,13 +107,16 @@ def _follow_schedule(
     feet: FeetMemory, ground_height0: float, stance: Array, foot_z: Array, rate: float
 ) -> float:
     """The paper's plain setting: contacts are the schedule's, the ground is flat and known."""
+    contact, early_contact = feet.contact, feet.early_contact
+    unloaded, touchdown_seen = feet.unloaded, feet.touchdown_seen
+    ground = feet.ground
     total, count = 0.0, 0
     for leg in range(4):
-        feet.contact[leg] = feet.touchdown_seen[leg] = stance[leg]
-        feet.early_contact[leg] = feet.unloaded[leg] = 0.0
+        contact[leg] = touchdown_seen[leg] = stance[leg]
+        early_contact[leg] = unloaded[leg] = 0.0
         if stance[leg] > 0.5:
-            feet.ground[leg] = foot_z[leg] - FOOT_RADIUS
-            total += feet.ground[leg]
+            ground[leg] = foot_z[leg] - FOOT_RADIUS
+            total += ground[leg]
             count += 1
     return ground_height0 + rate * (total / count - ground_height0)
 
@@ -134,19 +137,23 @@ def _update_stance(
     feet: FeetMemory, phase: GaitPhase, loaded: Flags, rule: ContactRule, dt: float
 ) -> bool:
     """Which of the feet that shall stand are contacts; whether they all carry."""
+    contact, early_contact = feet.contact, feet.early_contact
+    unloaded, lift = feet.unloaded, feet.lift
+    reflex, reaction = feet.reflex, feet.reaction
+    stance, switched = phase.stance, phase.switched
     carried = True
     for leg in range(4):
-        if phase.stance[leg] < 0.5:
+        if stance[leg] < 0.5:
             continue
         carries = loaded[leg]
-        if rule.reject_side_contacts > 0.5 and not phase.switched and feet.contact[leg] < 0.5:
-            carries = carries and from_below(feet.reaction[leg])
-        if phase.switched:
-            feet.early_contact[leg] = 0.0
-            feet.unloaded[leg] = 0.0
-        feet.lift[leg], feet.reflex[leg] = 0.0, 0.0
-        feet.unloaded[leg] = 0.0 if carries else feet.unloaded[leg] + dt
-        feet.contact[leg] = 1.0 if feet.unloaded[leg] <= rule.lost_after else 0.0
+        if rule.reject_side_contacts > 0.5 and not switched and contact[leg] < 0.5:
+            carries = carries and from_below(reaction[leg])
+        if switched:
+            early_contact[leg] = 0.0
+            unloaded[leg] = 0.0
+        lift[leg], reflex[leg] = 0.0, 0.0
+        unloaded[leg] = 0.0 if carries else unloaded[leg] + dt
+        contact[leg] = 1.0 if unloaded[leg] <= rule.lost_after else 0.0
         carried = carried and carries
     return carried
 
@@ -165,32 +172,37 @@ def _update_swing(
         rule: when a foot is a contact.
         dt: time since the last tick, s.
     """
-    progress, rejects = phase.progress, rule.reject_side_contacts > 0.5
+    contact, early_contact = feet.contact, feet.early_contact
+    unloaded, touchdown_seen = feet.unloaded, feet.touchdown_seen
+    lift, reflex = feet.lift, feet.reflex
+    reaction = feet.reaction
+    stance, progress, switched = phase
+    rejects = rule.reject_side_contacts > 0.5
     for leg in range(4):
-        if phase.stance[leg] > 0.5:
+        if stance[leg] > 0.5:
             continue
-        if phase.switched:
-            feet.touchdown_seen[leg] = 0.0
-            feet.early_contact[leg] = 0.0
-            feet.unloaded[leg] = 0.0
-            feet.reflex[leg] = 0.0
-            feet.lift[leg] = -1.0 if feet.contact[leg] > 0.5 else 0.0
-        if feet.lift[leg] < 0.0:
+        if switched:
+            touchdown_seen[leg] = 0.0
+            early_contact[leg] = 0.0
+            unloaded[leg] = 0.0
+            reflex[leg] = 0.0
+            lift[leg] = -1.0 if contact[leg] > 0.5 else 0.0
+        if lift[leg] < 0.0:
             if not carried and loaded[leg] and progress < rule.hold:
-                feet.contact[leg] = 1.0
+                contact[leg] = 1.0
                 continue
-            feet.lift[leg] = 0.0 if phase.switched else progress
-        feet.contact[leg] = 0.0
-        since = (progress - feet.lift[leg]) / (1.0 - feet.lift[leg])
-        below = not rejects or from_below(feet.reaction[leg])
+            lift[leg] = 0.0 if switched else progress
+        contact[leg] = 0.0
+        since = (progress - lift[leg]) / (1.0 - lift[leg])
+        below = not rejects or from_below(reaction[leg])
         if loaded[leg] and below and since > _EARLIEST_TOUCHDOWN:
-            feet.early_contact[leg] = 1.0
-            feet.unloaded[leg] = 0.0
-            feet.reflex[leg] = 0.0
-        if feet.early_contact[leg] > 0.5:
+            early_contact[leg] = 1.0
+            unloaded[leg] = 0.0
+            reflex[leg] = 0.0
+        if early_contact[leg] > 0.5:
             if rejects:
-                feet.unloaded[leg] = 0.0 if loaded[leg] else feet.unloaded[leg] + dt
-            feet.contact[leg] = 1.0 if feet.unloaded[leg] <= rule.lost_after else 0.0
+                unloaded[leg] = 0.0 if loaded[leg] else unloaded[leg] + dt
+            contact[leg] = 1.0 if unloaded[leg] <= rule.lost_after else 0.0
         elif rule.reflex > 0.0:
             stopped = loaded[leg] and not below
             in_time = since > _EARLIEST_REFLEX and progress < _LATEST_REFLEX
@@ -202,13 +214,14 @@ def _update_reflex(
     feet: FeetMemory, leg: int, stopped: bool, progress: float, duration: float, dt: float
 ) -> None:
     """Begin a foot's reflex, or let time pass in it; at its end the swing begins anew."""
+    lift, reflex = feet.lift, feet.reflex
     if stopped:
-        feet.reflex[leg] = duration
-    elif feet.reflex[leg] > 0.0:
-        feet.reflex[leg] -= dt
-        if feet.reflex[leg] <= 0.0:
-            feet.reflex[leg] = 0.0
-            feet.lift[leg] = progress
+        reflex[leg] = duration
+    elif reflex[leg] > 0.0:
+        reflex[leg] -= dt
+        if reflex[leg] <= 0.0:
+            reflex[leg] = 0.0
+            lift[leg] = progress
 
 
 @compiled
@@ -221,17 +234,19 @@ def _update_ground(
     rate: float,
 ) -> float:
     """Where the ground is under the feet in contact; its new filtered height."""
+    contact, touchdown_seen = feet.contact, feet.touchdown_seen
+    ground = feet.ground
     total, count = 0.0, 0
     for leg in range(4):
         # The ground is where the foot first bore load: to take its height at the scheduled
         # touchdown would take that of a foot still in the air, and ratchet upward.
-        if feet.contact[leg] > 0.5 and loaded[leg] and feet.touchdown_seen[leg] < 0.5:
-            feet.touchdown_seen[leg] = 1.0
-            feet.ground[leg] = foot_z[leg] - FOOT_RADIUS
-        if feet.contact[leg] > 0.5 and feet.touchdown_seen[leg] > 0.5:
+        if contact[leg] > 0.5 and loaded[leg] and touchdown_seen[leg] < 0.5:
+            touchdown_seen[leg] = 1.0
+            ground[leg] = foot_z[leg] - FOOT_RADIUS
+        if contact[leg] > 0.5 and touchdown_seen[leg] > 0.5:
             # The estimator's height drifts; a standing foot carries its ground along with it.
-            feet.ground[leg] += rate * (foot_z[leg] - FOOT_RADIUS - feet.ground[leg])
+            ground[leg] += rate * (foot_z[leg] - FOOT_RADIUS - ground[leg])
             if stance[leg] > 0.5:
-                total += feet.ground[leg]
+                total += ground[leg]
                 count += 1
     return ground_height0 + rate * (total / count - ground_height0) if count > 0 else ground_height0

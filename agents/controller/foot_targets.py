@@ -116,18 +116,22 @@ def update_anchors(
         dt: time since the last tick, s.
     """
     descent, tracks = gains.descent_speed * dt, gains.track_sinking_trunk > 0.5
-    start, goal, feet = swing_start_of(memory), foot_goal_of(memory), feet_memory_of(memory)
+    start, goal = swing_start_of(memory), foot_goal_of(memory)
+    feet_memory = feet_memory_of(memory)
+    contact, early_contact = feet_memory.contact, feet_memory.early_contact
+    lift = feet_memory.lift
+    stance, progress, switched = phase
     for leg in range(4):
-        stands = phase.stance[leg] > 0.5
-        if not stands and (phase.switched or feet.lift[leg] == phase.progress):
+        stands = stance[leg] > 0.5
+        if not stands and (switched or lift[leg] == progress):
             start[leg] = p_foot[leg]
-        if feet.contact[leg] > 0.5:
+        if contact[leg] > 0.5:
             goal[leg] = p_foot[leg]
-        elif stands or feet.early_contact[leg] > 0.5:
+        elif stands or early_contact[leg] > 0.5:
             if not tracks:
                 goal[leg, 2] -= descent
                 continue
-            if phase.switched and stands:
+            if switched and stands:
                 goal[leg] = p_foot[leg]
             goal[leg, 2] -= descent - min(0.0, trunk.velocity[2]) * dt
             goal[leg, 2] = max(goal[leg, 2], trunk.position[2] - _LONGEST)
@@ -162,7 +166,7 @@ def desired_accelerations(
     memory: Array,
     phase: GaitPhase,
     trunk: TrunkState,
-    feet_state: FeetState,
+    feet: FeetState,
     motion: MotionReference,
     gains: FeetGains,
 ) -> Array:
@@ -174,43 +178,54 @@ def desired_accelerations(
         memory: `Memory.flat` of this tick after `update_anchors`; `reaction` changes.
         phase: of the gait.
         trunk: where it is and how it moves.
-        feet_state: where the feet are and how they move.
+        feet: where the feet are and how they move.
         motion: of the trunk, as footholds count on it.
         gains: what feet are asked for.
     """
-    feet, goal = feet_memory_of(memory), foot_goal_of(memory)
+    feet_memory = feet_memory_of(memory)
+    contact, early_contact = feet_memory.contact, feet_memory.early_contact
+    ground, lift = feet_memory.ground, feet_memory.lift
+    reflex, reaction = feet_memory.reflex, feet_memory.reaction
+    goal, start = foot_goal_of(memory), swing_start_of(memory)
+    stance, progress = phase.stance, phase.progress
+    p_foot, v_foot = feet.position, feet.velocity
     out = np.zeros((4, 3))
-    expected, highest = _expected_ground(phase.stance, feet.ground), np.max(feet.ground)
+    expected, highest = _expected_ground(stance, ground), np.max(ground)
     for leg in range(4):
-        if feet.contact[leg] > 0.5:
-            feet.reaction[leg] = 0.0
+        if contact[leg] > 0.5:
+            reaction[leg] = 0.0
             continue
-        position, velocity = feet_state.position[leg], feet_state.velocity[leg]
+        position, velocity = p_foot[leg], v_foot[leg]
         reference = np.zeros((3, 3))
-        if phase.stance[leg] > 0.5 or feet.early_contact[leg] > 0.5:
+        if stance[leg] > 0.5 or early_contact[leg] > 0.5:
             reference[0] = goal[leg]
             reference[1, 2] = -gains.descent_speed
-        elif feet.reflex[leg] > 0.0:
+        elif reflex[leg] > 0.0:
             reference[0] = position
-            reference[1] = _reflex_velocity(feet.reaction[leg], gains.reflex_lift)
+            reference[1] = _reflex_velocity(reaction[leg], gains.reflex_lift)
         else:
             target = foothold(
                 leg,
                 trunk.position,
                 trunk.R,
                 motion,
-                (1.0 - phase.progress) * gains.stance_time,
+                (1.0 - progress) * gains.stance_time,
                 gains.stance_time,
                 gains.raibert_gain,
             )
-            start, lift = swing_start_of(memory)[leg], feet.lift[leg]
             reference = _swing(
-                start, target, (expected, highest), lift, phase.progress, trunk.position[2], gains
+                start[leg],
+                target,
+                (expected, highest),
+                lift[leg],
+                progress,
+                trunk.position[2],
+                gains,
             )
         correction = gains.kp * (reference[0] - position) + gains.kd * (reference[1] - velocity)
         out[leg] = reference[2] + correction
         # What stops a foot that is to move with an acceleration a holds it back by −a.
-        feet.reaction[leg] = -correction
+        reaction[leg] = -correction
     return out
 
 

@@ -73,10 +73,10 @@ def update_mu_reduction(
     """
     if rule.slip_speed <= 0.0:
         return 0.0
-    slides, v = False, feet.velocity
+    slides, stance, v, force = False, phase.stance, feet.velocity, feet.force
     if phase.progress >= _SETTLED:
         for leg in range(4):
-            if contact[leg] > 0.5 and phase.stance[leg] > 0.5 and feet.force[leg] >= rule.slip_load:
+            if contact[leg] > 0.5 and stance[leg] > 0.5 and force[leg] >= rule.slip_load:
                 slides = slides or v[leg, 0] ** 2 + v[leg, 1] ** 2 > rule.slip_speed**2
     rate = _LOSS if slides else -rule.recovery
     return min(max(0.0, rule.mu - rule.mu_min), max(0.0, mu_reduction0 + rate * dt))

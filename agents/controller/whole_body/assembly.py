@@ -64,24 +64,25 @@ def _split_feet(
     terms: RigidBodyTerms, p_foot: Array, goal: Goal
 ) -> tuple[StackedFeet, StackedFeet]:
     """The feet in contact and the others."""
+    contact, _, swing, force = goal
     n_c = 0
     for leg in range(4):
-        if goal.contact[leg] > 0.5:
+        if contact[leg] > 0.5:
             n_c += 1
     n_on, n_off = 3 * n_c, 12 - 3 * n_c
     on = StackedFeet(np.zeros((n_on, 18)), np.zeros(n_on), np.zeros(n_on))
     off = StackedFeet(np.zeros((n_off, 18)), np.zeros(n_off), np.zeros(n_off))
     i_on, i_off = 0, 0
     for leg in range(4):
-        if goal.contact[leg] > 0.5:
+        if contact[leg] > 0.5:
             rows = slice(i_on, i_on + 3)
             _foot_jacobian(terms, p_foot[leg], leg, on.J[rows], on.drift[rows])
-            on.desired[rows] = goal.force[leg]
+            on.desired[rows] = force[leg]
             i_on += 3
         else:
             rows = slice(i_off, i_off + 3)
             _foot_jacobian(terms, p_foot[leg], leg, off.J[rows], off.drift[rows])
-            off.desired[rows] = goal.swing[leg]
+            off.desired[rows] = swing[leg]
             i_off += 3
     return on, off
 

@@ -92,12 +92,13 @@ def _unconstrained(problem: WholeBodyProblem) -> tuple[Array, bool]:
     step = np.negative(problem.g).reshape(12, 1)
     cholesky_solve(cholesky(problem.H), step)
     tau = step[:, 0].copy()
+    C, c = problem.C, problem.c
     feasible = bool(np.all(np.abs(tau) <= TORQUE_LIMIT))
-    for row in range(problem.C.shape[0]):
+    for row in range(C.shape[0]):
         total = 0.0
         for k in range(12):
-            total += problem.C[row, k] * tau[k]
-        if not total >= problem.c[row] - _TOLERANCE:
+            total += C[row, k] * tau[k]
+        if not total >= c[row] - _TOLERANCE:
             feasible = False
     return tau, feasible
 
