@@ -48,14 +48,14 @@ def measure(
     figures: dict[str, Any] = {"ticks": len(ticks) - first, "robots": config.team.robots}
     agent = Agent(config, "r1", predictor)
     watch = _Stopwatch()
-    watched = Agent(config, "r1", predictor)
-    watched._controller = _Watched(config, watch)
+    timed = Agent(config, "r1", predictor)
+    timed._controller = _TimedController(config, watch)
     between = {"hot": lambda: None, "cold": _evict()}
     with collector_off():
         _replay(agent, ticks)  # first calls load and set up
-        for name, forget in between.items():
-            whole = [_replay(agent, ticks, forget)[first:] for _ in range(passes)]
-            parts = [_staged(watched, watch, ticks, forget)[first:] for _ in range(passes)]
+        for name, evict in between.items():
+            whole = [_replay(agent, ticks, evict)[first:] for _ in range(passes)]
+            parts = [_staged(timed, watch, ticks, evict)[first:] for _ in range(passes)]
             times, stages = np.concatenate(whole), np.concatenate(parts)
             figures[name] = {
                 "median": float(np.median(times)),
@@ -77,12 +77,12 @@ def collector_off() -> Iterator[None]:
 
 
 def _replay(
-    agent: Agent, ticks: list[AgentTick], forget: Callable[[], object] = lambda: None
+    agent: Agent, ticks: list[AgentTick], evict: Callable[[], object] = lambda: None
 ) -> Array:
-    """Time of every tick, µs; `forget` is called before each."""
+    """Time of every tick, µs; `evict` is called before each."""
     times, memory = np.empty(len(ticks)), agent.initial()
     for k, tick in enumerate(ticks):
-        forget()
+        evict()
         begun = monotonic_ns()
         memory, outputs = _step(agent, memory, tick, decode(tick.payload, State))
         encode(outputs.command)
@@ -91,12 +91,12 @@ def _replay(
 
 
 def _staged(
-    agent: Agent, watch: _Stopwatch, ticks: list[AgentTick], forget: Callable[[], object]
+    agent: Agent, watch: _Stopwatch, ticks: list[AgentTick], evict: Callable[[], object]
 ) -> Array:
     """Time of every tick's stages, (T, 5), µs."""
     times, memory = np.empty((len(ticks), len(STAGES))), agent.initial()
     for k, tick in enumerate(ticks):
-        forget()
+        evict()
         watch.ns.clear()
         begun = monotonic_ns()
         state = decode(tick.payload, State)
@@ -113,8 +113,10 @@ def _staged(
 def _step(
     agent: Agent, memory: AgentState, tick: AgentTick, state: State
 ) -> tuple[AgentState, Outputs]:
-    heard = tick.inputs
-    return agent.step(memory, Inputs(state, heard.measurements, heard.plans, heard.references))
+    received = tick.inputs
+    return agent.step(
+        memory, Inputs(state, received.measurements, received.plans, received.references)
+    )
 
 
 def _evict() -> Callable[[], object]:
@@ -133,7 +135,7 @@ class _Stopwatch:
         self.ns: defaultdict[str, int] = defaultdict(int)
 
 
-class _Watched(Controller):
+class _TimedController(Controller):
     """A controller whose halves are timed."""
 
     def __init__(self, config: Config, watch: _Stopwatch) -> None:

@@ -29,14 +29,14 @@ def record(config: Config, predictor: Predictor | None) -> list[AgentTick]:
         return reference_at(config, tick) if tick % REFERENCE_EPOCH_MS == 0 else None
 
     rollout = Rollout(config, predictor, reference)
-    heard = _Heard(rollout.agents["r1"])
-    rollout.agents["r1"] = heard
+    agent = _RecordingAgent(rollout.agents["r1"])
+    rollout.agents["r1"] = agent
     for _ in rollout.ticks(round(1000 * config.world.seconds)):
         pass
-    return heard.ticks
+    return agent.ticks
 
 
-class _Heard(Agent):
+class _RecordingAgent(Agent):
     """An agent that keeps what it is given."""
 
     def __init__(self, agent: Agent) -> None:

@@ -56,11 +56,11 @@ class TsidCase:
 def cases(config: Config, predictor: Predictor | None, ticks: list[AgentTick]) -> list[TsidCase]:
     """The whole-body part's inputs at every tick after the stand."""
     agent = Agent(config, "r1", predictor)
-    agent._controller = listening = _Listening(config)
+    agent._controller = controller = _RecordingController(config)
     memory = agent.initial()
     for tick in ticks:
         memory, _ = agent.step(memory, tick.inputs)
-    return listening.cases[config.gait.stand_ms :]
+    return controller.cases[config.gait.stand_ms :]
 
 
 def compare(config: Config, found: list[TsidCase]) -> dict[str, Any] | None:
@@ -169,7 +169,7 @@ def _whole_body(
     )
 
 
-class _Listening(Controller):
+class _RecordingController(Controller):
     """A controller that keeps what its QP is given."""
 
     def __init__(self, config: Config) -> None:

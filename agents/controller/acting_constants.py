@@ -8,7 +8,7 @@ import numpy as np
 
 from quadriga.agents.controller.foot_targets import N_FEET_GAINS, FeetGains, feet_gains
 from quadriga.agents.controller.friction import N_FRICTION_RULE, FrictionRule, friction_rule
-from quadriga.agents.controller.maths.rigid_body import N_LINK_NUMBERS, N_LINKS
+from quadriga.agents.controller.maths.links import LINK_SIZE, N_LINKS
 from quadriga.agents.controller.maths.rows import numbers, places
 from quadriga.agents.controller.model import RigidBody
 from quadriga.agents.controller.trunk_feedback import (
@@ -61,7 +61,7 @@ class ConstantsLayout(NamedTuple):
 
 _LAYOUT: Final = ConstantsLayout(
     **places(
-        links=N_LINKS * N_LINK_NUMBERS,
+        links=N_LINKS * LINK_SIZE,
         mass=1,
         com=3,
         inertia_inverse=3 * 3,
@@ -99,7 +99,7 @@ def unpack_constants(row: Array) -> ActingConstants:
         row[_LAYOUT.mass], row[_LAYOUT.com], row[_LAYOUT.inertia_inverse].reshape(3, 3)
     )
     return ActingConstants(
-        row[_LAYOUT.links].reshape(N_LINKS, N_LINK_NUMBERS),
+        row[_LAYOUT.links].reshape(N_LINKS, LINK_SIZE),
         body,
         TrunkGains(*numbers(row[_LAYOUT.trunk], N_TRUNK_GAINS)),
         FeetGains(*numbers(row[_LAYOUT.feet], N_FEET_GAINS)),

@@ -14,6 +14,7 @@ import numpy as np
 from quadriga.agents.controller.maths.leg_kinematics import leg_kinematics
 from quadriga.agents.controller.maths.rotation import cross, rotation_matrix
 from quadriga.agents.controller.memory import FilterState
+from quadriga.agents.controller.readings import Readings
 from quadriga.shared.config.sections import EstimatorConfig
 from quadriga.shared.robot.a1 import FOOT_RADIUS, GRAVITY, STAND_HEIGHT, Array
 from quadriga.shared.runtime.jit import compiled
@@ -21,34 +22,6 @@ from quadriga.shared.wire.messages import State, Truth
 
 # Variances of a known state: position, velocity, four feet; m², m²/s², m².
 _KNOWN: Final = (1e-6, 1e-4, 1e-5, 1e-5, 1e-5, 1e-5)
-
-# Where `State.row` keeps what.
-_Q_JOINT: Final = State.CUTS["q_joint"]
-_V_JOINT: Final = State.CUTS["v_joint"]
-_QUAT: Final = State.CUTS["imu_quat_wxyz"]
-_GYRO: Final = State.CUTS["imu_gyro"]
-_ACCEL: Final = State.CUTS["imu_accel"]
-_FOOT_FORCE: Final = State.CUTS["foot_force"]
-
-
-class Readings(NamedTuple):
-    """What the sensors measure, see `State`.
-
-    Attributes:
-        q_joint: joint angles, (12,), rad.
-        v_joint: joint rates, (12,), rad/s.
-        quat_wxyz: attitude of the IMU, trunk to world, (4,).
-        gyro: angular velocity, (3,), rad/s, trunk frame.
-        accel: specific force, (3,), m/s², trunk frame.
-        foot_force: normal forces, (4,), N.
-    """
-
-    q_joint: Array
-    v_joint: Array
-    quat_wxyz: Array
-    gyro: Array
-    accel: Array
-    foot_force: Array
 
 
 class Estimate(NamedTuple):
@@ -106,19 +79,6 @@ def filter_noise(config: EstimatorConfig) -> FilterNoise:
         swing=config.swing_sigma,
         leg_position=config.leg_position_sigma,
         leg_velocity=config.leg_velocity_sigma,
-    )
-
-
-@compiled
-def readings_of(state: Array) -> Readings:
-    """Views of a `State.row`."""
-    return Readings(
-        state[_Q_JOINT],
-        state[_V_JOINT],
-        state[_QUAT],
-        state[_GYRO],
-        state[_ACCEL],
-        state[_FOOT_FORCE],
     )
 
 

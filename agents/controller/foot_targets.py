@@ -190,7 +190,7 @@ def desired_accelerations(
     stance, progress = phase.stance, phase.progress
     p_foot, v_foot = feet.position, feet.velocity
     out = np.zeros((4, 3))
-    expected, highest = _expected_ground(stance, ground), np.max(ground)
+    levels = _expected_ground(stance, ground), np.max(ground)
     for leg in range(4):
         if contact[leg] > 0.5:
             reaction[leg] = 0.0
@@ -204,24 +204,7 @@ def desired_accelerations(
             reference[0] = position
             reference[1] = _reflex_velocity(reaction[leg], gains.reflex_lift)
         else:
-            target = foothold(
-                leg,
-                trunk.position,
-                trunk.R,
-                motion,
-                (1.0 - progress) * gains.stance_time,
-                gains.stance_time,
-                gains.raibert_gain,
-            )
-            reference = _swing(
-                start[leg],
-                target,
-                (expected, highest),
-                lift[leg],
-                progress,
-                trunk.position[2],
-                gains,
-            )
+            reference = _swing(leg, start[leg], lift[leg], levels, progress, trunk, motion, gains)
         correction = gains.kp * (reference[0] - position) + gains.kd * (reference[1] - velocity)
         out[leg] = reference[2] + correction
         # What stops a foot that is to move with an acceleration a holds it back by −a.
@@ -242,36 +225,40 @@ def _expected_ground(stance: Array, ground: Array) -> float:
 
 @compiled
 def _swing(
+    leg: int,
     start: Array,
-    target: Array,
-    ground: tuple[float, float],
     lift: float,
+    ground: tuple[float, float],
     progress: float,
-    trunk_z: float,
+    trunk: TrunkState,
+    motion: MotionReference,
     gains: FeetGains,
 ) -> Array:
     """Reference of a swing foot, see `swing_reference`.
 
     Args:
+        leg: which.
         start: where its swing began, (3,), m, odometry frame.
-        target: foothold, (2,), m; brought near where the swing began anew.
+        lift: progress of the half cycle at which it began.
         ground: expected and highest height of the ground, m.
-        lift: progress of the half cycle at which the swing began.
         progress: of the half cycle.
-        trunk_z: height of the trunk, m.
+        trunk: where it is.
+        motion: of the trunk, as footholds count on it.
         gains: what feet are asked for.
     """
+    stance_time, k = gains.stance_time, gains.raibert_gain
+    remaining = (1.0 - progress) * stance_time
+    target = foothold(leg, trunk.position, trunk.R, motion, remaining, stance_time, k)
     expected, highest = ground
-    remaining = 1.0 - lift
-    duration = remaining * gains.stance_time
+    share = 1.0 - lift
     apex = highest + gains.swing_height
     if lift > 0.0:
         apex = max(apex, start[2] + _CLEARANCE)
-        limit_foothold(target, start, gains.acceleration, duration, gains.delay)
+        limit_foothold(target, start, gains.acceleration, share * stance_time, gains.delay)
     if gains.track_sinking_trunk > 0.5:
-        apex = min(apex, max(trunk_z - _SHORTEST, start[2]))
+        apex = min(apex, max(trunk.position[2] - _SHORTEST, start[2]))
     return swing_reference(
-        start, target, expected, apex, (progress - lift) / remaining, duration, gains.delay
+        start, target, expected, apex, (progress - lift) / share, share * stance_time, gains.delay
     )
 
 

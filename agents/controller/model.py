@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms, link_table, rigid_body_terms
+from quadriga.agents.controller.maths.links import link_table
+from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms, rigid_body_terms
 from quadriga.agents.controller.payload_estimate import add_load
 from quadriga.shared.robot.a1 import Array, q_stand
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from quadriga.agents.controller.maths.links import LINK
 from quadriga.shared.robot.a1 import GRAVITY, Array
 from quadriga.shared.runtime.jit import compiled
 
@@ -36,17 +37,18 @@ def add_load(links: Array, load: float) -> Array:
     """
     rows = links.copy()
     trunk = rows[0]
-    mass = trunk[0] + load
-    x, y, z = -trunk[1], -trunk[2], _HEIGHT - trunk[3]
-    share, reduced = load / mass, trunk[0] * load / mass
-    trunk[0] = mass
-    trunk[1] += share * x
-    trunk[2] += share * y
-    trunk[3] += share * z
-    trunk[4] += reduced * (y * y + z * z)
-    trunk[5] -= reduced * x * y
-    trunk[6] -= reduced * x * z
-    trunk[7] += reduced * (x * x + z * z)
-    trunk[8] -= reduced * y * z
-    trunk[9] += reduced * (x * x + y * y)
+    com, moments, bare = trunk[LINK.com], trunk[LINK.moments], trunk[LINK.mass]
+    mass = bare + load
+    x, y, z = -com[0], -com[1], _HEIGHT - com[2]
+    share, reduced = load / mass, bare * load / mass
+    trunk[LINK.mass] = mass
+    com[0] += share * x
+    com[1] += share * y
+    com[2] += share * z
+    moments[0] += reduced * (y * y + z * z)
+    moments[1] -= reduced * x * y
+    moments[2] -= reduced * x * z
+    moments[3] += reduced * (x * x + z * z)
+    moments[4] -= reduced * y * z
+    moments[5] += reduced * (x * x + y * y)
     return rows

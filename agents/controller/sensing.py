@@ -19,12 +19,12 @@ from quadriga.agents.controller.estimator import (
     filter_noise,
     filter_step,
     foot_trust,
-    readings_of,
 )
 from quadriga.agents.controller.maths.rotation import roll_pitch_yaw
 from quadriga.agents.controller.maths.rows import numbers, places
 from quadriga.agents.controller.memory import MEMORY, FilterState, feet_memory_of, filter_state_of
 from quadriga.agents.controller.payload_estimate import estimate_load
+from quadriga.agents.controller.readings import readings_of
 from quadriga.agents.controller.schedule import SCHEDULE, phase_of
 from quadriga.agents.controller.sensed import SENSED, feet_of, trunk_of
 from quadriga.shared.config.sections import Config

@@ -8,7 +8,7 @@ import numpy as np
 
 from quadriga.agents.controller.contact import contact_rule, update_contacts
 from quadriga.agents.controller.controller import Task
-from quadriga.agents.controller.estimator import Estimate, FilterNoise, filter_step, readings_of
+from quadriga.agents.controller.estimator import Estimate, FilterNoise, filter_step
 from quadriga.agents.controller.memory import (
     FeetMemory,
     FilterState,
@@ -16,6 +16,7 @@ from quadriga.agents.controller.memory import (
     initial_memory,
 )
 from quadriga.agents.controller.model import RigidBody
+from quadriga.agents.controller.readings import readings_of
 from quadriga.agents.controller.schedule import Schedule, phase_of
 from quadriga.agents.controller.sensed import TrunkState
 from quadriga.agents.controller.trunk_feedback import (

@@ -160,7 +160,7 @@ def test_a_late_foot_finds_the_ground_where_it_first_bears_load() -> None:
     for height in np.linspace(0.04, -0.02, 31):
         feet.z[1] = FOOT_RADIUS + height
         before = feet.run(1, OTHER, 0.1, 1)
-        assert before.feet.ground[1] == 0.0  # what was felt last, two steps ago
+        assert before.feet.ground[1] == 0.0  # what it stood on last, two steps ago
     assert before.feet.contact[1] == 0.0
     feet.force[1] = LOAD
     state = feet.run(1, OTHER, 0.2, 1)

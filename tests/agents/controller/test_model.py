@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from quadriga.agents.controller.maths.rigid_body import link_table
+from quadriga.agents.controller.maths.links import link_table
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.a1 import TOTAL_MASS, q_stand
 from tests.agents.controller.poses import BODY, FEET, MODEL, random_pose
