@@ -37,7 +37,7 @@ def test_the_page_says_what_the_rows_say(capsys: Said, tmp_path: Path) -> None:
     assert {link[1:] for link in found.links} <= found.anchors
     assert "17 walks: 2 variants, 1 world, 10 seeds (0 … 9), paired" in found.text
     assert "3 are still to be walked" in found.text
-    assert found.figures == ["success by variant", "falls against none", "errors"]
+    assert found.figures == ["success by variant", "falls against none", "errors against none"]
     assert "r2 fell at 2.50 s" in found.text
     assert "Did not fall where the baseline did: seeds 0 … 3." in found.text
     assert "c/configs/steps-none.toml --seed 0 --out" in found.text
