@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, PathPatch
-from matplotlib.path import Path
+from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator, StrMethodFormatter
 
+from quadriga.charts.bars import draw_bars
 from quadriga.charts.colours import BARS, LINES, PALETTE
 from quadriga.charts.panels import LEFT, Mark, Panel, PanelGrid
 from quadriga.charts.thinning import visible_points
@@ -132,7 +132,7 @@ def _fill(axes: Axes, panel: Panel, grid: PanelGrid, size: tuple[float, float]) 
     end = max(end, begin + 1e-3)
     tidy_axes(axes)
     if panel.rows:
-        _draw_bars(axes, panel, (begin, end), width)
+        draw_bars(axes, panel, (begin, end), width)
     else:
         _draw_curves(axes, replace(panel, part=(begin, end)), grid.points, tall)
     axes.set_xlim(begin, end)
@@ -142,39 +142,6 @@ def _fill(axes: Axes, panel: Panel, grid: PanelGrid, size: tuple[float, float]) 
         panel.title, loc="left", y=1.0, pad=5.0, fontsize=TEXT, fontweight="bold",
         color=PALETTE["ink"],
     )  # fmt: skip
-
-
-def _draw_bars(axes: Axes, panel: Panel, span: tuple[float, float], width: float) -> None:
-    axes.grid(visible=False)
-    point = (span[1] - span[0]) / width
-    for k, row in enumerate(panel.rows):
-        for style in dict.fromkeys(style for *_, style in row.bars):
-            # Bars of what is true lie as a thin line in those of what is scheduled.
-            inset = 0.36 if style == "contact" else 0.12
-            wider = 1.5 * point if style in ("event", "trouble") else 0.0
-            sides = np.array(
-                [
-                    (max(begin, span[0]) - wider, min(stop, span[1]) + wider)
-                    for begin, stop, which in row.bars
-                    if which == style and stop >= span[0] and begin <= span[1]
-                ]
-            ).reshape(-1, 2)
-            sides[:, 1] = np.maximum(sides[:, 1], sides[:, 0] + 0.5 * point)  # can be seen
-            if len(sides):
-                path = _boxes(sides, k + inset, k + 1 - inset)
-                axes.add_patch(PathPatch(path, facecolor=BARS[style], linewidth=0.0))
-    axes.set_ylim(len(panel.rows), 0.0)
-    axes.set_yticks(np.arange(len(panel.rows)) + 0.5, [row.name for row in panel.rows])
-
-
-def _boxes(sides: np.ndarray, low: float, high: float) -> Path:
-    """Rectangles from `low` to `high` with these left and right sides, shape (k, 2)."""
-    left, right = sides.T
-    edges = np.full_like(left, low), np.full_like(left, high)
-    x = np.stack([left, right, right, left, left], axis=1)
-    y = np.stack([edges[0], edges[0], edges[1], edges[1], edges[0]], axis=1)
-    codes = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY]
-    return Path(np.stack([x.ravel(), y.ravel()], axis=1), codes * len(sides))
 
 
 def _draw_curves(axes: Axes, panel: Panel, points: int, tall: float) -> None:

@@ -93,7 +93,7 @@ def _build_panels(curves: Curves, kind: str) -> tuple[Panel, Panel]:
     column = curves.changed_most(kind)
     name = f"{_TITLES[kind]}: {_NAMES[kind][column]}"
     if not len(time):
-        return Panel(f"{name}, none recorded"), Panel("")
+        return Panel(f"{name}, none recorded", span=1.0), Panel("", span=1.0)
     shape = "step" if kind == "force" else "line"
     both = [
         Curve(time, old[:, column], _RECORDED, shape),

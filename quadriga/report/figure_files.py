@@ -24,7 +24,7 @@ def write_figures(run: Run, folder: Path) -> tuple[Path, ...]:
         TRAJECTORY: draw_trajectory(run, 0),
         FORCES: draw_forces_of_first(run),
         TOP_VIEW: draw_top_view(run.traces),
-        TIMES: draw_time_histograms(run.traces),
+        TIMES: draw_time_histograms(run),
     }
     for name, figure in figures.items():
         save_png(figure, folder / name)

@@ -9,10 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from quadriga.agents.time_grid import step_ms
-from quadriga.charts.colours import BARS, PALETTE, robot_colour, robot_style
-from quadriga.charts.draw import POINTS_PER_INCH, TEXT, WIDTH, add_legend, draw_panels, tidy_axes
+from quadriga.charts.colours import BARS, robot_style
+from quadriga.charts.draw import draw_panels
 from quadriga.charts.panels import Bars, Curve, Mark, Panel, PanelGrid
-from quadriga.recordings.traces import Traces
 from quadriga.report.run import Run
 from quadriga.report.trunk_figures import draw_over_run, mark_falls, robot_legend
 from quadriga.shared.bus.members import PLANNER
@@ -21,6 +20,7 @@ from quadriga.shared.robot.a1 import Array
 from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import REFERENCE
 
+_BINS: Final = 60  # of a histogram
 _SENT_S: Final = 0.3  # statuses further apart than this are not joined
 _WORLD: Final = ("push", "fall", "fault", "stop", "terrain", "payload")
 _LEGEND: Final = (
@@ -94,8 +94,8 @@ def draw_times(run: Run) -> Figure:
 
 
 def _build_worst(statuses: tuple[Status, ...], values: list[Array], style: str) -> Curve:
-    kept = [(s.tick / 1000, v.max()) for s, v in zip(statuses, values, strict=True) if len(v)]
-    time, worst = np.array(kept).reshape(-1, 2).T
+    points = [(s.tick / 1000, v.max()) for s, v in zip(statuses, values, strict=True) if len(v)]
+    time, worst = np.array(points).reshape(-1, 2).T
     return Curve(time, worst, style, gap=_SENT_S)
 
 
@@ -143,31 +143,28 @@ def draw_ages(run: Run) -> Figure:
     return draw_over_run(run, panels, [*legend, ("asked", "reference")], height=70.0)
 
 
-def draw_time_histograms(traces: Traces) -> Figure:
+def draw_time_histograms(run: Run) -> Figure:
     """Distribution of planner solve times and control tick times of every robot."""
-    figure = Figure(figsize=(WIDTH / POINTS_PER_INCH, 280.0 / POINTS_PER_INCH))
-    places = ((0.058, 0.18, 0.428, 0.68), (0.558, 0.18, 0.428, 0.68))
-    for place, field, label in zip(
-        places, ("planner_ms", "tick_us"), ("planner solve [ms]", "control tick [µs]"), strict=True
+    panels = []
+    for field, title in (
+        ("planner_ms", "planner solves by ms"),
+        ("tick_us", "control ticks by µs"),
     ):
-        axes = figure.add_axes(place)
-        tidy_axes(axes)
-        axes.set_title("count", loc="left", fontsize=TEXT, fontweight="bold")
-        axes.set_xlabel(label, fontsize=TEXT, color=PALETTE["soft"])
         times = [
-            np.concatenate([np.zeros(0), *(getattr(s, field) for s in traces.statuses[robot])])
-            for robot in traces.robots
+            np.concatenate([np.zeros(0), *(getattr(s, field) for s in run.traces.statuses[robot])])
+            for robot in run.traces.robots
         ]
         every = np.concatenate(times)
         if not len(every):
-            axes.text(0.5, 0.5, "none recorded", transform=axes.transAxes, ha="center")
+            panels.append(Panel(f"{title}: none recorded", span=1.0))
             continue
         # Beyond the 99.5 % quantile lie single outliers that would flatten the rest.
-        high = float(np.quantile(every, 0.995)) * 1.1 + 1e-9
-        for i, values in enumerate(times):
-            axes.hist(
-                np.minimum(values, high), bins=np.linspace(0.0, high, 60).tolist(),
-                histtype="step", color=robot_colour(i),
-            )  # fmt: skip
-    add_legend(figure, [(robot_style(i), robot) for i, robot in enumerate(traces.robots)])
-    return figure
+        edges = np.linspace(0.0, 1.1 * float(np.quantile(every, 0.995)) + 1e-9, _BINS + 1)
+        curves = []
+        for index, values in enumerate(times):
+            counts, _ = np.histogram(np.minimum(values, edges[-1]), edges)
+            style, held = robot_style(index), 1.4 * float(edges[1])  # the last bin is drawn too
+            curves.append(Curve(edges[:-1], counts.astype(float), style, "step", gap=held))
+        panels.append(Panel(title, curves, floor=0.0, part=(0.0, float(edges[-1]))))
+    grid = PanelGrid(0.0, 1.0, columns=2, height=200.0, across="time")
+    return draw_panels(panels, grid, legend=robot_legend(run))
