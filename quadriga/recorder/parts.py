@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Final, Self
 
 from quadriga.shared.errors import RecordingError
-from quadriga.shared.recording.reader import RecordingWriter
 from quadriga.shared.recording.sequence import lost_by_key
+from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.runtime.clock import monotonic
 
 _RECORD: Final = 64  # bytes that a message takes at most in a file beside its payload

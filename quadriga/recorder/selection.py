@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from quadriga.recorder.parts import Limits
 from quadriga.recordings.key_patterns import key_patterns
-from quadriga.shared.recording.reader import MAX_CHANNELS
+from quadriga.shared.recording.writer import MAX_CHANNELS
 from quadriga.shared.wire.topics import TABLE
 
 

@@ -12,8 +12,10 @@ from quadriga.recordings.checks.sequence import Ages, Gaps, Order
 from quadriga.recordings.readable import open_readable
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
-from quadriga.shared.recording.reader import COUNTS, ChunkEntry, Recording
+from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.salvage import Salvage
+from quadriga.shared.recording.writer import COUNTS
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.topics import Topic, topic_of
 from quadriga.tables import align_columns

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.shared.errors import MessageError
-from quadriga.shared.recording.reader import ChunkEntry
+from quadriga.shared.recording.mcap_chunk import ChunkEntry
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.topics import topic_of
 

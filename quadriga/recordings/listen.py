@@ -15,7 +15,7 @@ from quadriga.recordings.readable import config_or_default, open_readable
 from quadriga.shared.bus.zenoh_bus import POLL, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
-from quadriga.shared.recording.reader import ChunkEntry
+from quadriga.shared.recording.mcap_chunk import ChunkEntry
 from quadriga.shared.runtime.clock import monotonic, wall_ns
 from quadriga.shared.wire.envelope import envelope
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from quadriga.shared.recording.mcap_chunk import name_of
-from quadriga.shared.recording.reader import ChunkEntry
+from quadriga.shared.recording.mcap_chunk import ChunkEntry, name_of
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.tables import NOTHING, align_columns
 

@@ -10,10 +10,10 @@ from typing import Final
 from quadriga.recordings.readable import config_or_default, open_readable
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import RecordingError
-from quadriga.shared.recording.reader import COUNTS, LOST, PROFILE, Recording, RecordingWriter
+from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.salvage import Damage, Salvage
 from quadriga.shared.recording.sequence import TickTrack
-from quadriga.shared.recording.writer import reason
+from quadriga.shared.recording.writer import COUNTS, LOST, PROFILE, RecordingWriter, reason
 from quadriga.shared.runtime.clock import wall_ns
 from quadriga.tables import align_columns
 

@@ -12,8 +12,8 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
-from quadriga.shared.recording.mcap_chunk import name_of
-from quadriga.shared.recording.reader import ChunkEntry, Recording
+from quadriga.shared.recording.mcap_chunk import ChunkEntry, name_of
+from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.salvage import Damage
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.wire.codec import decode

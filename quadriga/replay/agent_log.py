@@ -12,7 +12,8 @@ from quadriga.agents.inbox.inbox import Inbox, Order, Source, decode_packet, ord
 from quadriga.agents.inbox.intake_log import ANYONE
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.errors import RecordingError
-from quadriga.shared.recording.reader import ChunkEntry, Recording
+from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.shared.recording.reader import Recording
 from quadriga.shared.wire.messages import Consumed
 from quadriga.shared.wire.topics import (
     COMMAND,

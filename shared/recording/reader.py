@@ -19,23 +19,10 @@ from mcap.writer import MCAP0_MAGIC
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.mcap_chunk import CORRUPT, RECORD, ChunkEntry, messages_of, stream
 from quadriga.shared.recording.seal import unseal
-from quadriga.shared.recording.writer import (
-    COUNTS,
-    LOST,
-    MAX_CHANNELS,
-    PROFILE,
-    SINCE,
-    RecordingWriter,
-    reason,
-)
+from quadriga.shared.recording.writer import PROFILE, reason
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Message
 from quadriga.shared.wire.topics import TABLE, topic_of
-
-__all__ = [
-    "COUNTS", "LOST", "MAX_CHANNELS", "PROFILE", "SINCE", "ChunkEntry", "Recording",
-    "RecordingWriter",
-]  # fmt: skip
 
 M = TypeVar("M", bound=Message)
 

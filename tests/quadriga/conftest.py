@@ -13,7 +13,7 @@ import pytest
 from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.sections import Config, ReferenceConfig, TeamConfig, WorldConfig
-from quadriga.shared.recording.reader import RecordingWriter
+from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.robot.a1 import q_stand, robot_names
 from quadriga.shared.wire import messages as msg
 from quadriga.shared.wire.codec import encode

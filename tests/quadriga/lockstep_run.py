@@ -12,7 +12,7 @@ import numpy as np
 from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.recording.reader import RecordingWriter
+from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.robot.a1 import q_stand
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Command, Event

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.recording import seal as recording_seal
-from quadriga.shared.recording.reader import Recording, RecordingWriter
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.wire.messages import State
 from tests.quadriga.commands.conftest import CONFIG, RunCommand
 

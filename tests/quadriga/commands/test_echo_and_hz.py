@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from quadriga.recordings.metadata import build_metadata
-from quadriga.shared.recording.reader import RecordingWriter
+from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.wire import messages as msg
 from tests.quadriga.commands.conftest import CONFIG, RunCommand
 from tests.quadriga.conftest import write

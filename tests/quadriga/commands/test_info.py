@@ -14,7 +14,8 @@ from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.mcap_chunk import check_schema
-from quadriga.shared.recording.reader import Recording, RecordingWriter
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.wire import messages as msg
 from quadriga.shared.wire.codec import encode
 from tests.quadriga.commands.conftest import CONFIG, RunCommand

@@ -15,7 +15,7 @@ from quadriga.export.run import FORMATS
 from quadriga.export.source import Source
 from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.sections import Config
-from quadriga.shared.recording.reader import RecordingWriter
+from quadriga.shared.recording.writer import RecordingWriter
 
 SMALL = """
 import resource, signal, sys

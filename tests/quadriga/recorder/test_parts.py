@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from quadriga.recorder.parts import Limits, Parts
-from quadriga.shared.recording.reader import LOST, Recording
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.writer import LOST
 from quadriga.shared.runtime.clock import ManualClock
 from quadriga.shared.wire.codec import encode
 from tests.shared.recording.test_reader import METADATA, state

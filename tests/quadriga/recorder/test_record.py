@@ -21,7 +21,8 @@ from quadriga.shared.bus.members import RECORDER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig, Config, RecorderConfig, TeamConfig
 from quadriga.shared.config.write import to_toml
-from quadriga.shared.recording.reader import LOST, SINCE, Recording
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.writer import LOST, SINCE
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Plan, Reference

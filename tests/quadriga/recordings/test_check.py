@@ -20,7 +20,7 @@ from quadriga.shared.config.sections import (
     TeamConfig,
     WorldConfig,
 )
-from quadriga.shared.recording.reader import RecordingWriter
+from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.wire import messages as msg
 from quadriga.shared.wire.codec import encode
 from tests.quadriga.conftest import WriteRun, run_config, write

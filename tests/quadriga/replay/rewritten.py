@@ -9,7 +9,9 @@ from typing import Any, Final
 
 import msgpack
 
-from quadriga.shared.recording.reader import ChunkEntry, Recording, RecordingWriter
+from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.writer import RecordingWriter
 
 BIN8: Final = 0xC4
 Edit = Callable[[ChunkEntry], bytes | None]

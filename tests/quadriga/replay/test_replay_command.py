@@ -26,7 +26,8 @@ from quadriga.replay.team_replay import replay
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, RecordingError
-from quadriga.shared.recording.reader import Recording, RecordingWriter
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Command, Reference
 from tests.quadriga.replay.rewritten import rewritten

@@ -13,9 +13,9 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.mcap_file import McapFile
-from quadriga.shared.recording.reader import MAX_CHANNELS, Recording, RecordingWriter
+from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.seal import seal
-from quadriga.shared.recording.writer import PROFILE
+from quadriga.shared.recording.writer import MAX_CHANNELS, PROFILE, RecordingWriter
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command, Reference, State
 from quadriga.shared.wire.topics import COMMAND, TABLE

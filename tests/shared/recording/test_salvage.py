@@ -12,8 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.shared.errors import RecordingError
-from quadriga.shared.recording.reader import ChunkEntry, Recording, RecordingWriter
+from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.salvage import Salvage
+from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Reference
 from tests.shared.recording.test_reader import METADATA, command, state
