@@ -18,7 +18,7 @@ from quadriga.shared.robot.a1 import FOOT_FRAMES, N_JOINTS, TORQUE_LIMIT, Array
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 
 if TYPE_CHECKING:
-    from benchmarks.low_level_tsid import TsidCase
+    from benchmarks.low_level_ticks import TsidCase
 
 _TRUNK = "root_joint"
 _POSITION = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
+from quadriga.agents.controller.whole_body.problem import Goal
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import Array
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Reference
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS
@@ -20,6 +22,23 @@ class AgentTick:
 
     payload: bytes
     inputs: Inputs
+
+
+@dataclass(frozen=True, slots=True)
+class TsidCase:
+    """What one tick gives the whole-body part.
+
+    Attributes:
+        sensed: `Sensed.flat`.
+        q: Pinocchio's configuration, (19,).
+        v: Pinocchio's velocity, (18,).
+        goal: what the QP is asked for.
+    """
+
+    sensed: Array
+    q: Array
+    v: Array
+    goal: Goal
 
 
 def record(config: Config, predictor: Predictor | None) -> list[AgentTick]:

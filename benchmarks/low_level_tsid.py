@@ -12,14 +12,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from benchmarks.children import result_of
 from benchmarks.low_level import collector_off
-from benchmarks.low_level_ticks import AgentTick
+from benchmarks.low_level_ticks import AgentTick, TsidCase
 from quadriga.agents.agent import Agent
 from quadriga.agents.controller.controller import Controller, ControllerOutputs, Task
 from quadriga.agents.controller.maths.rigid_body import rigid_body_terms
@@ -34,23 +33,6 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.clock import monotonic_ns
 from quadriga.shared.runtime.jit import compiled
-
-
-@dataclass(frozen=True, slots=True)
-class TsidCase:
-    """What one tick gives the whole-body part.
-
-    Attributes:
-        sensed: `Sensed.flat`.
-        q: Pinocchio's configuration, (19,).
-        v: Pinocchio's velocity, (18,).
-        goal: what the QP is asked for.
-    """
-
-    sensed: Array
-    q: Array
-    v: Array
-    goal: Goal
 
 
 def cases(config: Config, predictor: Predictor | None, ticks: list[AgentTick]) -> list[TsidCase]:

@@ -30,7 +30,7 @@ LOST: Final = "lost"  # held long enough: the team stops
 
 @record
 class PeerData:
-    """One peer's part of eq. 11 at planning step k; its window ends at `Selection.window_step`.
+    """One peer's part of eq. 11 at planning step k; its window ends at `PeerSelection.window_step`.
 
     Attributes:
         robot: the peer's name.
@@ -61,7 +61,7 @@ class PeerData:
 
 
 @record
-class Selection:
+class PeerSelection:
     """Everything an agent takes from its peers at one planning step.
 
     Attributes:
@@ -135,7 +135,7 @@ class Neighbours:
 
     def select(
         self, memory: PeerMemory, last: int, first_step: int, *, window_step: int | None = None
-    ) -> Selection:
+    ) -> PeerSelection:
         """What to use of each peer.
 
         Before its first plan has arrived a peer is taken to have planned no deviation at step
@@ -153,7 +153,7 @@ class Neighbours:
             self._select_peer(name, memory.peers[name], last, end, first_step)
             for name in self._indices
         ]
-        return Selection(tuple(peers), end)
+        return PeerSelection(tuple(peers), end)
 
     def lost_peers(self, memory: PeerMemory, last: int, first_step: int) -> tuple[str, ...]:
         """Names of the peers given up, those that `select` would call lost."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.planner.coupling import Coupling, fill_deviations
-from quadriga.agents.planner.neighbours import PeerData, Selection
+from quadriga.agents.planner.neighbours import PeerData, PeerSelection
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.shared.config.sections import Config
@@ -63,7 +63,9 @@ class Peers:
             for steps in behind:
                 self._coupling(step, step - steps)
 
-    def terms(self, before: PeerTerms, selection: Selection, step: int, y_base: Array) -> PeerTerms:
+    def terms(
+        self, before: PeerTerms, selection: PeerSelection, step: int, y_base: Array
+    ) -> PeerTerms:
         """The peers' terms of eq. 11 for planning step `step`; of silent peers their last share.
 
         Args:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces
 from quadriga.agents.planner.free_step import FreeStep, OwnWindow
-from quadriga.agents.planner.neighbours import Selection
+from quadriga.agents.planner.neighbours import PeerSelection
 from quadriga.agents.planner.peer_terms import Peers, PeerTerms
 from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem, unpack
 from quadriga.agents.planner.qp_solver import (
@@ -139,7 +139,7 @@ class Planner:
         return PlannerState()
 
     def peer_terms(
-        self, before: PeerTerms, selection: Selection, step: int, y_base: Array
+        self, before: PeerTerms, selection: PeerSelection, step: int, y_base: Array
     ) -> PeerTerms:
         """See `Peers.terms`."""
         return self._peers.terms(before, selection, step, y_base)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from quadriga.agents.gait import nominal_forces
-from quadriga.agents.planner.neighbours import PeerData, Selection
+from quadriga.agents.planner.neighbours import PeerData, PeerSelection
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs, PlanResult
 from quadriga.agents.predictor.predictor import Predictor
@@ -63,7 +63,7 @@ def terms_of(
 ) -> PeerTerms:
     """Terms of the peers given, by default of one that did and plans nothing."""
     y_base = np.tile(BASE, (config.planner.T_ini, 1)) if base is None else base
-    return planner.peer_terms(before, Selection(peers or (peer(config),)), STEP, y_base)
+    return planner.peer_terms(before, PeerSelection(peers or (peer(config),)), STEP, y_base)
 
 
 def plan(

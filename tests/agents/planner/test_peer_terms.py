@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from quadriga.agents.gait import nominal_forces
-from quadriga.agents.planner.neighbours import HELD, LOST, PeerData, Selection
+from quadriga.agents.planner.neighbours import HELD, LOST, PeerData, PeerSelection
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner
 from quadriga.agents.predictor.fits import fit_ridge
@@ -69,7 +69,7 @@ def test_a_silent_peers_effect_is_held_while_the_legs_change(
     third = peer(three, robot="r3", index=2)
 
     def terms(step: int, before: PeerTerms, *peers: PeerData) -> PeerTerms:
-        return planner.peer_terms(before, Selection(peers, step - 1), step, base)
+        return planner.peer_terms(before, PeerSelection(peers, step - 1), step, base)
 
     heard = terms(STEP, NOTHING, talking, third)
     now = heard
@@ -106,5 +106,7 @@ def test_on_the_way_nothing_is_set_up_any_more(
     first = walking_steps(config).start
     for step in range(first, first + 3 * len(walking_steps(config))):
         for steps in behind:
-            terms = planner.peer_terms(terms, Selection((peer(config),), step - steps), step, base)
+            terms = planner.peer_terms(
+                terms, PeerSelection((peer(config),), step - steps), step, base
+            )
             state, _ = planner.step(state, inputs_of(config, step), terms)
