@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces
-from quadriga.agents.planner.neighbours import FRESH, PeerData, Selection
+from quadriga.agents.planner.neighbours import FRESH, PeerData, PeerSelection
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.predictor.episode import commanded_outputs, output_base
 from quadriga.agents.predictor.predictor import Predictor
@@ -42,7 +42,7 @@ class PlanningTick:
     y_des: Array
     before: Array
     inputs: tuple[PlannerInputs, ...]
-    selections: tuple[Selection, ...]
+    selections: tuple[PeerSelection, ...]
     base_before: Array
 
 
@@ -110,7 +110,8 @@ def _tick(
         before=np.stack(before),
         inputs=inputs,
         selections=tuple(
-            Selection(tuple(peer for peer in peers if peer.index != i), step - 1) for i in range(n)
+            PeerSelection(tuple(peer for peer in peers if peer.index != i), step - 1)
+            for i in range(n)
         ),
         base_before=earlier[0].y_base_ini,
     )
