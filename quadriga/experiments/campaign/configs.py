@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from quadriga.experiments.campaign.ledger import write_text
 from quadriga.experiments.plan import Group
 from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.runtime.atomic import write_text
 
 CONFIGS: Final = "configs"
 

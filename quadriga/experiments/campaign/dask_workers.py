@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Generator, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -18,6 +17,7 @@ from quadriga.experiments.campaign.job import TrialJob, walk_trial
 from quadriga.experiments.predictors import file_sha256
 from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.shared.errors import ConfigError, ProcessError
+from quadriga.shared.runtime.atomic import write_bytes
 from quadriga.shared.runtime.places import cache_dir
 from quadriga.shared.runtime.signals import interrupts_held
 
@@ -40,9 +40,7 @@ class FileShipment(WorkerPlugin):
         folder = _folder()
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in self._files.items():
-            partial = folder / f"{name}.{os.getpid()}.partial"
-            partial.write_bytes(content)
-            partial.replace(folder / name)
+            write_bytes(folder / name, content)
 
 
 def each_done(

@@ -16,6 +16,7 @@ from typing import Any, Final, Self
 from quadriga.experiments.campaign.manifest import FILE, Manifest
 from quadriga.experiments.trial.outcome import TrialOutcome, column_names, from_cells, to_cells
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.runtime.atomic import write_text
 
 ROWS: Final = "trials.csv"
 _WRITTEN: Final = "what a campaign wrote there"
@@ -173,21 +174,6 @@ def explain_write_errors(folder: Path) -> Iterator[None]:
             error.strerror or str(error),
             "a place that can be written to",
         ) from None
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file that is there whole or not at all."""
-    write_bytes(path, text.encode("utf-8"))
-
-
-def write_bytes(path: Path, body: bytes) -> None:
-    """Write a file that is there whole or not at all."""
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    with partial.open("wb") as file:
-        file.write(body)
-        file.flush()
-        os.fsync(file.fileno())
-    partial.replace(path)
 
 
 def _mend(path: Path, manifest: Manifest) -> None:

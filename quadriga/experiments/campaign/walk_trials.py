@@ -26,6 +26,7 @@ from quadriga.shared.config.reference_trace import trace_sha256
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.warm_up import warm_up
 from quadriga.workers import run_each
 
@@ -109,9 +110,8 @@ def write_parquet(path: Path, rows: Sequence[TrialOutcome], manifest: Manifest) 
         return
     ordered = sorted(rows, key=lambda row: (row.group, row.seed))
     table = arrow.table(to_columns(ordered, [sweep.key for sweep in manifest.sweeps]))
-    partial = path.with_name(f"{path.name}.partial")
-    parquet.write_table(table, partial, compression="zstd")
-    partial.replace(path)
+    with atomic_write(path) as partial:
+        parquet.write_table(table, partial, compression="zstd")
 
 
 def build_manifest(plan: CampaignPlan, fitted: Mapping[Config, Fitted], typed: str) -> Manifest:

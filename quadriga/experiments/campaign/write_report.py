@@ -7,11 +7,12 @@ from typing import Final
 
 from rich.console import Console
 
-from quadriga.experiments.campaign.ledger import explain_write_errors, write_text
+from quadriga.experiments.campaign.ledger import explain_write_errors
 from quadriga.experiments.campaign.page import build_page
 from quadriga.experiments.campaign.recordings import record_trials
 from quadriga.experiments.campaign.report import CampaignReport, read_report
 from quadriga.experiments.summarise import find_worst
+from quadriga.shared.runtime.atomic import write_text
 
 PAGE: Final = "report.html"
 TABLES: Final = "report.md"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Container, Sequence
 from pathlib import Path
 from typing import Final
 
-from quadriga.experiments.campaign.ledger import read_manifest, read_rows, write_text
+from quadriga.experiments.campaign.ledger import read_manifest, read_rows
 from quadriga.experiments.campaign.manifest import FILE
 from quadriga.experiments.published.experiment import Experiment, Part
 from quadriga.experiments.published.figures import draw_figure
@@ -26,6 +26,7 @@ from quadriga.experiments.published.published_trials import (
 from quadriga.experiments.published.summarise_experiment import CampaignTrials, summarise_experiment
 from quadriga.experiments.results import Results
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.runtime.atomic import atomic_write, write_text
 
 README: Final = "README.md"
 PAGE: Final = Path("docs/results.md")
@@ -126,8 +127,8 @@ def _draw_figures(experiment: Experiment, results: Results, into: Path) -> list[
     (into / FIGURES).mkdir(parents=True, exist_ok=True)
     for name in experiment.published.figures:
         path = into / FIGURES / f"{experiment.name}-{name}.png"
-        partial = path.with_name(f"{path.name}.partial")
-        if draw_figure(name, experiment, results, partial):
-            partial.replace(path)
+        with atomic_write(path) as partial:
+            drawn = draw_figure(name, experiment, results, partial)
+        if drawn:
             found.append(path.relative_to(into / PAGE.parent).as_posix())
     return found

@@ -18,13 +18,13 @@ from quadriga.experiments.campaign.ledger import (
     read_rows,
     rows_of,
     rows_text,
-    write_bytes,
 )
 from quadriga.experiments.campaign.manifest import FILE, Manifest
 from quadriga.experiments.published.experiment import Experiment, Part
 from quadriga.experiments.published.summarise_experiment import CampaignTrials
 from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.runtime.atomic import write_bytes
 
 TRIALS: Final = Path("docs/results/trials")
 Campaigns = Mapping[Part, CampaignTrials]
