@@ -94,29 +94,29 @@ def _free_step(
     own: OwnWindow, effect: Array | float, prediction: _Prediction, minimiser: _Minimiser
 ) -> tuple[Array, Array, bool]:
     """Forces u and du, (2, N, 12); outputs y and y_nominal, (2, N, 6); is the plan usable?"""
-    T_ini, N = len(own.u_ini), len(own.y_des)
+    # Out of the tuples once: in a loop each access costs a count of references.
+    u_ini, y_ini, stance_ini, y_base_ini, y_base, y_des = own
+    Y_past, Y_v, columns, nominal, nominal_table = prediction
+    gradient, minus_inverse, lower, upper, slope = minimiser
+    T_ini, N = len(u_ini), len(y_des)
     past = np.empty(T_ini * (N_FORCES + N_OUTPUTS))
     for k in range(T_ini):
         pattern = 0
         for leg in range(4):
-            pattern = 2 * pattern + own.stance_ini[k, leg]
-        nominal = prediction.nominal_table[pattern]
-        past[N_FORCES * k : N_FORCES * (k + 1)] = own.u_ini[k] - nominal
+            pattern = 2 * pattern + stance_ini[k, leg]
+        past[N_FORCES * k : N_FORCES * (k + 1)] = u_ini[k] - nominal_table[pattern]
         at = N_FORCES * T_ini + N_OUTPUTS * k
-        past[at : at + N_OUTPUTS] = own.y_ini[k] - own.y_base_ini[k]
-    y_free = prediction.Y_past @ past + effect
-    error = y_free - (own.y_des - own.y_base).ravel()
-    f = minimiser.gradient @ error
-    x, usable = minimise_freely(
-        minimiser.minus_inverse, f, minimiser.lower, minimiser.upper, minimiser.slope
-    )
+        past[at : at + N_OUTPUTS] = y_ini[k] - y_base_ini[k]
+    y_free = Y_past @ past + effect
+    error = y_free - (y_des - y_base).ravel()
+    x, usable = minimise_freely(minus_inverse, gradient @ error, lower, upper, slope)
     forces, outputs = np.zeros((2, N, N_FORCES)), np.empty((2, N, N_OUTPUTS))
     du = forces[1].ravel()
-    for i in range(len(prediction.columns)):
-        du[prediction.columns[i]] = x[i]
-    forces[0] = prediction.nominal + forces[1]
-    outputs[0] = own.y_base + (y_free + prediction.Y_v @ x).reshape(N, N_OUTPUTS)
-    outputs[1] = own.y_base + y_free.reshape(N, N_OUTPUTS)
+    for i in range(len(columns)):
+        du[columns[i]] = x[i]
+    forces[0] = nominal + forces[1]
+    outputs[0] = y_base + (y_free + Y_v @ x).reshape(N, N_OUTPUTS)
+    outputs[1] = y_base + y_free.reshape(N, N_OUTPUTS)
     for output in outputs.flat:
         if not abs(output) <= OUTPUT_MAX:
             usable = False
