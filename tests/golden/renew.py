@@ -38,7 +38,6 @@ from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.schema import json_schema
 from quadriga.shared.wire.topics import topic_of
 from tests.golden import scenario
-from tests.golden.arithmetic import arithmetic
 from tests.golden.compare import first_difference
 from tests.golden.rerun import recorded, rerun
 
