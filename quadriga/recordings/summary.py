@@ -25,6 +25,7 @@ from quadriga.recordings.truth import distance
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.a1 import OUTPUTS, Array
 from quadriga.shared.runtime.histogram import QUANTILES
+from quadriga.shared.wire.codes import FALL, code_of
 from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import STATE
 
@@ -95,19 +96,23 @@ def _world(traces: Traces) -> dict[str, Any]:
     truth = traces.truth
     down = (truth.tilt > FALL_TILT) | (truth.y[..., 0] < FALL_HEIGHT)
     seen = {traces.robots[i] for i in np.flatnonzero(down.any(axis=0))}
-    told = {event.robot for event in traces.events if event.kind == "fall"}
+    told = {event.robot for event in traces.events if event.code == FALL}
     if not len(truth.tick):  # then the robots' own word must do
         told |= {
-            r for r, found in traces.statuses.items() if any(s.reason == "fall" for s in found)
+            r
+            for r, found in traces.statuses.items()
+            if any(code_of(s.reason) == FALL for s in found)
         }
+    end = next((event for event in reversed(traces.events) if event.kind == "stop"), None)
     return {
         "fell": bool(seen | told),
         "fallen": sorted(seen | told),
         "distance": distance(truth, 2 * traces.config.gait.stance_ms),
-        "end": next((e.detail for e in reversed(traces.events) if e.kind == "stop"), ""),
+        "end": end.detail if end is not None else "",
+        "end_code": end.code if end is not None else "",
         "yoke_drift_max": float(np.abs(truth.yoke_error).max(initial=0.0)),
         "events": [
-            {"tick": e.tick, "kind": e.kind, "robot": e.robot, "detail": e.detail}
+            {"tick": e.tick, "kind": e.kind, "code": e.code, "robot": e.robot, "detail": e.detail}
             for e in traces.events
         ],
     }

@@ -15,6 +15,7 @@ from quadriga.recordings.traces import ERRORS, FELT, Traces, felt_height_errors,
 from quadriga.recordings.truth import distance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import GRAVITY, N_LEGS, OUTPUTS, TOTAL_MASS, Array
+from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.messages import Measurement
 
 _SHORTEST: Final = 0.5  # m; over a shorter way a cost of transport is that of starting
@@ -126,7 +127,7 @@ def _cost_of_transport(config: Config, work: float | None, way: float | None) ->
 def _find_falls(traces: Traces) -> dict[str, float]:
     """When each robot fell: what the world says, and what its truth shows, whichever is first."""
     truth = traces.truth
-    times = {e.robot: e.tick / 1000.0 for e in reversed(traces.events) if e.kind == "fall"}
+    times = {e.robot: e.tick / 1000.0 for e in reversed(traces.events) if e.code == FALL}
     down = (truth.tilt > FALL_TILT) | (truth.y[..., 0] < FALL_HEIGHT)
     for i in np.flatnonzero(down.any(axis=0)):
         robot, seen = traces.robots[i], float(truth.tick[down[:, i].argmax()]) / 1000.0

@@ -206,13 +206,13 @@ def test_a_fall_is_seen_without_being_told(write_run: WriteRun) -> None:
 
 
 def test_a_fall_is_believed_when_told(write_run: WriteRun) -> None:
-    fall = msg.Event(999, 999_000_000, "fall", "r1", "tilt 1.2 rad")
-    stop = msg.Event(999, 999_000_000, "stop", "", "robots fell")
+    fall = msg.Event(999, 999_000_000, "fall", "r1", "tilt 1.2 rad", "fall")
+    stop = msg.Event(999, 999_000_000, "stop", "", "robots fell", "fallen")
     events = [("team/sim/event", event) for event in (fall, stop)]
     summary = summarise(write_run(run_config(2, 1.0), extra=events))
     assert summary["fell"] is True
     assert summary["fallen"] == ["r1"]
-    assert summary["end"] == "robots fell"
+    assert (summary["end"], summary["end_code"]) == ("robots fell", "fallen")
     assert "robots fell" in table(summary)
     assert summary["events"][:1] == [
         {"tick": 999, "kind": "fall", "robot": "r1", "detail": "tilt 1.2 rad"}

@@ -84,7 +84,7 @@ def test_forces_cost_what_they_deviate(walk: Walk) -> None:
 
 
 def fallen_at(traces: Traces, robot: str, tick: int) -> Traces:
-    event = Event(tick, tick * 1_000_000, "fall", robot, "")
+    event = Event(tick, tick * 1_000_000, "fall", robot, "", "fall")
     return replace(traces, events=(*traces.events, event))
 
 
