@@ -7,7 +7,7 @@ from typing import Final
 
 from quadriga.plant.deadlines import PERIOD_MS, Deadlines
 from quadriga.plant.late import FRESH, HOLD, grade, hold_joints
-from quadriga.plant.server import PlantServer
+from quadriga.plant.server import TOLD_TO_STOP, End, PlantServer
 from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.wire.messages import Command
 
@@ -15,24 +15,25 @@ TICK: Final = 1e-3  # s
 _SLACK: Final = 3.0  # ticks that are made up for
 
 
-def run_realtime(server: PlantServer, stopped: Callable[[], bool]) -> str:
-    """Step until the walk is over; the reason why it is, with what came late."""
+def run_realtime(server: PlantServer, stopped: Callable[[], bool]) -> End:
+    """Step until the walk is over; why it is, with what came late."""
     # A world that fell behind slows down: in ticks made up for at once nobody could answer.
     rate, motors = Rate(TICK, slack=_SLACK), _Motors(server)
-    reason = ""
-    while not reason and not stopped():
+    end: End | None = None
+    while end is None and not stopped():
         server.publish()
         motors.deadlines.note_lateness(rate.wait())  # meanwhile the agents answer
         for packet in server.bus.drain():
             server.commands.take(*packet, tick=server.plant.tick, oldest=0)
-        reason = server.step(motors.commands())
-        if server.plant.tick % PERIOD_MS == 0 or reason:
+        end = server.step(motors.commands())
+        if server.plant.tick % PERIOD_MS == 0 or end is not None:
             server.publish_status(motors.deadlines.status(server.plant.tick, rate.overruns))
     late = (
         ", ".join(f"{name} {count}" for name, count in sorted(motors.deadlines.late.items()))
         or "none"
     )
-    return f"{reason or 'signal'}; late ticks: {late}; overruns of the world: {rate.overruns}"
+    code, detail = end or TOLD_TO_STOP
+    return End(code, f"{detail}; late ticks: {late}; overruns of the world: {rate.overruns}")
 
 
 class _Motors:

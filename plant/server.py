@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, NamedTuple
 
 from quadriga.plant.commands import CommandBox
 from quadriga.plant.protocol import Plant
@@ -12,11 +12,22 @@ from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
+from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import encode, truncate_text
 from quadriga.shared.wire.messages import Command, Event, Status
 from quadriga.shared.wire.topics import EVENT, STATE, STATUS, TRUTH
 
 FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first fall
+
+
+class End(NamedTuple):
+    """Why a walk is over: a code of `quadriga.shared.wire.codes.EVENTS`, and prose."""
+
+    code: str
+    detail: str
+
+
+TOLD_TO_STOP: Final = End(codes.SIGNAL, "signal")
 
 
 class PlantServer:
@@ -58,35 +69,38 @@ class PlantServer:
             put[name](encode(state))
         plant.settle()
 
-    def announce(self, kind: str, robot: str, detail: str) -> None:
+    def announce(self, code: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""
-        tick = self.plant.tick
-        self._send(Event(tick, tick * 1_000_000, kind, robot, truncate_text(detail)))
+        tick, kind = self.plant.tick, codes.EVENTS[code].kind
+        self._send(Event(tick, tick * 1_000_000, kind, robot, truncate_text(detail), code))
 
     def publish_status(self, status: Status) -> None:
         """Publish the plant's account of itself."""
         self._put_status(encode(status))
 
-    def step(self, commands: Mapping[str, Command]) -> str:
-        """Advance the plant by one tick; the reason to end the walk, or ""."""
+    def step(self, commands: Mapping[str, Command]) -> End | None:
+        """Advance the plant by one tick; why the walk ends, if it does."""
         self._report_malformed()
         for event in self.plant.step(commands):
             self._send(event)
-            if event.kind == "fall":
+            if event.code == codes.FALL:
                 self._fallen.add(event.robot)
                 self._last_tick = min(self._last_tick, event.tick + FALL_LINGER_MS)
         if self.plant.tick < self._last_tick:
-            return ""
+            return None
         self._report_malformed(at_once=True)
         fallen = [name for name in self.plant.names if name in self._fallen]
-        return f"fall of {', '.join(fallen)}" if fallen else "end of world.seconds"
+        if fallen:
+            return End(codes.FALLEN, f"fall of {', '.join(fallen)}")
+        return End(codes.TIME_OVER, "end of world.seconds")
 
     def _report_malformed(self, *, at_once: bool = False) -> None:
         """Announce malformed commands, once in a second of world time at most unless `at_once`."""
         count = self.commands.malformed
         if count != self._malformed and (at_once or self.plant.tick % 1000 == 0):
             self._malformed = count
-            self.announce("fault", "", f"{count} commands dropped: {self.commands.last_error}")
+            detail = f"{count} commands dropped: {self.commands.last_error}"
+            self.announce(codes.MALFORMED, "", detail)
 
     def _send(self, event: Event) -> None:
         put = self._put_stop if event.kind == "stop" else self._put_event

@@ -17,14 +17,19 @@ NOTHING: Final = "–"
 _WIDE: Final = 180  # characters a line may have where no terminal says how many there are
 # Unit of each output, and of each of `quadriga.recordings.traces.ERRORS`, and its factor from SI.
 UNITS: Final = {
-    "z": ("mm", 1e3), "z-felt": ("mm", 1e3), "vx": ("mm/s", 1e3), "vy": ("mm/s", 1e3),
-    "roll": ("mrad", 1e3), "pitch": ("mrad", 1e3), "wz": ("mrad/s", 1e3),
+    "z": ("mm", 1e3), "z-over-stance-feet": ("mm", 1e3), "vx": ("mm/s", 1e3),
+    "vy": ("mm/s", 1e3), "roll": ("mrad", 1e3), "pitch": ("mrad", 1e3), "wz": ("mrad/s", 1e3),
 }  # fmt: skip
+
+
+def error_text(name: str) -> str:
+    """An output or an error as a reader knows it."""
+    return name.replace("-over-stance-feet", " over the stance feet")
 
 
 def label_output(name: str) -> str:
     """An output or an error with its unit, as a heading."""
-    return f"{name} [{UNITS[name][0]}]"
+    return f"{error_text(name)} [{UNITS[name][0]}]"
 
 
 LABELS: Final = tuple(label_output(name) for name in OUTPUTS)

@@ -47,5 +47,9 @@ class RecordingError(QuadrigaError):
     """A recording cannot be read or written."""
 
 
+class NewerRecordingError(RecordingError):
+    """A recording that only a later version of this project can read."""
+
+
 class ProcessError(QuadrigaError):
     """A process of the team failed or did not start."""

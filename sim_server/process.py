@@ -44,4 +44,5 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
         gc.disable()  # a collection in mid-tick costs more than the tick
         take_priority(config.runtime.priority)
         loop = run_realtime if config.world.mode == "realtime" else run_lockstep
-        server.announce("stop", "", loop(server, stopped))
+        end = loop(server, stopped)
+        server.announce(end.code, "", end.detail)

@@ -158,13 +158,13 @@ def _build_plans(
 
 def _is_of_this_code(experiment: Experiment, runs: Path) -> bool:
     """Whether an experiment's runs may be published although nobody named it."""
-    from quadriga.experiments.campaign.job import code_and_libraries
     from quadriga.experiments.campaign.ledger import read_manifest
     from quadriga.experiments.campaign.manifest import FILE
+    from quadriga.experiments.trial.origin import code_and_libraries, is_same_code
 
     folders = [experiment.folder(runs, part) for part in experiment.parts]
     versions = {read_manifest(one).versions for one in folders if (one / FILE).is_file()}
-    if versions <= {code_and_libraries()}:
+    if all(is_same_code(version, code_and_libraries()) for version in versions):
         return True
     say(
         f"{experiment.name}: what is published stays; {runs / experiment.name} was walked with "

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from quadriga.experiments.measures import MEASURES, Interval, name_ratio
 from quadriga.experiments.results import COST, POOLED, Results, World
 from quadriga.experiments.sweep import to_number
+from quadriga.tables import error_text
 
 _COLOURS: Final = (
     "#1f77b4",
@@ -156,7 +157,7 @@ def _collect_points(
                 if estimate is None:
                     continue
                 if len(measures) > 1:
-                    row = measure.removeprefix("ratio-")
+                    row = error_text(measure.removeprefix("ratio-"))
                     row = row if len(names) == 1 else f"{row}  {name}"
                 else:
                     row = name

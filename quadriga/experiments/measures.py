@@ -10,7 +10,7 @@ from typing import Final
 from quadriga.experiments.results import COST, Line, Tally
 from quadriga.experiments.statistics import mcnemar, paired_difference, wilson
 from quadriga.recordings.traces import ERRORS
-from quadriga.tables import UNITS
+from quadriga.tables import UNITS, error_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +141,9 @@ def _read(
 def _greatest(name: str) -> Measure:
     unit, factor = UNITS[name]
     of = _read(lambda tally: tally.rmse_max[name], factor)
-    return Measure(f"greatest RMSE of {name} of a walk", unit, ".1f", of, interval=False)
+    return Measure(
+        f"greatest RMSE of {error_text(name)} of a walk", unit, ".1f", of, interval=False
+    )
 
 
 MEASURES: Final[Mapping[str, Measure]] = {
@@ -157,7 +159,7 @@ MEASURES: Final[Mapping[str, Measure]] = {
     **{
         name_ratio(name): Measure(
             "control cost over that of {}, median" if name == COST
-            else f"RMSE of {name} over that of {{}}, median",
+            else f"RMSE of {error_text(name)} over that of {{}}, median",
             "", ".3f", _ratio(name), paired=True,
         )
         for name in (COST, *ERRORS)

@@ -9,7 +9,7 @@ from quadriga.experiments.measures import MEASURES, format_p, keep_together, nam
 from quadriga.experiments.results import ALL, COST, POOLED, Beside, Line, Results, Tally
 from quadriga.experiments.statistics import mcnemar
 from quadriga.recordings.traces import ERRORS
-from quadriga.tables import NOTHING, Table, format_number, format_output, label_output
+from quadriga.tables import NOTHING, Table, error_text, format_number, format_output, label_output
 
 POOLED_NOTE: Final = (
     f"{ALL.capitalize()}: pairs of every world together. Where one seed gives similar worlds (the "
@@ -80,7 +80,7 @@ def build_falls_table(results: Results) -> Table:
 
 def build_ratios_table(results: Results, names: Sequence[str]) -> Table:
     """Errors of every other variant over the baseline's: of `COST` and some of `ERRORS`."""
-    head = [f"RMSE {name}" if name != COST else "control cost" for name in names]
+    head = [f"RMSE {error_text(name)}" if name != COST else "control cost" for name in names]
     title = f"Errors over those of {results.baseline}"
     lines = _compared(results)
     return _build(title, results, lines, ["pairs", *head], lambda line: _ratios(line, names))

@@ -2,49 +2,27 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterator
 from dataclasses import asdict
-from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-import quadriga
-from quadriga import agents, shared, sim_server
+from quadriga.identification.behaviour import behaviour
+from quadriga.shared.config.renamed import with_first_names
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.places import cache_file
 
-_LOOK = 0.2  # s, between two looks for a file that another process writes
-# What a recorded walk depends on: the code of the world and of the agent, and what they rest on.
-_LIBRARIES = ("mujoco", "pin", "numpy", "numba", "daqp", "example-robot-data")
-_CODE = (
-    (shared, ("**/*",)),
-    (agents, ("**/*",)),
-    (sim_server, ("**/*",)),
-    (quadriga, ("identification/collect.py", "identification/rollout.py")),
-)
-# What a trial's figures depend on besides its configuration and predictor.
-_TRIAL_CODE = (
-    *_CODE,
-    (
-        quadriga,
-        (
-            "experiments/trial/*.py",
-            "team/operator.py",
-            "recordings/summary.py",
-            "recordings/traces.py",
-            "recordings/truth.py",
-        ),
-    ),
-)
-_FIT_CODE = ((agents, ("predictor/*", "planner/*")),)
+_LOOK: Final = 0.2  # s, between two looks for a file that another process writes
+# What a recorded walk rests on besides this project's code.
+_LIBRARIES: Final = ("mujoco", "pin", "numpy", "numba", "daqp", "example-robot-data")
 # Keys of the identification that the walks do not depend on, only what is made of them.
-_FITTED = (
+_FITTED: Final = (
     "predictor", "neighbours", "phases", "phase_ridge", "ridge", "block_weight", "max_radius",
     "gain_range",
 )  # fmt: skip
@@ -52,33 +30,33 @@ _FITTED = (
 
 def data_key(config: Config) -> str:
     """Key of the collected data: everything a collected walk depends on."""
-    ident = asdict(config.identification)
-    for fitted in _FITTED:
-        del ident[fitted]
-    parts: dict[str, Any] = {
-        "robots": config.team.robots, "yokes": config.team.yokes, "spacing": config.team.spacing,
-        "alternate_phase": config.team.alternate_phase,
-        "sensors": asdict(config.sensors), "estimator": asdict(config.estimator),
-        "gait": asdict(config.gait), "controller": asdict(config.controller),
-        "height": config.reference.height, "interface": config.planner.interface,
-        "horizon": [config.planner.T_ini, config.planner.N] if ident["seconds"] == 0 else [],
-        "identification": ident, "code": _code_digest(_CODE),
-        "libraries": {name: version(name) for name in _LIBRARIES},
-    }  # fmt: skip
-    return _digest(parts)
+    team, planner = asdict(config.team), asdict(config.planner)
+    ident = {k: v for k, v in asdict(config.identification).items() if k not in _FITTED}
+    horizon = ("T_ini", "N") if config.identification.seconds == 0 else ()
+    sections: dict[str, Any] = {
+        "team": {k: team[k] for k in ("robots", "yokes", "spacing", "alternate_phase")},
+        "sensors": asdict(config.sensors),
+        "estimator": asdict(config.estimator),
+        "gait": asdict(config.gait),
+        "controller": asdict(config.controller),
+        "reference": {"height": config.reference.height},
+        "planner": {k: planner[k] for k in ("interface", *horizon)},
+        "identification": ident,
+    }
+    code = behaviour("quadriga.identification.sample_collection", _collections)
+    libraries = {name: version(name) for name in _LIBRARIES}
+    return _digest([with_first_names(sections), code, libraries])
 
 
 def predictor_key(config: Config) -> str:
     """Key of the fitted predictor: its data, the fit's settings and the fit's code."""
     planner = asdict(config.planner)
-    return _digest(
-        {
-            "data": data_key(config),
-            "identification": asdict(config.identification),
-            "planner": {k: planner[k] for k in ("N", "T_ini", "applied", "Q", "R", "interface")},
-            "code": _code_digest(_FIT_CODE),
-        }
-    )
+    sections: dict[str, Any] = {
+        "identification": asdict(config.identification),
+        "planner": {k: planner[k] for k in ("N", "T_ini", "applied", "Q", "R", "interface")},
+    }
+    code = behaviour("quadriga.identification.sample_fits", _fits)
+    return _digest([data_key(config), with_first_names(sections), code])
 
 
 def predictor_path(config: Config) -> Path:
@@ -104,30 +82,24 @@ def await_predictor(path: Path, timeout: float) -> None:
                 f"predictor {path}",
                 f"no such file after {timeout:g} s",
                 "a file",
-                "`quadriga prepare` makes it; from another configuration or version of the code "
-                "it has another name",
+                "`quadriga prepare` makes it; from another configuration, code "
+                "or kind of machine it has another name",
             )
         sleep(_LOOK)
 
 
-@lru_cache(maxsize=1)
-def trial_code() -> str:
-    """Digest of the code that a trial's figures depend on."""
-    return _code_digest(_TRIAL_CODE)[:16]
-
-
-def _digest(parts: dict[str, Any]) -> str:
+def _digest(parts: list[Any]) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _code_digest(packages: Iterable[tuple[Any, tuple[str, ...]]]) -> str:
-    """Digest of the syntax trees: a changed comment or layout does not cost a new collection."""
-    digest = hashlib.sha256()
-    for package, patterns in packages:
-        root = Path(package.__file__).parent
-        for pattern in patterns:
-            for path in sorted(root.glob(pattern)):
-                if path.suffix == ".py":
-                    tree = ast.parse(path.read_text(encoding="utf-8"))
-                    digest.update(f"{path.name}{ast.dump(tree)}".encode())
-    return digest.hexdigest()
+# Imported when they are run: who only looks for a file needs no simulator.
+def _collections() -> Iterator[Array]:
+    from quadriga.identification.sample_collection import sample_collections
+
+    return sample_collections()
+
+
+def _fits() -> Iterator[Array]:
+    from quadriga.identification.sample_fits import sample_fits
+
+    return sample_fits()

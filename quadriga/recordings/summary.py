@@ -14,17 +14,18 @@ from quadriga.recordings.gaps import end_of_world, missing_ticks, repeated_ticks
 from quadriga.recordings.metadata import recorded_versions
 from quadriga.recordings.traces import (
     ERRORS,
-    FELT,
+    OVER_STANCE_FEET,
     Traces,
     estimate_errors,
-    felt_height_errors,
     in_force,
     read_traces,
+    stance_height_errors,
 )
 from quadriga.recordings.truth import distance
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.a1 import OUTPUTS, Array
 from quadriga.shared.runtime.histogram import QUANTILES
+from quadriga.shared.wire.codes import FALL, code_of
 from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import STATE
 
@@ -95,19 +96,23 @@ def _world(traces: Traces) -> dict[str, Any]:
     truth = traces.truth
     down = (truth.tilt > FALL_TILT) | (truth.y[..., 0] < FALL_HEIGHT)
     seen = {traces.robots[i] for i in np.flatnonzero(down.any(axis=0))}
-    told = {event.robot for event in traces.events if event.kind == "fall"}
+    told = {event.robot for event in traces.events if event.code == FALL}
     if not len(truth.tick):  # then the robots' own word must do
         told |= {
-            r for r, found in traces.statuses.items() if any(s.reason == "fall" for s in found)
+            r
+            for r, found in traces.statuses.items()
+            if any(code_of(s.reason) == FALL for s in found)
         }
+    end = next((event for event in reversed(traces.events) if event.kind == "stop"), None)
     return {
         "fell": bool(seen | told),
         "fallen": sorted(seen | told),
         "distance": distance(truth, 2 * traces.config.gait.stance_ms),
-        "end": next((e.detail for e in reversed(traces.events) if e.kind == "stop"), ""),
+        "end": end.detail if end is not None else "",
+        "end_code": end.code if end is not None else "",
         "yoke_drift_max": float(np.abs(truth.yoke_error).max(initial=0.0)),
         "events": [
-            {"tick": e.tick, "kind": e.kind, "robot": e.robot, "detail": e.detail}
+            {"tick": e.tick, "kind": e.kind, "code": e.code, "robot": e.robot, "detail": e.detail}
             for e in traces.events
         ],
     }
@@ -121,20 +126,20 @@ def _tracking(traces: Traces) -> dict[str, Any]:
     wanted[:, [1, 2, 5, 0]] = reference
     y = truth.y[steady]
     error = y - wanted[steady, None]
-    felt = [_felt_heights(traces, robot, begin) for robot in traces.robots]
+    heights = [_height_errors(traces, robot, begin) for robot in traces.robots]
     return {
         "steady_from": begin / 1000.0,
         **{f"mean_{name}": _mean(y[..., OUTPUTS.index(name)]) for name in ("vx", "vy", "wz")},
-        "rmse": _with_felt(_rmse(error), _joined(felt)),
+        "rmse": _with_height(_rmse(error), _joined(heights)),
         "rmse_per_robot": {
-            robot: _with_felt(_rmse(error[:, i : i + 1]), felt[i])
+            robot: _with_height(_rmse(error[:, i : i + 1]), heights[i])
             for i, robot in enumerate(traces.robots)
         },
     }
 
 
-def _felt_heights(traces: Traces, robot: str, begin: int) -> Array:
-    tick, error = felt_height_errors(traces, robot)
+def _height_errors(traces: Traces, robot: str, begin: int) -> Array:
+    tick, error = stance_height_errors(traces, robot)
     return error[tick >= begin]
 
 
@@ -227,9 +232,9 @@ def _rmse(error: Array) -> dict[str, float | None]:
     return {name: _root(_mean(error[..., i] ** 2)) for i, name in enumerate(OUTPUTS)}
 
 
-def _with_felt(rmse: Mapping[str, float | None], felt: Array) -> dict[str, float | None]:
-    """RMSE by name of `ERRORS`, with that of the height over the felt ground."""
-    every = {**rmse, FELT: _root(_mean(felt**2))}
+def _with_height(rmse: Mapping[str, float | None], errors: Array) -> dict[str, float | None]:
+    """RMSE by name of `ERRORS`, with that of the height over the stance feet."""
+    every = {**rmse, OVER_STANCE_FEET: _root(_mean(errors**2))}
     return {name: every[name] for name in ERRORS}
 
 

@@ -10,12 +10,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from quadriga.tables import format_number, printable
+from quadriga.tables import error_text, format_number, printable
 
 # Unit and factor of each of `quadriga.recordings.traces.ERRORS`.
 _ERRORS = {
-    "z": ("mm", 1e3), "z-felt": ("mm", 1e3), "vx": ("m/s", 1.0), "vy": ("m/s", 1.0),
-    "roll": ("rad", 1.0), "pitch": ("rad", 1.0), "wz": ("rad/s", 1.0),
+    "z": ("mm", 1e3), "z-over-stance-feet": ("mm", 1e3), "vx": ("m/s", 1.0),
+    "vy": ("m/s", 1.0), "roll": ("rad", 1.0), "pitch": ("rad", 1.0), "wz": ("rad/s", 1.0),
 }  # fmt: skip
 
 
@@ -116,7 +116,7 @@ def _format_errors(rmse: Mapping[str, float | None]) -> str:
     for name, value in rmse.items():
         unit, factor = _ERRORS[name]
         digits = ".1f" if factor > 1.0 else ".4f"
-        parts.append(f"{name} {format_number(value, digits, factor)} {unit}")
+        parts.append(f"{error_text(name)} {format_number(value, digits, factor)} {unit}")
     half = (len(parts) + 1) // 2
     return ", ".join(parts[:half]) + "\n" + ", ".join(parts[half:])
 

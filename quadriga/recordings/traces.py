@@ -32,10 +32,10 @@ from quadriga.shared.wire.topics import COMMAND, INPUTS, STATE, topic_of
 # Up to 1 kHz each: only their ticks are read.
 _TIMED_ONLY: Final = (STATE.name, COMMAND.name, INPUTS.name)
 # What a walk is judged by: the outputs by the world's truth, the height over the terrain under the
-# hips, and the height over the ground that the robot's feet feel, by its own word: what it is asked
-# to keep. Where a hip passes the edge of a block the former jumps, whatever the robot does.
-FELT: Final = "z-felt"
-ERRORS: Final = (OUTPUTS[0], FELT, *OUTPUTS[1:])
+# hips, and the height over the stance feet, by the robot's own measurement: what it is asked to
+# keep. Where a hip passes the edge of a block the former jumps, whatever the robot does.
+OVER_STANCE_FEET: Final = "z-over-stance-feet"
+ERRORS: Final = (OUTPUTS[0], OVER_STANCE_FEET, *OUTPUTS[1:])
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +168,7 @@ def estimate_errors(traces: Traces, index: int) -> tuple[Ticks, Array]:
 
     Returns:
         Ticks (K,) and errors (K, 6); that of the roll is the shorter way round, that of z NaN on
-        uneven ground, where the one is a height over what the feet feel, the other over the
+        uneven ground, where the one is a height over the stance feet, the other over the
         terrain under the hips.
     """
     own, truth = traces.measurements[traces.robots[index]], traces.truth
@@ -181,8 +181,8 @@ def estimate_errors(traces: Traces, index: int) -> tuple[Ticks, Array]:
     return tick, error
 
 
-def felt_height_errors(traces: Traces, robot: str) -> tuple[Ticks, Array]:
-    """A robot's height over the ground that its feet feel, by its own word, less the one asked for.
+def stance_height_errors(traces: Traces, robot: str) -> tuple[Ticks, Array]:
+    """A robot's height over its stance feet, as it measures it, less the one asked for.
 
     Returns:
         Ticks (K,) at which one was asked for, and errors (K,), m.

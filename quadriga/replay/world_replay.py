@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
-from quadriga.plant.lockstep import ANSWERS
 from quadriga.recordings.by_tick import by_tick
 from quadriga.replay.difference import Difference, find_difference
 from quadriga.shared.config.sections import Config
@@ -15,10 +14,10 @@ from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command, Event, Message
 from quadriga.shared.wire.topics import COMMAND, EVENT, STATE, TRUTH, topic_of
-from quadriga.sim_server.world.motors import WEAKENED
 from quadriga.sim_server.world.world import World
 
 _NAMES: Final = frozenset(topic.name for topic in (STATE, COMMAND, TRUTH, EVENT))
@@ -113,11 +112,9 @@ class _Silent:
 
     def update(self, entries: Iterable[ChunkEntry]) -> None:
         for event in _decode_events(self._key, entries):
-            if event.kind != "fault" or not event.robot or event.detail.endswith(WEAKENED):
-                continue
-            if event.detail.endswith(ANSWERS):
+            if event.code == codes.BACK:
                 self.robots.discard(event.robot)
-            else:
+            elif event.code in (codes.SILENT, codes.GONE):
                 self.robots.add(event.robot)
 
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from quadriga.recordings.metadata import recorded_versions
 from quadriga.report.run import Run
-from quadriga.report.timeline import FALL
 from quadriga.shared.config.reference_trace import ROW_END
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import departures
+from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, STATE, STATUS, TRUTH
 
 _DIGITS: Final = 12  # of a digest

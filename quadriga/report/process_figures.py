@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from quadriga.agents.planning.fade import FADED
 from quadriga.agents.time_grid import step_ms
 from quadriga.charts.colours import BARS, robot_style
 from quadriga.charts.draw import draw_panels
@@ -42,7 +43,7 @@ def draw_timeline(run: Run) -> Figure:
     for robot in run.traces.robots:
         mine = [entry for entry in run.timeline if entry.robot == robot]
         plans = [
-            (e.tick / 1000, e.stop / 1000, "faded" if e.text.startswith("faded") else "nominal")
+            (e.tick / 1000, e.stop / 1000, "faded" if e.code == FADED else "nominal")
             for e in mine
             if e.kind == "plan"
         ]

@@ -8,13 +8,13 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.modes import STAND, WALK
+from quadriga.agents.modes import DAMPING, ESTOP, STAND, WALK
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import Ticks
+from quadriga.shared.wire.codes import FALL, code_of
 from quadriga.shared.wire.messages import Plan, Status
 from quadriga.shared.wire.topics import MEASUREMENT, STATE, TRUTH
 
-FALL: Final = "fall"
 FAULT: Final = "fault"
 STOP: Final = "stopped"
 _TROUBLE: Final = (FALL, FAULT, STOP)
@@ -34,6 +34,8 @@ class TimelineEntry:
         robot: whom it concerns, or empty.
         kind: of an event of the world, or stopped, mode, plan, counted, gap.
         text: what it was.
+        code: of an event, a plan's status or a reason to stop (`quadriga.shared.wire.codes`).
+        passive: whether the robot's joints were only damped from then on.
     """
 
     tick: int
@@ -41,6 +43,8 @@ class TimelineEntry:
     robot: str
     kind: str
     text: str
+    code: str = ""
+    passive: bool = False
 
     @property
     def trouble(self) -> bool:
@@ -51,11 +55,11 @@ class TimelineEntry:
 def build_timeline(traces: Traces, begin: int, end: int) -> tuple[TimelineEntry, ...]:
     """All entries of a run, by time."""
     found = [
-        TimelineEntry(e.tick, e.tick, e.robot, e.kind, e.detail)
+        TimelineEntry(e.tick, e.tick, e.robot, e.kind, e.detail, e.code, passive=e.code == FALL)
         for e in traces.events
         if e.tick <= end
     ]
-    fallen = {event.robot for event in traces.events if event.kind == FALL}
+    fallen = {event.robot for event in traces.events if event.code == FALL}
     for robot, statuses in traces.statuses.items():
         found += [entry for entry in _find_falls(robot, statuses) if robot not in fallen][:1]
         found += _find_mode_changes(robot, [s for s in statuses if s.tick <= end])
@@ -73,8 +77,9 @@ def build_timeline(traces: Traces, begin: int, end: int) -> tuple[TimelineEntry,
 def _find_falls(robot: str, statuses: Sequence[Status]) -> Iterator[TimelineEntry]:
     """Falls that the robot itself reports, for recordings without a world that does."""
     for status in statuses:
-        if status.reason == FALL:
-            yield TimelineEntry(status.tick, status.tick, robot, FALL, "by its own word")
+        if code_of(status.reason) == FALL:
+            tick, text = status.tick, "by its own word"
+            yield TimelineEntry(tick, tick, robot, FALL, text, FALL, passive=True)
 
 
 def _find_mode_changes(robot: str, statuses: Sequence[Status]) -> Iterator[TimelineEntry]:
@@ -85,7 +90,9 @@ def _find_mode_changes(robot: str, statuses: Sequence[Status]) -> Iterator[Timel
             continue
         if status.reason and status.reason != before[1]:
             text = f"{status.reason} ({status.mode})"
-            yield TimelineEntry(status.tick, status.tick, robot, STOP, text)
+            code, passive = code_of(status.reason), status.mode in (DAMPING, ESTOP)
+            tick = status.tick
+            yield TimelineEntry(tick, tick, robot, STOP, text, code, passive=passive)
         elif before[0] and status.mode not in (WALK, before[0]):
             yield TimelineEntry(status.tick, status.tick, robot, "mode", status.mode)
         elif before[0] == STAND and status.mode == WALK:
@@ -120,7 +127,8 @@ def _find_failed_plans(robot: str, plans: Sequence[Plan], end: int) -> Iterator[
         count, first = k + 1 - first, k + 1
         if plan.status != "solved":
             many = f"{count} plans" if count > 1 else "1 plan"
-            yield TimelineEntry(begin, min(stop, end), robot, "plan", f"{plan.status}, {many}")
+            text, code = f"{plan.status}, {many}", code_of(plan.status)
+            yield TimelineEntry(begin, min(stop, end), robot, "plan", text, code)
 
 
 def _find_gaps(traces: Traces, end: int) -> Iterator[TimelineEntry]:

@@ -12,10 +12,11 @@ from quadriga.charts.panels import Curve, Mark, Panel, PanelGrid
 from quadriga.report.foot_figures import build_gait_panel, gait_legend
 from quadriga.report.run import Run
 from quadriga.report.samples import find_slip
-from quadriga.report.timeline import FALL, FAULT, STOP
+from quadriga.report.timeline import FAULT, STOP
 from quadriga.report.troubles import Trouble
 from quadriga.report.trunk_figures import robot_legend
 from quadriga.report.window import BEFORE_MS, SLIP, TILT
+from quadriga.shared.wire.codes import FALL
 
 _AFTER_MS: Final = 200  # shown after the second that is judged
 _GAP: Final = 0.05  # s without a sample, after which a curve is not joined

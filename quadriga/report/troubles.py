@@ -12,7 +12,7 @@ from quadriga.charts.thinning import find_spells
 from quadriga.report.conditions import Condition, assess_robot
 from quadriga.report.run import Run
 from quadriga.report.samples import Samples
-from quadriga.report.timeline import FALL, TimelineEntry
+from quadriga.report.timeline import TimelineEntry
 from quadriga.report.window import (
     BEFORE_MS,
     SLIP,
@@ -24,6 +24,7 @@ from quadriga.report.window import (
     passive_since,
 )
 from quadriga.shared.robot.a1 import Leg
+from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 _SIGNS: Final = ("push", "plan", "counted", "gap", "mode")  # kinds of entries that are signs

@@ -14,9 +14,9 @@ from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.recordings.traces import estimate_errors, in_force
 from quadriga.recordings.truth import Ticks
 from quadriga.report.run import Run
-from quadriga.report.timeline import FALL
 from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robot.a1 import OUTPUTS, Array
+from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 NAMES: Final = ("z [m]", "vx [m/s]", "vy [m/s]", "roll [rad]", "pitch [rad]", "wz [rad/s]")

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.agents.modes import DAMPING, ESTOP
 from quadriga.charts.thinning import find_spells
 from quadriga.report.run import Run
 from quadriga.report.samples import Samples
-from quadriga.report.timeline import FALL, STOP
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 BEFORE_MS: Final = 1000
@@ -17,7 +15,6 @@ TILT: Final = 0.25  # rad; walks on rough ground stay below
 SLIP: Final = 0.2  # m/s; feet in stance roll at up to 0.06
 TORQUE: Final = 0.98  # share of the limit
 _LOST_MS: Final = 40  # ms of scheduled stance without contact
-_PASSIVE: Final = (f"({DAMPING})", f"({ESTOP})")
 
 
 def cut_window(samples: Samples, tick: int) -> Samples:
@@ -36,7 +33,6 @@ def find_lost_stance(window: Samples, leg: int) -> list[tuple[int, int]]:
 def passive_since(run: Run, robot: str, tick: int) -> int | None:
     """When a robot fell or went passive, if well before `tick`: its second says nothing then."""
     for entry in run.timeline:
-        passive = entry.kind == FALL or (entry.kind == STOP and entry.text.endswith(_PASSIVE))
-        if entry.robot == robot and passive and entry.tick < tick - TOGETHER_MS:
+        if entry.robot == robot and entry.passive and entry.tick < tick - TOGETHER_MS:
             return entry.tick
     return None

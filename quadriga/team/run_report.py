@@ -17,6 +17,7 @@ from quadriga.report.page import PAGE, write_page
 from quadriga.report.run import build_run, read_run
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.wire.codes import SIGNAL
 
 
 def report_folder(run_dir: Path, *, pictures: bool, console: Console) -> dict[str, Any]:
@@ -73,8 +74,8 @@ def has_failed(summary: dict[str, Any]) -> bool:
 
 
 def _check_end(summary: dict[str, Any]) -> None:
-    end = summary["end"]
-    if not end or end.startswith("signal"):
+    end = summary["end_code"]
+    if end in ("", SIGNAL):
         raise ProcessError(
             "the walk",
             f"an end at {summary['duration']:.1f} s",

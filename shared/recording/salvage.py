@@ -15,7 +15,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Footer, Metadata
 from mcap.writer import MCAP0_MAGIC
 
-from quadriga.shared.errors import RecordingError
+from quadriga.shared.errors import NewerRecordingError, RecordingError
 from quadriga.shared.recording.mcap_chunk import (
     CORRUPT,
     RECORD,
@@ -195,9 +195,9 @@ class Salvage:
         if record.name == PROFILE:
             try:
                 record.metadata = unseal(record.metadata, str(self.path))
-            except RecordingError as error:
-                if "newer" in error.cause:
-                    raise
+            except NewerRecordingError:
+                raise
+            except RecordingError:
                 return None
         return record
 

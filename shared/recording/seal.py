@@ -7,7 +7,7 @@ import zlib
 from collections.abc import Mapping
 from typing import Final
 
-from quadriga.shared.errors import RecordingError
+from quadriga.shared.errors import NewerRecordingError, RecordingError
 
 FORMAT: Final = 1  # of the recordings that this version writes
 _FORMAT_KEY: Final = "format"
@@ -24,7 +24,8 @@ def unseal(stored: Mapping[str, str], name: str) -> dict[str, str]:
     """What `seal` was given; metadata without a trace of a seal are taken as they are.
 
     Raises:
-        RecordingError: a newer format, or damaged; `name` is the file's.
+        NewerRecordingError: a newer format.
+        RecordingError: damaged; `name` is the file's.
     """
     values = dict(stored)
     sealed = any(mark in repr(stored) for mark in (f"'{_FORMAT_KEY}'", _CRC_KEY))
@@ -41,9 +42,9 @@ def unseal(stored: Mapping[str, str], name: str) -> dict[str, str]:
     return values
 
 
-def newer_format_error(name: str, got: str, expected: str) -> RecordingError:
+def newer_format_error(name: str, got: str, expected: str) -> NewerRecordingError:
     """The error of a file that only a later version of this project can read."""
-    return RecordingError(name, got, expected, "recorded by a newer quadriga: update this one")
+    return NewerRecordingError(name, got, expected, "recorded by a newer quadriga: update this one")
 
 
 def _crc(values: Mapping[str, str]) -> str:

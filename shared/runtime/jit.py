@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
 import shutil
 import sys
 from collections.abc import Callable, Sequence
@@ -15,13 +14,13 @@ from typing import Final, TypeVar, cast
 
 import numba
 
+from quadriga.shared.runtime.imports import followed_files
 from quadriga.shared.runtime.places import SOURCE, cache_dir
 
 F = TypeVar("F", bound=Callable[..., object])
 
 _PACKAGES: Final = ("agents", "shared", "sim_server")
-_MARK: Final = "@compiled"
-_IMPORT: Final = re.compile(r"^from ([\w.]+) import (\([\w\s,]+\)|[\w ,]+)", re.MULTILINE)
+_MARK: Final = "\n@compiled"
 
 
 def compiled(function: F) -> F:
@@ -38,21 +37,15 @@ def sources(root: Path) -> Sequence[Path]:
 
     Args:
         root: the folder of this project's package `quadriga`.
+
+    Raises:
+        QuadrigaError: no file has compiled functions.
     """
-    found = [
-        path for name in _PACKAGES for path in sorted((root / "quadriga" / name).rglob("*.py"))
-    ]
-    texts = {path: path.read_text(encoding="utf-8") for path in found}
-    todo = [path for path, text in texts.items() if _MARK in text]
-    wanted = set(todo)
-    while todo:
-        for module, names in _IMPORT.findall(texts[todo.pop()]):
-            place = root.joinpath(*module.split("."))
-            inside = (place / f"{name}.py" for name in re.findall(r"\w+", names))
-            new = {place.with_suffix(".py"), *inside} & texts.keys() - wanted
-            todo += new
-            wanted |= new
-    return sorted(wanted)
+    files = (path for name in _PACKAGES for path in (root / "quadriga" / name).rglob("*.py"))
+    marked = (path for path in files if _MARK in path.read_text(encoding="utf-8"))
+    return followed_files(
+        root, (".".join(path.relative_to(root).with_suffix("").parts) for path in marked)
+    )
 
 
 @lru_cache(maxsize=1)

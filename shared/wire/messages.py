@@ -17,6 +17,7 @@ import numpy as np
 
 from quadriga.shared.robot.a1 import OUTPUTS, Array
 from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.codes import code_of_schema_1
 from quadriga.shared.wire.entries import FORCES, JOINTS, LEGS, ONE, WXYZ, XYZ
 
 Dim = int | str
@@ -44,6 +45,11 @@ class Message:
     SCHEMA: ClassVar[int] = 1
     tick: int = plain(int, "world time of the content [ms]")
     stamp_ns: int = plain(int, "world time of the content [ns]")
+
+    @classmethod
+    def upgrade(cls, schema: int, body: dict[str, Any]) -> dict[str, Any] | None:
+        """Fields of a message of an earlier schema as today's has them; None: not readable."""
+        return None
 
 
 class Flat(Message):
@@ -231,8 +237,21 @@ class Truth(Message):
 
 @record
 class Event(Message):
-    """Something happened in the world."""
+    """Something happened in the world.
 
+    Of schema 1, which had no `code`, recordings are still read.
+    """
+
+    SCHEMA = 2
     kind: str = plain(str, "push, payload, terrain, fault, fall, start or stop")
     robot: str = plain(str, "the robot concerned, or empty")
     detail: str = plain(str, "free text")
+    code: str = plain(str, "what happened, one of quadriga.shared.wire.codes.EVENTS")
+
+    @classmethod
+    def upgrade(cls, schema: int, body: dict[str, Any]) -> dict[str, Any] | None:
+        """Fields of an event of schema 1, with its code."""
+        kind, detail = body.get("kind"), body.get("detail")
+        if schema != 1 or not isinstance(kind, str) or not isinstance(detail, str):
+            return None
+        return {**body, "code": code_of_schema_1(kind, detail)}

@@ -15,7 +15,6 @@ from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.world.layout import JOINT_POSITIONS, JOINT_RATES
 
-WEAKENED: Final = "of its torque"  # how the event of a weak motor ends; a re-simulation reads it
 _KEY: Final = "world.weak_motor"
 _GRAMMAR: Final = "'robot:joint:start[s]', commas between motors"
 _ANY: Final = "any"
@@ -48,7 +47,7 @@ class WeakMotor:
     @property
     def detail(self) -> str:
         """What is announced when it weakens."""
-        return f"{_JOINTS[self.joint]} gives {100 * self.share:g} % {WEAKENED}"
+        return f"{_JOINTS[self.joint]} gives {100 * self.share:g} % of its torque"
 
 
 @compiled

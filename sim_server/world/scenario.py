@@ -11,6 +11,7 @@ import numpy as np
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import N_JOINTS, Array, robot_names
+from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Event
 from quadriga.sim_server.world.motors import WeakMotor, weak_motors
 from quadriga.sim_server.world.payload import Load
@@ -69,20 +70,20 @@ def build_scenario(config: Config, loads: Sequence[Load]) -> Scenario:
     names, world = robot_names(config.team.robots), config.world
     pushes = all_pushes(config, np.random.default_rng((world.seed, _PUSHES)))
     weak = weak_motors(config, np.random.default_rng((world.seed, _MOTORS)))
-    events = [event(0, "start", "", f"{len(names)} robots, {config.team.yokes} yokes")]
-    events.append(event(0, "terrain", "", _ground(config)))
+    events = [event(0, codes.START, "", f"{len(names)} robots, {config.team.yokes} yokes")]
+    events.append(event(0, codes.TERRAIN, "", _ground(config)))
     events += [
-        event(0, "payload", name, load.detail)
+        event(0, codes.PAYLOAD, name, load.detail)
         for name, load in zip(names, loads, strict=True)
         if load.mass > 0.0
     ]
-    events += [event(m.start, "fault", names[m.robot], m.detail) for m in weak]
+    events += [event(m.start, codes.WEAK_MOTOR, names[m.robot], m.detail) for m in weak]
     for push in sorted(pushes, key=lambda item: item.start):
         detail = (
             f"{push.force:g} N towards {math.degrees(push.direction):g} deg"
             f" for {(push.stop - push.start) / 1000:g} s"
         )
-        events += [event(push.start, "push", names[i], detail) for i in push.robots]
+        events += [event(push.start, codes.PUSH, names[i], detail) for i in push.robots]
     return Scenario(n=len(names), pushes=pushes, weak=weak, events=tuple(events))
 
 
@@ -94,6 +95,7 @@ def _ground(config: Config) -> str:
     return f"{world.terrain}{grade} up to {world.terrain_height:g} m, seed {world.seed}"
 
 
-def event(tick: int, kind: str, robot: str, detail: str) -> Event:
-    """The announcement of something that happened at `tick`."""
-    return Event(tick=tick, stamp_ns=tick * 1_000_000, kind=kind, robot=robot, detail=detail)
+def event(tick: int, code: str, robot: str, detail: str) -> Event:
+    """The announcement of something that happened at `tick`, by its code."""
+    kind = codes.EVENTS[code].kind
+    return Event(tick, tick * 1_000_000, kind, robot, detail, code)

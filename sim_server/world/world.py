@@ -11,6 +11,7 @@ import numpy as np
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import FOOT_FRAMES, N_JOINTS, N_LEGS, Array, robot_names
+from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.messages import Command, Event, State, Truth
 from quadriga.sim_server.terrain.loose import PERIOD, LooseStones
 from quadriga.sim_server.world import layout
@@ -175,5 +176,5 @@ class World:
             if not (cosine >= _FALL_COSINE and above >= _FALL_HEIGHT):
                 self._fallen[i] = True
                 detail = f"tilt {math.acos(max(-1.0, cosine)):.2f} rad, height {above:.3f} m"
-                events.append(event(self.tick, "fall", self.names[i], detail))
+                events.append(event(self.tick, FALL, self.names[i], detail))
         return events

@@ -32,13 +32,13 @@ from quadriga.shared.errors import PredictorError, QuadrigaError, RecordingError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import PROFILE
 from quadriga.shared.robot.a1 import Array, robot_names
+from quadriga.shared.runtime.arithmetic import arithmetic
 from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.shared.runtime.clock import wall_ns
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.schema import json_schema
 from quadriga.shared.wire.topics import topic_of
 from tests.golden import scenario
-from tests.golden.arithmetic import arithmetic
 from tests.golden.compare import first_difference
 from tests.golden.rerun import recorded, rerun
 

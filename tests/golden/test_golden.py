@@ -18,10 +18,10 @@ from quadriga.agents.planner.checked_predictor import load_checked
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.arithmetic import arithmetic, differences
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command, Message, State
 from tests.golden import scenario
-from tests.golden.arithmetic import arithmetic, differences
 from tests.golden.compare import TOLERANCE, first_difference
 from tests.golden.renew import ARITHMETIC, note, write
 from tests.golden.rerun import recorded, rerun

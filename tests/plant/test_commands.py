@@ -56,7 +56,7 @@ def test_real_time_takes_older_ones_but_never_goes_back(box: CommandBox) -> None
         command(5, float("nan")),
         command(5, float("inf")),
         command(5)[:-1],
-        encode(Event(5, 5, "fall", "r1", "")),
+        encode(Event(5, 5, "fall", "r1", "", "fall")),
     ],
 )
 def test_what_is_malformed_is_dropped_and_counted(box: CommandBox, payload: bytes) -> None:

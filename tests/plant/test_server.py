@@ -11,6 +11,7 @@ import pytest
 
 from quadriga.plant.server import FALL_LINGER_MS, PlantServer
 from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import MAX_TEXT, decode
 from quadriga.shared.wire.messages import Command, Event, State
 from quadriga.shared.wire.topics import COMMAND, EVENT, STATE, TRUTH
@@ -54,7 +55,7 @@ def test_a_malformed_command_is_reported_in_few_words(body: dict[str, object]) -
 
 def test_a_detail_is_cut_to_what_an_event_may_hold() -> None:
     server, heard = served()
-    server.announce("fault", "r1", "x" * (MAX_TEXT + 1))
+    server.announce(codes.SILENT, "r1", "x" * (MAX_TEXT + 1))
     assert heard.events()[0].detail == "x" * (MAX_TEXT - 1) + "…"
 
 
@@ -62,8 +63,8 @@ def test_a_detail_is_cut_to_what_an_event_may_hold() -> None:
 def test_in_real_time_nothing_but_the_end_waits_for_who_does_not_listen(mode: str) -> None:
     server, heard = served(mode=mode)
     server.publish()
-    for kind in ("push", "fault", "fall", "stop"):
-        server.announce(kind, "", "")
+    for code in (codes.PUSH, codes.BACK, codes.FALL, codes.SIGNAL):
+        server.announce(code, "", "")
     droppable = {key: drop for key, drop, _ in heard.packets[:2]}
     assert droppable == {
         STATE.key("team", "r1"): mode == "realtime",
@@ -89,7 +90,7 @@ class BlindPlant:
     def step(self, commands: Mapping[str, Command]) -> list[Event]:
         self.tick += 1
         fell = self._falls and self.tick == 1
-        return [Event(1, 1_000_000, "fall", "r1", "")] if fell else []
+        return [Event(1, 1_000_000, "fall", "r1", "", "fall")] if fell else []
 
     def truth(self) -> None:
         return None
@@ -102,10 +103,11 @@ class BlindPlant:
 def test_any_plant_is_served(falls: bool) -> None:
     config, heard = configured(seconds=2.0), Listener()
     server = PlantServer(config, BlindPlant(falls=falls), cast("Bus", heard))
-    reason = ""
-    while not reason:
+    end = None
+    while end is None:
         server.publish()
-        reason = server.step({})
+        end = server.step({})
     assert {key for key, _, _ in heard.packets} <= {STATE.key("team", "r1"), EVENT.key("team")}
-    assert reason == ("fall of r1" if falls else "end of world.seconds")
+    fallen, over = (codes.FALLEN, "fall of r1"), (codes.TIME_OVER, "end of world.seconds")
+    assert end == (fallen if falls else over)
     assert server.plant.tick == (1 + FALL_LINGER_MS if falls else 2000)

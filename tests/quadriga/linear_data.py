@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from quadriga.identification import cache as keys
 from quadriga.identification.cache import data_path
 from quadriga.identification.dataset import Dataset, write_data
 from quadriga.shared.config.load import load
@@ -45,6 +43,4 @@ def dataset(samples: int = 700) -> Dataset:
 def put_data(folder: Path, patch: pytest.MonkeyPatch, found: Dataset | None = None) -> None:
     """Make `folder` the cache, with the linear team's data in it."""
     patch.setenv("XDG_CACHE_HOME", str(folder))
-    # An edit of the code in the middle of the tests must not change the keys.
-    patch.setattr(keys, "_code_digest", lru_cache(keys._code_digest))
     write_data(data_path(config_of()), found or dataset())

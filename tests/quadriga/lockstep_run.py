@@ -14,6 +14,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.robot.a1 import q_stand
+from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Command, Event
 from quadriga.sim_server.world.world import World
@@ -65,8 +66,9 @@ def packets(config: Config) -> Iterator[tuple[int, str, bytes]]:
             for key in ("team/r7/state", "team/r2/state"):
                 yield tick, key, encode(world.states()["r1"])
         if tick in (SILENT.start, SILENT.stop):
-            said = "answers again" if tick == SILENT.stop else "silent for 10 s: damped"
-            yield tick, "team/sim/event", encode(Event(tick, 10**6 * tick, "fault", "r2", said))
+            code = codes.BACK if tick == SILENT.stop else codes.SILENT
+            fault = Event(tick, 10**6 * tick, "fault", "r2", "in any words", code)
+            yield tick, "team/sim/event", encode(fault)
         if tick in SILENT:
             del commands["r2"]
         for event in world.step(commands):

@@ -12,6 +12,7 @@ import pytest
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.codes import SILENT
 from quadriga.shared.wire.messages import Command, Event, Truth
 from quadriga.shared.wire.topics import COMMAND, EVENT, TRUTH
 from quadriga.team.launch import Launch
@@ -37,10 +38,10 @@ def await_tick(bus: Bus, tick: int) -> int:
     return next(now for now in found if now >= tick)
 
 
-def await_event(bus: Bus, robot: str, text: str) -> int:
-    """When an event of a robot happens whose text holds `text`, in ticks."""
+def await_event(bus: Bus, robot: str, code: str) -> int:
+    """When an event of a robot of this code happens, in ticks."""
     events = (decode(payload, Event) for payload in payloads(bus, EVENT.key(TEAM)))
-    return next(event.tick for event in events if event.robot == robot and text in event.detail)
+    return next(event.tick for event in events if event.robot == robot and event.code == code)
 
 
 def freeze(running: Launch, bus: Bus, robot: str, tick: int, ticks: int) -> None:
@@ -52,7 +53,7 @@ def freeze(running: Launch, bus: Bus, robot: str, tick: int, ticks: int) -> None
     pids = running.pids
     await_tick(bus, tick)
     os.kill(pids[robot], signal.SIGSTOP)
-    now = await_tick(bus, await_event(bus, robot, "silent") + ticks)
+    now = await_tick(bus, await_event(bus, robot, SILENT) + ticks)
     os.kill(pids["sim"], signal.SIGSTOP)
     for key, payload in bus.drain():
         if key == TRUTH.key(TEAM):

@@ -19,7 +19,6 @@ from quadriga.agents.planner.checked_predictor import load_checked as load_predi
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.commands.parser import main
 from quadriga.identification.predictors import ensure_predictor
-from quadriga.plant.lockstep import ANSWERS
 from quadriga.replay.outcome import ReplayOutcome
 from quadriga.replay.recorded_predictor import copy_predictor
 from quadriga.replay.saved_qp import load as load_qp
@@ -29,6 +28,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import CENTRAL
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.wire.codes import BACK
 from quadriga.shared.wire.messages import (
     Command,
     Consumed,
@@ -274,7 +274,7 @@ def frozen_for_a_while(running: Launch, endpoint: str) -> None:
     bus.subscribe("team/**")
     try:
         freeze(running, bus, "r1", tick=500, ticks=300)
-        await_tick(bus, await_event(bus, "r1", ANSWERS) + 200)
+        await_tick(bus, await_event(bus, "r1", BACK) + 200)
         os.kill(running.pids["sim"], signal.SIGTERM)
     finally:
         bus.close()

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from importlib.metadata import version
 
-from quadriga.agents.predictor.store import versions
 from quadriga.experiments.plan import Group, with_seed
 from quadriga.experiments.predictors import Fitted
 from quadriga.experiments.trial.evaluate import evaluate
 from quadriga.experiments.trial.figures_of_merit import Figures
+from quadriga.experiments.trial.origin import code_and_libraries, is_same_code
 from quadriga.experiments.trial.outcome import TrialOutcome, build_outcome
-from quadriga.identification.cache import trial_code
 from quadriga.identification.fit_report import reason
 from quadriga.shared.config.reference_trace import trace_sha256
 from quadriga.shared.config.sections import Config
@@ -39,14 +36,6 @@ class TrialJob:
         return f"{self.group.name}-{self.seed}"
 
 
-@lru_cache(maxsize=1)
-def code_and_libraries() -> str:
-    """Code and libraries of this process, as every row names them."""
-    more = {name: version(name) for name in ("numba", "example-robot-data")}
-    found = {**versions(), **more, "code": trial_code()}
-    return ", ".join(f"{name} {version}" for name, version in found.items())
-
-
 def walk_trial(
     job: TrialJob, walk: Callable[[Config, Fitted], Figures] | None = None
 ) -> TrialOutcome:
@@ -58,7 +47,7 @@ def walk_trial(
         PredictorFileError: the predictor's file, or that of its data, is gone or damaged.
     """
     mine = code_and_libraries()
-    if mine != job.versions:
+    if not is_same_code(mine, job.versions):
         raise ProcessError(
             "a worker's code and libraries", mine, job.versions, "install the same version there"
         )
@@ -77,7 +66,7 @@ def walk_trial(
     except PredictorError as error:
         found = reason(error)
     shas = (config_sha256(config), job.fitted.sha256)
-    return build_outcome(job.group, job.seed, shas, found, monotonic() - begun, mine)
+    return build_outcome(job.group, job.seed, shas, found, monotonic() - begun, job.versions)
 
 
 def _evaluate(config: Config, fitted: Fitted) -> Figures:

@@ -8,11 +8,16 @@ from pathlib import Path
 from typing import Any, Final
 
 from quadriga.experiments.plan import Group
+from quadriga.experiments.trial.origin import is_same_code
 from quadriga.shared.errors import ConfigError
 
 FILE: Final = "campaign.json"
 FORMAT: Final = 1
 _REMEDY: Final = "trials of both must not be mixed: use a new folder"
+_UNKNOWN: Final = (
+    "this machine's last digits are others (arithmetic) and the sources have changed, so that "
+    "nobody can tell whether the code does the same: use a new folder"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,14 +94,16 @@ class Manifest:
         """Refuse to go on with other code or libraries.
 
         Raises:
-            ConfigError: they are not those that the folder's trials were walked with.
+            ConfigError: they are not those that the folder's trials were walked with, or nobody
+                can tell.
         """
-        if versions != self.versions:
+        same = is_same_code(versions, self.versions)
+        if not same:
             raise ConfigError(
                 f"--out {folder}",
                 f"trials with code and versions {self.versions}",
                 versions,
-                _REMEDY,
+                _UNKNOWN if same is None else _REMEDY,
             )
 
     def merged(self, more: Manifest, folder: Path) -> Manifest:
@@ -130,6 +137,7 @@ class Manifest:
             typed=(*self.typed, *(t for t in more.typed if t not in self.typed)),
             variants={**self.variants, **more.variants},
             groups=tuple(groups.values()),
+            versions=self.versions,  # of the same code by another name, perhaps
         )
 
 

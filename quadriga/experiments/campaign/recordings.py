@@ -10,11 +10,11 @@ from typing import Final
 from rich.console import Console
 
 from quadriga.experiments.campaign.configs import config_file
-from quadriga.experiments.campaign.job import code_and_libraries
 from quadriga.experiments.campaign.manifest import Manifest
 from quadriga.experiments.plan import Group, with_seed
 from quadriga.experiments.predictors import Fitted, prepare_predictors
 from quadriga.experiments.trial.figures_of_merit import Figures, compute_figures
+from quadriga.experiments.trial.origin import code_and_libraries
 from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.experiments.trial.over_bus import walk_over_bus
 from quadriga.recordings.summary import RECORDING

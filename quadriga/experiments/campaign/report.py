@@ -39,7 +39,7 @@ _NOTES: Final = {
     "errors": "Pairs that both walked to the end: RMSE, and control cost, over that of the "
     "baseline. Median, in brackets its exact 95 % interval (order statistics; six pairs at least).",
     "tracking": "Root mean square errors over the steady part, all robots; medians over the walks "
-    "to the end. z: over the terrain under the hips; z-felt: over the ground that the feet feel.",
+    "to the end. z: over the terrain under the hips, or over the stance feet as measured.",
 }
 
 

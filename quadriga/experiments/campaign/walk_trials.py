@@ -13,7 +13,7 @@ from typing import Final
 from rich.console import Console
 
 from quadriga.experiments.campaign.configs import write_configs
-from quadriga.experiments.campaign.job import TrialJob, code_and_libraries, walk_trial
+from quadriga.experiments.campaign.job import TrialJob, walk_trial
 from quadriga.experiments.campaign.ledger import Ledger, explain_write_errors, read_manifest
 from quadriga.experiments.campaign.manifest import FILE, GroupEntry, Manifest, SweepEntry
 from quadriga.experiments.campaign.progress import TrialProgress
@@ -21,6 +21,7 @@ from quadriga.experiments.campaign.recordings import record_trial, run_dir_of
 from quadriga.experiments.plan import CampaignPlan
 from quadriga.experiments.predictors import Fitted, prepare_predictors
 from quadriga.experiments.trial.figures_of_merit import Figures
+from quadriga.experiments.trial.origin import code_and_libraries
 from quadriga.experiments.trial.outcome import TrialOutcome, to_columns
 from quadriga.shared.config.reference_trace import trace_sha256
 from quadriga.shared.config.sections import Config
@@ -84,7 +85,7 @@ def walk_campaign(
                 seed,
                 plan.configs[group],
                 fitted[plan.configs[group]],
-                manifest.versions,
+                ledger.manifest.versions,
                 traces[group],
             )
             for group, seed in plan.trials()

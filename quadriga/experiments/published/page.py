@@ -43,8 +43,8 @@ walked to the end, with the exact interval by order statistics. Each p and inter
 single figure, not corrected for their number. Cost of transport, control cost and times of planning
 are medians over walks; times are of the machine that walked, under load. Errors are by the world's
 truth: z is the height over the terrain under the hips, and jumps where a hip passes the edge of a
-block; z-felt is that over the ground which the standing feet feel, by the robots' own word (a test
-holds it against the truth), and what they are asked to keep. A requirement is held
+block; z over the stance feet is as the robots measure it (a test holds it against the truth), and
+what they are asked to keep. A requirement is held
 against the figure itself unless it names a bound of its interval; behind *met* and *missed* stands
 how far the figure, or that bound, is from the limit. What an experiment was walked with is named by
 versions and by a digest of the code; walked with later code it may come to other figures.

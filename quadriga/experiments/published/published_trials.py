@@ -22,6 +22,7 @@ from quadriga.experiments.campaign.ledger import (
 from quadriga.experiments.campaign.manifest import FILE, Manifest
 from quadriga.experiments.published.experiment import Experiment, Part
 from quadriga.experiments.published.summarise_experiment import CampaignTrials
+from quadriga.experiments.trial.origin import is_same_code
 from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.atomic import write_bytes
@@ -78,7 +79,8 @@ def has_more_published(experiment: Experiment, campaigns: Campaigns, into: Path)
     """
     manifests = [read_published_manifest(experiment, part, into) for part in experiment.parts]
     old = {manifest.versions for manifest in manifests if manifest is not None}
-    if not old or old != {manifest.versions for manifest, _ in campaigns.values()}:
+    mine = {manifest.versions for manifest, _ in campaigns.values()}
+    if not old or not all(is_same_code(one, other) for one in old for other in mine):
         return False
     return _count(read_published_trials(experiment, into)) > _count(campaigns)
 

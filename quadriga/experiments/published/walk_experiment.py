@@ -7,7 +7,6 @@ from pathlib import Path
 
 from rich.console import Console
 
-from quadriga.experiments.campaign.job import code_and_libraries
 from quadriga.experiments.campaign.ledger import read_manifest
 from quadriga.experiments.campaign.manifest import FILE
 from quadriga.experiments.campaign.walk_trials import Workers, build_manifest, walk_campaign
@@ -16,6 +15,7 @@ from quadriga.experiments.plan import CampaignPlan, build_plan
 from quadriga.experiments.predictors import prepare_predictors
 from quadriga.experiments.published.experiment import Experiment, Part
 from quadriga.experiments.published.published_trials import read_published_manifest, unpack_trials
+from quadriga.experiments.trial.origin import code_and_libraries
 from quadriga.shared.errors import ConfigError
 
 PartPlan = tuple[Part, CampaignPlan]  # one of an experiment's campaigns, and its trials

@@ -11,10 +11,17 @@ from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces
 from quadriga.recordings.summary import FALL_HEIGHT, FALL_TILT, steady_from
-from quadriga.recordings.traces import ERRORS, FELT, Traces, felt_height_errors, in_force
+from quadriga.recordings.traces import (
+    ERRORS,
+    OVER_STANCE_FEET,
+    Traces,
+    in_force,
+    stance_height_errors,
+)
 from quadriga.recordings.truth import distance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import GRAVITY, N_LEGS, OUTPUTS, TOTAL_MASS, Array
+from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.messages import Measurement
 
 _SHORTEST: Final = 0.5  # m; over a shorter way a cost of transport is that of starting
@@ -52,7 +59,7 @@ class Figures:
         mean: of each output over the steady part, all robots; m, m/s, rad, rad/s.
         rmse: the same, of each of `quadriga.recordings.traces.ERRORS`.
         cost: mean of ‖y − y_des‖²_Q + ‖u − u_nominal‖²_R over samples of 10 ms and robots, where
-            the height is that over the felt ground.
+            the height is that over the stance feet.
         cost_outputs, cost_forces: its two parts.
         planner_ms_median, planner_ms_p99: time of one planning step, ms.
         solves: planning steps timed.
@@ -92,7 +99,7 @@ def compute_figures(walk: Walk) -> Figures:
     demanded[:, 0, [1, 2, 5, 0]] = reference
     y, error = truth.y[steady], (truth.y - demanded)[steady]
     squares = {name: _mean(error[..., i] ** 2) for i, name in enumerate(OUTPUTS)}
-    squares[FELT] = _height_squares(traces, begin, end)
+    squares[OVER_STANCE_FEET] = _height_squares(traces, begin, end)
     outputs = _output_cost(planner.Q, squares)
     forces = _mean(_force_cost(walk, begin, end, np.tile(planner.R, N_LEGS)))
     every = [status for found in traces.statuses.values() for status in found]
@@ -126,7 +133,7 @@ def _cost_of_transport(config: Config, work: float | None, way: float | None) ->
 def _find_falls(traces: Traces) -> dict[str, float]:
     """When each robot fell: what the world says, and what its truth shows, whichever is first."""
     truth = traces.truth
-    times = {e.robot: e.tick / 1000.0 for e in reversed(traces.events) if e.kind == "fall"}
+    times = {e.robot: e.tick / 1000.0 for e in reversed(traces.events) if e.code == FALL}
     down = (truth.tilt > FALL_TILT) | (truth.y[..., 0] < FALL_HEIGHT)
     for i in np.flatnonzero(down.any(axis=0)):
         robot, seen = traces.robots[i], float(truth.tick[down[:, i].argmax()]) / 1000.0
@@ -140,17 +147,17 @@ def _find_stops(traces: Traces, fallen: Mapping[str, float]) -> dict[str, str]:
 
 
 def _height_squares(traces: Traces, begin: int, end: int) -> float | None:
-    """Mean square of the height over the felt ground less the one asked for, m²."""
+    """Mean square of the height over the stance feet less the one asked for, m²."""
     parts = [np.zeros(0)]
     for robot in traces.robots:
-        tick, error = felt_height_errors(traces, robot)
+        tick, error = stance_height_errors(traces, robot)
         parts.append(error[_within(tick, begin, end)])
     return _mean(np.concatenate(parts) ** 2)
 
 
 def _output_cost(Q: Sequence[float], squares: Mapping[str, float | None]) -> float | None:
-    """∑ q e², with the height over the felt ground: what the planner can do something about."""
-    found = [squares[FELT], *(squares[name] for name in OUTPUTS[1:])]
+    """∑ q e², with the height over the stance feet: what the planner can do something about."""
+    found = [squares[OVER_STANCE_FEET], *(squares[name] for name in OUTPUTS[1:])]
     terms = [q * square for q, square in zip(Q, found, strict=True) if square is not None]
     return sum(terms) if len(terms) == len(OUTPUTS) else None
 

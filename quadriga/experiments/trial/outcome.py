@@ -24,13 +24,14 @@ class TrialOutcome:
         time_to_fall_s, first_to_fall: when, and which robot.
         stopped: why robots stopped that did not fall.
         rmse_z … rmse_wz: over the steady part, all robots; m, m/s, rad, rad/s. `rmse_z` is by the
-            world's truth over the terrain under the hips, `rmse_z_felt` over what the feet feel.
+            world's truth over the terrain under the hips, `rmse_z_over_stance_feet` as
+            the robots measure it.
         mean_vx: over the steady part, all robots, m/s.
         distance_m: length of the way, mean over the robots.
         energy_j: ∑ |τ q̇| dt of all motors over the whole walk.
         cost_of_transport: energy over weight (robots and payload) and distance.
         control_cost: mean of ‖y − y_des‖²_Q + ‖u − u_nominal‖²_R per sample and robot, the height
-            over the felt ground.
+            over the stance feet.
         planner_ms_p50, planner_ms_p99, solves: of planning steps, wall time.
         plans: how many plans had which status.
         seconds: world time walked.
@@ -51,7 +52,7 @@ class TrialOutcome:
     first_to_fall: str
     stopped: str
     rmse_z: float | None
-    rmse_z_felt: float | None
+    rmse_z_over_stance_feet: float | None
     rmse_vx: float | None
     rmse_vy: float | None
     rmse_roll: float | None

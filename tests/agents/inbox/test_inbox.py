@@ -225,13 +225,17 @@ def test_who_owes_what() -> None:
 
 def test_an_emergency_stop_and_the_end_are_never_held_back() -> None:
     box = arrivals()
-    feed(box, ("estop", EStop(5, 5, "tripped")), ("sim/event", Event(5, 5, "push", "r1", "")))
+    feed(
+        box, ("estop", EStop(5, 5, "tripped")), ("sim/event", Event(5, 5, "push", "r1", "", "push"))
+    )
     assert not box.ended
     estop = box.pop_inputs(standing(6), NOTHING).estop
     assert estop is not None
     assert estop.reason == "tripped"
     feed(
-        box, ("sim/event", Event(7, 7, "stop", "", "")), ("sim/event", Event(8, 8, "fall", "", ""))
+        box,
+        ("sim/event", Event(7, 7, "stop", "", "", "signal")),
+        ("sim/event", Event(8, 8, "fall", "", "", "fall")),
     )
     assert box.ended
 

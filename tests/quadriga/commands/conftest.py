@@ -29,12 +29,12 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with RecordingWriter(path, about, 16, periods=periods(CONFIG)) as writer:
         for entry in Recording(source).entries():
             writer.write(entry.key, entry.payload, entry.log_time_ns)
-        for tick, kind, robot, detail in (
-            (200, "push", "r1", "80 N"),
-            (500, "fall", "r2", "tilt 1.0 rad"),
-            (600, "stop", "", "fall of r2"),
+        for tick, kind, robot, detail, code in (
+            (200, "push", "r1", "80 N", "push"),
+            (500, "fall", "r2", "tilt 1.0 rad", "fall"),
+            (600, "stop", "", "fall of r2", "fallen"),
         ):
-            event = msg.Event(tick, tick * 1_000_000, kind, robot, detail)
+            event = msg.Event(tick, tick * 1_000_000, kind, robot, detail, code)
             writer.write("team/sim/event", encode(event), entry.log_time_ns)
     return path
 

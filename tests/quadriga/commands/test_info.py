@@ -72,7 +72,9 @@ def test_metadata_of_anybody_do_no_harm(
     path = tmp_path / "odd.mcap"
     told = build_metadata(CONFIG, "") | {"versions": versions, "topics": versions}
     with RecordingWriter(path, told, 16, periods=periods(CONFIG)) as writer:
-        writer.write("team/sim/event", encode(msg.Event(200, 0, "stop", "", "\x1b[2J\nend")), 0)
+        writer.write(
+            "team/sim/event", encode(msg.Event(200, 0, "stop", "", "\x1b[2J\nend", "time-over")), 0
+        )
     status, lines, err = run_command("info", path)
     assert (status, err) == (0, "")
     assert "\x1b" not in "".join(lines)

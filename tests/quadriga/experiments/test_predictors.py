@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from quadriga.experiments.campaign.job import TrialJob, code_and_libraries, walk_trial
+from quadriga.experiments.campaign.job import TrialJob, walk_trial
 from quadriga.experiments.plan import Group
 from quadriga.experiments.predictors import Fitted, prepare_predictors
+from quadriga.experiments.trial.origin import code_and_libraries
 from quadriga.identification.cache import predictor_path
 from quadriga.shared.config import reference_trace as trace
 from quadriga.shared.errors import PredictorFileError, ProcessError

@@ -12,7 +12,7 @@ from tests.quadriga.conftest import run_config, write
 
 SECONDS = 0.8
 LEFT_OUT = {"team/r1/state": 1, "team/some/body/else": 1}
-FALL = Event(700, 700_000_000, "fall", "r2", "tilt 1.10 rad")
+FALL = Event(700, 700_000_000, "fall", "r2", "tilt 1.10 rad", "fall")
 STATUS = Status(
     750,
     750_000_000,

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 from threading import Timer
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from quadriga.identification import cache
+from quadriga.identification.behaviour import behaviour
 from quadriga.identification.cache import await_predictor, data_key, predictor_key
+from quadriga.shared.config.renamed import RENAMED
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.runtime.places import cache_dir
@@ -68,14 +69,7 @@ def changed(config: Config, name: str) -> Config:
     return replace(config, **{section_name: replace(section, **{key: value})})
 
 
-@pytest.fixture
-def code_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Digest the code once: it does not change while a test runs."""
-    monkeypatch.setattr(cache, "_code_digest", lru_cache(cache._code_digest))
-
-
 @pytest.mark.parametrize("section", [item.name for item in fields(Config)])
-@pytest.mark.usefixtures("code_once")
 def test_keys_change_with_what_they_depend_on_and_with_that_alone(section: str) -> None:
     """Every key of the configuration in turn; a new key must find its place here."""
     config = Config()
@@ -89,13 +83,11 @@ def test_keys_change_with_what_they_depend_on_and_with_that_alone(section: str) 
         assert (predictor_key(other) != predictor) == (name in WALKED | FITTED), name
 
 
-@pytest.mark.usefixtures("code_once")
 def test_no_two_changes_share_a_key() -> None:
     keys = [predictor_key(changed(Config(), name)) for name in sorted(WALKED | FITTED)]
     assert len(set(keys)) == len(keys)
 
 
-@pytest.mark.usefixtures("code_once")
 def test_the_horizon_does_not_touch_data_of_a_given_length() -> None:
     """`identification.seconds` set: the same walks serve any horizon, each with its own fit."""
     config = Config()
@@ -105,34 +97,36 @@ def test_the_horizon_does_not_touch_data_of_a_given_length() -> None:
         assert predictor_key(changed(config, name)) != predictor_key(config)
 
 
-@pytest.mark.usefixtures("code_once")
 def test_the_same_configuration_has_the_same_key() -> None:
     assert data_key(Config()) == data_key(Config())
     assert predictor_key(Config()) == predictor_key(Config())
     assert data_key(Config()) != predictor_key(Config())
 
 
-def test_changed_code_changes_the_digest_and_a_changed_comment_does_not(tmp_path: Path) -> None:
-    package = SimpleNamespace(__file__=str(tmp_path / "__init__.py"))
-
-    def digest(text: str, name: str = "walk.py") -> str:
-        (tmp_path / name).write_text(text, encoding="utf-8")
-        return cache._code_digest(((package, ("*",)),))
-
-    first = digest("x = 1\n")
-    assert digest("# why\nx  =  1\n") == first
-    assert digest("x = 2\n") != first
-    assert digest("x = 1\n") == first
-    assert digest("not code", "notes.txt") == first
-    assert digest("y = 1\n", "other.py") != first
+def test_new_names_of_keys_change_no_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = data_key(Config()), predictor_key(Config())
+    assert RENAMED
+    monkeypatch.setattr(cache, "with_first_names", lambda sections: sections)
+    assert data_key(Config()) != before[0], "with today's names it would"
+    monkeypatch.undo()
+    assert (data_key(Config()), predictor_key(Config())) == before
 
 
-@pytest.mark.parametrize("patterns", cache._CODE + cache._FIT_CODE, ids=str)
-def test_all_code_that_is_named_exists(patterns: tuple[Any, tuple[str, ...]]) -> None:
-    package, names = patterns
-    for name in names:
-        found = list(Path(package.__file__).parent.glob(name))
-        assert any(path.suffix == ".py" for path in found), name
+@pytest.mark.parametrize(("part", "predictor_alone"), [("collection", False), ("fits", True)])
+def test_keys_change_with_what_the_code_does(
+    part: str, predictor_alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data, predictor = data_key(Config()), predictor_key(Config())
+    asked: list[str] = []
+
+    def other(module: str, samples: Any) -> str:
+        asked.append(module)
+        return "other" if module.endswith(part) else behaviour(module, samples)
+
+    monkeypatch.setattr(cache, "behaviour", other)
+    assert (data_key(Config()) == data) == predictor_alone
+    assert predictor_key(Config()) != predictor
+    assert all(find_spec(name) for name in asked)
 
 
 def test_the_cache_is_the_users(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

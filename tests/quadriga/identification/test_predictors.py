@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,6 @@ from rich.console import Console
 from quadriga.agents.predictor.episode import SIGNALS
 from quadriga.agents.predictor.hankel import required_samples
 from quadriga.agents.predictor.store import read
-from quadriga.identification import cache as keys
 from quadriga.identification import predictors
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.dataset import Dataset, check_excitation, read_data, write_data
@@ -51,7 +49,6 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(folder))
         # An edit of the code in the middle of the tests must not change the keys.
-        patch.setattr(keys, "_code_digest", lru_cache(keys._code_digest))
         ensure_predictor(TINY, silent())
         yield folder
 

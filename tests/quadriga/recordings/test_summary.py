@@ -116,8 +116,8 @@ def test_on_uneven_ground_the_estimated_height_is_compared_with_nothing(
     summary = summarise(write_run(rough))
     assert summary["estimator_rmse"]["z"] is None
     assert summary["estimator_rmse"]["vx"] == pytest.approx(ESTIMATOR_ERROR[1], abs=APPROX)
-    felt = (0.004**2 / 2 + ESTIMATOR_ERROR[0] ** 2) ** 0.5
-    assert summary["rmse"]["z-felt"] == pytest.approx(felt, rel=0.05)
+    measured = (0.004**2 / 2 + ESTIMATOR_ERROR[0] ** 2) ** 0.5
+    assert summary["rmse"]["z-over-stance-feet"] == pytest.approx(measured, rel=0.05)
     assert "z –" in table(summary)
 
 
@@ -206,13 +206,13 @@ def test_a_fall_is_seen_without_being_told(write_run: WriteRun) -> None:
 
 
 def test_a_fall_is_believed_when_told(write_run: WriteRun) -> None:
-    fall = msg.Event(999, 999_000_000, "fall", "r1", "tilt 1.2 rad")
-    stop = msg.Event(999, 999_000_000, "stop", "", "robots fell")
+    fall = msg.Event(999, 999_000_000, "fall", "r1", "tilt 1.2 rad", "fall")
+    stop = msg.Event(999, 999_000_000, "stop", "", "robots fell", "fallen")
     events = [("team/sim/event", event) for event in (fall, stop)]
     summary = summarise(write_run(run_config(2, 1.0), extra=events))
     assert summary["fell"] is True
     assert summary["fallen"] == ["r1"]
-    assert summary["end"] == "robots fell"
+    assert (summary["end"], summary["end_code"]) == ("robots fell", "fallen")
     assert "robots fell" in table(summary)
     assert summary["events"][:1] == [
         {"tick": 999, "kind": "fall", "robot": "r1", "detail": "tilt 1.2 rad"}

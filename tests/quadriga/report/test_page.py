@@ -35,7 +35,7 @@ def outline(folder: Path) -> Outline:
 def fallen(tick: int, robot: str = "r2") -> Iterator[Packet]:
     """What is told of a fall."""
     head = (tick, tick * 1_000_000)
-    yield "team/sim/event", msg.Event(*head, "fall", robot, "tilt 1.00 rad")
+    yield "team/sim/event", msg.Event(*head, "fall", robot, "tilt 1.00 rad", "fall")
     nothing = np.zeros(0)
     yield (
         f"team/{robot}/status",
@@ -184,7 +184,7 @@ def test_what_is_not_a_message_does_no_harm(write_run: WriteRun) -> None:
     short = np.zeros((1, 12)), np.zeros((1, 6))
     odd: list[Packet] = [
         ("team/r1/plan", msg.Plan(640, 0, 16, *short, "<b>&", {"r9": 3}, 0)),
-        ("team/sim/event", msg.Event(700, 0, "fault", "r9", "<script>alert(1)</script>")),
+        ("team/sim/event", msg.Event(700, 0, "fault", "r9", "<script>alert(1)</script>", "")),
         ("team/r1/measurement", msg.Measurement(
             forged, 0, np.zeros(12), np.full(6, 1e30), np.ones(4))),
         ("team/r1/measurement", msg.Measurement(330, 0, np.zeros(12), np.zeros(6), np.ones(4))),

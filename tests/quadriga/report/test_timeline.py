@@ -36,8 +36,8 @@ def test_spells_of_plans_are_one_entry_each(write_run: WriteRun) -> None:
 
     found = [entry for entry in entries(write_run, change) if entry.kind == "plan"]
     assert found == [
-        TimelineEntry(480, 600, "r1", "plan", "faded, 3 plans"),
-        TimelineEntry(800, 840, "r1", "plan", "nominal:x, 1 plan"),
+        TimelineEntry(480, 600, "r1", "plan", "faded, 3 plans", "faded"),
+        TimelineEntry(800, 840, "r1", "plan", "nominal:x, 1 plan", "nominal"),
     ]
 
 
@@ -50,7 +50,8 @@ def test_a_stop_is_told_with_its_reason_and_asks_for_an_explanation(write_run: W
 
     found = entries(write_run, change)
     (stop,) = [entry for entry in found if entry.trouble]
-    assert stop == TimelineEntry(800, 800, "r1", "stopped", "reference-lost (stopping)")
+    text, code = "reference-lost (stopping)", "reference-lost"
+    assert stop == TimelineEntry(800, 800, "r1", "stopped", text, code)
     assert TimelineEntry(1000, 1000, "r1", "mode", "stand") in found
 
 

@@ -153,7 +153,7 @@ def test_a_gap_in_the_sensors_and_a_push_are_signs(write_run: WriteRun) -> None:
     def change(key: str, message: Message) -> Message | None:
         return None if key == "team/r1/state" and 1000 <= message.tick < 1050 else message
 
-    push = [("team/sim/event", msg.Event(800, 0, "push", "r2", "90 N"))]
+    push = [("team/sim/event", msg.Event(800, 0, "push", "r2", "90 N", "push"))]
     trouble = find_only(write_short(write_run, change, extra=[*push, *fallen(FALL)]))
     gap = "gap: 50 messages of r1/state are missing"
     assert (1000, gap) in [(sign.tick, sign.text) for sign in signs(trouble, "r1")]

@@ -83,7 +83,7 @@ def test_a_walk_ends_at_the_same_tick_for_who_is_behind(late: bool) -> None:
             while not late and heard < tick:
                 heard, over = _next_tick(operator, heard)
                 assert not over
-        event(encode(Event(800, 800 * 10**6, "stop", "", "end of world.seconds")))
+        event(encode(Event(800, 800 * 10**6, "stop", "", "end of world.seconds", "time-over")))
         if late:
             sim.close()  # it leaves once all has arrived
         over = False
@@ -98,7 +98,7 @@ def said_stop(reason: str, tick: int) -> EStop:
     with Bus.open(config.bus, "team", SIM) as sim, Bus.open(config.bus, "team", "r1") as r1:
         r1.subscribe(ESTOP.key("team"))
         put, over = sim.publisher(TRUTH.key("team")), Flag()
-        told = encode(Event(tick, 0, "", "", ""))
+        told = encode(Event(tick, 0, "", "", "", ""))
 
         def tell() -> None:
             while not over.wait(0.02):

@@ -9,17 +9,19 @@ from rich.console import Console
 from quadriga.commands.parser import main
 from quadriga.recordings.summary import SUMMARY
 from quadriga.shared.errors import ProcessError
+from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Event, Status
 from quadriga.team.run_report import report_folder
 from tests.quadriga.conftest import WriteRun, run_config
 
 
-def event(kind: str, robot: str, detail: str) -> list[tuple[str, Event]]:
-    return [("team/sim/event", Event(1000, 10**9, kind, robot, detail))]
+def event(code: str, robot: str, detail: str) -> list[tuple[str, Event]]:
+    kind = codes.EVENTS[code].kind
+    return [("team/sim/event", Event(1000, 10**9, kind, robot, detail, code))]
 
 
 def test_a_finished_walk_is_summed_up_and_drawn(write_run: WriteRun) -> None:
-    folder = write_run(run_config(1, 2.0), extra=event("stop", "", "end of world.seconds"))
+    folder = write_run(run_config(1, 2.0), extra=event(codes.TIME_OVER, "", "end of world.seconds"))
     summary = report_folder(folder, pictures=False, console=Console(quiet=True))
     assert not summary["fell"]
     assert (folder / SUMMARY).is_file()
@@ -37,7 +39,7 @@ def test_a_walk_that_was_cut_short_is_a_failure_but_summed_up(write_run: WriteRu
 def test_a_file_that_cannot_be_written_costs_one_line(
     write_run: WriteRun, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = write_run(run_config(1, 2.0), extra=event("stop", "", "end of world.seconds"))
+    folder = write_run(run_config(1, 2.0), extra=event(codes.TIME_OVER, "", "end of world.seconds"))
     (folder / "summary.json").mkdir()
     assert main(["report", str(folder), "--no-render"]) == 2
     said = capsys.readouterr().err
@@ -48,7 +50,7 @@ def test_a_file_that_cannot_be_written_costs_one_line(
 def test_the_exit_status_of_a_report_tells_of_a_fall(
     write_run: WriteRun, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    fallen = event("fall", "r1", "tilt") + event("stop", "", "fall of r1")
+    fallen = event(codes.FALL, "r1", "tilt") + event(codes.FALLEN, "", "fall of r1")
     folder = write_run(run_config(1, 2.0), extra=fallen)
     assert main(["report", str(folder), "--no-render"]) == 1
     out = capsys.readouterr().out
@@ -61,7 +63,7 @@ def test_a_robot_that_stopped_on_its_own_is_a_failure_without_a_fall(
 ) -> None:
     nothing = np.zeros(0)
     lost = Status(1999, 1999 * 10**6, "stand", "peer-lost:r2", "kalman", {}, {}, nothing, nothing)
-    end = event("stop", "", "end of world.seconds")
+    end = event(codes.TIME_OVER, "", "end of world.seconds")
     folder = write_run(run_config(1, 2.0), extra=[("team/r1/status", lost), *end])
     assert main(["report", str(folder), "--no-render"]) == 1
     assert "peer-lost:r2" in capsys.readouterr().out

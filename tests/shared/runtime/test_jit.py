@@ -9,13 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from quadriga.shared.runtime import jit, places
+from quadriga.shared import errors
+from quadriga.shared.runtime import imports, jit, places
 
 FILES = {
     "quadriga/__init__.py": "",
     "quadriga/shared/__init__.py": "",
     "quadriga/shared/runtime/__init__.py": "",
     "quadriga/shared/runtime/jit.py": Path(jit.__file__).read_text(encoding="utf-8"),
+    "quadriga/shared/errors.py": Path(errors.__file__).read_text(encoding="utf-8"),
+    "quadriga/shared/runtime/imports.py": Path(imports.__file__).read_text(encoding="utf-8"),
     "quadriga/shared/runtime/places.py": Path(places.__file__).read_text(encoding="utf-8"),
     "quadriga/shared/numbers.py": "OFFSET = 0.5\n",
     "quadriga/agents/__init__.py": "",

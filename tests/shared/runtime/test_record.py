@@ -30,5 +30,5 @@ def test_a_record_is_a_data_class_with_slots() -> None:
 def test_the_type_checker_sees_a_frozen_class() -> None:
     pair = Pair(1)
     pair.first = 5  # type: ignore[misc]  # unused, and so an error of the type checker, if not
-    event = Event(0, 0, "push", "r1", "")
+    event = Event(0, 0, "push", "r1", "", "push")
     event.robot = "r2"  # type: ignore[misc]

@@ -32,7 +32,7 @@ def test_noise_is_never_an_error(payload: bytes) -> None:
 
 
 def test_a_cut_message_has_no_envelope() -> None:
-    whole = encode(Event(70_000, 70_000_000_000, "fall", "r1", ""))
+    whole = encode(Event(70_000, 70_000_000_000, "fall", "r1", "", "fall"))
     for length in range(len(whole) - 1):
         found = envelope(whole[:length])
         assert found in (None, (70_000, 70_000_000_000))

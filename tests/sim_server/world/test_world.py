@@ -174,8 +174,8 @@ def test_a_weak_motor_gives_its_share_of_the_torque_from_its_time_on() -> None:
         np.testing.assert_array_equal(tau["r1"], limited)
         limited[8] *= 0.4 if tick >= 10 else 1.0
         np.testing.assert_array_equal(tau["r2"], limited)
-        faults = [(e.kind, e.robot, e.detail) for e in events if e.kind == "fault"]
-        told = [("fault", "r2", "RL_calf gives 40 % of its torque")] if tick == 10 else []
+        faults = [(e.code, e.robot, e.detail) for e in events if e.kind == "fault"]
+        told = [("weak-motor", "r2", "RL_calf gives 40 % of its torque")] if tick == 10 else []
         assert faults == told
         assert (encode(world.truth()) == encode(sound.truth())) == (tick < 10)
 

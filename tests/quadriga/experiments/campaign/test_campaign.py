@@ -12,10 +12,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from quadriga.commands.parser import main
-from quadriga.experiments.campaign.job import TrialJob, code_and_libraries, walk_trial
+from quadriga.experiments.campaign.job import TrialJob, walk_trial
 from quadriga.experiments.campaign.ledger import read_manifest, read_rows
 from quadriga.experiments.plan import Group
 from quadriga.experiments.predictors import Fitted
+from quadriga.experiments.trial.origin import code_and_libraries
 from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ProcessError

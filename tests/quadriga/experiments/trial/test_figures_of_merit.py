@@ -34,10 +34,10 @@ def test_tracking_errors_are_those_of_the_summary(walk: Walk) -> None:
     assert not found.stopped
 
 
-def test_the_felt_height_is_what_the_robots_say(walk: Walk) -> None:
+def test_the_height_over_the_stance_feet_is_what_the_robots_measure(walk: Walk) -> None:
     """A sine of whole periods and the estimator's error, over the steady part of all robots."""
     expected = (0.004**2 / 2 + ESTIMATOR_ERROR[0] ** 2) ** 0.5
-    assert compute_figures(walk).rmse["z-felt"] == pytest.approx(expected, rel=0.01)
+    assert compute_figures(walk).rmse["z-over-stance-feet"] == pytest.approx(expected, rel=0.01)
     found = dict(walk.traces.measurements)
     begun, off = steady_from(walk.traces), 0.01
     for name, trace in found.items():
@@ -48,7 +48,7 @@ def test_the_felt_height_is_what_the_robots_say(walk: Walk) -> None:
         off = 0.0  # of all but the first
     n = walk.traces.config.team.robots
     moved = compute_figures(replace(walk, traces=replace(walk.traces, measurements=found)))
-    assert moved.rmse["z-felt"] == pytest.approx(0.01 / n**0.5, rel=1e-6)
+    assert moved.rmse["z-over-stance-feet"] == pytest.approx(0.01 / n**0.5, rel=1e-6)
 
 
 def test_the_cost_is_the_weighted_mean_of_the_known_errors(walk: Walk) -> None:
@@ -84,7 +84,7 @@ def test_forces_cost_what_they_deviate(walk: Walk) -> None:
 
 
 def fallen_at(traces: Traces, robot: str, tick: int) -> Traces:
-    event = Event(tick, tick * 1_000_000, "fall", robot, "")
+    event = Event(tick, tick * 1_000_000, "fall", robot, "", "fall")
     return replace(traces, events=(*traces.events, event))
 
 

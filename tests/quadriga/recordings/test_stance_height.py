@@ -1,4 +1,4 @@
-"""The height over the felt ground, by the robots' own word, against the world's truth."""
+"""The height over the stance feet, as the robots measure it, against the world's truth."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ CONFIG = load(
 HEIGHT, FILTER_MS = CONFIG.reference.height, CONFIG.controller.ground_filter_ms
 
 
-def test_errors_of_the_felt_height_are_errors_of_the_true_one() -> None:
+def test_errors_of_the_measured_height_are_errors_of_the_true_one() -> None:
     """True: the trunk over the mean of what lies under loaded feet, filtered alike."""
     rollout = Rollout(CONFIG, None, lambda t: reference_at(CONFIG, t) if t % 100 == 0 else None)
     world = rollout.world
     feet = np.array(world._feet).reshape(2, 4)
-    level, felt, true = np.zeros(2), [], []
+    level, measured, true = np.zeros(2), [], []
     for tick in rollout.ticks(4000):
         truth = world.truth()
         ground = world.physics.geom_xpos[feet, 2] - FOOT_RADIUS
@@ -36,9 +36,9 @@ def test_errors_of_the_felt_height_are_errors_of_the_true_one() -> None:
             level[i] += (ground[i, loaded[i]].mean() - level[i]) / FILTER_MS
         samples = [out.measurement for out in tick.outputs.values()]
         if tick.tick > 1500 and tick.tick % 10 == 0:
-            felt.append([sample.y[0] for sample in samples if sample is not None])
+            measured.append([sample.y[0] for sample in samples if sample is not None])
             true.append(truth.base_pos[:, 2] - level)
-    errors = np.array(felt) - HEIGHT, np.array(true) - HEIGHT
+    errors = np.array(measured) - HEIGHT, np.array(true) - HEIGHT
     own, real = (float(np.sqrt(np.mean(error**2))) for error in errors)
     assert own > 0.003, "nothing to be measured"
     assert 0.75 < own / real < 1.25

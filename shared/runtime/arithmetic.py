@@ -12,10 +12,13 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+import json
 import math
 import platform
 import struct
+from functools import lru_cache
 from pathlib import Path
+from typing import Final
 
 import llvmlite.binding
 import numba
@@ -23,8 +26,8 @@ import numpy as np
 import scipy.linalg  # noqa: F401  (loads the BLAS that is asked about)
 from threadpoolctl import threadpool_info
 
-TOLD = ("cpu", "numba's processor")  # whom to ask about it; they decide on no bit themselves
-_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "pin", "libpinocchio", "daqp")
+_DECIDES_NOTHING: Final = ("cpu", "numba's processor")  # for a reader: they decide on no bit
+_PACKAGES: Final = ("numpy", "scipy", "numba", "llvmlite", "pin", "libpinocchio", "daqp")
 
 
 def arithmetic() -> dict[str, str]:
@@ -52,8 +55,16 @@ def differences(here: dict[str, str], there: dict[str, str]) -> list[str]:
     return [
         f"{name} {here.get(name, 'unknown')!r} instead of {there.get(name, 'unknown')!r}"
         for name in sorted(here.keys() | there.keys())
-        if name not in TOLD and here.get(name) != there.get(name)
+        if name not in _DECIDES_NOTHING and here.get(name) != there.get(name)
     ]
+
+
+@lru_cache(maxsize=1)
+def arithmetic_digest() -> str:
+    """Digest of what decides on the last bits here: equal digests, equal bytes."""
+    deciding = {k: v for k, v in arithmetic().items() if k not in _DECIDES_NOTHING}
+    text = json.dumps([deciding, bool(numba.config.DISABLE_JIT)], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
 def _libm() -> str:

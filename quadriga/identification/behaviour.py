@@ -1,0 +1,105 @@
+"""What code does, as a digest: of the numbers that it gives on a fixed set of samples.
+
+Names, comments and layout change no digest; a gain, a constant or the order of a sum does. Who
+asks need not run the samples: their digest is kept in the user's cache, by all it depends on.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+import platform
+from collections.abc import Callable, Iterable
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from quadriga.shared.robot.a1 import Array
+from quadriga.shared.runtime.arithmetic import arithmetic_digest
+from quadriga.shared.runtime.imports import followed_files
+from quadriga.shared.runtime.places import SOURCE, cache_dir
+
+_LIBRARIES: Final = (
+    "mujoco",
+    "pin",
+    "numpy",
+    "scipy",
+    "numba",
+    "daqp",
+    "osqp",
+    "example-robot-data",
+)
+_KEPT: Final = 20  # digests of earlier code in the cache: a few for who goes back and forth
+
+
+@cache
+def behaviour(module: str, samples: Callable[[], Iterable[Array]]) -> str:
+    """Digest of the numbers that samples give; 16 hexadecimal digits.
+
+    They are run only if no process of this machine has run them with this code, these libraries
+    and this arithmetic before; a process that finds another at it waits.
+
+    Args:
+        module: that `samples` runs; all it imports is the code that the digest depends on.
+        samples: gives arrays of any shape, the same ones each time.
+
+    Raises:
+        QuadrigaError: there is no such module.
+    """
+    folder = cache_dir() / "behaviour"
+    kept = folder / f"{module.rpartition('.')[2]}-{_origin(module)}"
+    if kept.is_file():
+        return kept.read_text(encoding="ascii")
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / ".lock").open("wb") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not kept.is_file():
+            partial = kept.with_name(f"{kept.name}.{os.getpid()}.partial")
+            partial.write_text(digest_of(samples()), encoding="ascii")
+            partial.replace(kept)
+            _forget(kept)
+    return kept.read_text(encoding="ascii")
+
+
+def digest_of(arrays: Iterable[Array]) -> str:
+    """Digest of numbers and of nothing else; 16 hexadecimal digits."""
+    found = hashlib.sha256()
+    for array in arrays:
+        found.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
+    return found.hexdigest()[:16]
+
+
+def numbers(*values: float | None) -> Array:
+    """Numbers as an array, NaN for those that there are not."""
+    return np.array([np.nan if value is None else value for value in values], dtype=float)
+
+
+@cache
+def sources_digest(module: str) -> str:
+    """Digest of the text of a module and of all that it imports; 16 hexadecimal digits.
+
+    Raises:
+        QuadrigaError: there is no such module.
+    """
+    found = hashlib.sha256()
+    for path in followed_files(SOURCE, [module]):
+        found.update(f"\0{path.relative_to(SOURCE)}\0".encode() + path.read_bytes())
+    return found.hexdigest()[:16]
+
+
+def _origin(module: str) -> str:
+    """Digest of all that numbers depend on: sources, libraries, and the machine's arithmetic."""
+    versions = [platform.python_version(), *(f"{name} {version(name)}" for name in _LIBRARIES)]
+    text = f"{sources_digest(module)} {arithmetic_digest()} {versions}"
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _forget(kept: Path) -> None:
+    stem = kept.name.rpartition("-")[0]
+    found = sorted(kept.parent.glob(f"{stem}-*"), key=lambda path: path.stat().st_mtime_ns)
+    for old in found[:-_KEPT]:
+        old.unlink(missing_ok=True)

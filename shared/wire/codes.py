@@ -1,0 +1,68 @@
+"""Codes that programs decide by; the prose beside them is for people alone.
+
+An event carries one of `EVENTS`. Statuses of plans and reasons to stop are written `code` or
+`code:detail` (`solved`, `nominal:infeasible`, `estop:dog on the track`): `code_of` takes the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+
+class EventCode(NamedTuple):
+    """What an event's code stands for: the kind of event, and what has happened."""
+
+    kind: str
+    meaning: str
+
+
+START: Final = "start"
+TERRAIN: Final = "terrain"
+PAYLOAD: Final = "payload"
+PUSH: Final = "push"
+FALL: Final = "fall"
+WEAK_MOTOR: Final = "weak-motor"
+SILENT: Final = "silent"
+GONE: Final = "gone"
+BACK: Final = "back"
+MALFORMED: Final = "malformed"
+TIME_OVER: Final = "time-over"
+FALLEN: Final = "fallen"
+SIGNAL: Final = "signal"
+
+EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
+    {
+        START: EventCode("start", "the walk begins"),
+        TERRAIN: EventCode("terrain", "what the ground is"),
+        PAYLOAD: EventCode("payload", "a robot carries a load"),
+        PUSH: EventCode("push", "a push of a robot begins"),
+        FALL: EventCode("fall", "a robot fell"),
+        WEAK_MOTOR: EventCode("fault", "a motor gives less torque from now on"),
+        SILENT: EventCode("fault", "a robot did not answer in time: the world waits no longer"),
+        GONE: EventCode("fault", "a robot left the bus: the world waits no longer"),
+        BACK: EventCode("fault", "a robot answers again: the world waits for it"),
+        MALFORMED: EventCode("fault", "commands did not decode"),
+        TIME_OVER: EventCode("stop", "the walk is over: world.seconds have passed"),
+        FALLEN: EventCode("stop", "the walk is over: a robot fell"),
+        SIGNAL: EventCode("stop", "the walk is over: the world was told to stop"),
+    }
+)
+# How details of events without a code end or begin (schema 1), by kind; the last one fits all.
+_WORDS: Final = {
+    "fault": (("of its torque", WEAK_MOTOR), ("answers again", BACK), ("dropped", MALFORMED),
+              ("gone", GONE), ("", SILENT)),
+    "stop": (("signal", SIGNAL), ("fall of", FALLEN), ("", TIME_OVER)),
+}  # fmt: skip
+
+
+def code_of(text: str) -> str:
+    """The code of a plan's status or of a reason to stop; "" of none."""
+    return text.partition(":")[0]
+
+
+def code_of_schema_1(kind: str, detail: str) -> str:
+    """The code of an event that was recorded when events had none."""
+    words = _WORDS.get(kind, (("", kind),))
+    return next(code for word, code in words if word in detail)
