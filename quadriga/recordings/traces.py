@@ -27,7 +27,7 @@ from quadriga.shared.wire.messages import (
     Status,
     Truth,
 )
-from quadriga.shared.wire.topics import COMMAND, INPUTS, STATE, topic_of
+from quadriga.shared.wire.topics import COMMAND, INPUTS, STATE, Topic, topic_of
 
 # Up to 1 kHz each: only their ticks are read.
 _TIMED_ONLY: Final = (STATE.name, COMMAND.name, INPUTS.name)
@@ -109,12 +109,8 @@ def read_traces(recording: Recording, names: Container[str] | None = None) -> Tr
             invalid[key] += 1
             continue
         if topic.name not in _TIMED_ONLY:
-            try:
-                message = decode(payload, topic.type)
-            except MessageError:
-                invalid[key] += 1
-                continue
-            if isinstance(message, Truth) and not _fits(message, config):
+            message = _decode_valid(payload, topic, config)
+            if message is None:
                 invalid[key] += 1
                 continue
             decoded[topic.type, robot].append(message)
@@ -142,6 +138,15 @@ def read_traces(recording: Recording, names: Container[str] | None = None) -> Tr
         events=tuple(decoded[Event, ""]),
         world=tuple(decoded[Status, SIM]),
     )
+
+
+def _decode_valid(payload: bytes, topic: Topic, config: Config) -> Message | None:
+    """The message, None if its bytes are none or do not fit the team."""
+    try:
+        message = decode(payload, topic.type)
+    except MessageError:
+        return None
+    return None if isinstance(message, Truth) and not _fits(message, config) else message
 
 
 def in_force(references: tuple[Ticks, Array], tick: Ticks) -> Array:
