@@ -19,6 +19,11 @@ RENAMED: Final[Mapping[str, str]] = MappingProxyType(
 _FIRST: Final = {new: old for old, new in RENAMED.items()}
 
 
+def current_name(name: str) -> str:
+    """What `section.key`, of whatever version, is called today."""
+    return RENAMED.get(name, name)
+
+
 def with_current_names(sections: Mapping[str, Any]) -> dict[str, Any]:
     """Values by section and key as another version wrote them, under today's names."""
     return {section: _rename(section, keys, RENAMED) for section, keys in sections.items()}

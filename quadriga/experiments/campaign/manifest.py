@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from quadriga.experiments.plan import Group
 from quadriga.experiments.trial.origin import is_same_code
+from quadriga.shared.config.renamed import current_name
 from quadriga.shared.errors import ConfigError
 
 FILE: Final = "campaign.json"
@@ -71,7 +72,7 @@ class Manifest:
 
     @classmethod
     def from_dict(cls, body: Mapping[str, Any]) -> Manifest:
-        """The inverse of `asdict`, after JSON.
+        """The inverse of `asdict`, after JSON; keys of an earlier version have today's names.
 
         Raises:
             ValueError, KeyError, TypeError: it is something else.
@@ -82,8 +83,15 @@ class Manifest:
             GroupEntry(**{**g, "swept": tuple(g["swept"]), "seeds": tuple(g["seeds"])})
             for g in body["groups"]
         )
-        sweeps = tuple(SweepEntry(**sweep) for sweep in body["sweeps"])
-        return cls(**{**body, "typed": tuple(body["typed"]), "groups": groups, "sweeps": sweeps})
+        sweeps = tuple(
+            SweepEntry(**{**sweep, "key": current_name(sweep["key"])}) for sweep in body["sweeps"]
+        )
+        variants = {
+            variant: {current_name(key): value for key, value in dict(keys).items()}
+            for variant, keys in dict(body["variants"]).items()
+        }
+        read = {"groups": groups, "sweeps": sweeps, "variants": variants}
+        return cls(**{**body, "typed": tuple(body["typed"]), **read})
 
     @property
     def trials(self) -> int:

@@ -12,7 +12,12 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.shared.config.load import build, load
-from quadriga.shared.config.renamed import RENAMED, with_current_names, with_first_names
+from quadriga.shared.config.renamed import (
+    RENAMED,
+    current_name,
+    with_current_names,
+    with_first_names,
+)
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import ConfigError, RecordingError
@@ -33,6 +38,7 @@ FIRST_NAMES_SHA256 = "1ef0cbe238d0ab9e18d4bba4d9a55d45aabc813083288aed69ec7899b1
 def test_a_new_name_is_a_key_and_an_old_one_is_none(old: str, new: str) -> None:
     assert new in KEYS
     assert old not in KEYS
+    assert current_name(old) == current_name(new) == new
 
 
 def test_no_two_keys_had_one_name() -> None:

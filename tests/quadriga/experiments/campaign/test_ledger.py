@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.experiments.campaign.ledger import ROWS, Ledger, read_manifest, read_rows
+from quadriga.experiments.campaign.manifest import Manifest
 from quadriga.experiments.plan import Group
 from quadriga.experiments.trial.outcome import build_outcome, column_names, from_cells, to_cells
 from quadriga.shared.errors import ConfigError
@@ -133,3 +135,11 @@ def test_a_folder_of_something_else_is_no_campaign(tmp_path: Path) -> None:
         (tmp_path / "campaign.json").write_text(text, encoding="utf-8")
         with pytest.raises(ConfigError, match=r"campaign\.json"):
             read_manifest(tmp_path)
+
+
+def test_keys_of_an_earlier_version_are_read_under_todays_names() -> None:
+    old = {**asdict(manifest("none")), "variants": {"soft": {"controller.leash": 0.1}}}
+    old["sweeps"] = [{"key": "controller.mu_least", "name": "mu"}]
+    read = Manifest.from_dict(json.loads(json.dumps(old)))
+    assert read.variants == {"soft": {"controller.position_error_limit": 0.1}}
+    assert [sweep.key for sweep in read.sweeps] == ["controller.mu_min"]
