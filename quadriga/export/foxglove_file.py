@@ -14,7 +14,7 @@ from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateCha
 
 from quadriga.export.columns import TickReached
 from quadriga.export.layout import Layout
-from quadriga.export.protobuf import ProtobufType, type_of
+from quadriga.export.protobuf import ProtobufType, build_type
 from quadriga.export.scene import Scene, path_ticks, stamp_of
 from quadriga.export.source import ExportedMessage, Source
 from quadriga.export.tracking import NAMES, Tracking
@@ -82,7 +82,7 @@ class _Scalars:
         message, layout = item.message, item.layout
         kind = self._types.get(layout.kind)
         if kind is None:
-            kind = self._types[layout.kind] = type_of(layout)
+            kind = self._types[layout.kind] = build_type(layout)
         cut = layout.sampled
         samples = item.numbers[:, :cut] if cut else None
         payload = kind.encode(_read_plain(message, layout), item.numbers[0, cut:], samples)

@@ -56,7 +56,7 @@ class ProtobufType:
             _add(top, field, _TYPES[of])
         for field in lists:
             _add(top, field, _Field.TYPE_DOUBLE, repeated=True)
-        paths, sampled = ([_identifiers(one) for one in names] for names in (numbers, samples))
+        paths, sampled = ([_split_name(one) for one in names] for names in (numbers, samples))
         _fill(top, self.name, paths)
         if sampled:
             _nest(top, _SAMPLES, self.name, sampled, repeated=True)
@@ -106,7 +106,7 @@ class _Template:
         return body.tobytes()
 
 
-def type_of(layout: Layout) -> ProtobufType:
+def build_type(layout: Layout) -> ProtobufType:
     """The protobuf type of a kind of message."""
     plain = (("tick", int), *layout.plain)
     cut = layout.sampled
@@ -115,7 +115,7 @@ def type_of(layout: Layout) -> ProtobufType:
     )
 
 
-def _identifiers(name: str) -> tuple[str, ...]:
+def _split_name(name: str) -> tuple[str, ...]:
     """The parts of a name as protobuf allows them: r1-r2 becomes r1_r2."""
     words = (re.sub(r"\W", "_", part, flags=re.ASCII) for part in name.split("."))
     return tuple(word if re.match(r"[A-Za-z_]", word) else f"_{word}" for word in words)

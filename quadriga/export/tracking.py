@@ -37,9 +37,9 @@ class Tracking:
                 traces.plans[robot], traces.config.planner.applied
             )
             rows = [
-                _at(tick, traces.truth.tick, traces.truth.y[:, i]),
+                _look_up(tick, traces.truth.tick, traces.truth.y[:, i]),
                 estimated,
-                _at(tick, np.rint(1000 * begin).astype(np.int64) + SAMPLE_MS, planned),
+                _look_up(tick, np.rint(1000 * begin).astype(np.int64) + SAMPLE_MS, planned),
                 in_force(traces.references, tick),
             ]
             self._rows[robot] = tick, np.concatenate(rows, axis=1)
@@ -51,7 +51,7 @@ class Tracking:
         return rows[at] if at < len(ticks) and ticks[at] == tick else None
 
 
-def _at(tick: Ticks, known: Ticks, values: Array) -> Array:
+def _look_up(tick: Ticks, known: Ticks, values: Array) -> Array:
     """Rows of `values` at each tick, NaN where none is known. Shape (len(tick), 6)."""
     padded = np.vstack([np.full((1, len(OUTPUTS)), np.nan), values.reshape(-1, len(OUTPUTS))])
     order = np.argsort(known, kind="stable")  # of several for one tick the last counts

@@ -19,7 +19,7 @@ from quadriga.identification.cache import predictor_path
 from quadriga.identification.dataset import Dataset, check_excitation
 from quadriga.identification.fit_figure import draw
 from quadriga.identification.fit_report import FitReport, Unfit, horizon_errors, refusal
-from quadriga.identification.fit_tables import comparison, report_sheets
+from quadriga.identification.fit_tables import build_comparison, build_report_tables
 from quadriga.identification.predictors import build_provenance, ensure_data
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
@@ -52,7 +52,7 @@ def fit_and_report(config: Config, console: Console, *, every: bool) -> Path:
             reports.append(report_fit(replace(config, identification=chosen), dataset, kind))
     mine = reports[kinds.index(config.identification.predictor)]
     if every:
-        sheets = whole = [comparison(reports)]
+        sheets = whole = [build_comparison(reports)]
         stem = path.with_name(f"{path.stem}-all")
         write_json(stem.with_suffix(".json"), [report.to_dict() for report in reports])
     else:
@@ -114,7 +114,7 @@ def write_page(
 
 
 def _sheets(report: FitReport | Unfit, whole: bool = False) -> list[Table]:
-    return report_sheets(report, whole=whole) if isinstance(report, FitReport) else []
+    return build_report_tables(report, whole=whole) if isinstance(report, FitReport) else []
 
 
 def _read_fit_seconds(path: Path, digest: str) -> float | None:

@@ -14,20 +14,25 @@ from quadriga.tables import LABELS, NOTHING, Table, format_number, format_output
 _SHOWN = 5  # samples of the horizon that a terminal shows
 
 
-def report_sheets(report: FitReport, *, whole: bool = False) -> list[Table]:
+def build_report_tables(report: FitReport, *, whole: bool = False) -> list[Table]:
     """Everything about one predictor; `whole`: with the errors at every sample of the horizon."""
     N = report.meta.N
     shown = np.arange(N) if whole else np.linspace(0, N - 1, min(N, _SHOWN)).round().astype(int)
-    return [_figures(report), _outputs(report), _horizon(report, shown.tolist()), _coupling(report)]
+    return [
+        _build_figures(report),
+        _build_outputs(report),
+        _build_horizon(report, shown.tolist()),
+        _build_coupling(report),
+    ]
 
 
-def comparison(reports: Sequence[FitReport | Unfit]) -> Table:
+def build_comparison(reports: Sequence[FitReport | Unfit]) -> Table:
     """Several predictors fitted to the same data, a row for each."""
     columns = (
         "predictor", *LABELS, "error", "height gains", "radius / limit", "condition", "MB",
         "fit [s]", "verdict",
     )  # fmt: skip
-    rows = [_compared(report, len(columns)) for report in reports]
+    rows = [_build_row(report, len(columns)) for report in reports]
     fitted = [report for report in reports if isinstance(report, FitReport)]
     notes = []
     if fitted:
@@ -40,11 +45,11 @@ def comparison(reports: Sequence[FitReport | Unfit]) -> Table:
             f"outputs, scaled, over that of persistence (limit 1); limits of height gains "
             f"{low:g} … {high:g}; radius: of the map of the robots' best responses."
         )
-    notes += [f"{r.name}: {_verdict(r)}." for r in reports if r.refused]
+    notes += [f"{r.name}: {_describe_verdict(r)}." for r in reports if r.refused]
     return Table("Predictors on the same data: held-out RMSE", columns, tuple(rows), notes)
 
 
-def _compared(report: FitReport | Unfit, width: int) -> tuple[str, ...]:
+def _build_row(report: FitReport | Unfit, width: int) -> tuple[str, ...]:
     if isinstance(report, Unfit):
         return (report.name, *(NOTHING,) * (width - 2), "no fit")
     gates = report.gates
@@ -62,16 +67,16 @@ def _compared(report: FitReport | Unfit, width: int) -> tuple[str, ...]:
     )
 
 
-def _verdict(report: FitReport | Unfit) -> str:
+def _describe_verdict(report: FitReport | Unfit) -> str:
     return f"refused: {reason(report.refused)}" if report.refused else "accepted"
 
 
-def _figures(report: FitReport) -> Table:
+def _build_figures(report: FitReport) -> Table:
     gates, origin, meta = report.gates, report.provenance, report.meta
     low, high = gates.gain_limits
     seconds = [0.001 * SAMPLE_MS * sum(samples) for samples in (origin.samples, origin.held_out)]
     rows = [
-        ("verdict", _verdict(report), ""),
+        ("verdict", _describe_verdict(report), ""),
         ("held-out error / persistence", format_number(gates.error), "< 1"),
         *(
             (
@@ -80,7 +85,7 @@ def _figures(report: FitReport) -> Table:
                 f"{low:g} … {high:g}",
             )
             for k, time in enumerate(gates.gain_times)
-            for robot, gain in zip(_names(report), (r[k] for r in gates.gains), strict=True)
+            for robot, gain in zip(_list_robots(report), (r[k] for r in gates.gains), strict=True)
         ),
         ("best-response radius", format_number(gates.radius), f"< {gates.radius_limit:g}"),
         ("condition number", format_number(gates.condition, ".3g"), ""),
@@ -88,7 +93,7 @@ def _figures(report: FitReport) -> Table:
         ("fit", f"{format_number(report.fit_seconds, '.1f')} s", ""),
         ("data", f"{sum(origin.samples)} samples ({seconds[0]:.0f} s), {seconds[1]:.0f} s held out",
          ""),
-        ("episodes", f"{len(origin.seeds)}, seeds {_ranges(origin.seeds)}", ""),
+        ("episodes", f"{len(origin.seeds)}, seeds {_format_ranges(origin.seeds)}", ""),
         ("horizon", f"N = {meta.N}, T_ini = {meta.T_ini}, {meta.phases} phases", ""),
         ("configuration of the data", origin.config_digest[:16], ""),
         ("digest", report.sha256[:16], ""),
@@ -97,7 +102,7 @@ def _figures(report: FitReport) -> Table:
     return Table(title, ("figure", "value", "limit"), tuple(rows))
 
 
-def _outputs(report: FitReport) -> Table:
+def _build_outputs(report: FitReport) -> Table:
     gates = report.gates
     rows = []
     for name, label in zip(OUTPUTS, LABELS, strict=True):
@@ -109,7 +114,7 @@ def _outputs(report: FitReport) -> Table:
     return Table("Held-out error", columns, tuple(rows), (note,))
 
 
-def _horizon(report: FitReport, samples: Sequence[int]) -> Table:
+def _build_horizon(report: FitReport, samples: Sequence[int]) -> Table:
     errors = report.horizon
     rows = [
         (
@@ -125,21 +130,21 @@ def _horizon(report: FitReport, samples: Sequence[int]) -> Table:
     return Table("RMSE / persistence over the horizon", ("ahead", *LABELS), tuple(rows))
 
 
-def _coupling(report: FitReport) -> Table:
+def _build_coupling(report: FitReport) -> Table:
     table = report.gates.coupling
     rows = tuple(
         (robot, *(format_number(norm) for norm in row))
-        for robot, row in zip(_names(report), table, strict=True)
+        for robot, row in zip(_list_robots(report), table, strict=True)
     )
     note = "Frobenius norms of the scaled G_ij: what robot j (column) does to robot i (row)."
-    return Table("Coupling", ("", *_names(report)), rows, (note,))
+    return Table("Coupling", ("", *_list_robots(report)), rows, (note,))
 
 
-def _names(report: FitReport) -> tuple[str, ...]:
+def _list_robots(report: FitReport) -> tuple[str, ...]:
     return robot_names(report.meta.robots)
 
 
-def _ranges(numbers: Sequence[int]) -> str:
+def _format_ranges(numbers: Sequence[int]) -> str:
     """Ascending numbers, runs of neighbours shortened: 1000–1003, 1005."""
     runs: list[list[int]] = []
     for number in numbers:

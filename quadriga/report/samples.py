@@ -65,19 +65,19 @@ def read_samples(recording: Recording, traces: Traces) -> dict[str, Samples]:
         except MessageError:
             continue
     return {
-        robot: _samples(traces, index, states[robot], measured[robot])
+        robot: _build_samples(traces, index, states[robot], measured[robot])
         for index, robot in enumerate(robot_names(traces.config.team.robots))
     }
 
 
-def _samples(
+def _build_samples(
     traces: Traces, index: int, states: Sequence[State], measured: Sequence[Measurement]
 ) -> Samples:
     states = list({state.tick: state for state in sorted(states, key=lambda s: s.tick)}.values())
     tick = ticks_of(states)
     quat = stack(states, "imu_quat_wxyz", 4)
     force = stack(states, "foot_force", N_LEGS)
-    stance = _newest(
+    stance = _look_up_newest(
         tick,
         ticks_of(measured),
         stack(measured, "stance", N_LEGS) > 0.5,
@@ -86,36 +86,36 @@ def _samples(
     contact = force > traces.config.controller.contact_force
     truth = traces.truth
     if len(truth.tick):
-        contact = _at(tick, truth.tick, truth.grf[:, index, :, 2] > _LOADED, contact)
+        contact = _look_up(tick, truth.tick, truth.grf[:, index, :, 2] > _LOADED, contact)
     _, x, y, _ = np.moveaxis(quat, -1, 0)
     return Samples(
         tick=tick,
         tilt=np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)),
         foot_force=force,
-        foot_speed=_foot_speed(states, _velocity(traces, index, tick)),
+        foot_speed=_compute_foot_speed(states, _find_velocity(traces, index, tick)),
         torque=np.abs(stack(states, "tau_joint", N_FORCES)).max(axis=1, initial=0.0) / TORQUE_LIMIT,
         stance=stance,
         contact=contact,
     )
 
 
-def _velocity(traces: Traces, index: int, tick: Ticks) -> Array:
+def _find_velocity(traces: Traces, index: int, tick: Ticks) -> Array:
     """Forward and leftward velocity, true or else estimated. Shape (M, 2), m/s, NaN: unknown."""
     unknown = np.full((len(tick), 2), np.nan)
     measured = traces.measurements[traces.robots[index]]
-    estimated: Array = _at(tick, measured.tick, measured.y[:, 1:3], unknown)
+    estimated: Array = _look_up(tick, measured.tick, measured.y[:, 1:3], unknown)
     if not len(traces.truth.tick):
         return estimated
-    true: Array = _at(tick, traces.truth.tick, traces.truth.y[:, index, 1:3], estimated)
+    true: Array = _look_up(tick, traces.truth.tick, traces.truth.y[:, index, 1:3], estimated)
     return true
 
 
-def _foot_speed(states: Sequence[State], velocity: Array) -> Array:
+def _compute_foot_speed(states: Sequence[State], velocity: Array) -> Array:
     """Horizontal speed of the lowest point of each foot. Shape (M, 4), m/s."""
     speed = np.zeros((len(states), N_LEGS))
     for k, state in enumerate(states):
         p_foot, v_foot, omega_calf = leg_kinematics(state.q_joint, state.v_joint)
-        tilt = _tilt_rotation(state.imu_quat_wxyz)
+        tilt = _compute_tilt_rotation(state.imu_quat_wxyz)
         down = tilt.T @ np.array([0.0, 0.0, -FOOT_RADIUS])
         rolling = np.cross(omega_calf + state.imu_gyro, down)
         relative = (np.cross(state.imu_gyro, p_foot) + v_foot + rolling) @ tilt.T
@@ -123,7 +123,7 @@ def _foot_speed(states: Sequence[State], velocity: Array) -> Array:
     return speed
 
 
-def _tilt_rotation(quat_wxyz: Array) -> Array:
+def _compute_tilt_rotation(quat_wxyz: Array) -> Array:
     """Trunk to yaw frame, R_y(pitch) R_x(roll). Shape (3, 3)."""
     w, x, y, z = quat_wxyz.tolist()
     sin_pitch = min(1.0, max(-1.0, 2 * (w * y - z * x)))
@@ -139,7 +139,7 @@ def _tilt_rotation(quat_wxyz: Array) -> Array:
     )
 
 
-def _at(tick: Ticks, known: Ticks, values: Any, otherwise: Any) -> Any:
+def _look_up(tick: Ticks, known: Ticks, values: Any, otherwise: Any) -> Any:
     """Values at the ticks that are known, `otherwise` at the others; first axis is time."""
     _, here, there = np.intersect1d(tick, known, return_indices=True)
     found = np.array(otherwise)
@@ -147,7 +147,7 @@ def _at(tick: Ticks, known: Ticks, values: Any, otherwise: Any) -> Any:
     return found
 
 
-def _newest(tick: Ticks, known: Ticks, values: Any, otherwise: Any) -> Any:
+def _look_up_newest(tick: Ticks, known: Ticks, values: Any, otherwise: Any) -> Any:
     """At each tick the newest value that is not too old, or else `otherwise`."""
     if not len(known):
         return otherwise

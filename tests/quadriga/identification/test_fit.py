@@ -19,7 +19,7 @@ from quadriga.commands.parser import main
 from quadriga.identification.cache import predictor_path
 from quadriga.identification.fit import report_fit
 from quadriga.identification.fit_report import FitReport, Unfit, horizon_errors
-from quadriga.identification.fit_tables import comparison, report_sheets
+from quadriga.identification.fit_tables import build_comparison, build_report_tables
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.a1 import OUTPUTS
 from tests.quadriga.linear_data import arguments, config_of, dataset, put_data
@@ -142,11 +142,11 @@ def test_what_cannot_be_fitted_at_all_is_a_row_with_the_reason() -> None:
     report = report_fit(config_of(), dataset(), "ridge")
     assert isinstance(report, FitReport)
     singular = Unfit("arx", PredictorError("normal equations", "a pivot of 0", "positive"))
-    table = comparison([report, singular])
+    table = build_comparison([report, singular])
     assert all(len(row) == len(table.columns) for row in table.rows)
     assert (table.rows[1][0], table.rows[1][-1]) == ("arx", "no fit")
     assert "arx: refused: normal equations a pivot of 0, not positive." in table.notes
-    for sheet in report_sheets(report, whole=True):
+    for sheet in build_report_tables(report, whole=True):
         assert all(len(row) == len(sheet.columns) for row in sheet.rows)
 
 
