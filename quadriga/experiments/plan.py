@@ -99,7 +99,7 @@ def build_plan(
     configs = {}
     for name, points, variant in product(files, _points(sweeps), variants):
         keys = dict(zip((sweep.key for sweep in sweeps), points, strict=True))
-        for key in variant.keys.keys() & {*keys, *_OURS, *_replaced(keys)}:
+        for key in variant.keys.keys() & {*keys, *_OURS, *_keys_of_presets(keys)}:
             raise ConfigError(
                 f"variant {variant.name}: {key}",
                 repr(variant.keys[key]),
@@ -163,7 +163,7 @@ def _over(given: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
     return overlay(deepcopy(given), keys)
 
 
-def _replaced(swept: Iterable[str]) -> set[str]:
+def _keys_of_presets(swept: Iterable[str]) -> set[str]:
     """Keys that a swept preset would take back from a variant."""
     sections = [section for section in PRESETS if f"{section}.preset" in swept]
     return {f"{section}.{key}" for section in sections for key in preset_keys(section)}

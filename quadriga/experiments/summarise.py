@@ -72,7 +72,8 @@ def tally_trials(rows: Sequence[TrialOutcome]) -> Tally:
         slowest=min(speeds, default=None),
         fastest=max(speeds, default=None),
         rmse_max={
-            name: max(_known(row.rmse(name) for row in upright), default=None) for name in ERRORS
+            name: max(_drop_missing(row.rmse(name) for row in upright), default=None)
+            for name in ERRORS
         },
         planner_ms_p50=_median(row.planner_ms_p50 for row in walked),
         planner_ms_p99=_median(row.planner_ms_p99 for row in walked),
@@ -126,12 +127,12 @@ def _divide(pairs: Iterable[tuple[TrialOutcome, TrialOutcome]], name: str) -> It
             yield one / other
 
 
-def _known(values: Iterable[float | None]) -> list[float]:
+def _drop_missing(values: Iterable[float | None]) -> list[float]:
     return [value for value in values if value is not None]
 
 
 def _median(values: Iterable[float | None]) -> float | None:
-    return _round(median(_known(values)))
+    return _round(median(_drop_missing(values)))
 
 
 def _round(value: float | None) -> float | None:

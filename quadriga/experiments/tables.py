@@ -75,18 +75,18 @@ def build_falls_table(results: Results) -> Table:
         "difference [points]",
         "McNemar p",
     )
-    return _build(f"Falls against {base}", results, _compared(results), head, _falls)
+    return _build(f"Falls against {base}", results, _select_compared(results), head, _falls)
 
 
 def build_ratios_table(results: Results, names: Sequence[str]) -> Table:
     """Errors of every other variant over the baseline's: of `COST` and some of `ERRORS`."""
     head = [f"RMSE {error_text(name)}" if name != COST else "control cost" for name in names]
     title = f"Errors over those of {results.baseline}"
-    lines = _compared(results)
+    lines = _select_compared(results)
     return _build(title, results, lines, ["pairs", *head], lambda line: _ratios(line, names))
 
 
-def _compared(results: Results) -> list[Line]:
+def _select_compared(results: Results) -> list[Line]:
     return [line for line in results.lines if line.beside is not None]
 
 

@@ -43,7 +43,7 @@ class FileShipment(WorkerPlugin):
             write_bytes(folder / name, content)
 
 
-def each_done(
+def run_each(
     todo: Sequence[TrialJob], jobs: int, address: str
 ) -> Generator[tuple[TrialJob, TrialOutcome], None, None]:
     """Jobs with their outcomes, in the order in which they are done, each once.

@@ -159,7 +159,7 @@ def _choose_workers(workers: Workers, out: Path) -> Callable[[Sequence[TrialJob]
             "the extra 'campaign'",
             "pip install -e '.[campaign]' in the checkout, or leave --dask out",
         ) from None
-    return lambda todo: dask.each_done(todo, min(workers.jobs, len(todo)), workers.dask)
+    return lambda todo: dask.run_each(todo, min(workers.jobs, len(todo)), workers.dask)
 
 
 def _walk_over_bus(todo: Sequence[TrialJob], out: Path) -> Outcomes:

@@ -33,18 +33,6 @@ def draw_figure(name: str, experiment: Experiment, results: Results, path: Path)
     return True
 
 
-def _success(experiment: Experiment, results: Results) -> Figure | None:
-    return draw_success(results, _limits(experiment))
-
-
-def _falls(experiment: Experiment, results: Results) -> Figure | None:
-    return draw_falls(results, _limits(experiment))
-
-
-def _ratios(experiment: Experiment, results: Results) -> Figure | None:
-    return draw_ratios(results, experiment.published.ratios, _limits(experiment))
-
-
 def _sweeps(experiment: Experiment, results: Results) -> Figure | None:
     return draw_sweeps(
         results,
@@ -57,9 +45,9 @@ def _sweeps(experiment: Experiment, results: Results) -> Figure | None:
 
 
 FIGURES: Final[Mapping[str, Callable[[Experiment, Results], Figure | None]]] = {
-    "success": _success,
-    "falls": _falls,
-    "ratios": _ratios,
+    "success": lambda asked, found: draw_success(found, _limits(asked)),
+    "falls": lambda asked, found: draw_falls(found, _limits(asked)),
+    "ratios": lambda asked, found: draw_ratios(found, asked.published.ratios, _limits(asked)),
     "sweep": _sweeps,
 }
 
