@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
-import os
 import platform
 from collections.abc import Callable, Iterable
 from functools import cache
@@ -20,6 +19,7 @@ import numpy as np
 
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.arithmetic import arithmetic_digest
+from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.imports import followed_files
 from quadriga.shared.runtime.places import SOURCE, cache_dir
 
@@ -58,9 +58,7 @@ def behaviour(module: str, samples: Callable[[], Iterable[Array]]) -> str:
     with (folder / ".lock").open("wb") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not kept.is_file():
-            partial = kept.with_name(f"{kept.name}.{os.getpid()}.partial")
-            partial.write_text(digest_of(samples()), encoding="ascii")
-            partial.replace(kept)
+            write_text(kept, digest_of(samples()))
             _forget(kept)
     return kept.read_text(encoding="ascii")
 

@@ -47,7 +47,8 @@ block; z over the stance feet is as the robots measure it (a test holds it again
 what they are asked to keep. A requirement is held
 against the figure itself unless it names a bound of its interval; behind *met* and *missed* stands
 how far the figure, or that bound, is from the limit. What an experiment was walked with is named by
-versions and by a digest of the code; walked with later code it may come to other figures.
+versions and by a digest of what the code does; code that does something else may come to other
+figures.
 """
 
 
