@@ -215,7 +215,7 @@ def test_a_fall_is_believed_when_told(write_run: WriteRun) -> None:
     assert (summary["end"], summary["end_code"]) == ("robots fell", "fallen")
     assert "robots fell" in table(summary)
     assert summary["events"][:1] == [
-        {"tick": 999, "kind": "fall", "robot": "r1", "detail": "tilt 1.2 rad"}
+        {"tick": 999, "kind": "fall", "code": "fall", "robot": "r1", "detail": "tilt 1.2 rad"}
     ]
 
 
