@@ -45,6 +45,7 @@ def roll_out(
     rollout = Rollout(config, None, lambda tick: _reference(config, tick), planner=timed)
     if config.planner.kind not in (*CENTRAL, "none"):
         rollout.agents = {n: Agent(config, n, predictor, monotonic_ns) for n in rollout.agents}
+        rollout.states = {name: agent.initial() for name, agent in rollout.agents.items()}
     log, meter = _WalkLog(config), _WorkMeter(rollout.world)
     last = round(1000 * config.world.seconds)
     while rollout.world.tick < last and not rollout.world.fallen():
