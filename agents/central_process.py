@@ -16,10 +16,10 @@ from quadriga.agents.plausibility import is_within_limits
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.agents.time_grid import step_ms
 from quadriga.shared.bus.barrier import meet
-from quadriga.shared.bus.members import PLANNER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
+from quadriga.shared.members import PLANNER, SIM
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.runtime.blas import one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns

@@ -14,10 +14,10 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.rehearsal import rehearse
 from quadriga.agents.telemetry import Telemetry
 from quadriga.shared.bus.barrier import meet
-from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
+from quadriga.shared.members import SIM
 from quadriga.shared.runtime.blas import one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import take_priority

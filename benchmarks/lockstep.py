@@ -16,10 +16,10 @@ from benchmarks.children import SPAWN, child, running
 from quadriga.plant.lockstep import run_lockstep
 from quadriga.plant.server import PlantServer
 from quadriga.shared.bus.barrier import meet, start_together
-from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
+from quadriga.shared.members import SIM
 from quadriga.shared.robot.a1 import N_JOINTS, q_stand, robot_names
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import decode, encode

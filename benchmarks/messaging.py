@@ -16,10 +16,10 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.children import SPAWN, child, result_of, running
-from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
+from quadriga.shared.members import SIM
 from quadriga.shared.robot.a1 import N_JOINTS, robot_names
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
 from quadriga.shared.runtime.scheduling import take_priority

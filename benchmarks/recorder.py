@@ -25,12 +25,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks.children import SPAWN, child, running
-from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import RecordingError
+from quadriga.shared.members import SIM
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.wire.codec import encode

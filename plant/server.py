@@ -8,10 +8,10 @@ from typing import Final, NamedTuple
 
 from quadriga.plant.commands import CommandBox
 from quadriga.plant.protocol import Plant
-from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
+from quadriga.shared.members import SIM
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import encode, truncate_text
 from quadriga.shared.wire.messages import Command, Event, Status

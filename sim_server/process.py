@@ -9,9 +9,9 @@ from quadriga.plant.lockstep import run_lockstep
 from quadriga.plant.realtime import run_realtime
 from quadriga.plant.server import PlantServer
 from quadriga.shared.bus.barrier import meet, start_together
-from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
+from quadriga.shared.members import SIM
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.topics import topics_for

@@ -11,9 +11,9 @@ from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.planning.operator_references import AHEAD_MS
 from quadriga.agents.plausibility import is_orientation, is_within_limits
 from quadriga.agents.time_grid import step_ms
-from quadriga.shared.bus.members import OPERATOR, PLANNER, SIM
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.errors import MessageError
+from quadriga.shared.members import OPERATOR, PLANNER, SIM
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import EStop, Event, Message, Plan, Reference, State, Truth
 from quadriga.shared.wire.topics import (

@@ -8,8 +8,8 @@ from typing import Final
 from quadriga.agents.agent import Inputs
 from quadriga.agents.inbox.inbox import Inbox, Order, Source, order_of
 from quadriga.agents.planning.interface import NOTHING, Expected
-from quadriga.shared.bus.members import OPERATOR, SIM
 from quadriga.shared.config.sections import Config
+from quadriga.shared.members import OPERATOR, SIM
 from quadriga.shared.wire.messages import Consumed, Message
 from quadriga.shared.wire.topics import (
     ESTOP,

@@ -14,8 +14,8 @@ from quadriga.agents.planner.team_planner import TeamPlanner
 from quadriga.agents.planning.remote import central_latency
 from quadriga.agents.planning.team import Central, CentralState
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.shared.bus.members import PLANNER
 from quadriga.shared.config.sections import Config
+from quadriga.shared.members import PLANNER
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.blas import one_blas_thread
 from quadriga.shared.wire.messages import Event, Measurement, Plan, Reference

@@ -14,10 +14,10 @@ from quadriga.playback.keyboard import PAUSE, QUIT, STEP, Keyboard
 from quadriga.playback.timeline import Timeline
 from quadriga.playback.transport import Transport
 from quadriga.progress import build_progress
-from quadriga.shared.bus.members import OPERATOR, PLANNER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError, ConfigError
+from quadriga.shared.members import OPERATOR, PLANNER, SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
 
 PLAYER: Final = "player"

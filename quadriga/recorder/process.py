@@ -12,11 +12,11 @@ from quadriga.recorder.selection import KeyFilter, Selection
 from quadriga.recorder.session import Session
 from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.bus.barrier import meet, members
-from quadriga.shared.bus.members import RECORDER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import RecordingError
+from quadriga.shared.members import RECORDER, SIM
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.signals import stop_on_signals
 

@@ -7,8 +7,8 @@ from typing import Final
 
 from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter
-from quadriga.shared.bus.members import PLANNER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.members import PLANNER, SIM
 from quadriga.shared.recording.mcap_chunk import name_of, robot_of
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns

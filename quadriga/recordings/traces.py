@@ -10,10 +10,10 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.recordings.truth import Ticks, TruthTrace, build_truth_trace, stack, ticks_of
-from quadriga.shared.bus.members import PLANNER, SIM
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.errors import MessageError, RecordingError
+from quadriga.shared.members import PLANNER, SIM
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.a1 import OUTPUTS, Array, robot_names

@@ -15,8 +15,8 @@ from quadriga.charts.draw import draw_panels
 from quadriga.charts.panels import Bars, Curve, Mark, Panel, PanelGrid
 from quadriga.report.run import Run
 from quadriga.report.trunk_figures import draw_over_run, mark_falls, robot_legend
-from quadriga.shared.bus.members import PLANNER
 from quadriga.shared.config.sections import CENTRAL
+from quadriga.shared.members import PLANNER
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import REFERENCE

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Final, Self
 
 from quadriga.shared.bus.barrier import processes
-from quadriga.shared.bus.members import LAST, RECORDER, SIM, Member
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError
+from quadriga.shared.members import LAST, RECORDER, SIM, Member
 from quadriga.shared.runtime.clock import monotonic, sleep
 
 _ONE_THREAD: Final = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from quadriga.shared.bus import members
+from quadriga.shared import members
 from quadriga.shared.bus.barrier import meet
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.reference_trace import trace_of

@@ -8,10 +8,10 @@ import numpy as np
 from rich.console import Console
 
 from quadriga.progress import build_progress
-from quadriga.shared.bus.members import LAUNCHER
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
+from quadriga.shared.members import LAUNCHER
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Event, Truth

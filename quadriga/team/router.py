@@ -6,9 +6,9 @@ import sys
 from collections.abc import Callable
 from typing import Final
 
-from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
 from quadriga.shared.config.sections import Config
+from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.signals import stop_on_signals
 

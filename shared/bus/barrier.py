@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from quadriga.shared.bus.members import SIM, Member, team_members
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.errors import BusError
+from quadriga.shared.members import SIM, Member, team_members
 from quadriga.shared.robot.a1 import robot_names
 
 

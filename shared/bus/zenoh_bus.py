@@ -11,7 +11,6 @@ from typing import Any, Final, Self
 
 import zenoh
 
-from quadriga.shared.bus.members import ROUTER
 from quadriga.shared.bus.presence import Presence
 from quadriga.shared.bus.zenoh_settings import (
     NO_LINK,
@@ -21,6 +20,7 @@ from quadriga.shared.bus.zenoh_settings import (
 )
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
+from quadriga.shared.members import ROUTER
 from quadriga.shared.runtime.clock import monotonic, sleep
 
 Packet = tuple[str, bytes]  # key, payload as received

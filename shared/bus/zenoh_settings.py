@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from quadriga.shared.bus.members import SIM
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
+from quadriga.shared.members import SIM
 
 NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
 _COMMON: Final = {

@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass
 from typing import Final
 
-from quadriga.shared.bus import members
-from quadriga.shared.bus.members import AGENT, LAUNCHER, OPERATOR, PLANNER, SIM
+from quadriga.shared import members
 from quadriga.shared.errors import MessageError
+from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, SIM
 from quadriga.shared.wire import messages as msg
 
 CONFIGURED: Final = -1  # a time that the configuration says: see `quadriga.shared.config.timing`

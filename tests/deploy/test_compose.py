@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from quadriga.commands.parser import build_parser
-from quadriga.shared.bus.members import LAST, ROUTER
 from quadriga.shared.config.load import load
+from quadriga.shared.members import LAST, ROUTER
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.team.launch import ProcessSpec, process_table
 

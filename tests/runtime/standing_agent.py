@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from quadriga.shared.bus.barrier import meet
-from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
+from quadriga.shared.members import SIM
 from quadriga.shared.robot.a1 import N_JOINTS, q_stand
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import die_with_parent, stop_on_signals

@@ -16,8 +16,8 @@ from quadriga.experiments.trial.figures_of_merit import Walk
 from quadriga.identification.rollout import Rollout, Tick
 from quadriga.recordings.traces import MeasurementTrace, Traces
 from quadriga.recordings.truth import build_truth_trace, ticks_of
-from quadriga.shared.bus.members import PLANNER
 from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.members import PLANNER
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.runtime.clock import monotonic_ns
 from quadriga.shared.wire.messages import Event, Measurement, Reference, Status, Truth

@@ -15,10 +15,10 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.playback.timeline import Timeline, parse_remap, rename
-from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import HERE, Bus, Packet
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.members import SIM
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.envelope import envelope

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from quadriga.shared.bus.members import OPERATOR, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig, Config, TeamConfig
 from quadriga.shared.config.write import config_sha256, to_toml
+from quadriga.shared.members import OPERATOR, SIM
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import EStop

@@ -17,10 +17,10 @@ from mcap.reader import make_reader
 
 from quadriga.commands.parser import main
 from quadriga.recordings.survey import survey
-from quadriga.shared.bus.members import RECORDER, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig, Config, RecorderConfig, TeamConfig
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.members import RECORDER, SIM
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import LOST, SINCE
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from quadriga.shared.bus.members import SIM
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.sections import BusConfig, Config, TeamConfig
+from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.wire.codec import encode
 from quadriga.team.endpoint import free_endpoint

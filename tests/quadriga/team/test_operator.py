@@ -9,10 +9,10 @@ from threading import Thread
 import numpy as np
 import pytest
 
-from quadriga.shared.bus.members import OPERATOR, SIM
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import BusConfig, Config
+from quadriga.shared.members import OPERATOR, SIM
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.wire.codec import MAX_TEXT, MAX_TICK, decode, encode
 from quadriga.shared.wire.messages import EStop, Event, Truth

@@ -98,7 +98,7 @@ def test_the_sources_are_those_with_compiled_functions_and_what_they_import() ->
     root = places.SOURCE
     found = {str(path.relative_to(root)) for path in jit.sources(root)}
     assert {
-        "quadriga/agents/controller/controller.py",
+        "quadriga/agents/controller/acting.py",
         "quadriga/agents/controller/swing.py",
         "quadriga/agents/gait.py",
         "quadriga/shared/robot/a1.py",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from quadriga.agents.inbox.inbox import Inbox
-from quadriga.shared.bus import members
+from quadriga.shared import members
 from quadriga.shared.config.load import load
 from quadriga.shared.config.timing import max_ages, periods
 from quadriga.shared.errors import MessageError

@@ -7,7 +7,7 @@ from collections import Counter
 import pytest
 
 from quadriga.commands.parser import build_parser
-from quadriga.shared.bus.members import LAST, RECORDER, ROLES, SIM, Role, team_members
+from quadriga.shared.members import LAST, RECORDER, ROLES, SIM, Role, team_members
 
 ROBOTS = ("r1", "r2")
 
