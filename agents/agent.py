@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -125,8 +125,7 @@ class StepProblems:
     planner: SolvedQp | None
 
 
-@record
-class _Tick:
+class _Tick(NamedTuple):
     """All that one step computes, before it is packed into state and outputs."""
 
     mode: Mode
@@ -229,26 +228,28 @@ class Agent:
         references = remember_references(state.references, inputs.references, tick)
         reference, reference_age = reference_at(references, tick, self._height)
 
-        course = self._course(state, tick)
+        course = state.mode if state.mode.name == WALK else self._course(state, tick)
         stops = _stops_on_arrival(inputs.estop, course, reference_age)
-        schedule = self._schedules.at(tick, resolve_stops(course, tick, stops))
+        mode = resolve_stops(course, tick, stops) if stops else course
+        schedule = self._schedules.at(tick, mode)
         sensed = self._sense(state, inputs, schedule, dt)
         if not sensed.upright >= self._fallen_cosine:
             stops.append(Stop(DAMPING, NO_ESTIMATE if math.isnan(sensed.upright) else FALL))
+            mode = resolve_stops(course, tick, stops)
 
         planning_inputs = PlanningInputs(
             tick,
-            resolve_stops(course, tick, stops),
+            mode,
             references,
-            self._sample_measurement(state, tick, sensed),
+            self._sample_measurement(state, tick, sensed) if tick % SAMPLE_MS == 0 else None,
             inputs.measurements,
             inputs.plans,
         )
         planning, planned = self._planning.step(state.planning, planning_inputs)
         if planned.stop_reason:
             stops.append(Stop(STOPPING, planned.stop_reason))
+            mode = resolve_stops(course, tick, stops)
 
-        mode = resolve_stops(course, tick, stops)
         task = self._tasks.build(
             tick, mode, reference, planned.setpoint, inputs.excitation, schedule.progress
         )
@@ -257,8 +258,9 @@ class Agent:
         failures = 0 if acted.solution.solved else state.failures + 1
         if failures >= self.config.controller.max_failures:
             stops.append(Stop(DAMPING, f"qp-{acted.solution.status}"))
+            mode = resolve_stops(course, tick, stops)
         return _Tick(
-            resolve_stops(course, tick, stops),
+            mode,
             failures,
             references,
             reference_age,
@@ -270,9 +272,7 @@ class Agent:
         )
 
     def _course(self, state: AgentState, tick: int) -> Mode:
-        """The mode if nothing stops the robot at this tick."""
-        if state.mode.name == WALK:
-            return state.mode
+        """The mode of a robot that does not walk, if nothing stops it at this tick."""
         stand_ms, stance_ms = self._stand_ms, self._stance_ms
         ends = (state.tick - stand_ms) // stance_ms != (tick - stand_ms) // stance_ms
         return step_mode(state.mode, tick, stand_ms, ends)
@@ -295,7 +295,7 @@ class Agent:
         or all of it: nobody knows what was applied in it.
         """
         begun = tick - SAMPLE_MS
-        if tick % SAMPLE_MS != 0 or begun < 0 or begun > state.tick:
+        if begun < 0 or begun > state.tick:
             return None
         stance = self._schedules.at(begun, state.mode).stance
         return Measurement(tick, tick * 1_000_000, sensed.memory.mean_force, sensed.outputs, stance)

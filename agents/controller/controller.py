@@ -7,6 +7,8 @@ functions that these calls are made of.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from quadriga.agents.controller.acting import ACTED, ACTED_SIZE, TASK, TASK_SIZE, act, goal_of
@@ -166,21 +168,16 @@ class Controller:
         return build(terms, sensed.R, sensed.p_foot, goal, weights)
 
 
-_NOW = (np.nan, np.nan)  # footholds count on the velocity of now
-
-
 def _row_of(task: Task) -> Array:
     """A task as compiled code takes it, see `TaskLayout`."""
     row = np.empty(TASK_SIZE)
     row[TASK.deviation] = task.deviation
-    row[TASK.v.start :] = (
-        task.vx,
-        task.vy,
-        task.wz,
-        task.height,
-        task.feedforward,
-        *(_NOW if task.ahead is None else task.ahead),
-    )
+    row[TASK.v.start] = task.vx  # one by one: numpy makes an array of a tuple first
+    row[TASK.v.start + 1] = task.vy
+    row[TASK.wz] = task.wz
+    row[TASK.height] = task.height
+    row[TASK.feedforward] = task.feedforward
+    row[TASK.ahead] = math.nan if task.ahead is None else task.ahead
     return row
 
 
