@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -125,20 +125,6 @@ class StepProblems:
     planner: SolvedQp | None
 
 
-class _Tick(NamedTuple):
-    """All that one step computes, before it is packed into state and outputs."""
-
-    mode: Mode
-    failures: int
-    references: tuple[Reference, ...]
-    reference_age: int
-    sensed: Sensed
-    planning_inputs: PlanningInputs
-    planning: Any
-    planned: PlanningOutputs
-    acted: ControllerOutputs
-
-
 class Agent:
     """Fixed data of one robot's agent; `step` is a function of state and inputs alone.
 
@@ -169,6 +155,7 @@ class Agent:
         self._tasks = Tasks(config)
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
         self._damping = config.controller.damping
+        self._max_failures = config.controller.max_failures
 
     @property
     def peers(self) -> tuple[str, ...]:
@@ -189,39 +176,19 @@ class Agent:
 
     def step(self, state: AgentState, inputs: Inputs) -> tuple[AgentState, Outputs]:
         """Advance to the tick of `inputs.state`; that tick must be later than the last one."""
-        now, tick = self._run(state, inputs), inputs.state.tick
-        planned, solution = now.planned, now.acted.solution
-        command = self._command(tick, solution, state.last_tau, now.mode)
-        counters = _count(state.counters, planned, solution)
-        new = AgentState(
-            tick,
-            now.mode,
-            now.planning,
-            now.acted.memory,
-            now.references,
-            command.tau if solution.solved else state.last_tau,
-            now.failures,
-            counters,
-        )
-        return new, Outputs(
-            command,
-            now.planning_inputs.measurement,
-            planned.plan,
-            now.mode.name,
-            now.mode.reason,
-            counters,
-            {"reference": float(now.reference_age), **planned.ages_ms},
-            planned.planner_ns,
-        )
+        new, outputs, _ = self._run(state, inputs)
+        return new, outputs
 
     def problems_of(self, state: AgentState, inputs: Inputs) -> StepProblems:
         """The QPs that `step` solves for these arguments, also where a closed form answers them."""
-        now = self._run(state, inputs)
-        whole_body = self._controller.problem(now.sensed, now.acted.memory, now.acted.goal)
-        planner = self._planning.problem_of(state.planning, now.planning_inputs)
-        return StepProblems(whole_body, now.acted.solution, planner)
+        _, _, (sensed, planning_inputs, acted) = self._run(state, inputs)
+        whole_body = self._controller.problem(sensed, acted.memory, acted.goal)
+        planner = self._planning.problem_of(state.planning, planning_inputs)
+        return StepProblems(whole_body, acted.solution, planner)
 
-    def _run(self, state: AgentState, inputs: Inputs) -> _Tick:
+    def _run(
+        self, state: AgentState, inputs: Inputs
+    ) -> tuple[AgentState, Outputs, tuple[Sensed, PlanningInputs, ControllerOutputs]]:
         """Sense, plan, act. Each of them sees the mode after the stops that came up before it."""
         tick = inputs.state.tick
         dt = 1e-3 if state.tick < 0 else min(_LONGEST_DT, 1e-3 * (tick - state.tick))
@@ -237,13 +204,11 @@ class Agent:
             stops.append(Stop(DAMPING, NO_ESTIMATE if math.isnan(sensed.upright) else FALL))
             mode = resolve_stops(course, tick, stops)
 
+        measurement = (
+            self._sample_measurement(state, tick, sensed) if tick % SAMPLE_MS == 0 else None
+        )
         planning_inputs = PlanningInputs(
-            tick,
-            mode,
-            references,
-            self._sample_measurement(state, tick, sensed) if tick % SAMPLE_MS == 0 else None,
-            inputs.measurements,
-            inputs.plans,
+            tick, mode, references, measurement, inputs.measurements, inputs.plans
         )
         planning, planned = self._planning.step(state.planning, planning_inputs)
         if planned.stop_reason:
@@ -255,21 +220,29 @@ class Agent:
         )
         new_sample = tick // SAMPLE_MS != state.tick // SAMPLE_MS
         acted = self._controller.act(sensed, schedule, task, dt, new_sample=new_sample)
-        failures = 0 if acted.solution.solved else state.failures + 1
-        if failures >= self.config.controller.max_failures:
-            stops.append(Stop(DAMPING, f"qp-{acted.solution.status}"))
-            mode = resolve_stops(course, tick, stops)
-        return _Tick(
-            mode,
-            failures,
-            references,
-            reference_age,
-            sensed,
-            planning_inputs,
-            planning,
-            planned,
-            acted,
+        solution, failures = acted.solution, 0
+        if not solution.solved:
+            failures = state.failures + 1
+            if failures >= self._max_failures:
+                stops.append(Stop(DAMPING, f"qp-{solution.status}"))
+                mode = resolve_stops(course, tick, stops)
+
+        tau = solution.tau if not failures else state.last_tau  # the QP's, or the last good ones
+        command = self._command(tick, tau, mode, solved=not failures)
+        counters = _count(state.counters, planned, solution)
+        ages_ms = {"reference": float(reference_age), **planned.ages_ms}
+        outputs = Outputs(
+            command,
+            measurement,
+            planned.plan,
+            mode.name,
+            mode.reason,
+            counters,
+            ages_ms,
+            planned.planner_ns,
         )
+        new = AgentState(tick, mode, planning, acted.memory, references, tau, failures, counters)
+        return new, outputs, (sensed, planning_inputs, acted)
 
     def _course(self, state: AgentState, tick: int) -> Mode:
         """The mode of a robot that does not walk, if nothing stops it at this tick."""
@@ -300,15 +273,14 @@ class Agent:
         stance = self._schedules.at(begun, state.mode).stance
         return Measurement(tick, tick * 1_000_000, sensed.memory.mean_force, sensed.outputs, stance)
 
-    def _command(
-        self, tick: int, solution: WholeBodySolution, last_tau: Array, mode: Mode
-    ) -> Command:
-        """The motor command: the QP's torques, the last good ones, or damping."""
+    def _command(self, tick: int, tau: Array, mode: Mode, *, solved: bool) -> Command:
+        """The motor command: torques, with damping where they are not this tick's, or damping."""
         row = np.zeros(60)  # tau, q_des, v_des, kp, kd
-        if mode.passive or not solution.solved:
+        passive = mode.passive
+        if passive or not solved:
             row[48:] = self._damping
-        if not mode.passive:
-            row[:12] = solution.tau if solution.solved else last_tau
+        if not passive:
+            row[:12] = tau
         return Command.from_row(tick, tick * 1_000_000, row)
 
 

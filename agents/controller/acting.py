@@ -17,7 +17,7 @@ from quadriga.agents.controller.friction import update_mu_reduction
 from quadriga.agents.controller.maths.rigid_body import rigid_body_terms
 from quadriga.agents.controller.maths.rotation import from_yaw_frame
 from quadriga.agents.controller.maths.rows import places, row_size
-from quadriga.agents.controller.memory import MEMORY, MEMORY_SIZE
+from quadriga.agents.controller.memory import MEMORY
 from quadriga.agents.controller.payload_estimate import add_load
 from quadriga.agents.controller.schedule import phase_of
 from quadriga.agents.controller.sensed import (
@@ -38,14 +38,21 @@ from quadriga.agents.controller.trunk_feedback import (
     feedback,
     feedforward,
 )
-from quadriga.agents.controller.whole_body.problem import SOLUTION_SIZE, Goal, with_mu
+from quadriga.agents.controller.whole_body.problem import Goal, with_mu
 from quadriga.agents.controller.whole_body.solution import solve_closed_form
 from quadriga.shared.robot.a1 import GRAVITY, N_FORCES, N_LEGS, TOTAL_MASS, Array
 from quadriga.shared.runtime.jit import compiled
 
 
 class TaskLayout(NamedTuple):
-    """Where the row of a `Task` keeps what, see there; `ahead` is NaN for the velocity of now."""
+    """Where the row of a `Task` keeps what.
+
+    Attributes:
+        deviation, v, wz, height, feedforward: see `Task`.
+        ahead: likewise; NaN for the velocity of now.
+        dt: time since the last tick, s.
+        new_sample: 1 if a sample of forces begins with this tick, else 0.
+    """
 
     deviation: slice
     v: slice
@@ -53,9 +60,13 @@ class TaskLayout(NamedTuple):
     height: int
     feedforward: int
     ahead: slice
+    dt: int
+    new_sample: int
 
 
-TASK: Final = TaskLayout(**places(deviation=N_FORCES, v=2, wz=1, height=1, feedforward=1, ahead=2))
+TASK: Final = TaskLayout(
+    **places(deviation=N_FORCES, v=2, wz=1, height=1, feedforward=1, ahead=2, dt=1, new_sample=1)
+)
 TASK_SIZE: Final = row_size(TASK)
 
 
@@ -68,18 +79,7 @@ class GoalLayout(NamedTuple):
 
 
 _GOAL: Final = GoalLayout(**places(trunk=6, swing=N_LEGS * 3, force=N_FORCES))
-
-
-class ActedLayout(NamedTuple):
-    """Where the row that `act` fills keeps the new memory, the goal and `WholeBodySolution.x`."""
-
-    memory: slice
-    goal: slice
-    x: slice
-
-
-ACTED: Final = ActedLayout(**places(memory=MEMORY_SIZE, goal=row_size(_GOAL), x=SOLUTION_SIZE))
-ACTED_SIZE: Final = row_size(ACTED)
+GOAL_SIZE: Final = row_size(_GOAL)
 
 
 def goal_of(row: Array, contact: Array) -> Goal:
@@ -95,10 +95,10 @@ def act(
     sensed: Array,
     schedule: Array,
     task: Array,
-    dt: float,
-    new_sample: bool,
     constants: Array,
-    out: Array,
+    memory: Array,
+    goal_row: Array,
+    x: Array,
 ) -> int:
     """Ask the whole-body QP for torques and solve it where no limit is active.
 
@@ -107,23 +107,25 @@ def act(
         sensed: `Sensed.flat`.
         schedule: `Schedule.row`.
         task: see `TaskLayout`.
-        dt: time since the last tick, s.
-        new_sample: whether a sample of forces begins with this tick.
         constants: `acting_constants`.
-        out: see `ActedLayout`; filled.
+        memory: the new `Memory.flat`, filled.
+        goal_row: see `GoalLayout`, filled.
+        x: see `WholeBodySolution`, filled.
 
     Returns:
         What `solve_closed_form` does.
     """
-    memory, load = out[ACTED.memory], memory0[MEMORY.load]
     memory[:] = memory0
+    load, dt = memory0[MEMORY.load], task[TASK.dt]
     fixed, phase = unpack_constants(constants), phase_of(schedule, sensed[SENSED.switched] > 0.5)
     trunk, p_foot, contact = trunk_of(sensed), feet_of(sensed), memory[MEMORY.contact]
     q, v = coordinates_of(sensed)
     terms = rigid_body_terms(q, v, add_load(fixed.links, load))
     body = SingleRigidBody(fixed.body.mass + load, fixed.body.com, fixed.body.inertia_inverse)
 
-    deviation = accumulate_forces(memory, task[TASK.deviation], phase.stance, new_sample)
+    deviation = accumulate_forces(
+        memory, task[TASK.deviation], phase.stance, task[TASK.new_sample] > 0.5
+    )
     push, v_des = _track_reference(memory, trunk, task, fixed.trunk, dt)
     if task[TASK.feedforward] > 0.5:
         push += feedforward(deviation, phase.stance, trunk, p_foot, body)
@@ -140,11 +142,11 @@ def act(
     update_anchors(memory, phase, trunk, p_foot, fixed.feet, dt)
     swing = desired_accelerations(memory, phase, trunk, feet, motion, fixed.feet)
     goal = Goal(contact, push, swing, desired_forces(contact, deviation, trunk.R, body.mass))
-    _note_goal(goal, out[ACTED.goal])
+    _note_goal(goal, goal_row)
 
     weights = with_mu(fixed.weights, fixed.weights.mu - memory[MEMORY.mu_reduction])
-    out[ACTED.x] = 0.0
-    return solve_closed_form(terms, trunk.R, p_foot, goal, weights, out[ACTED.x])
+    x[:] = 0.0
+    return solve_closed_form(terms, trunk.R, p_foot, goal, weights, x)
 
 
 @compiled
@@ -200,6 +202,10 @@ def _track_reference(
 @compiled
 def _note_goal(goal: Goal, row: Array) -> None:
     """Fill a goal's row."""
-    row[_GOAL.trunk] = goal.trunk
-    row[_GOAL.swing] = goal.swing.ravel()
-    row[_GOAL.force] = goal.force.ravel()
+    for k in range(6):
+        row[_GOAL.trunk.start + k] = goal.trunk[k]
+    for leg in range(4):
+        for axis in range(3):
+            k = 3 * leg + axis
+            row[_GOAL.swing.start + k] = goal.swing[leg, axis]
+            row[_GOAL.force.start + k] = goal.force[leg, axis]

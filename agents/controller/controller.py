@@ -8,10 +8,12 @@ functions that these calls are made of.
 from __future__ import annotations
 
 import math
+import struct
+from typing import Final
 
 import numpy as np
 
-from quadriga.agents.controller.acting import ACTED, ACTED_SIZE, TASK, TASK_SIZE, act, goal_of
+from quadriga.agents.controller.acting import GOAL_SIZE, TASK, TASK_SIZE, act, goal_of
 from quadriga.agents.controller.acting_constants import acting_constants
 from quadriga.agents.controller.estimator import Estimate, filter_at, standing_filter
 from quadriga.agents.controller.maths.rotation import roll_pitch_yaw
@@ -22,6 +24,7 @@ from quadriga.agents.controller.sensed import SENSED, SENSED_SIZE, Sensed
 from quadriga.agents.controller.sensing import place, sense, sensing_constants
 from quadriga.agents.controller.whole_body.assembly import build
 from quadriga.agents.controller.whole_body.problem import (
+    SOLUTION_SIZE,
     UNCONSTRAINED,
     Goal,
     WholeBodyProblem,
@@ -33,6 +36,10 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.messages import State
+
+# The numbers of a task's row behind the deviation: v, wz, height, feedforward, ahead, …
+_NUMBERS: Final = struct.Struct(f"={TASK_SIZE - TASK.v.start}d")
+_NUMBERS_AT: Final = 8 * TASK.v.start
 
 
 @record
@@ -135,20 +142,14 @@ class Controller:
             dt: time since the last tick, s.
             new_sample: whether a sample of forces begins with this tick.
         """
-        out = np.empty(ACTED_SIZE)
+        flat, goal_row, x = np.empty(MEMORY_SIZE), np.empty(GOAL_SIZE), np.empty(SOLUTION_SIZE)
+        row = _row_of(task, dt, new_sample)
         rows = act(
-            sensed.memory.flat,
-            sensed.flat,
-            schedule.row,
-            _row_of(task),
-            dt,
-            new_sample,
-            self._acting,
-            out,
+            sensed.memory.flat, sensed.flat, schedule.row, row, self._acting, flat, goal_row, x
         )
-        memory, goal_row = Memory(out[ACTED.memory]), out[ACTED.goal]
+        memory = Memory(flat)
         if rows:
-            solution = WholeBodySolution(out[ACTED.x], UNCONSTRAINED, rows)
+            solution = WholeBodySolution(x, UNCONSTRAINED, rows)
             return ControllerOutputs(memory, goal_row, solution)
         goal = goal_of(goal_row, memory.contact)
         problem = self.problem(sensed, memory, goal)
@@ -168,16 +169,14 @@ class Controller:
         return build(terms, sensed.R, sensed.p_foot, goal, weights)
 
 
-def _row_of(task: Task) -> Array:
+def _row_of(task: Task, dt: float, new_sample: bool) -> Array:
     """A task as compiled code takes it, see `TaskLayout`."""
     row = np.empty(TASK_SIZE)
     row[TASK.deviation] = task.deviation
-    row[TASK.v.start] = task.vx  # one by one: numpy makes an array of a tuple first
-    row[TASK.v.start + 1] = task.vy
-    row[TASK.wz] = task.wz
-    row[TASK.height] = task.height
-    row[TASK.feedforward] = task.feedforward
-    row[TASK.ahead] = math.nan if task.ahead is None else task.ahead
+    x, y = (math.nan, math.nan) if task.ahead is None else task.ahead
+    # At once: each number that numpy is given by itself costs as much as this.
+    numbers = task.vx, task.vy, task.wz, task.height, task.feedforward, x, y, dt, new_sample
+    _NUMBERS.pack_into(row, _NUMBERS_AT, *numbers)  # type: ignore[arg-type]  # it is a buffer
     return row
 
 

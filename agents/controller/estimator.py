@@ -117,10 +117,19 @@ def foot_trust(
 
 
 @compiled
-def _update(mean: Array, covariance: Array, h: Array, innovation: Array, variance: float) -> None:
-    """Scalar Kalman update in place: measurement row h (6,), one innovation per axis (3,)."""
-    gain = covariance @ h
-    gain_over_s = gain / (np.sum(h * gain) + variance)
+def _update(
+    mean: Array, covariance: Array, gain: Array, variance: float, innovation: Array
+) -> None:
+    """Scalar Kalman update in place.
+
+    Args:
+        mean: see `FilterState`.
+        covariance: likewise.
+        gain: P hᵀ of the measurement's row h, (6,).
+        variance: h P hᵀ plus the measurement's own.
+        innovation: measured less expected, one for each axis, (3,).
+    """
+    gain_over_s = gain / variance
     for row in range(6):
         for axis in range(3):
             mean[row, axis] += gain_over_s[row] * innovation[axis]
@@ -189,17 +198,16 @@ def filter_step(
     omega = R @ readings.gyro
     roll_velocity = _rolling_velocity(R, omega, omega_leg)
     _predict(state, acceleration, roll_velocity, trust, noise, dt)
-    h = np.zeros(6)
     for leg in range(4):
-        reach = R @ p_leg[leg]
-        h[:] = 0.0
-        h[0], h[2 + leg] = -1.0, 1.0
-        _update(mean, covariance, h, reach - (mean[2 + leg] - mean[0]), noise.leg_position**2)
+        reach, foot = R @ p_leg[leg], 2 + leg
+        gain = covariance[:, foot] - covariance[:, 0]  # the foot's place less the trunk's
+        variance = gain[foot] - gain[0] + noise.leg_position**2
+        _update(mean, covariance, gain, variance, reach - (mean[foot] - mean[0]))
         if trust[leg] > 0.0:
-            h[:] = 0.0
-            h[1] = 1.0
             v_trunk = roll_velocity[leg] - R @ v_leg[leg] - cross(omega, reach)
-            _update(mean, covariance, h, v_trunk - mean[1], (noise.leg_velocity / trust[leg]) ** 2)
+            gain = covariance[:, 1].copy()
+            variance = gain[1] + (noise.leg_velocity / trust[leg]) ** 2
+            _update(mean, covariance, gain, variance, v_trunk - mean[1])
     p_foot = np.empty((4, 3))
     for leg in range(4):
         p_foot[leg] = mean[0] + R @ p_leg[leg]

@@ -13,6 +13,15 @@ from quadriga.shared.runtime.jit import compiled
 
 
 @compiled
+def dot(x: Array, y: Array) -> float:
+    """xᵀ y. Shapes (k,), (k,)."""
+    total = 0.0
+    for k in range(len(x)):
+        total += x[k] * y[k]
+    return total
+
+
+@compiled
 def times(A: Array, x: Array) -> Array:
     """A x. Shapes (m, k), (k,)."""
     y = np.zeros(A.shape[0])

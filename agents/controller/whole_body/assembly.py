@@ -10,6 +10,7 @@ from quadriga.agents.controller.maths.dense import (
     add_gram,
     cholesky,
     cholesky_solve,
+    dot,
     product,
     symmetrise,
     times,
@@ -128,7 +129,7 @@ def _resolve_contacts(terms: RigidBodyTerms, feet: StackedFeet) -> tuple[Array, 
     Lambda_inverse = np.empty((n, n))
     for i in range(n):
         for j in range(i + 1):
-            Lambda_inverse[i, j] = np.sum(J_c_M_inverse[i] * J_c[j])
+            Lambda_inverse[i, j] = dot(J_c_M_inverse[i], J_c[j])
         Lambda_inverse[i, i] *= 1.0 + 1e-9
     cholesky_solve(cholesky(Lambda_inverse), affine)
     acceleration = np.empty((18, 13))
@@ -199,11 +200,14 @@ def _friction_cone(A: Array, a0: Array, weights: Weights) -> tuple[Array, Array]
     cone, force_min = weights.mu / np.sqrt(2.0), weights.force_min
     C, c = np.empty((5 * n_c, 12)), np.empty(5 * n_c)
     for i in range(n_c):
-        x, y, z = A[3 * i], A[3 * i + 1], A[3 * i + 2]
+        row = 5 * i
         x0, y0, z0 = a0[3 * i], a0[3 * i + 1], a0[3 * i + 2]
-        C[5 * i], c[5 * i] = z, force_min - z0
-        C[5 * i + 1], c[5 * i + 1] = cone * z - x, x0 - cone * z0
-        C[5 * i + 2], c[5 * i + 2] = cone * z + x, -x0 - cone * z0
-        C[5 * i + 3], c[5 * i + 3] = cone * z - y, y0 - cone * z0
-        C[5 * i + 4], c[5 * i + 4] = cone * z + y, -y0 - cone * z0
+        c[row] = force_min - z0
+        c[row + 1], c[row + 2] = x0 - cone * z0, -x0 - cone * z0
+        c[row + 3], c[row + 4] = y0 - cone * z0, -y0 - cone * z0
+        for k in range(12):  # no arithmetic of rows, which would allocate each of them
+            x, y, z = A[3 * i, k], A[3 * i + 1, k], A[3 * i + 2, k]
+            C[row, k] = z
+            C[row + 1, k], C[row + 2, k] = cone * z - x, cone * z + x
+            C[row + 3, k], C[row + 4, k] = cone * z - y, cone * z + y
     return C, c

@@ -7,7 +7,7 @@ from typing import Final
 import daqp
 import numpy as np
 
-from quadriga.agents.controller.maths.dense import cholesky, cholesky_solve, times
+from quadriga.agents.controller.maths.dense import cholesky, cholesky_solve, dot
 from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms
 from quadriga.agents.controller.whole_body.assembly import build
 from quadriga.agents.controller.whole_body.problem import (
@@ -93,12 +93,12 @@ def _unconstrained(problem: WholeBodyProblem) -> tuple[Array, bool]:
     cholesky_solve(cholesky(problem.H), step)
     tau = step[:, 0].copy()
     C, c = problem.C, problem.c
-    feasible = bool(np.all(np.abs(tau) <= TORQUE_LIMIT))
-    for row in range(C.shape[0]):
-        total = 0.0
-        for k in range(12):
-            total += C[row, k] * tau[k]
-        if not total >= c[row] - _TOLERANCE:
+    feasible = True
+    for torque in tau:
+        if not abs(torque) <= TORQUE_LIMIT:
+            feasible = False
+    for row in range(len(c)):
+        if not dot(C[row], tau) >= c[row] - _TOLERANCE:
             feasible = False
     return tau, feasible
 
@@ -111,6 +111,8 @@ def _imply(problem: WholeBodyProblem, contact: Array, tau: Array, x: Array) -> N
     row = 0
     for leg in range(4):
         if contact[leg] > 0.5:
-            x[12 + 3 * leg : 15 + 3 * leg] = times(A[row : row + 3], tau) + a0[row : row + 3]
+            for axis in range(3):
+                x[12 + 3 * leg + axis] = dot(A[row + axis], tau) + a0[row + axis]
             row += 3
-    x[24 : 24 + len(defect0)] = times(problem.B, tau) + defect0
+    for k in range(len(defect0)):
+        x[24 + k] = dot(problem.B[k], tau) + defect0[k]

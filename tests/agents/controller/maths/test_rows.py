@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from quadriga.agents.controller.acting import ACTED, TASK
+from quadriga.agents.controller.acting import TASK
 from quadriga.agents.controller.maths.rows import numbers, places, row_size
 from quadriga.agents.controller.memory import MEMORY, MEMORY_SIZE
 from quadriga.agents.controller.schedule import SCHEDULE
@@ -32,7 +32,7 @@ def test_places_follow_each_other_and_a_single_number_has_an_index() -> None:
     assert found == {"a": slice(0, 3), "b": 3, "c": slice(4, 6), "d": 6}
 
 
-@pytest.mark.parametrize("layout", [MEMORY, SENSED, SCHEDULE, TASK, ACTED])
+@pytest.mark.parametrize("layout", [MEMORY, SENSED, SCHEDULE, TASK])
 def test_every_number_of_a_row_has_one_name(layout: NamedTuple) -> None:
     count = np.zeros(row_size(layout))
     for place in layout:
