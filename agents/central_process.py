@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.planner.team_planner import TeamPlanner
 from quadriga.agents.planning.interface import REFUSED
 from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
@@ -26,6 +27,7 @@ from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.codes import code_of
 from quadriga.shared.wire.messages import Event, Measurement, Reference, Status
 from quadriga.shared.wire.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
@@ -132,8 +134,8 @@ class _CentralShell:
         if not outputs.plans or outputs.planner_ns is None:
             return
         plan = outputs.plans[0][1]
-        if plan.status != "solved":
-            self._counters[f"plan_{plan.status.partition(':')[0]}"] += 1
+        if plan.status != SOLVED:
+            self._counters[f"plan_{code_of(plan.status)}"] += 1
         if state.refused:
             self._counters[REFUSED] = state.refused
         took = np.array([1e-6 * outputs.planner_ns])

@@ -14,6 +14,7 @@ from quadriga.agents.planner.neighbours import PeerSelection
 from quadriga.agents.planner.peer_terms import Peers, PeerTerms
 from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem, unpack
 from quadriga.agents.planner.qp_solver import (
+    NOMINAL,
     SOLVED,
     SOLVERS,
     Residuals,
@@ -27,6 +28,7 @@ from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walkin
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.codes import with_detail
 
 PEER_LOST: Final = "peer-lost"
 IMPLAUSIBLE: Final = "implausible"
@@ -198,7 +200,7 @@ class Planner:
             du, y, y_nominal = np.zeros_like(du), inputs.y_des, inputs.y_des
             status = IMPLAUSIBLE if status == SOLVED else status
         result = PlanResult(
-            status=SOLVED if status == SOLVED else f"nominal:{status}",
+            status=SOLVED if status == SOLVED else with_detail(NOMINAL, status),
             u=setup.nominal + du,
             du=du,
             y=y,

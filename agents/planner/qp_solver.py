@@ -18,11 +18,16 @@ from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.jit import compiled
 
 SOLVED: Final = "solved"
+NOMINAL: Final = "nominal"  # code of a plan's status: no solution, hence the nominal forces
 _FAR: Final = 1e30  # DAQP's infinity
 _DAQP_STATUS: Final = MappingProxyType({
     1: SOLVED, -1: "infeasible", -2: "cycling", -3: "unbounded", -4: "iteration-limit",
     -5: "not-convex", -6: "overdetermined",
 })  # fmt: skip
+_OSQP_INFEASIBLE: Final = (
+    osqp.SolverStatus.OSQP_PRIMAL_INFEASIBLE,
+    osqp.SolverStatus.OSQP_PRIMAL_INFEASIBLE_INACCURATE,
+)
 # Beyond these the answer is not used, whatever the solver says of itself.
 _MAX_VIOLATION: Final = 1e-5  # N
 _MAX_STATIONARITY: Final = 1e-5  # relative to the terms of the gradient
@@ -198,9 +203,10 @@ class OsqpSolver:
             adaptive_rho_interval=50,  # by iterations, never by time
         )
         result = solver.solve(raise_error=False)
-        status = result.info.status.replace(" ", "-")
-        status = "infeasible" if status.startswith("primal-infeasible") else status
-        return judge(self._problem, f, result.x, result.y, status, int(result.info.iter), low, high)
+        info = result.info
+        status = "infeasible" if info.status_val in _OSQP_INFEASIBLE else info.status
+        status = status.replace(" ", "-")
+        return judge(self._problem, f, result.x, result.y, status, int(info.iter), low, high)
 
 
 @compiled

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.modes import DAMPING, ESTOP, STAND, WALK
+from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.wire.codes import FALL, code_of
@@ -125,7 +126,7 @@ def _find_failed_plans(robot: str, plans: Sequence[Plan], end: int) -> Iterator[
             continue
         begin, stop = plans[first].tick, following.tick if following else plan.tick
         count, first = k + 1 - first, k + 1
-        if plan.status != "solved":
+        if plan.status != SOLVED:
             many = f"{count} plans" if count > 1 else "1 plan"
             text, code = f"{plan.status}, {many}", code_of(plan.status)
             yield TimelineEntry(begin, min(stop, end), robot, "plan", text, code)
