@@ -22,7 +22,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER, SIM
 from quadriga.shared.robot.a1 import robot_names
-from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
@@ -47,7 +47,7 @@ def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None
         BusError: the bus cannot be opened, or the team is not complete in time.
     """
     stopped = stopped or stop_on_signals()
-    one_blas_thread()
+    use_one_blas_thread()
     team, names = config.team.name, robot_names(config.team.robots)
     with Bus.open(config.bus, team, PLANNER, stopped) as bus:
         shell = _CentralShell(config, Central(config, planner, monotonic_ns), bus)
@@ -89,7 +89,7 @@ class _CentralShell:
         state, since = CentralState(), monotonic()
         while not (stopped() or self._ended):
             packet = self._bus.get(POLL)
-            if packet is None and SIM not in self._bus.present(HERE):
+            if packet is None and SIM not in self._bus.members_at(HERE):
                 return
             for key, payload in (packet, *self._bus.drain()) if packet else ():
                 self._take(key, payload)

@@ -47,7 +47,7 @@ def run_parts(options: Options) -> int:
 
     from benchmarks.figure import draw
     from benchmarks.page import headline, section, targets
-    from benchmarks.parts import PARTS, prefixed
+    from benchmarks.parts import PARTS, add_prefix
 
     console = Console(width=120, highlight=False)
     result: dict[str, Any] = {"machine": describe_machine(), "quick": options.quick}
@@ -56,7 +56,7 @@ def run_parts(options: Options) -> int:
     for name in options.parts:
         with console.status(f"{name} …") as status:
             try:
-                parts[name] = PARTS[name](options, console, prefixed(status.update, name))
+                parts[name] = PARTS[name](options, console, add_prefix(status.update, name))
             except (QuadrigaError, ChildProcessError) as error:
                 failed[name] = str(error)
         if name in parts:

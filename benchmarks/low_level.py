@@ -55,7 +55,7 @@ def measure(
         _replay(agent, ticks)  # first calls load and set up
         for name, evict in between.items():
             whole = [_replay(agent, ticks, evict)[first:] for _ in range(passes)]
-            parts = [_staged(timed, watch, ticks, evict)[first:] for _ in range(passes)]
+            parts = [_time_stages(timed, watch, ticks, evict)[first:] for _ in range(passes)]
             times, stages = np.concatenate(whole), np.concatenate(parts)
             figures[name] = {
                 "median": float(np.median(times)),
@@ -90,7 +90,7 @@ def _replay(
     return 1e-3 * times
 
 
-def _staged(
+def _time_stages(
     agent: Agent, watch: _Stopwatch, ticks: list[AgentTick], evict: Callable[[], object]
 ) -> Array:
     """Time of every tick's stages, (T, 5), µs."""

@@ -80,14 +80,14 @@ def _world(config: Config, place: str, ticks: int) -> dict[str, dict[str, float]
             times: dict[str, list[int]] = {name: [] for name in TRANSPORTS}
             for begin in range(-_WARM_UP, ticks, _BLOCK):
                 for name, tick in zip(TRANSPORTS, (by_bus, by_socket), strict=True):
-                    took = [_timed(tick) for _ in range(min(_BLOCK, ticks - begin))]
+                    took = [_time_tick(tick) for _ in range(min(_BLOCK, ticks - begin))]
                     times[name] += took if begin >= 0 else []
             for link in links:
                 link.close()
     return {name: _spread(found) for name, found in times.items()}
 
 
-def _timed(tick: Any) -> int:
+def _time_tick(tick: Any) -> int:
     begun = monotonic_ns()
     tick()
     return monotonic_ns() - begun

@@ -21,11 +21,11 @@ Part = dict[str, Any]
 
 def planner(options: Options, console: Console, tell: Tell) -> Part:
     """What a plan costs, ours and as written; `python -m benchmarks.planner` does it at length."""
-    from benchmarks.planner import measure, walked
+    from benchmarks.planner import measure, record_walks
     from benchmarks.planner_contenders import Local, Team
 
     robots, seconds = (1, 1.0) if options.quick else (3, 1.2)
-    config, predictor, walks = walked(robots, seconds, console)
+    config, predictor, walks = record_walks(robots, seconds, console)
     tell("plans")
     rows = measure(config, Local(config, predictor), walks)
     if not options.quick:
@@ -105,7 +105,7 @@ def walks(options: Options, console: Console, tell: Tell) -> Part:
         warm_up(config, console)
         tell(f"n = {robots} in one process")
         parts = result_of(alone, config, predictor)
-        found = over_the_bus(config, path, predictor, prefixed(tell, f"n = {robots}"))
+        found = over_the_bus(config, path, predictor, add_prefix(tell, f"n = {robots}"))
         rows.append({"robots": robots, "alone": parts, **found})
     return {
         "rows": rows,
@@ -132,7 +132,7 @@ def recorder_turns(options: Options, rows: list[Part], console: Console, tell: T
     return found
 
 
-def prefixed(tell: Tell, prefix: str) -> Tell:
+def add_prefix(tell: Tell, prefix: str) -> Tell:
     """`tell` with `prefix` before what is told."""
     return lambda text: tell(f"{prefix}: {text}")
 

@@ -81,7 +81,7 @@ def main() -> None:
     console = Console(width=120)
     rows: list[Row] = []
     for robots in options.robots:
-        config, predictor, walks = walked(robots, options.seconds, console)
+        config, predictor, walks = record_walks(robots, options.seconds, console)
         rows += measure(config, Local(config, predictor), walks)
         team = [walk[-TEAM_STEPS:] for walk in walks]
         rows += measure(config, Team(config, predictor), team)
@@ -111,7 +111,7 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def walked(
+def record_walks(
     robots: int, seconds: float, console: Console
 ) -> tuple[Config, Predictor, list[list[PlanningTick]]]:
     """A team, its predictor, and the planning steps of its walks."""
@@ -123,7 +123,7 @@ def walked(
 
 def deepc(robots: int, seconds: float, console: Console) -> list[Row]:
     """Eq. 5 for a team of this size, with CVXPY for one robot where it is installed."""
-    config, _, walks = walked(robots, seconds, console)
+    config, _, walks = record_walks(robots, seconds, console)
     episodes = ensure_data(config, console).training
     extra = []
     if robots == 1 and AVAILABLE:

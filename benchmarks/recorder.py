@@ -137,15 +137,15 @@ def await_probes(file: Path, publishers: int) -> None:
         ChildProcessError: it does not, since it or a publisher has failed.
     """
     deadline = monotonic() + PATIENCE
-    while (heard := probed(file)) < publishers:
+    while (connected := count_publishers(file)) < publishers:
         if monotonic() > deadline:
             raise ChildProcessError(
-                f"the recorder heard {heard} of {publishers} publishers within {PATIENCE:g} s"
+                f"the recorder heard {connected} of {publishers} publishers within {PATIENCE:g} s"
             )
         sleep(0.1)
 
 
-def probed(file: Path) -> int:
+def count_publishers(file: Path) -> int:
     """How many publishers the recorder hears."""
     try:
         return len({entry.key for entry in Recording(file).entries()})

@@ -45,11 +45,11 @@ def _check_meta(path: Path, got: PredictorMeta, expected: PredictorMeta) -> None
     pairs = [(name, getattr(got, name), getattr(expected, name)) for name in _MATCHED]
     fitted = dict(got.controller)
     pairs += [(f"controller.{k}", fitted.get(k), wanted) for k, wanted in expected.controller]
-    for name, found, wanted in pairs:
-        if found != wanted:
+    for name, stored, wanted in pairs:
+        if stored != wanted:
             raise PredictorFileError(
                 f"predictor {path}: {name}",
-                repr(found),
+                repr(stored),
                 f"{wanted!r} as configured",
                 f"fitted for another setting; {REMEDY}",
             )

@@ -26,13 +26,15 @@ class Coupling:
 
     def __init__(self, G: Array, stance: Sequence[NDArray[np.bool_]]) -> None:
         width = G.shape[2] if len(G) else 0
-        kept = [
-            np.concatenate([np.arange(width - 3 * pattern.size), width - 3 * pattern.size + found])
-            for pattern, found in ((pattern, stance_columns(pattern)) for pattern in stance)
+        force_columns = [
+            np.concatenate(
+                [np.arange(width - 3 * legs.size), width - 3 * legs.size + stance_columns(legs)]
+            )
+            for legs in stance
         ]
-        places = [i * width + columns for i, columns in enumerate(kept)]
+        places = [i * width + columns for i, columns in enumerate(force_columns)]
         self._places = np.concatenate(places) if places else np.zeros(0, dtype=np.int64)
-        blocks = [block[:, columns] for block, columns in zip(G, kept, strict=True)]
+        blocks = [block[:, columns] for block, columns in zip(G, force_columns, strict=True)]
         rows = np.concatenate(blocks, axis=1) if blocks else np.zeros((0, 0))
         self._rows = np.ascontiguousarray(rows, dtype=np.float32)
 

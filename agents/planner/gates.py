@@ -130,8 +130,8 @@ def height_gains(config: Config, predictor: Predictor) -> Array:
             ]
             gains[k, robot] = z[rows] / physical[rows]
     worst = np.abs(gains - 1.0).argmax(axis=0)
-    found: Array = np.take_along_axis(gains, worst[None], axis=0)[0]
-    return found
+    greatest: Array = np.take_along_axis(gains, worst[None], axis=0)[0]
+    return greatest
 
 
 def physical_height(controller: ControllerConfig, interface: str, N: int) -> Array:

@@ -51,13 +51,13 @@ def remember(
     oldest = tick - _span_ms(config)
     for robot, measurement in measurements:
         history = peers.get(robot)
-        kept = None
+        extended = None
         if history is not None and _is_usable_measurement(config, measurement, tick):
-            kept = _insert(history.measurements, measurement, oldest, _by_tick)
-        if history is None or kept is None:
+            extended = _insert(history.measurements, measurement, oldest, _by_tick)
+        if history is None or extended is None:
             refused += 1
         else:
-            peers[robot] = replace(history, measurements=kept)
+            peers[robot] = replace(history, measurements=extended)
     for robot, plan in plans:
         history = peers.get(robot)
         kept_plans = None

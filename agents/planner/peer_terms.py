@@ -118,10 +118,10 @@ class Peers:
     def _coupling(self, step: int, window_step: int) -> Coupling:
         """The coupling at planning step `step` to plans that begin at `window_step`."""
         place = place_in(self._cycle, step), place_in(self._cycle, window_step)
-        found = self._couplings.get(place)
-        if found is None:
+        coupling = self._couplings.get(place)
+        if coupling is None:
             phase = phase_of(self._config, step, self._predictor.phases)
             G = self._predictor.G[phase][self._index, self._others]
             stance = [horizon_stance(self._config, j, window_step) for j in self._others]
-            found = self._couplings[place] = Coupling(G, stance)
-        return found
+            coupling = self._couplings[place] = Coupling(G, stance)
+        return coupling

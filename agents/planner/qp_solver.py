@@ -256,10 +256,10 @@ def judge(
     """Hold a solver's claim against the conditions of optimality; what fails is "inaccurate"."""
     if status != SOLVED:
         return no_solution(problem, status)
-    found = residuals(problem, f, v, multipliers, lower, upper)
-    if not (found.primal <= _MAX_VIOLATION and found.stationarity <= _MAX_STATIONARITY):
-        return replace(no_solution(problem, "inaccurate"), residuals=found)
-    return QpSolution(SOLVED, v, multipliers, found, iterations)
+    checked = residuals(problem, f, v, multipliers, lower, upper)
+    if not (checked.primal <= _MAX_VIOLATION and checked.stationarity <= _MAX_STATIONARITY):
+        return replace(no_solution(problem, "inaccurate"), residuals=checked)
+    return QpSolution(SOLVED, v, multipliers, checked, iterations)
 
 
 def residuals(

@@ -92,13 +92,13 @@ class TeamPlanner:
 
     def _problem(self, step: int, stance: NDArray[np.bool_]) -> tuple[PlannerProblem, Solver]:
         key = phase_of(self._config, step, self._phases), stance.tobytes()
-        found = self._problems.get(key)
-        if found is None:
+        entry = self._problems.get(key)
+        if entry is None:
             condensed = self._formulation(key[0], stance)
             problem = constrain(self._config.planner, condensed, stance)
-            found = problem, SOLVERS[self._config.planner.solver](problem)
-            self._problems[key] = found
-        return found
+            entry = problem, SOLVERS[self._config.planner.solver](problem)
+            self._problems[key] = entry
+        return entry
 
 
 def build_centralised(config: Config, predictor: Predictor) -> TeamPlanner:

@@ -88,8 +88,8 @@ def reduce(episodes: Sequence[Episode], T_ini: int, N: int) -> Reduction:
     S_bb = S[np.ix_(b, b)]
     left = S_bb - response @ S_ab
     values, vectors = linalg.eigh(0.5 * (left + left.T), check_finite=False)
-    kept = values > _RANK_TOLERANCE * np.linalg.norm(S_bb)
-    spread = vectors[:, kept] * np.sqrt(values[kept])
+    significant = values > _RANK_TOLERANCE * np.linalg.norm(S_bb)
+    spread = vectors[:, significant] * np.sqrt(values[significant])
     return Reduction(
         n, T_ini, N, 0.5 * (inverse + inverse.T), np.ascontiguousarray(response), spread
     )

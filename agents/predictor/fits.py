@@ -41,8 +41,8 @@ def fit_pinv(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, or of another team.
     """
-    found = solve_pinv(normal_equations(episodes, meta), meta)
-    return _one_phase(found, _without_penalty(meta, "pinv"))
+    solutions = solve_pinv(normal_equations(episodes, meta), meta)
+    return _one_phase(solutions, _without_penalty(meta, "pinv"))
 
 
 def fit_ridge(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
@@ -55,8 +55,8 @@ def fit_ridge(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
     """
-    found = solve_ridge(normal_equations(episodes, meta), meta, meta.ridge)
-    return _one_phase(found, replace(meta, kind="ridge", phases=1))
+    solutions = solve_ridge(normal_equations(episodes, meta), meta, meta.ridge)
+    return _one_phase(solutions, replace(meta, kind="ridge", phases=1))
 
 
 def fit_gamma(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
@@ -65,8 +65,8 @@ def fit_gamma(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, of another team, or forces that do not excite.
     """
-    found = solve_gamma(normal_equations(episodes, meta), meta)
-    return _one_phase(found, _without_penalty(meta, "gamma"))
+    solutions = solve_gamma(normal_equations(episodes, meta), meta)
+    return _one_phase(solutions, _without_penalty(meta, "gamma"))
 
 
 def fit_causal(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
@@ -75,8 +75,8 @@ def fit_causal(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
     """
-    found = solve_causal(normal_equations(episodes, meta), meta, meta.ridge)
-    return _one_phase(found, replace(meta, kind="causal", phases=1))
+    solutions = solve_causal(normal_equations(episodes, meta), meta, meta.ridge)
+    return _one_phase(solutions, replace(meta, kind="causal", phases=1))
 
 
 def fit_arx(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
@@ -90,12 +90,12 @@ def fit_arx(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     """
     check_episodes(episodes, meta)
     one_step = replace(meta, N=1)
-    found = solve_ridge(normal_equations(episodes, one_step), one_step, meta.ridge)
-    x = roll_out(found.x, meta)
+    solutions = solve_ridge(normal_equations(episodes, one_step), one_step, meta.ridge)
+    x = roll_out(solutions.x, meta)
     for i in range(meta.robots):
         strangers = [j for j in range(meta.robots) if j not in members_of(meta, i)]
         x[i].reshape(meta.robots, meta.width, -1)[strangers] = 0.0
-    return _one_phase(Solutions(x, found.condition), replace(meta, kind="arx", phases=1))
+    return _one_phase(Solutions(x, solutions.condition), replace(meta, kind="arx", phases=1))
 
 
 def fit_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
@@ -116,9 +116,9 @@ def fit_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
             continue
         explained = np.einsum("ab,ibk->aik", regression.zz, pooled, optimize=True)
         left = replace(regression, zy=regression.zy - explained)
-        found = solve_ridge(left, meta, meta.phase_ridge)
-        blocks.append(to_physical(pooled + found.x, meta))
-        condition = max(condition, found.condition)
+        solutions = solve_ridge(left, meta, meta.phase_ridge)
+        blocks.append(to_physical(pooled + solutions.x, meta))
+        condition = max(condition, solutions.condition)
     return Predictor(replace(meta, kind="phase"), np.stack(blocks), condition)
 
 
@@ -157,8 +157,8 @@ FITS: Final[Mapping[str, Fit]] = {
 }
 
 
-def _one_phase(found: Solutions, meta: PredictorMeta) -> Predictor:
-    return Predictor(meta, to_physical(found.x, meta)[None], found.condition)
+def _one_phase(solutions: Solutions, meta: PredictorMeta) -> Predictor:
+    return Predictor(meta, to_physical(solutions.x, meta)[None], solutions.condition)
 
 
 def _without_penalty(meta: PredictorMeta, kind: str) -> PredictorMeta:

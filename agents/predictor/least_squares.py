@@ -80,9 +80,11 @@ def _solve_least_norm(A: Array, b: Array) -> tuple[Array, float]:
         return x, condition_number(norm, factor)
     except PredictorError:
         values, vectors = linalg.eigh(A, check_finite=False)
-        kept = values > floor
-        V = vectors[:, kept]
-        return V @ ((V.T @ b) / values[kept, None]), float(values[-1] / values[kept][0])
+        significant = values > floor
+        V = vectors[:, significant]
+        return V @ ((V.T @ b) / values[significant, None]), float(
+            values[-1] / values[significant][0]
+        )
 
 
 def _solve_groups(regression: Regression, meta: PredictorMeta, solve: Solve) -> Solutions:
@@ -91,8 +93,8 @@ def _solve_groups(regression: Regression, meta: PredictorMeta, solve: Solve) -> 
     x, condition = np.zeros((n, n * meta.width, outputs)), 0.0
     for robots, rows in _groups(meta):
         b = regression.zy[np.ix_(rows, robots)].reshape(len(rows), -1)
-        found, one = solve(regression.zz[np.ix_(rows, rows)], b)
-        x[np.ix_(robots, rows)] = found.reshape(len(rows), len(robots), -1).transpose(1, 0, 2)
+        solution, one = solve(regression.zz[np.ix_(rows, rows)], b)
+        x[np.ix_(robots, rows)] = solution.reshape(len(rows), len(robots), -1).transpose(1, 0, 2)
         condition = max(condition, one)
     return Solutions(x, condition)
 

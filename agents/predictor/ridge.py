@@ -151,17 +151,20 @@ def _solve_each(A: Array, b: Array, W: int, light: float, heavy: float) -> Array
         factor = factorise(_add_penalty(A, light))
         return linalg.cho_solve((factor, True), b[:, 0], check_finite=False)[None]
     x = np.empty((n, n * W, k))
-    for kept, gone in ((slice(0, n // 2), slice(n // 2, n)), (slice(n // 2, n), slice(0, n // 2))):
-        K, D = (slice(s.start * W, s.stop * W) for s in (kept, gone))
+    for half, eliminated in (
+        (slice(0, n // 2), slice(n // 2, n)),
+        (slice(n // 2, n), slice(0, n // 2)),
+    ):
+        K, D = (slice(s.start * W, s.stop * W) for s in (half, eliminated))
         factor = factorise(_add_penalty(A[D, D], heavy))
         X, R = (
             linalg.solve_triangular(factor, rhs, lower=True, check_finite=False)
-            for rhs in (A[D, K], b[D, kept].reshape(D.stop - D.start, -1))
+            for rhs in (A[D, K], b[D, half].reshape(D.stop - D.start, -1))
         )
-        rest = b[K, kept] - (X.T @ R).reshape(K.stop - K.start, -1, k)
-        found = _solve_each(A[K, K] - X.T @ X, rest, W, light, heavy)
-        x[kept, K] = found
-        across = R - (X @ found.transpose(1, 0, 2).reshape(K.stop - K.start, -1))
+        rest = b[K, half] - (X.T @ R).reshape(K.stop - K.start, -1, k)
+        solution = _solve_each(A[K, K] - X.T @ X, rest, W, light, heavy)
+        x[half, K] = solution
+        across = R - (X @ solution.transpose(1, 0, 2).reshape(K.stop - K.start, -1))
         back = linalg.solve_triangular(factor, across, lower=True, trans=1, check_finite=False)
-        x[kept, D] = back.reshape(D.stop - D.start, -1, k).transpose(1, 0, 2)
+        x[half, D] = back.reshape(D.stop - D.start, -1, k).transpose(1, 0, 2)
     return x

@@ -55,13 +55,13 @@ class Provenance:
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that a fit depends on."""
-    found = {"python": platform.python_version()}
+    installed = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:
-            found[package] = metadata.version(package)
+            installed[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
-            found[package] = "not installed"
-    return found
+            installed[package] = "not installed"
+    return installed
 
 
 def predictor_sha256(predictor: Predictor) -> str:

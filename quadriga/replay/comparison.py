@@ -78,8 +78,8 @@ class Comparison:
         self._sent, self._on_pair = log.sent, on_pair
         self.verdict = ReplayVerdict()
 
-    def recorded_at(self, tick: int) -> dict[str, Message]:
-        """What was recorded of a step that is still to be compared, by topic."""
+    def recorded_messages(self, tick: int) -> dict[str, Message]:
+        """The recorded messages of a step that is still to be compared, by topic."""
         found = {}
         for name, at, exchange in tuple(self._sent):
             if name == PLAN.name or at == tick:

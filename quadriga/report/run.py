@@ -50,7 +50,7 @@ class Run:
         """Whether the simulator's truth was recorded."""
         return len(self.traces.truth.tick) > 0
 
-    def measured(self, index: int) -> tuple[Ticks, Array]:
+    def outputs_of(self, index: int) -> tuple[Ticks, Array]:
         """Ticks and outputs (·, 6) of a robot: the true ones, or else its own estimates."""
         if self.has_truth:
             return self.traces.truth.tick, self.traces.truth.y[:, index]

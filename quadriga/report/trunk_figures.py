@@ -99,7 +99,7 @@ def draw_reference(run: Run) -> Figure:
     for i in (1, 2, 0, 5):
         curves = []
         for index in range(len(run.traces.robots)):
-            tick, y = run.measured(index)
+            tick, y = run.outputs_of(index)
             mean = average_over_period(tick, y[:, i], period)
             curves.append(Curve(tick / 1000, mean, robot_style(index), gap=_GAP))
         asked, wanted = _read_wanted(run, 0)
@@ -163,7 +163,7 @@ def _share_points(run: Run, curves: int) -> int:
 
 def _read_wanted(run: Run, index: int) -> tuple[Ticks, Array]:
     """Ticks and the outputs asked for then; shape (·, 6), NaN before the first reference."""
-    tick, _ = run.measured(index)
+    tick, _ = run.outputs_of(index)
     reference = in_force(run.traces.references, tick)
     wanted = np.zeros((len(tick), len(OUTPUTS)))
     wanted[:, _ASKED] = reference

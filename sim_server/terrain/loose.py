@@ -34,7 +34,7 @@ class LooseStones:
 
     def __init__(self, pebbles: Pebbles, model: Any, physics: Any, robots: int) -> None:
         """Take over the bodies that `Pebbles.add_to` has added last."""
-        self._parked = pebbles.parked(robots)
+        self._parked = pebbles.parking_poses(robots)
         count = len(self._parked)
         self._q = physics.qpos[-7 * count :].reshape(count, 7)
         self._v = physics.qvel[-6 * count :].reshape(count, 6)
@@ -69,7 +69,7 @@ class LooseStones:
 
     def _asleep_near(self, feet: Array) -> list[int]:
         """Stones without a body that a foot is near to and cannot be inside of, in order."""
-        found: set[int] = set()
+        stones: set[int] = set()
         for x, y, z in feet.tolist():
             i, j = self._cell(np.array((x, y)))
             around = [
@@ -84,8 +84,8 @@ class LooseStones:
                 close = square < self._near**2
                 if z < self._on_top:
                     close &= square > self._touching**2
-                found.update(np.array(around)[close].tolist())
-        return sorted(found)
+                stones.update(np.array(around)[close].tolist())
+        return sorted(stones)
 
     def _wake(self, stone: int) -> None:
         free = np.flatnonzero((self._of_size == self._size[stone]) & (self.stone_of == _NOBODY))

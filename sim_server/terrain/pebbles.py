@@ -48,7 +48,7 @@ class Pebbles:
         """From the centre of the largest stone to its end, m."""
         return float(self.half.max())
 
-    def parked(self, robots: int) -> Array:
+    def parking_poses(self, robots: int) -> Array:
         """Where the stones that can move wait; those of one size after the other. Shape (p, 7)."""
         count = len(SIZES) * -(-_PER_LEG * N_LEGS * robots // len(SIZES))
         parked = np.zeros((count, 7))
@@ -58,7 +58,7 @@ class Pebbles:
 
     def add_to(self, spec: mujoco.MjSpec, robots: int, friction: float) -> None:
         """Add the bodies of stones that can move, after everything else: parked, without weight."""
-        parked = self.parked(robots)
+        parked = self.parking_poses(robots)
         for k, pose in enumerate(parked.tolist()):
             i = k * len(SIZES) // len(parked)
             body = spec.worldbody.add_body(name=f"pebble{k}", pos=pose[:3], gravcomp=1.0)

@@ -170,7 +170,7 @@ def _numbers(text: str) -> list[float]:
 
 
 def _child(element: ET.Element, tag: str) -> ET.Element:
-    found = element.find(tag)
-    if found is None:
+    child = element.find(tag)
+    if child is None:
         raise ConfigError("A1 URDF", f"<{element.tag}> without <{tag}>", f"a <{tag}>")
-    return found
+    return child

@@ -53,7 +53,7 @@ class Ledger:
             ) from None
         try:
             kept = read_manifest(folder) if (folder / FILE).is_file() else None
-            self.manifest = manifest if kept is None else kept.merged(manifest, folder)
+            self.manifest = manifest if kept is None else kept.merge(manifest, folder)
             self.rows = read_rows(folder, self.manifest)
             write_text(folder / FILE, manifest_text(self.manifest))
             _mend(folder / ROWS, self.manifest)

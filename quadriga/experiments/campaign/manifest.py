@@ -114,8 +114,8 @@ class Manifest:
                 _UNKNOWN if same is None else _REMEDY,
             )
 
-    def merged(self, more: Manifest, folder: Path) -> Manifest:
-        """This one with more to walk.
+    def merge(self, more: Manifest, folder: Path) -> Manifest:
+        """This manifest with the trials of another one added.
 
         Raises:
             ConfigError: trials of the two would not belong together.

@@ -67,7 +67,7 @@ def read_experiment(path: Path) -> Experiment:
     table.check_one("baseline", baseline, known)
     names = _scenarios(table)
     labels = [scenarios.label(name) for name in names]
-    published = _published(table.table("publish", _TABLES), compared=len(variants) > 1)
+    published = _read_published(table.table("publish", _TABLES), compared=len(variants) > 1)
     return Experiment(
         name=path.stem,
         title=table.text("title"),
@@ -216,7 +216,7 @@ def _parts(table: _TomlTable, names: tuple[str, ...]) -> tuple[Part, ...]:
     return tuple(found)
 
 
-def _published(table: _TomlTable, *, compared: bool) -> Published:
+def _read_published(table: _TomlTable, *, compared: bool) -> Published:
     return Published(
         outcome=table.texts("outcome", _OUTCOME, COLUMNS),
         falls=table.yes("falls", compared),

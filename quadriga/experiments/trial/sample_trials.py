@@ -74,7 +74,7 @@ def sample_trials() -> Iterator[Array]:
         seen: list[Array] = []
 
         def watch(tick: Tick, seen: list[Array] = seen) -> None:
-            seen.extend(sent(tick))
+            seen.extend(numbers_sent(tick))
 
         predictor = None if config.planner.kind == "none" else sample_predictor(config)
         walk = roll_out(config, predictor, _team_planner(config, predictor), watch)
@@ -84,7 +84,7 @@ def sample_trials() -> Iterator[Array]:
         yield from of_figures(compute_figures(walk))
 
 
-def sent(tick: Tick) -> Iterator[Array]:
+def numbers_sent(tick: Tick) -> Iterator[Array]:
     """The numbers of what agents sent at a tick, and how many events there were."""
     for out in tick.outputs.values():
         yield out.command.row

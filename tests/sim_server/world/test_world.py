@@ -175,8 +175,8 @@ def test_a_weak_motor_gives_its_share_of_the_torque_from_its_time_on() -> None:
         limited[8] *= 0.4 if tick >= 10 else 1.0
         np.testing.assert_array_equal(tau["r2"], limited)
         faults = [(e.code, e.robot, e.detail) for e in events if e.kind == "fault"]
-        told = [("weak-motor", "r2", "RL_calf gives 40 % of its torque")] if tick == 10 else []
-        assert faults == told
+        expected = [("weak-motor", "r2", "RL_calf gives 40 % of its torque")] if tick == 10 else []
+        assert faults == expected
         assert (encode(world.truth()) == encode(sound.truth())) == (tick < 10)
 
 
