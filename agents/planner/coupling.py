@@ -13,11 +13,11 @@ from quadriga.shared.runtime.jit import compiled
 
 
 class Coupling:
-    """What the peers do to one agent over a horizon in which they stand as scheduled.
+    """Effect of the peers on one agent's outputs over a horizon with a given stance schedule.
 
-    A swinging leg of a peer carries no force: its columns, a third of all, are left out, which
-    is exact. Single precision is off by 3e-7 of an effect, and is half as much memory to go
-    through.
+    A swinging leg of a peer carries no force: its columns, a third of all, are left out, which is
+    exact. Single precision changes an effect by 3e-7 of its size and halves the memory that is
+    read.
 
     Args:
         G: the peers' blocks G_ij side by side, (n − 1, 6 N, 18 T_ini + 12 N).
@@ -52,7 +52,7 @@ def fill_deviations(
     known: NDArray[np.bool_],
     du: Array,
 ) -> None:
-    """Write a peer's [u_ini; y_ini; u] as deviations, flat; an unknown sample does not deviate.
+    """Write a peer's deviations [u_ini; y_ini; u] into `out`; those of unknown samples are zero.
 
     `out` is (18 T_ini + 12 N,); the rest is of `PeerData`, where forces are deviations already, and
     the base of the outputs, (T_ini, 6).

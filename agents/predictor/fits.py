@@ -49,8 +49,8 @@ def fit_ridge(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     """Block-weighted ridge regression of G; with w = 1 the plain one.
 
     Row i minimises ‖Y_f^i − Σ_j G_ij Z_j‖² + ridge · M · (‖G_ii‖² + w² Σ_{j≠i} ‖G_ij‖²) with M
-    columns: what the peers are not clearly seen to do is not attributed to them, without which
-    the agents' best responses to each other's last plans diverge.
+    columns: effects that the data do not clearly show are not attributed to the peers. Without this
+    weight the agents' best responses to each other's last plans diverge.
 
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
@@ -70,7 +70,7 @@ def fit_gamma(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
 
 
 def fit_causal(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """Block-weighted ridge with a block-lower-triangular U_f part: no force acts before its time.
+    """Block-weighted ridge with a block-lower-triangular U_f part: no output depends on later forces.
 
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
@@ -82,8 +82,8 @@ def fit_causal(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
 def fit_arx(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     """One-step block-weighted ridge regression, rolled out over N steps by the whole team.
 
-    With yoked neighbours only, what reaches a robot through a neighbour's neighbour within the
-    horizon is cut off: G_ij is zero wherever i and j are not yoked.
+    With yoked neighbours only, the effect of a neighbour's neighbour within the horizon is left
+    out: G_ij is zero wherever i and j are not yoked.
 
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
@@ -102,8 +102,8 @@ def fit_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     """One G for each phase of the gait, drawn towards the ridge fit of all data together.
 
     Row i of phase p minimises over its own windows the error plus phase_ridge · M_p times the
-    block-weighted square of the departure from the pooled fit: without data of its own a phase
-    has that of all.
+    block-weighted square of the departure from the pooled fit: a phase without data of its own gets
+    the pooled fit.
 
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
@@ -123,9 +123,9 @@ def fit_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
 
 
 def fit_hankel(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """G = Y_f [U_p; Y_p; U_f]† (eq. 6) as the paper has it; forms the Hankel matrices.
+    """G = Y_f [U_p; Y_p; U_f]† (eq. 6) as in the paper, from the Hankel matrices themselves.
 
-    The independent reference of the other fits; takes minutes where they take seconds.
+    An independent reference for the other fits; it takes minutes where they take seconds.
 
     Raises:
         PredictorError: no data, too little, or of another team.

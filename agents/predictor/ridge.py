@@ -16,7 +16,7 @@ from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
 
 @dataclass(frozen=True, slots=True)
 class Solutions:
-    """What a solver found.
+    """A solver's result.
 
     Attributes:
         x: scaled solutions, shape (n, n W, 6 N); zero in the rows of robots left out.
@@ -59,7 +59,7 @@ def solve_ridge(regression: Regression, meta: PredictorMeta, ridge: float) -> So
 
 
 def solve_causal(regression: Regression, meta: PredictorMeta, ridge: float) -> Solutions:
-    """The same with y at sample t explained by [u_ini; y_ini] and u_0 … u_t alone.
+    """Like `solve_ridge`, but [u_ini; y_ini] and u_0 … u_t alone explain y at sample t.
 
     With columns in the order of time the normal equations of sample t are a leading block of
     those of the last, and so are their Cholesky factors: one factor serves all N of them. u_k is
@@ -132,9 +132,9 @@ def _add_penalty(A: Array, penalty: Array | float) -> Array:
 def _solve_each(A: Array, b: Array, W: int, light: float, heavy: float) -> Array:
     """Solutions x_i of (A + D_i) x_i = b_i, D_i = light on block i and heavy on all others.
 
-    Eliminating one half of the blocks, all heavy there, leaves the same problem for each block of
-    the other half; so all n solutions cost 7/3 of one factorisation. Unlike correcting one common
-    factorisation for each block this loses no digits to a large ratio of the penalties.
+    One half of the blocks, all with the heavy penalty, is eliminated, which leaves the same problem
+    for the other half; so all n solutions cost 7/3 of one factorisation. Correcting one common
+    factorisation for each block would lose digits where the ratio of the penalties is large.
 
     Args:
         A: shape (n W, n W).
