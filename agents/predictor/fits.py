@@ -70,7 +70,7 @@ def fit_gamma(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
 
 
 def fit_causal(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """Block-weighted ridge with a block-lower-triangular U_f part: no output depends on later forces.
+    """Block-weighted ridge with a block-lower-triangular U_f part: no force acts backwards.
 
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
