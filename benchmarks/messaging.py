@@ -1,4 +1,4 @@
-"""What the messages of a lock-step tick cost, without world and robots: the Bus and raw sockets.
+"""Time of the messages of a lock-step tick without world and robots: the Bus and raw sockets.
 
 One process sends every robot a state and waits for all commands, as the sim server does; one
 process per robot answers. Both transports carry the same payloads between as many processes and

@@ -1,4 +1,4 @@
-"""The benchmark's page: the figures of each part in a few lines, and what they are held to."""
+"""The benchmark's page: the figures of each part in a few lines, and their limits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NO_TSID: Final = "not measured: `import tsid` fails or crashes here"
 
 
 def headline(parts: dict[str, Part]) -> dict[str, Any]:
-    """The figures that other programs look for; None where a part was left out."""
+    """The figures that other programs read; None where a part was left out."""
     low, walks, recorder = (parts.get(name, {}) for name in ("low-level", "walks", "recorder"))
     rows, cost = walks.get("rows", []), walks.get("recorder")
     tsid = low.get("tsid")
@@ -37,10 +37,10 @@ def headline(parts: dict[str, Part]) -> dict[str, Any]:
 
 
 def messaging_share(row: Part) -> float:
-    """Share of a tick over the bus that is neither physics nor control, were those in a row.
+    """Share of a tick over the bus beyond physics and control one after the other.
 
-    Robots compute side by side over the bus, so on several cores this is less than what messages
-    and waiting take, and may be negative.
+    Over the bus robots compute in parallel, so on several cores this is less than the time of
+    messages and waiting, and may be negative.
     """
     return 1.0 - float(row["alone"]["tick_us"] / row["tick_us"])
 
@@ -56,7 +56,7 @@ def section(name: str, part: Part) -> Table:
 
 
 def targets(figures: dict[str, Any]) -> Table:
-    """What was measured of what is held to a limit."""
+    """The measured figures that have a limit."""
     shown = Table.grid(padding=(0, 1))
     for key, sign, limit in TARGETS:
         name, _, size = key.partition(".")

@@ -1,4 +1,4 @@
-"""The parts of the benchmark: what each measures. Each imports what it needs."""
+"""The parts of the benchmark, one function each, which imports what it needs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Part = dict[str, Any]
 
 
 def planner(options: Options, console: Console, tell: Tell) -> Part:
-    """What a plan costs, ours and as written; `python -m benchmarks.planner` does it at length."""
+    """Time of a plan, ours and as written; `python -m benchmarks.planner` measures it at length."""
     from benchmarks.planner import measure, record_walks
     from benchmarks.planner_contenders import Local, Team
 
@@ -73,7 +73,7 @@ def world(options: Options, _console: Console, tell: Tell) -> Part:
 
 
 def recorder(options: Options, _console: Console, _tell: Tell) -> Part:
-    """What the recorder takes in."""
+    """The recorder's throughput."""
     from benchmarks.recorder import measure
 
     with tempfile.TemporaryDirectory() as scratch:
@@ -82,7 +82,7 @@ def recorder(options: Options, _console: Console, _tell: Tell) -> Part:
 
 
 def fit(options: Options, _console: Console, _tell: Tell) -> Part:
-    """The predictor's fit for a small team; `python -m benchmarks.fit` does the large ones."""
+    """The predictor's fit for a small team; `python -m benchmarks.fit` measures large ones."""
     from dataclasses import asdict
 
     from benchmarks.children import result_of
@@ -94,7 +94,7 @@ def fit(options: Options, _console: Console, _tell: Tell) -> Part:
 
 
 def walks(options: Options, console: Console, tell: Tell) -> Part:
-    """Real walks of every size, and of one with and without the recorder in turns."""
+    """Real walks of every team size, and of one size with and without recorder in turns."""
     from benchmarks.children import result_of
     from benchmarks.walks import alone, over_the_bus
     from quadriga.warm_up import warm_up
@@ -133,7 +133,7 @@ def recorder_turns(options: Options, rows: list[Part], console: Console, tell: T
 
 
 def add_prefix(tell: Tell, prefix: str) -> Tell:
-    """`tell` with `prefix` before what is told."""
+    """A function that calls `tell` with `prefix` before the text."""
     return lambda text: tell(f"{prefix}: {text}")
 
 

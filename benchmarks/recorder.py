@@ -1,9 +1,9 @@
-"""What the recorder takes in: real publishers over real Zenoh, messages/s, gaps, share of a core.
+"""The recorder's throughput with real publishers over Zenoh: messages/s, gaps, share of a core.
 
 Run: python -m benchmarks.recorder [--rate 20000] [--seconds 5] [--publishers 2] [--json FILE]
 
 Publishers are processes that send commands of a growing tick in real time, each on keys of its own,
-and wait for nobody; `quadriga record --now` writes them down. Gaps are looked for in the file.
+and never wait; `quadriga record --now` records them. Gaps are counted in the file.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from quadriga.team.endpoint import free_endpoint
 KEYS = 10  # of each publisher
 PROBE = "probe"  # sent until the recorder has heard every publisher
 PATIENCE = 60.0  # s, for every publisher to be heard, and for the recorder to close its file
-BURST = 0.001  # s, what is due is sent this often: as a world of many robots does
+BURST = 0.001  # s, period at which due messages are sent, as a world of many robots does
 
 
 def publish(
@@ -101,7 +101,7 @@ def measure(rate: float, seconds: float, publishers: int, folder: Path) -> dict[
 
 @contextmanager
 def recording(file: Path, config: Path) -> Iterator[int]:
-    """Run a recorder, whose process id is given; at the end of the block it closes the file."""
+    """Run a recorder and yield its process id; at the end of the block it closes the file."""
     recorder = subprocess.Popen(
         [
             sys.executable,
@@ -134,7 +134,7 @@ def await_probes(file: Path, publishers: int) -> None:
     """Wait until the recorder hears every publisher.
 
     Raises:
-        ChildProcessError: it does not, since it or a publisher has failed.
+        ChildProcessError: the recorder does not hear all, since it or a publisher has failed.
     """
     deadline = monotonic() + PATIENCE
     while (connected := count_publishers(file)) < publishers:
@@ -154,7 +154,7 @@ def count_publishers(file: Path) -> int:
 
 
 def figures(file: Path, sent: int) -> dict[str, float]:
-    """What the file tells."""
+    """Figures of the recorded file."""
     ticks: defaultdict[str, list[int]] = defaultdict(list)
     times = []
     for key, tick, log_time, _ in Recording(file).entries():
