@@ -59,7 +59,7 @@ class Inputs:
         state: the robot's own sensors at this tick.
         measurements: samples of peers, with the peer's name.
         plans: plans of peers, or of whoever plans for the robot, with the sender's name.
-        references: what the operator asked for.
+        references: of the operator.
         estop: an emergency stop, if one came.
         truth: of the simulator, only for the estimator "truth".
         excitation: force deviation to add, (12,), N, yaw frame; data collection only.

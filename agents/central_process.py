@@ -107,7 +107,7 @@ class _CentralShell:
         return self._config.planner.peer_timeout if self._lockstep else 0.0
 
     def _reference_known(self, state: CentralState, step: int) -> bool:
-        """Whether the operator's word for the time of `step` is there."""
+        """Whether the operator's reference for the time of `step` has arrived."""
         tick = step * step_ms(self._config)
         known = state.references
         return bool(known) and known[-1].tick >= tick - tick % EPOCH_MS

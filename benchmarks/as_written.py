@@ -25,7 +25,7 @@ from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
 
 Stance = NDArray[np.bool_]
 
-# OSQP's default tolerances, and those of a reference; rho adapts by iterations, never by time.
+# OSQP's own tolerances, and tighter ones for a reference; rho adapts by iterations, never by time.
 DEFAULT: Final[Mapping[str, float]] = MappingProxyType(
     {"adaptive_rho": 1, "adaptive_rho_interval": 50}
 )

@@ -1,4 +1,4 @@
-"""The real-time world's account: how old the commands were that it used, how late it was itself."""
+"""The real-time world's report: the age of the commands that it used, and its own lateness."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Deadlines:
         return ", ".join(f"{' '.join(filter(None, key))} {n}" for key, n in counts) or "none"
 
     def status(self, tick: int, overruns: int) -> Status:
-        """All of it, as `<team>/sim/status` carries it.
+        """The report, as sent on `<team>/sim/status`.
 
         `ages_ms` holds median, p99 and max of `<robot>.command` and of the world's own `jitter`;
         counters are `<robot>.late`, `.held`, `.damped`, `ticks` and `overruns`; `tick_us` holds the

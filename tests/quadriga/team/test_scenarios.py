@@ -113,7 +113,8 @@ def test_a_wrong_name_is_one_error_that_lists_the_right_ones(
 
 
 @pytest.mark.parametrize(
-    ("text", "text"), [("world = 3\n", r"^world: "), ("[wrld]\nseed = 3\n", "did you mean 'world'")]
+    ("text", "message"),
+    [("world = 3\n", r"^world: "), ("[wrld]\nseed = 3\n", "did you mean 'world'")],
 )
 def test_a_file_over_a_scenario_is_checked_as_any(tmp_path: Path, text: str, message: str) -> None:
     file = tmp_path / "wrong.toml"
