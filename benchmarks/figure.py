@@ -107,12 +107,12 @@ def _world(axis: Axes, part: Part) -> None:
 def _memory(axis: Axes, part: Part) -> None:
     """Private memory of the processes of the largest team."""
     row = max(part["rows"], key=lambda row: row["robots"])
-    found = {name: m for name, m in row["memory_mb"].items() if m}
-    names = list(found)[::-1]
-    axis.barh(names, [found[name]["rss"] for name in names], 0.6, color="0.85", label="resident")
+    memory = {name: m for name, m in row["memory_mb"].items() if m}
+    names = list(memory)[::-1]
+    axis.barh(names, [memory[name]["rss"] for name in names], 0.6, color="0.85", label="resident")
     axis.barh(
         names,
-        [found[name]["pss"] for name in names],
+        [memory[name]["pss"] for name in names],
         0.6,
         color=_COLOURS[0],
         label="its share of it",

@@ -45,16 +45,16 @@ def cases(config: Config, predictor: Predictor | None, ticks: list[AgentTick]) -
     return controller.cases[config.gait.stand_ms :]
 
 
-def compare(config: Config, found: list[TsidCase]) -> dict[str, Any] | None:
+def compare(config: Config, cases: list[TsidCase]) -> dict[str, Any] | None:
     """Run both on every case, see `_compare`; None if TSID is not installed."""
     try:
-        answer: dict[str, Any] | None = result_of(_compare, config, found)
+        answer: dict[str, Any] | None = result_of(_compare, config, cases)
     except ChildProcessError:
         return None
     return answer
 
 
-def _compare(config: Config, found: list[TsidCase]) -> dict[str, Any] | None:
+def _compare(config: Config, cases: list[TsidCase]) -> dict[str, Any] | None:
     """Median times of both, µs, taking turns to be first, and the difference of their torques."""
     warnings.simplefilter("ignore", RuntimeWarning)  # two of TSID's converters have one type
     try:
@@ -62,19 +62,19 @@ def _compare(config: Config, found: list[TsidCase]) -> dict[str, Any] | None:
     except ImportError:
         return None
     with collector_off():
-        return _turns(config, found)
+        return _turns(config, cases)
 
 
-def _turns(config: Config, found: list[TsidCase]) -> dict[str, Any]:
+def _turns(config: Config, cases: list[TsidCase]) -> dict[str, Any]:
     from benchmarks.low_level_peer import Tsid
 
     # TSID gives rotation and translation, and feet and trunk, one weight: so do both here.
     weights = Controller(config).weights._replace(tilt_length=1.0, swing_weight=1.0)
     ours, peer = _Ours(weights), Tsid(weights)
-    times, differences = np.empty((2, len(found))), []
-    for case in found[:20]:
+    times, differences = np.empty((2, len(cases))), []
+    for case in cases[:20]:
         ours.solve(case)
-    for k, case in enumerate(found):
+    for k, case in enumerate(cases):
         peer.set(case)
         answers: list[Array] = [np.empty(0), np.empty(0)]
         order: list[tuple[int, Callable[[TsidCase], object], Callable[[], Array]]] = [
@@ -94,7 +94,7 @@ def _turns(config: Config, found: list[TsidCase]) -> dict[str, Any]:
         "tsid_us_p99": float(p99[1]),
         "ratio": float(median[1] / median[0]),
         "torque_difference_median_nm": float(np.median(differences)),
-        "ticks": len(found),
+        "ticks": len(cases),
     }
 
 

@@ -45,9 +45,9 @@ def measure(robots: int, ticks: int = 2000) -> dict[str, Any]:
         others = [child(_bus_robot, config, name, ended) for name in names]
         others += [child(_socket_robot, config, place) for _ in names]
         with running(*others):
-            found = result_of(_world, config, place, ticks)
+            times = result_of(_world, config, place, ticks)
             ended.set()
-    return {"robots": robots, **found}
+    return {"robots": robots, **times}
 
 
 def _world(config: Config, place: str, ticks: int) -> dict[str, dict[str, float]]:
@@ -84,7 +84,7 @@ def _world(config: Config, place: str, ticks: int) -> dict[str, dict[str, float]
                     times[name] += took if begin >= 0 else []
             for link in links:
                 link.close()
-    return {name: _spread(found) for name, found in times.items()}
+    return {name: _spread(block) for name, block in times.items()}
 
 
 def _time_tick(tick: Any) -> int:

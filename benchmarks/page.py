@@ -89,9 +89,9 @@ def _planner(part: Part) -> list[str]:
 def _low_level(part: Part) -> list[str]:
     lines = []
     for name in ("hot", "cold"):
-        found = part[name]
-        stages = ", ".join(f"{stage} {us:.1f}" for stage, us in found["stages"].items())
-        lines.append(f"{name}: {found['median']:.0f} µs, p99 {found['p99']:.0f}: {stages}")
+        figures = part[name]
+        stages = ", ".join(f"{stage} {us:.1f}" for stage, us in figures["stages"].items())
+        lines.append(f"{name}: {figures['median']:.0f} µs, p99 {figures['p99']:.0f}: {stages}")
     tsid = part["tsid"]
     if tsid is None:
         return [*lines, f"whole-body part against TSID: {_NO_TSID}"]
@@ -151,15 +151,15 @@ def _walks(part: Part) -> list[str]:
     return lines
 
 
-def _memory(found: dict[str, dict[str, float]]) -> str:
+def _memory(figures: dict[str, dict[str, float]]) -> str:
     """RSS (PSS) by process, of all robots the largest."""
-    robots = [name for name in found if name[1:].isdigit()]
-    shown = {name: m for name, m in found.items() if name not in robots and m}
+    robots = [name for name in figures if name[1:].isdigit()]
+    shown = {name: m for name, m in figures.items() if name not in robots and m}
     if robots:
-        largest = max(robots, key=lambda name: found[name].get("rss", 0.0))
-        shown = {"largest agent": found[largest], **shown}
+        largest = max(robots, key=lambda name: figures[name].get("rss", 0.0))
+        shown = {"largest agent": figures[largest], **shown}
     cells = (f"{name} {m['rss']:.0f} ({m['pss']:.0f})" for name, m in shown.items() if m)
-    total = sum(m.get("pss", 0.0) for m in found.values())
+    total = sum(m.get("pss", 0.0) for m in figures.values())
     return f"MB (of it own): {', '.join(cells)}; all {total:.0f}"
 
 

@@ -42,11 +42,11 @@ def low_level(options: Options, console: Console, tell: Tell) -> Part:
     config, _, predictor = team(options, options.middle, seconds, console)
     ticks = low_level_ticks.record(config, predictor)
     tell("ticks")
-    found: Part = result_of(low_level.measure, config, predictor, ticks, passes)
+    figures: Part = result_of(low_level.measure, config, predictor, ticks, passes)
     tell("against TSID")
     cases = low_level_tsid.cases(config, predictor, ticks)
-    found["tsid"] = low_level_tsid.compare(config, cases)
-    return found
+    figures["tsid"] = low_level_tsid.compare(config, cases)
+    return figures
 
 
 def bus(options: Options, _console: Console, tell: Tell) -> Part:
@@ -105,8 +105,8 @@ def walks(options: Options, console: Console, tell: Tell) -> Part:
         warm_up(config, console)
         tell(f"n = {robots} in one process")
         parts = result_of(alone, config, predictor)
-        found = over_the_bus(config, path, predictor, add_prefix(tell, f"n = {robots}"))
-        rows.append({"robots": robots, "alone": parts, **found})
+        figures = over_the_bus(config, path, predictor, add_prefix(tell, f"n = {robots}"))
+        rows.append({"robots": robots, "alone": parts, **figures})
     return {
         "rows": rows,
         "planner": options.planner,
@@ -124,12 +124,12 @@ def recorder_turns(options: Options, rows: list[Part], console: Console, tell: T
     middle = options.middle
     config, path, predictor = team(options, middle, options.seconds, console)
     plain = replace(config, recorder=replace(config.recorder, enabled=False))
-    found: Part = {"robots": middle, "with": [], "without": []}
-    found["with"] += [row["rtf"] for row in rows if row["robots"] == middle]
+    figures: Part = {"robots": middle, "with": [], "without": []}
+    figures["with"] += [row["rtf"] for row in rows if row["robots"] == middle]
     for name, asked in (("without", plain), ("with", config), ("without", plain)):
         tell(f"n = {middle}, {name} recorder")
-        found[name].append(over_the_bus(asked, path, predictor, lambda _: None)["rtf"])
-    return found
+        figures[name].append(over_the_bus(asked, path, predictor, lambda _: None)["rtf"])
+    return figures
 
 
 def add_prefix(tell: Tell, prefix: str) -> Tell:

@@ -238,7 +238,7 @@ def row(robots: int, contender: Contender, yardstick: Contender) -> Row:
 
 def headline(rows: Sequence[Row]) -> dict[str, float]:
     """The figures that have a limit, of the default solver at n = 5."""
-    found = {r["problem"]: r for r in rows if r["robots"] == 5 and r["name"] == "daqp"}
+    by_problem = {r["problem"]: r for r in rows if r["robots"] == 5 and r["name"] == "daqp"}
     wanted = {
         "ratio_median": ("eq. 12, QP", "ratio_median"), "ratio_p99": ("eq. 12, QP", "ratio_p99"),
         "tick_ratio_median": ("eq. 12, tick", "ratio_median"),
@@ -247,9 +247,9 @@ def headline(rows: Sequence[Row]) -> dict[str, float]:
         "relative_gap": ("eq. 12, QP", "relative_gap"),
     }  # fmt: skip
     return {
-        key: float(found[problem][figure])
+        key: float(by_problem[problem][figure])
         for key, (problem, figure) in wanted.items()
-        if problem in found
+        if problem in by_problem
     }
 
 

@@ -162,7 +162,7 @@ def figures(file: Path, sent: int) -> dict[str, float]:
             continue
         ticks[key].append(tick)
         times.append(log_time)
-    gaps = sum(int((np.diff(found) != 1).sum()) + found[0] for found in ticks.values())
+    gaps = sum(int((np.diff(of_key) != 1).sum()) + of_key[0] for of_key in ticks.values())
     return {
         "sent": sent,
         "recorded": len(times),
@@ -180,11 +180,11 @@ if __name__ == "__main__":
     arguments.add_argument("--json", type=Path, default=None, metavar="FILE")
     options = arguments.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
-        found = measure(options.rate, options.seconds, options.publishers, Path(scratch))
+        result = measure(options.rate, options.seconds, options.publishers, Path(scratch))
     print(
-        f"{found['per_s']:,.0f} messages/s recorded of {found['asked_per_s']:,.0f} asked for; "
-        f"{found['recorded']:,.0f} of {found['sent']:,.0f} sent, {found['gaps']:.0f} gaps; "
-        f"{100 * found['core']:.0f} % of a core; load {found['load']:.1f}"
+        f"{result['per_s']:,.0f} messages/s recorded of {result['asked_per_s']:,.0f} asked for; "
+        f"{result['recorded']:,.0f} of {result['sent']:,.0f} sent, {result['gaps']:.0f} gaps; "
+        f"{100 * result['core']:.0f} % of a core; load {result['load']:.1f}"
     )
     if options.json is not None:
-        options.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+        options.json.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")

@@ -127,11 +127,11 @@ def _publish(
     for experiment, plans in todo:
         _walk(arguments, experiment, plans, runs)
         entries = publish(every, runs, into, renewed, say)
-    found = [(one.experiment, one.results) for one in entries if one.experiment.name in asked]
-    for experiment, results in found:
+    shown = [(one.experiment, one.results) for one in entries if one.experiment.name in asked]
+    for experiment, results in shown:
         _show(experiment, [build_requirement_table(experiment, results)])
     print(into / PAGE)
-    return found
+    return shown
 
 
 def _meets(experiment: Experiment, results: Results) -> bool:

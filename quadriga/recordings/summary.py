@@ -100,8 +100,8 @@ def _world(traces: Traces) -> dict[str, Any]:
     if not len(truth.tick):  # then the robots' own word must do
         reported |= {
             r
-            for r, found in traces.statuses.items()
-            if any(code_of(s.reason) == FALL for s in found)
+            for r, statuses in traces.statuses.items()
+            if any(code_of(s.reason) == FALL for s in statuses)
         }
     end = next((event for event in reversed(traces.events) if event.kind == "stop"), None)
     return {
@@ -179,7 +179,7 @@ def _deadlines(traces: Traces) -> dict[str, Any]:
         return {"realtime": None}
     sim_status = traces.world[-1]
     ticks = sim_status.counters.get("ticks", 0)
-    found: dict[str, Any] = {
+    by_member: dict[str, Any] = {
         "world": {
             "jitter_ms": _spread(sim_status, "jitter"),
             "overruns": sim_status.counters.get("overruns"),
@@ -188,7 +188,7 @@ def _deadlines(traces: Traces) -> dict[str, Any]:
     for robot in traces.robots:
         own = traces.statuses[robot]
         late = sim_status.counters.get(f"{robot}.late", 0)
-        found[robot] = {
+        by_member[robot] = {
             "late": late,
             "late_share": late / ticks if ticks else None,
             "held": sim_status.counters.get(f"{robot}.held", 0),
@@ -197,7 +197,7 @@ def _deadlines(traces: Traces) -> dict[str, Any]:
             "deadlines_missed": own[-1].counters.get("deadlines_missed") if own else None,
             "jitter_ms": _spread(own[-1], "jitter") if own else {},
         }
-    return {"realtime": found}
+    return {"realtime": by_member}
 
 
 def _spread(status: Status, name: str) -> dict[str, float]:

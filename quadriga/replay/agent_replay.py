@@ -172,10 +172,10 @@ def _save_problem(job: ReplayJob, agent: Agent, verdict: ReplayVerdict) -> tuple
     if verdict.first is None or verdict.step is None:
         return ()
     about = f"{job.robot} at tick {verdict.first.tick}"
-    found = problems_of(agent, verdict.step.before, verdict.step.inputs, about)
+    problems = problems_of(agent, verdict.step.before, verdict.step.inputs, about)
     kind = PLANNER if verdict.first.name == PLAN.name else WHOLE_BODY
-    if kind not in found:
+    if kind not in problems:
         return ()
     path = job.out / f"replay-{job.robot}-{verdict.first.tick}-{kind}.npz"
-    save(path, found[kind])
+    save(path, problems[kind])
     return (path,)

@@ -89,8 +89,8 @@ def _find_span(traces: Traces) -> tuple[int, int]:
     """First and last tick of what robots and world sent; of anything, if they sent nothing."""
     last, nothing = end_of_world(traces.config) + _FORGED, np.zeros(0, dtype=np.int64)
     for names in (_PACED, ("",)):
-        found = [ticks for key, ticks in traces.ticks.items() if key.endswith(names)]
-        ticks = np.concatenate([nothing, *found])
+        of_keys = [ticks for key, ticks in traces.ticks.items() if key.endswith(names)]
+        ticks = np.concatenate([nothing, *of_keys])
         ticks = ticks[ticks <= last]
         if len(ticks):
             return int(ticks.min()), int(ticks.max())

@@ -112,13 +112,13 @@ def read_campaigns(experiment: Experiment, runs: Path) -> dict[Part, CampaignTri
     Raises:
         ConfigError: a folder is not what was written there.
     """
-    found: dict[Part, CampaignTrials] = {}
+    campaigns: dict[Part, CampaignTrials] = {}
     for part in experiment.parts:
         folder = experiment.folder(runs, part)
         if (folder / FILE).is_file():
             manifest = read_manifest(folder)
-            found[part] = (manifest, read_rows(folder, manifest))
-    return found
+            campaigns[part] = (manifest, read_rows(folder, manifest))
+    return campaigns
 
 
 def _draw_figures(experiment: Experiment, results: Results, into: Path) -> list[str]:

@@ -63,10 +63,10 @@ def read_published_trials(experiment: Experiment, into: Path) -> Campaigns:
     Raises:
         ConfigError: a file is not what was written there.
     """
-    found = {part: read_published_manifest(experiment, part, into) for part in experiment.parts}
+    manifests = {part: read_published_manifest(experiment, part, into) for part in experiment.parts}
     return {
         part: (manifest, _rows(experiment, part, into, manifest))
-        for part, manifest in found.items()
+        for part, manifest in manifests.items()
         if manifest is not None
     }
 

@@ -95,13 +95,13 @@ def numbers_sent(tick: Tick) -> Iterator[Array]:
     yield numbers(len(tick.events))
 
 
-def of_figures(found: Figures) -> Iterator[Array]:
+def of_figures(figures: Figures) -> Iterator[Array]:
     """Figures of merit but for those of wall time."""
-    yield numbers(found.seconds, found.cost, found.cost_outputs, found.cost_forces)
-    yield numbers(found.distance, found.work, found.cost_of_transport, len(found.stopped))
-    yield numbers(*found.fallen.values())
-    yield numbers(*found.mean.values(), *found.rmse.values())
-    yield numbers(*sorted(found.plans.values()))
+    yield numbers(figures.seconds, figures.cost, figures.cost_outputs, figures.cost_forces)
+    yield numbers(figures.distance, figures.work, figures.cost_of_transport, len(figures.stopped))
+    yield numbers(*figures.fallen.values())
+    yield numbers(*figures.mean.values(), *figures.rmse.values())
+    yield numbers(*sorted(figures.plans.values()))
 
 
 def sample_predictor(config: Config) -> Predictor:
