@@ -108,7 +108,7 @@ def _publish(
     from quadriga.experiments.published.catalogue import CHECKOUT
     from quadriga.experiments.published.publish import PAGE, publish
     from quadriga.experiments.published.requirement_table import build_requirement_table
-    from quadriga.experiments.published.walk_experiment import take_up_published
+    from quadriga.experiments.published.walk_experiment import unpack_published
 
     into, runs = arguments.into or CHECKOUT, arguments.out
     chosen = [experiment for experiment in every if experiment.name in asked]
@@ -120,7 +120,7 @@ def _publish(
     entries = publish(every, runs, into, renewed, say)
     if arguments.from_published:
         for experiment, plans in todo:
-            count = take_up_published(
+            count = unpack_published(
                 experiment, plans, into, runs, typed=arguments.typed, console=Console(stderr=True)
             )
             say(f"{experiment.name}: {count:,} published trials taken up")

@@ -55,7 +55,7 @@ class Terrain:
         """Height of the ground at world positions x, y of any equal shape, m."""
         return np.zeros(np.shape(x)) if self.relief is None else self.relief.height(x, y)
 
-    def under(self, x: Array, y: Array, yaw: Array) -> Array:
+    def height_under_hips(self, x: Array, y: Array, yaw: Array) -> Array:
         """Mean height of the ground where a robot's feet stand under its hips, m.
 
         Args:

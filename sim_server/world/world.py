@@ -172,7 +172,9 @@ class World:
                 continue
             yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
             # The mean under the hips, since the trunk may be over a block between the feet.
-            above = z - float(self.team.terrain.under(np.array(x), np.array(y), np.array(yaw)))
+            above = z - float(
+                self.team.terrain.height_under_hips(np.array(x), np.array(y), np.array(yaw))
+            )
             if not (cosine >= _FALL_COSINE and above >= _FALL_HEIGHT):
                 self._fallen[i] = True
                 detail = f"tilt {math.acos(max(-1.0, cosine)):.2f} rad, height {above:.3f} m"

@@ -56,7 +56,7 @@ def check_folders(experiment: Experiment, runs: Path) -> None:
             read_manifest(folder).check_versions(code_and_libraries(), folder)
 
 
-def take_up_published(
+def unpack_published(
     experiment: Experiment,
     plans: Sequence[PartPlan],
     into: Path,
