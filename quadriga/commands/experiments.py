@@ -76,8 +76,8 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     _check_options(arguments)
     every, asked = load_experiments(arguments.names)
     chosen = [experiment for experiment in every if experiment.name in asked]
-    found = _look(arguments, chosen) if arguments.seeds else _publish(arguments, every, asked)
-    return int(arguments.require and not all(_meets(one, results) for one, results in found))
+    outcomes = _look(arguments, chosen) if arguments.seeds else _publish(arguments, every, asked)
+    return int(arguments.require and not all(_meets(one, results) for one, results in outcomes))
 
 
 def _look(

@@ -158,8 +158,8 @@ def _estimator(traces: Traces) -> dict[str, Any]:
 
 def _agents(traces: Traces) -> dict[str, Any]:
     statuses = traces.statuses
-    last = {robot: found[-1] for robot, found in statuses.items() if found}
-    every = [status for found in statuses.values() for status in found]
+    last = {robot: of_robot[-1] for robot, of_robot in statuses.items() if of_robot}
+    every = [status for of_robot in statuses.values() for status in of_robot]
     planner_ms = _concatenate([status.planner_ms for status in every])
     tick_us = _concatenate([status.tick_us for status in every])
     return {
