@@ -40,6 +40,7 @@ from quadriga.agents.tasks import Tasks
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array, robot_names
 from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.codes import code_of, with_detail
 from quadriga.shared.wire.messages import Command, EStop, Measurement, Plan, Reference, State, Truth
 from quadriga.shared.wire.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
 
@@ -58,7 +59,7 @@ class Inputs:
         state: the robot's own sensors at this tick.
         measurements: samples of peers, with the peer's name.
         plans: plans of peers, or of whoever plans for the robot, with the sender's name.
-        references: what the operator asked for.
+        references: of the operator.
         estop: an emergency stop, if one came.
         truth: of the simulator, only for the estimator "truth".
         excitation: force deviation to add, (12,), N, yaw frame; data collection only.
@@ -288,7 +289,7 @@ def _stops_on_arrival(estop: EStop | None, course: Mode, reference_age: int) -> 
     """Stops that what arrived, or did not arrive, asks for."""
     stops = []
     if estop is not None:
-        stops.append(Stop(ESTOP, f"estop:{estop.reason}"))
+        stops.append(Stop(ESTOP, with_detail(ESTOP, estop.reason)))
     if course.name == WALK and reference_age > REFERENCE.max_age_ms:
         stops.append(Stop(STOPPING, REFERENCE_LOST))
     return stops
@@ -300,7 +301,7 @@ def _count(
     """The counters with what was out of the ordinary at this tick."""
     names = []
     if planned.plan is not None and planned.plan.status != SOLVED:
-        names.append(f"plan_{planned.plan.status.partition(':')[0]}")
+        names.append(f"plan_{code_of(planned.plan.status)}")
     names += planned.unusual
     if solution.status != UNCONSTRAINED:
         names.append("qp_constrained" if solution.solved else "qp_failed")

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.planner.team_planner import TeamPlanner
 from quadriga.agents.planning.interface import REFUSED
 from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
@@ -21,11 +22,12 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER, SIM
 from quadriga.shared.robot.a1 import robot_names
-from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.codes import code_of
 from quadriga.shared.wire.messages import Event, Measurement, Reference, Status
 from quadriga.shared.wire.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
@@ -45,7 +47,7 @@ def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None
         BusError: the bus cannot be opened, or the team is not complete in time.
     """
     stopped = stopped or stop_on_signals()
-    one_blas_thread()
+    use_one_blas_thread()
     team, names = config.team.name, robot_names(config.team.robots)
     with Bus.open(config.bus, team, PLANNER, stopped) as bus:
         shell = _CentralShell(config, Central(config, planner, monotonic_ns), bus)
@@ -87,7 +89,7 @@ class _CentralShell:
         state, since = CentralState(), monotonic()
         while not (stopped() or self._ended):
             packet = self._bus.get(POLL)
-            if packet is None and SIM not in self._bus.present(HERE):
+            if packet is None and SIM not in self._bus.members_at(HERE):
                 return
             for key, payload in (packet, *self._bus.drain()) if packet else ():
                 self._take(key, payload)
@@ -105,7 +107,7 @@ class _CentralShell:
         return self._config.planner.peer_timeout if self._lockstep else 0.0
 
     def _reference_known(self, state: CentralState, step: int) -> bool:
-        """Whether the operator's word for the time of `step` is there."""
+        """Whether the operator's reference for the time of `step` has arrived."""
         tick = step * step_ms(self._config)
         known = state.references
         return bool(known) and known[-1].tick >= tick - tick % EPOCH_MS
@@ -132,8 +134,8 @@ class _CentralShell:
         if not outputs.plans or outputs.planner_ns is None:
             return
         plan = outputs.plans[0][1]
-        if plan.status != "solved":
-            self._counters[f"plan_{plan.status.partition(':')[0]}"] += 1
+        if plan.status != SOLVED:
+            self._counters[f"plan_{code_of(plan.status)}"] += 1
         if state.refused:
             self._counters[REFUSED] = state.refused
         took = np.array([1e-6 * outputs.planner_ns])

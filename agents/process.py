@@ -18,7 +18,7 @@ from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import SIM
-from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
@@ -48,7 +48,7 @@ def run(
             state has come that is newer than those before.
     """
     stopped = stopped or stop_on_signals()
-    one_blas_thread()
+    use_one_blas_thread()
     agent = Agent(config, robot, predictor, monotonic_ns)
     inbox = Inbox(config, robot, agent.peers)
     with Bus.open(config.bus, config.team.name, robot, stopped) as bus:
@@ -92,7 +92,7 @@ class _Shell:
             if state is not None:
                 memory = self._answer(memory, state)
                 self._misfits = None
-            elif SIM not in self._bus.present(HERE):
+            elif SIM not in self._bus.members_at(HERE):
                 return
             else:
                 self._check_clock(memory.tick)
@@ -170,7 +170,7 @@ class _Shell:
 
     def _missing_sources(self, tick: int, expected: Expected) -> set[Source]:
         """Sources that have not sent their message yet and are worth waiting for."""
-        received, present = self._inbox.received, self._bus.present(HERE)
+        received, present = self._inbox.received, self._bus.members_at(HERE)
         return {
             source
             for source in self._inbox.missing_sources(tick, expected)

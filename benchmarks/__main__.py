@@ -1,11 +1,11 @@
-"""What everything costs, on one page: planner, low level, messages, world, recorder, fit, walks.
+"""The benchmark on one page: planner, low level, messages, world, recorder, fit, walks.
 
 Run: python -m benchmarks [PART ...] [--robots 1 2 3 5 10] [--seconds 4] [--out FILE]
 
-Prints a page, writes FILE (JSON) and beside it a picture. Each part is measured by real processes
-and real walks of this machine; what else runs on it is in the figures, so let nothing. A team
-that has not walked here before is collected and fitted first, which for ten takes minutes;
-`--planner none` walks without. `--quick` only shows that all parts work.
+Prints a page, writes FILE (JSON) and beside it a picture. Each part is measured with real processes
+and real walks on this machine. Other programs change the figures, so run none. For a team that has
+not walked here before, data are collected and a predictor is fitted first, which takes minutes for
+ten robots; `--planner none` walks without a predictor. `--quick` only shows that all parts work.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ def main() -> int:
 
 
 def run_parts(options: Options) -> int:
-    """Every part in turn, then the page."""
+    """Run every part in turn, then build the page."""
     from rich.console import Console
 
     from benchmarks.figure import draw
     from benchmarks.page import headline, section, targets
-    from benchmarks.parts import PARTS, prefixed
+    from benchmarks.parts import PARTS, add_prefix
 
     console = Console(width=120, highlight=False)
     result: dict[str, Any] = {"machine": describe_machine(), "quick": options.quick}
@@ -56,7 +56,7 @@ def run_parts(options: Options) -> int:
     for name in options.parts:
         with console.status(f"{name} …") as status:
             try:
-                parts[name] = PARTS[name](options, console, prefixed(status.update, name))
+                parts[name] = PARTS[name](options, console, add_prefix(status.update, name))
             except (QuadrigaError, ChildProcessError) as error:
                 failed[name] = str(error)
         if name in parts:
@@ -74,7 +74,7 @@ def run_parts(options: Options) -> int:
 
 
 def describe_machine() -> dict[str, Any]:
-    """What the figures depend on beside the code."""
+    """The machine's properties that the figures depend on."""
     from benchmarks.children import result_of
     from quadriga.shared.config.sections import Config
     from quadriga.shared.runtime.scheduling import take_priority
@@ -125,7 +125,7 @@ def parse_options(words: Sequence[str] | None = None) -> Options:
         parser.error(f"no part {', '.join(unknown)}; there are {', '.join(PARTS)}")
     if min(given.robots) < 1 or given.seconds < 1.0:
         parser.error("a walk takes at least one robot and one second")
-    folder = given.out.parent  # looked at now, not after minutes
+    folder = given.out.parent  # checked now, not after minutes of measuring
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -1,9 +1,9 @@
-"""The paper's problems as they stand there, in sparse OSQP: for comparison, never in the loop.
+"""The paper's problems as written there, solved by sparse OSQP; for comparison only.
 
 Eq. 12 for one agent, eq. 7 for a whole team, eq. 5 with g and σ. Outputs stay variables, swing
 legs are variables bounded to zero, and one solver object is updated and warm-started from tick to
 tick, so an answer depends on the ticks before it. Forces and outputs are deviations, as in the
-planner; the constant part of the cost is left out, and all of it halved.
+planner; the cost is halved and without its constant part.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
 
 Stance = NDArray[np.bool_]
 
-# OSQP's own tolerances, and those of a reference; rho adapts by iterations, never by time.
+# OSQP's own tolerances, and tighter ones for a reference; rho adapts by iterations, never by time.
 DEFAULT: Final[Mapping[str, float]] = MappingProxyType(
     {"adaptive_rho": 1, "adaptive_rho_interval": 50}
 )
@@ -37,12 +37,12 @@ TIGHT: Final[Mapping[str, float]] = MappingProxyType({
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """An answer of OSQP, taken as it is.
+    """An unchecked answer of OSQP.
 
     Attributes:
         u: force deviations, shape (n, N, 12), N.
         y: output deviations, shape (n, N, 6), m, m/s, rad, rad/s.
-        status: OSQP's own word; u and y may be NaN unless it is "solved".
+        status: as OSQP reports it; u and y may be NaN unless it is "solved".
         iterations: OSQP's count.
     """
 
@@ -57,7 +57,7 @@ class PaperQp:
 
     Args:
         config: N, weights, friction, bounds.
-        G_u: what the forces of n robots do to their outputs, shape (6 n N, 12 n N).
+        G_u: effect of the forces of n robots on their outputs, shape (6 n N, 12 n N).
         settings: OSQP's.
     """
 
@@ -176,7 +176,7 @@ class _Warm:
             self._model = osqp.OSQP()
             self._model.setup(self._P, q, self._A, lower, upper, verbose=False, **self._settings)
         else:
-            self._model.update(q=q, l=lower, u=upper)  # a name it does not know it would ignore
+            self._model.update(q=q, l=lower, u=upper)  # unknown names are ignored
         result = self._model.solve(raise_error=False)
         return result.x, result.info.status, int(result.info.iter)
 

@@ -1,4 +1,4 @@
-"""Imported before numpy it holds BLAS to one thread, as agents that share a machine must."""
+"""Limits BLAS to one thread if imported before numpy, as in agents that share a machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Processes of a benchmark, which neither an error nor an interrupt leaves behind."""
+"""Processes of a benchmark, which are ended even after an error or an interrupt."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def _live(parent: int, target: Callable[..., None], arguments: tuple[Any, ...]) 
 
 @contextmanager
 def running(*processes: SpawnProcess) -> Iterator[None]:
-    """Start the processes; at the end of the block wait for them, after an error end them.
+    """Start the processes; at the end of the block wait for them, or end them after an error.
 
     Raises:
         ChildProcessError: one failed, or did not leave in time.
     """
-    resource_tracker.ensure_running()  # before signals are held: its start lets them through
+    resource_tracker.ensure_running()  # started before signals are held, as its start releases them
     try:
-        with interrupts_held():  # Ctrl-C goes to all, but is this process's to handle
+        with interrupts_held():  # Ctrl-C reaches all processes, but only this one handles it
             for process in processes:
                 process.start()
         yield
@@ -57,14 +57,14 @@ def running(*processes: SpawnProcess) -> Iterator[None]:
 
 
 def result_of(target: Callable[..., Any], *arguments: Any) -> Any:
-    """What `target` returns in a process of its own that is scheduled like those of a walk.
+    """The result of `target`, run in a process of its own that is scheduled like those of a walk.
 
     Raises:
-        ChildProcessError: it raised, which it has shown, or crashed.
+        ChildProcessError: it crashed, or raised an error, which it has printed.
     """
     receiver, sender = SPAWN.Pipe(duplex=False)
     with running(child(_answer, sender, target, arguments)):
-        sender.close()  # else its end would not be noticed
+        sender.close()  # otherwise the end of the process would not be noticed
         try:
             return receiver.recv()
         except EOFError:

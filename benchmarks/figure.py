@@ -1,4 +1,4 @@
-"""The benchmark as a picture; a part that was left out leaves its panel out."""
+"""The benchmark as a picture, with a panel for each part that was measured."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _factor(axis: Axes, part: Part) -> None:
 
 
 def _shares(axis: Axes, part: Part) -> None:
-    """Left what it takes in one process, part by part; right over the bus."""
+    """Left bars: time in one process, part by part; right bars: over the bus."""
     rows, width = part["rows"], 0.38
     place, base = np.arange(len(rows)), np.zeros(len(rows))
     labels = {"physics_us": "physics", "controllers_us": "control", "planners_us": "planning"}
@@ -105,14 +105,14 @@ def _world(axis: Axes, part: Part) -> None:
 
 
 def _memory(axis: Axes, part: Part) -> None:
-    """Own memory of the processes, of the largest team."""
+    """Private memory of the processes of the largest team."""
     row = max(part["rows"], key=lambda row: row["robots"])
-    found = {name: m for name, m in row["memory_mb"].items() if m}
-    names = list(found)[::-1]
-    axis.barh(names, [found[name]["rss"] for name in names], 0.6, color="0.85", label="resident")
+    memory = {name: m for name, m in row["memory_mb"].items() if m}
+    names = list(memory)[::-1]
+    axis.barh(names, [memory[name]["rss"] for name in names], 0.6, color="0.85", label="resident")
     axis.barh(
         names,
-        [found[name]["pss"] for name in names],
+        [memory[name]["pss"] for name in names],
         0.6,
         color=_COLOURS[0],
         label="its share of it",

@@ -1,9 +1,9 @@
-"""Time and memory of the predictor's fits on random data of the sizes that large teams need.
+"""Time and memory of the predictor's fits on random data, of the sizes that large teams need.
 
 Each fit runs in a process of its own, whose peak memory is the fit's. Budgets of the default:
 n = 5, T = 12,000 in 3 s and 0.5 GB; n = 10, T = 20,000 in 12 s (two cores).
 
-On a machine that does other things too, two BLAS threads wait for each other and one is faster:
+On a busy machine two BLAS threads wait for each other and one thread is faster:
 OMP_NUM_THREADS=1 python -m benchmarks.fit
 
 Run: python -m benchmarks.fit [--out FILE] [--kinds ridge causal …] [--sizes 5 10] [--repeats 3]
@@ -46,7 +46,7 @@ SIZES = (Size(3, 5_250, 1.0, None), Size(5, 12_000, 3.0, 0.5), Size(10, 20_000, 
 
 @dataclass(frozen=True)
 class Measured:
-    """One fit: wall and processor time, peak memory of its process and what that had before."""
+    """One fit: wall and processor time, and memory of its process, at its peak and before."""
 
     robots: int
     samples: int
@@ -58,7 +58,7 @@ class Measured:
 
 
 def random_episodes(robots: int, samples: int) -> list[Episode]:
-    """White forces and white outputs: no fit is easier for it, none is meant to be good."""
+    """Data of white forces and white outputs: they make no fit faster, and no fit useful."""
     rng = np.random.default_rng(0)
     episodes = []
     for start in range(0, samples, EPISODE):

@@ -36,7 +36,7 @@ def processor_time() -> float:
 
 
 def stand(config: Config, robot: str, ended: Event, spent: Any) -> None:
-    """An agent that answers every state with PD around the standing pose."""
+    """Run an agent that answers every state with PD control around the standing pose."""
     zero, kp, kd = np.zeros(N_JOINTS), np.full(N_JOINTS, 80.0), np.full(N_JOINTS, 3.0)
     with Bus.open(config.bus, config.team.name, robot) as bus:
         bus.subscribe(STATE.key(config.team.name, robot))
@@ -53,7 +53,7 @@ def stand(config: Config, robot: str, ended: Event, spent: Any) -> None:
 
 
 def idle(config: Config, name: str, ended: Event) -> None:
-    """A member that subscribes to nothing."""
+    """Run a member of the team that subscribes to nothing."""
     with Bus.open(config.bus, config.team.name, name) as bus:
         meet(bus, config, ended.is_set)
         bus.declare(READY)

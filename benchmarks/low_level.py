@@ -1,9 +1,9 @@
-"""What the tick of one robot's low level costs and where the time goes, on a real walk's ticks.
+"""Time of one robot's low-level tick and of its stages, on the ticks of a real walk.
 
 A tick is everything between the bytes of a state and the bytes of the command: decode, estimate,
-gait and plan in force, rigid-body terms, references and QP, encode. Hot means one tick after
-the other; cold, that an array larger than the caches is gone through between two ticks: in a
-walk the world and other robots run in between, so the agent finds them cold.
+gait and plan in force, rigid-body terms, references and QP, encode. Hot means one tick after the
+other. Cold means that an array larger than the caches is read between two ticks, since in a walk
+the world and other robots run in between and empty the caches.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from quadriga.shared.wire.messages import State
 
 STAGES: Final = ("decode", "sense", "gait, plan", "terms, references, QP", "encode")
 _L2: Final = Path("/sys/devices/system/cpu/cpu0/cache/index2/size")
-_SIZE: Final = 8 << 20  # B, of an array larger than any L2 where the system does not tell its size
+_SIZE: Final = 8 << 20  # B, more than any L2 cache, where the system does not state its size
 
 
 def measure(
@@ -40,9 +40,9 @@ def measure(
 ) -> dict[str, Any]:
     """Medians and p99 of the whole tick and of its stages, µs, hot and cold.
 
-    Only ticks after the stand count. Each pass goes through the walk from its start, since an
-    agent remembers; the stages come from passes of their own, so that the stopwatch is not in
-    the whole.
+    Only ticks after the stand count. Each pass replays the walk from its start, since an agent has
+    a state. The stages are measured in passes of their own, so that the whole tick does not include
+    the stopwatch.
     """
     first = config.gait.stand_ms
     figures: dict[str, Any] = {"ticks": len(ticks) - first, "robots": config.team.robots}
@@ -55,7 +55,7 @@ def measure(
         _replay(agent, ticks)  # first calls load and set up
         for name, evict in between.items():
             whole = [_replay(agent, ticks, evict)[first:] for _ in range(passes)]
-            parts = [_staged(timed, watch, ticks, evict)[first:] for _ in range(passes)]
+            parts = [_time_stages(timed, watch, ticks, evict)[first:] for _ in range(passes)]
             times, stages = np.concatenate(whole), np.concatenate(parts)
             figures[name] = {
                 "median": float(np.median(times)),
@@ -90,7 +90,7 @@ def _replay(
     return 1e-3 * times
 
 
-def _staged(
+def _time_stages(
     agent: Agent, watch: _Stopwatch, ticks: list[AgentTick], evict: Callable[[], object]
 ) -> Array:
     """Time of every tick's stages, (T, 5), µs."""
@@ -120,7 +120,7 @@ def _step(
 
 
 def _evict() -> Callable[[], object]:
-    """A function after whose call the caches hold nothing of what was there before."""
+    """A function that evicts from the caches whatever they held before its call."""
     size = _SIZE
     if _L2.is_file():
         kibibytes = _L2.read_text(encoding="ascii").strip().removesuffix("K")

@@ -25,7 +25,7 @@ _POSITION = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
 class Tsid:
-    """One A1 with four feet that are contacts or tasks, as the tick has it."""
+    """One A1 with four feet, each of which is a contact or a task at a tick."""
 
     def __init__(self, weights: Weights) -> None:
         self._weights = weights
@@ -100,7 +100,7 @@ class Tsid:
             self._form.addMotionTask(task, self._weights.gamma_defect, 1, 0.0)
 
     def solve(self, case: TsidCase) -> None:
-        """What TSID does at a tick."""
+        """Solve the problem of a tick with TSID."""
         problem = self._form.computeProblemData(0.0, case.q, case.v)
         self._solution = self._solver.solve(problem)
 

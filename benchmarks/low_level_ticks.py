@@ -1,4 +1,4 @@
-"""What one robot's low level takes in on a real walk, tick by tick, for a benchmark."""
+"""The inputs of one robot's low level on a real walk, tick by tick, for a benchmark."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from quadriga.team.operator import reference_at
 
 @dataclass(frozen=True, slots=True)
 class AgentTick:
-    """Everything that reached an agent at one tick; its own state as it was on the wire."""
+    """All inputs of an agent at one tick; the robot's state as bytes of the wire."""
 
     payload: bytes
     inputs: Inputs
@@ -26,13 +26,13 @@ class AgentTick:
 
 @dataclass(frozen=True, slots=True)
 class TsidCase:
-    """What one tick gives the whole-body part.
+    """The inputs of the whole-body part at one tick.
 
     Attributes:
         sensed: `Sensed.flat`.
         q: Pinocchio's configuration, (19,).
         v: Pinocchio's velocity, (18,).
-        goal: what the QP is asked for.
+        goal: of the QP.
     """
 
     sensed: Array
@@ -42,7 +42,7 @@ class TsidCase:
 
 
 def record(config: Config, predictor: Predictor | None) -> list[AgentTick]:
-    """Walk `config` in this process and keep what r1 consumed at every tick."""
+    """Walk `config` in this process and record the inputs of r1 at every tick."""
 
     def reference(tick: int) -> Reference | None:
         return reference_at(config, tick) if tick % REFERENCE_EPOCH_MS == 0 else None
@@ -56,7 +56,7 @@ def record(config: Config, predictor: Predictor | None) -> list[AgentTick]:
 
 
 class _RecordingAgent(Agent):
-    """An agent that keeps what it is given."""
+    """An agent that records its inputs."""
 
     def __init__(self, agent: Agent) -> None:
         self._agent = agent

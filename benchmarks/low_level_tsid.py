@@ -1,8 +1,8 @@
 """The whole-body part of a tick against TSID: the same robot, the same ticks, the same costs.
 
 Ours is the rigid body's terms, assembly and solution, one compiled call as in the tick; TSID's is
-`computeProblemData` and the solution by its own solver (eiquadprog). References and contacts are
-set outside of what is timed.
+`computeProblemData` and the solution by its own solver (eiquadprog). Setting references and
+contacts is not timed.
 
 TSID is no dependency of the project. Its wheel on PyPI is built for another Pinocchio and crashes
 with ours; so it is tried in a process of its own.
@@ -45,36 +45,36 @@ def cases(config: Config, predictor: Predictor | None, ticks: list[AgentTick]) -
     return controller.cases[config.gait.stand_ms :]
 
 
-def compare(config: Config, found: list[TsidCase]) -> dict[str, Any] | None:
-    """Both on every case, see `_compare`; None if TSID is not there."""
+def compare(config: Config, cases: list[TsidCase]) -> dict[str, Any] | None:
+    """Run both on every case, see `_compare`; None if TSID is not installed."""
     try:
-        answer: dict[str, Any] | None = result_of(_compare, config, found)
+        answer: dict[str, Any] | None = result_of(_compare, config, cases)
     except ChildProcessError:
         return None
     return answer
 
 
-def _compare(config: Config, found: list[TsidCase]) -> dict[str, Any] | None:
-    """Medians, µs, of both in turns, each first at every other tick, and how torques differ."""
+def _compare(config: Config, cases: list[TsidCase]) -> dict[str, Any] | None:
+    """Median times of both, µs, taking turns to be first, and the difference of their torques."""
     warnings.simplefilter("ignore", RuntimeWarning)  # two of TSID's converters have one type
     try:
         import tsid  # noqa: F401
     except ImportError:
         return None
     with collector_off():
-        return _turns(config, found)
+        return _turns(config, cases)
 
 
-def _turns(config: Config, found: list[TsidCase]) -> dict[str, Any]:
+def _turns(config: Config, cases: list[TsidCase]) -> dict[str, Any]:
     from benchmarks.low_level_peer import Tsid
 
-    # TSID weighs turning like moving, and a foot like the trunk: so do both here.
+    # TSID gives rotation and translation, and feet and trunk, one weight: so do both here.
     weights = Controller(config).weights._replace(tilt_length=1.0, swing_weight=1.0)
     ours, peer = _Ours(weights), Tsid(weights)
-    times, differences = np.empty((2, len(found))), []
-    for case in found[:20]:
+    times, differences = np.empty((2, len(cases))), []
+    for case in cases[:20]:
         ours.solve(case)
-    for k, case in enumerate(found):
+    for k, case in enumerate(cases):
         peer.set(case)
         answers: list[Array] = [np.empty(0), np.empty(0)]
         order: list[tuple[int, Callable[[TsidCase], object], Callable[[], Array]]] = [
@@ -94,12 +94,12 @@ def _turns(config: Config, found: list[TsidCase]) -> dict[str, Any]:
         "tsid_us_p99": float(p99[1]),
         "ratio": float(median[1] / median[0]),
         "torque_difference_median_nm": float(np.median(differences)),
-        "ticks": len(found),
+        "ticks": len(cases),
     }
 
 
 class _Ours:
-    """Terms, assembly and solution as `Controller.act` goes about them."""
+    """Terms, assembly and solution as in `Controller.act`."""
 
     def __init__(self, weights: Weights) -> None:
         self._body, self._weights, self._row = RigidBody(), weights, np.array(weights)
@@ -139,7 +139,7 @@ def _whole_body(
     weights: Array,
     x: Array,
 ) -> int:
-    """Terms and `solve_closed_form`: rows are cheaper to hand over than tuples."""
+    """Terms and `solve_closed_form`: arrays are cheaper to pass than tuples."""
     q, v = coordinates_of(sensed)
     return solve_closed_form(
         rigid_body_terms(q, v, links),
@@ -152,7 +152,7 @@ def _whole_body(
 
 
 class _RecordingController(Controller):
-    """A controller that keeps what its QP is given."""
+    """A controller that records the inputs of its QP."""
 
     def __init__(self, config: Config) -> None:
         super().__init__(config)

@@ -1,4 +1,4 @@
-"""What the messages of a lock-step tick cost, without world and robots: the Bus and raw sockets.
+"""Time of the messages of a lock-step tick without world and robots: the Bus and raw sockets.
 
 One process sends every robot a state and waits for all commands, as the sim server does; one
 process per robot answers. Both transports carry the same payloads between as many processes and
@@ -45,9 +45,9 @@ def measure(robots: int, ticks: int = 2000) -> dict[str, Any]:
         others = [child(_bus_robot, config, name, ended) for name in names]
         others += [child(_socket_robot, config, place) for _ in names]
         with running(*others):
-            found = result_of(_world, config, place, ticks)
+            times = result_of(_world, config, place, ticks)
             ended.set()
-    return {"robots": robots, **found}
+    return {"robots": robots, **times}
 
 
 def _world(config: Config, place: str, ticks: int) -> dict[str, dict[str, float]]:
@@ -80,14 +80,14 @@ def _world(config: Config, place: str, ticks: int) -> dict[str, dict[str, float]
             times: dict[str, list[int]] = {name: [] for name in TRANSPORTS}
             for begin in range(-_WARM_UP, ticks, _BLOCK):
                 for name, tick in zip(TRANSPORTS, (by_bus, by_socket), strict=True):
-                    took = [_timed(tick) for _ in range(min(_BLOCK, ticks - begin))]
+                    took = [_time_tick(tick) for _ in range(min(_BLOCK, ticks - begin))]
                     times[name] += took if begin >= 0 else []
             for link in links:
                 link.close()
-    return {name: _spread(found) for name, found in times.items()}
+    return {name: _spread(block) for name, block in times.items()}
 
 
-def _timed(tick: Any) -> int:
+def _time_tick(tick: Any) -> int:
     begun = monotonic_ns()
     tick()
     return monotonic_ns() - begun

@@ -1,4 +1,4 @@
-"""What the command line of the benchmark asks for."""
+"""The options of the benchmark's command line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Options:
         robots: sizes of the teams that walk.
         seconds: world time of each walk.
         planner: `planner.kind` of the walks.
-        quick: everything tiny.
+        quick: whether every part is as small as possible.
         out: the JSON file.
     """
 
@@ -28,5 +28,5 @@ class Options:
 
     @property
     def middle(self) -> int:
-        """The size of team that has figures of its own: 3 unless only others walk."""
+        """The size of the team in the low-level and recorder parts: 3 unless only others walk."""
         return min(self.robots, key=lambda n: abs(n - 3))

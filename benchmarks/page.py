@@ -1,4 +1,4 @@
-"""The benchmark's page: the figures of each part in a few lines, and what they are held to."""
+"""The benchmark's page: the figures of each part in a few lines, and their limits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NO_TSID: Final = "not measured: `import tsid` fails or crashes here"
 
 
 def headline(parts: dict[str, Part]) -> dict[str, Any]:
-    """The figures that other programs look for; None where a part was left out."""
+    """The figures that other programs read; None where a part was left out."""
     low, walks, recorder = (parts.get(name, {}) for name in ("low-level", "walks", "recorder"))
     rows, cost = walks.get("rows", []), walks.get("recorder")
     tsid = low.get("tsid")
@@ -37,10 +37,10 @@ def headline(parts: dict[str, Part]) -> dict[str, Any]:
 
 
 def messaging_share(row: Part) -> float:
-    """Share of a tick over the bus that is neither physics nor control, were those in a row.
+    """Share of a tick over the bus beyond physics and control one after the other.
 
-    Robots compute side by side over the bus, so on several cores this is less than what messages
-    and waiting take, and may be negative.
+    Over the bus robots compute in parallel, so on several cores this is less than the time of
+    messages and waiting, and may be negative.
     """
     return 1.0 - float(row["alone"]["tick_us"] / row["tick_us"])
 
@@ -56,7 +56,7 @@ def section(name: str, part: Part) -> Table:
 
 
 def targets(figures: dict[str, Any]) -> Table:
-    """What was measured of what is held to a limit."""
+    """The measured figures that have a limit."""
     shown = Table.grid(padding=(0, 1))
     for key, sign, limit in TARGETS:
         name, _, size = key.partition(".")
@@ -89,9 +89,9 @@ def _planner(part: Part) -> list[str]:
 def _low_level(part: Part) -> list[str]:
     lines = []
     for name in ("hot", "cold"):
-        found = part[name]
-        stages = ", ".join(f"{stage} {us:.1f}" for stage, us in found["stages"].items())
-        lines.append(f"{name}: {found['median']:.0f} µs, p99 {found['p99']:.0f}: {stages}")
+        figures = part[name]
+        stages = ", ".join(f"{stage} {us:.1f}" for stage, us in figures["stages"].items())
+        lines.append(f"{name}: {figures['median']:.0f} µs, p99 {figures['p99']:.0f}: {stages}")
     tsid = part["tsid"]
     if tsid is None:
         return [*lines, f"whole-body part against TSID: {_NO_TSID}"]
@@ -151,15 +151,15 @@ def _walks(part: Part) -> list[str]:
     return lines
 
 
-def _memory(found: dict[str, dict[str, float]]) -> str:
+def _memory(figures: dict[str, dict[str, float]]) -> str:
     """RSS (PSS) by process, of all robots the largest."""
-    robots = [name for name in found if name[1:].isdigit()]
-    shown = {name: m for name, m in found.items() if name not in robots and m}
+    robots = [name for name in figures if name[1:].isdigit()]
+    shown = {name: m for name, m in figures.items() if name not in robots and m}
     if robots:
-        largest = max(robots, key=lambda name: found[name].get("rss", 0.0))
-        shown = {"largest agent": found[largest], **shown}
+        largest = max(robots, key=lambda name: figures[name].get("rss", 0.0))
+        shown = {"largest agent": figures[largest], **shown}
     cells = (f"{name} {m['rss']:.0f} ({m['pss']:.0f})" for name, m in shown.items() if m)
-    total = sum(m.get("pss", 0.0) for m in found.values())
+    total = sum(m.get("pss", 0.0) for m in figures.values())
     return f"MB (of it own): {', '.join(cells)}; all {total:.0f}"
 
 

@@ -1,4 +1,4 @@
-"""The parts of the benchmark: what each measures. Each imports what it needs."""
+"""The parts of the benchmark, one function each, which imports what it needs."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ Part = dict[str, Any]
 
 
 def planner(options: Options, console: Console, tell: Tell) -> Part:
-    """What a plan costs, ours and as written; `python -m benchmarks.planner` does it at length."""
-    from benchmarks.planner import measure, walked
+    """Time of a plan, ours and as written; `python -m benchmarks.planner` measures it at length."""
+    from benchmarks.planner import measure, record_walks
     from benchmarks.planner_contenders import Local, Team
 
     robots, seconds = (1, 1.0) if options.quick else (3, 1.2)
-    config, predictor, walks = walked(robots, seconds, console)
+    config, predictor, walks = record_walks(robots, seconds, console)
     tell("plans")
     rows = measure(config, Local(config, predictor), walks)
     if not options.quick:
@@ -42,11 +42,11 @@ def low_level(options: Options, console: Console, tell: Tell) -> Part:
     config, _, predictor = team(options, options.middle, seconds, console)
     ticks = low_level_ticks.record(config, predictor)
     tell("ticks")
-    found: Part = result_of(low_level.measure, config, predictor, ticks, passes)
+    figures: Part = result_of(low_level.measure, config, predictor, ticks, passes)
     tell("against TSID")
     cases = low_level_tsid.cases(config, predictor, ticks)
-    found["tsid"] = low_level_tsid.compare(config, cases)
-    return found
+    figures["tsid"] = low_level_tsid.compare(config, cases)
+    return figures
 
 
 def bus(options: Options, _console: Console, tell: Tell) -> Part:
@@ -73,7 +73,7 @@ def world(options: Options, _console: Console, tell: Tell) -> Part:
 
 
 def recorder(options: Options, _console: Console, _tell: Tell) -> Part:
-    """What the recorder takes in."""
+    """The recorder's throughput."""
     from benchmarks.recorder import measure
 
     with tempfile.TemporaryDirectory() as scratch:
@@ -82,7 +82,7 @@ def recorder(options: Options, _console: Console, _tell: Tell) -> Part:
 
 
 def fit(options: Options, _console: Console, _tell: Tell) -> Part:
-    """The predictor's fit for a small team; `python -m benchmarks.fit` does the large ones."""
+    """The predictor's fit for a small team; `python -m benchmarks.fit` measures large ones."""
     from dataclasses import asdict
 
     from benchmarks.children import result_of
@@ -94,7 +94,7 @@ def fit(options: Options, _console: Console, _tell: Tell) -> Part:
 
 
 def walks(options: Options, console: Console, tell: Tell) -> Part:
-    """Real walks of every size, and of one with and without the recorder in turns."""
+    """Real walks of every team size, and of one size with and without recorder in turns."""
     from benchmarks.children import result_of
     from benchmarks.walks import alone, over_the_bus
     from quadriga.warm_up import warm_up
@@ -105,8 +105,8 @@ def walks(options: Options, console: Console, tell: Tell) -> Part:
         warm_up(config, console)
         tell(f"n = {robots} in one process")
         parts = result_of(alone, config, predictor)
-        found = over_the_bus(config, path, predictor, prefixed(tell, f"n = {robots}"))
-        rows.append({"robots": robots, "alone": parts, **found})
+        figures = over_the_bus(config, path, predictor, add_prefix(tell, f"n = {robots}"))
+        rows.append({"robots": robots, "alone": parts, **figures})
     return {
         "rows": rows,
         "planner": options.planner,
@@ -124,16 +124,16 @@ def recorder_turns(options: Options, rows: list[Part], console: Console, tell: T
     middle = options.middle
     config, path, predictor = team(options, middle, options.seconds, console)
     plain = replace(config, recorder=replace(config.recorder, enabled=False))
-    found: Part = {"robots": middle, "with": [], "without": []}
-    found["with"] += [row["rtf"] for row in rows if row["robots"] == middle]
+    figures: Part = {"robots": middle, "with": [], "without": []}
+    figures["with"] += [row["rtf"] for row in rows if row["robots"] == middle]
     for name, asked in (("without", plain), ("with", config), ("without", plain)):
         tell(f"n = {middle}, {name} recorder")
-        found[name].append(over_the_bus(asked, path, predictor, lambda _: None)["rtf"])
-    return found
+        figures[name].append(over_the_bus(asked, path, predictor, lambda _: None)["rtf"])
+    return figures
 
 
-def prefixed(tell: Tell, prefix: str) -> Tell:
-    """`tell` with `prefix` before what is told."""
+def add_prefix(tell: Tell, prefix: str) -> Tell:
+    """A function that calls `tell` with `prefix` before the text."""
     return lambda text: tell(f"{prefix}: {text}")
 
 

@@ -1,12 +1,12 @@
-"""What a plan costs: the paper's problems as they stand there, against ours, on a real walk.
+"""Time of a plan on a real walk: the paper's problems as written there, against ours.
 
 Run: python -m benchmarks.planner [--robots 3 5] [--seconds 4] [--out FILE]
 
-Every contender gets every planning step of the same walks, one after the other within each step,
-in one process with one BLAS thread. Times are processor time: what else the machine does
-meanwhile is not in them. "as written" is sparse OSQP with its own tolerances, one
-object warm-started from step to step. Errors are against OSQP at 1e-9 on the condensed
-problem; the gap is relative to what the plan improves on nominal forces.
+Every contender solves every planning step of the same walks, one after the other within each step,
+in one process with one BLAS thread. Times are processor times, so other programs do not count. "as
+written" is sparse OSQP with its own tolerances, one object warm-started from step to step. Errors
+are against OSQP at 1e-9 on the condensed problem; the gap is relative to the plan's improvement on
+nominal forces.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 
-# What the figures at n = 5 are held to.
+# Limits of the figures at n = 5.
 TARGETS = {
     "ratio_median": (">=", 30.0), "ratio_p99": (">=", 15.0), "tick_ratio_median": (">=", 20.0),
     "central_ratio_median": (">=", 50.0), "applied_force_error_n": ("<=", 0.01),
@@ -81,7 +81,7 @@ def main() -> None:
     console = Console(width=120)
     rows: list[Row] = []
     for robots in options.robots:
-        config, predictor, walks = walked(robots, options.seconds, console)
+        config, predictor, walks = record_walks(robots, options.seconds, console)
         rows += measure(config, Local(config, predictor), walks)
         team = [walk[-TEAM_STEPS:] for walk in walks]
         rows += measure(config, Team(config, predictor), team)
@@ -111,7 +111,7 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def walked(
+def record_walks(
     robots: int, seconds: float, console: Console
 ) -> tuple[Config, Predictor, list[list[PlanningTick]]]:
     """A team, its predictor, and the planning steps of its walks."""
@@ -123,7 +123,7 @@ def walked(
 
 def deepc(robots: int, seconds: float, console: Console) -> list[Row]:
     """Eq. 5 for a team of this size, with CVXPY for one robot where it is installed."""
-    config, _, walks = walked(robots, seconds, console)
+    config, _, walks = record_walks(robots, seconds, console)
     episodes = ensure_data(config, console).training
     extra = []
     if robots == 1 and AVAILABLE:
@@ -149,12 +149,12 @@ def measure(
     walks: Sequence[Sequence[PlanningTick]],
     extra: Sequence[Contender] = (),
 ) -> list[Row]:
-    """Give every case to every contender in turn, another one first each time; one row each."""
+    """Run every contender on every case, another one first each time; one row per contender."""
     contenders = [*formulation.contenders(), *extra]
     cases = [case for walk in walks for tick in walk for case in formulation.cases(tick)]
     for case in formulation.cases(walks[0][0]):
         for contender in contenders:
-            contender.run(case)  # sets up what is set up at the first call
+            contender.run(case)  # the first call includes the set-up
     for turn, case in enumerate(cases):
         exact = reference(case.problem, case.f)
         for place in range(len(contenders)):
@@ -212,7 +212,7 @@ def judge(config: Config, case: Case, exact: Array, u: Array) -> tuple[float, fl
 
 
 def row(robots: int, contender: Contender, yardstick: Contender) -> Row:
-    """Figures of one contender; ratios are times of the yardstick over its own."""
+    """Figures of one contender; ratios are the yardstick's times over the contender's."""
     (median, p99), (slow, slow_p99) = (
         1e3 * np.percentile(c.times, (50, 99)) for c in (contender, yardstick)
     )
@@ -237,8 +237,8 @@ def row(robots: int, contender: Contender, yardstick: Contender) -> Row:
 
 
 def headline(rows: Sequence[Row]) -> dict[str, float]:
-    """The figures that are held to a limit, of the default solver at n = 5."""
-    found = {r["problem"]: r for r in rows if r["robots"] == 5 and r["name"] == "daqp"}
+    """The figures that have a limit, of the default solver at n = 5."""
+    by_problem = {r["problem"]: r for r in rows if r["robots"] == 5 and r["name"] == "daqp"}
     wanted = {
         "ratio_median": ("eq. 12, QP", "ratio_median"), "ratio_p99": ("eq. 12, QP", "ratio_p99"),
         "tick_ratio_median": ("eq. 12, tick", "ratio_median"),
@@ -247,9 +247,9 @@ def headline(rows: Sequence[Row]) -> dict[str, float]:
         "relative_gap": ("eq. 12, QP", "relative_gap"),
     }  # fmt: skip
     return {
-        key: float(found[problem][figure])
+        key: float(by_problem[problem][figure])
         for key, (problem, figure) in wanted.items()
-        if problem in found
+        if problem in by_problem
     }
 
 

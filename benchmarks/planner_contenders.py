@@ -1,4 +1,4 @@
-"""The ways of making a plan that the benchmark compares, each as one function of a case."""
+"""The ways of computing a plan that the benchmark compares, each as one function of a case."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class Case:
     """One plan to make: of one robot (eq. 12) or of the team (eq. 5, 7).
 
     Attributes:
-        tick: what the walk gave.
+        tick: the planning step of the walk.
         robots: whose plan.
-        problem, f: the condensed problem, to judge answers by.
+        problem, f: the condensed problem, by which answers are judged.
         y_free: outputs without future forces, (6 N · robots,).
         y_des: desired outputs.
     """
@@ -53,11 +53,11 @@ class Case:
 
 @dataclass
 class Contender:
-    """One way of making a plan and what came of it.
+    """One way of computing a plan, with its times and errors.
 
     Attributes:
-        problem: what it solves; times are compared with "as written" of the same problem.
-        name: how it solves it.
+        problem: the one it solves; times are compared with "as written" of the same problem.
+        name: the way it solves it.
         run: force deviations of a case, N.
         times: seconds of each plan.
         errors: per plan the cone's violation [N], the force error on the applied samples [N] and
@@ -84,7 +84,7 @@ class Local:
         self._solvers: dict[tuple[str, int, bytes], Solver] = {}
 
     def cases(self, tick: PlanningTick) -> list[Case]:
-        """The plans of one step; also sets up, once for all ticks, what is set up once."""
+        """The plans of one step; also makes the set-up that all ticks share."""
         made = []
         for i, stance in enumerate(tick.stance):
             key = i, stance.tobytes()
@@ -99,7 +99,7 @@ class Local:
         return made
 
     def contenders(self) -> list[Contender]:
-        """Fresh ones: what is warm-started starts cold."""
+        """New contenders, so that warm-started solvers start cold."""
         paper, whole = ([PaperQp(self._config.planner, G_u) for G_u in self._G_u] for _ in range(2))
 
         def as_written(case: Case) -> Array:
@@ -168,7 +168,7 @@ class Team:
         return [Case(tick, tuple(range(len(tick.stance))), problem, f, y_free, y_des)]
 
     def contenders(self) -> list[Contender]:
-        """Both with everything that depends on the tick: free response and QP."""
+        """Two contenders, timed with all that depends on the tick: free response and QP."""
         paper = PaperQp(self._config.planner, self._G_u)
 
         def as_written(case: Case) -> Array:
@@ -205,7 +205,7 @@ class Deepc:
         return [Case(tick, robots, problem, problem.linear_term(past, y_des), y_free, y_des)]
 
     def contenders(self) -> list[Contender]:
-        """Both with everything that depends on the tick."""
+        """Two contenders, timed with all that depends on the tick."""
         planner = self._config.planner
         paper = DeepcQp(planner, self._episodes, planner.lambda_g, planner.lambda_sigma)
 

@@ -1,4 +1,4 @@
-"""Eq. 5 as a user of CVXPY writes it: the peer that DeePC is usually tried with.
+"""Eq. 5 as a user of CVXPY writes it, the usual tool to try DeePC with.
 
 `pip install cvxpy` makes it available; it is no dependency of the project.
 """
@@ -20,7 +20,7 @@ AVAILABLE = find_spec("cvxpy") is not None
 
 
 class CvxpyDeepc:
-    """One robot's DeePC with parameters for what changes, so that CVXPY compiles it once.
+    """One robot's DeePC; what changes is a parameter, so that CVXPY compiles the problem once.
 
     Args:
         config: horizons, weights, friction and bounds.

@@ -1,4 +1,4 @@
-"""What planners were given on a real walk: every planning step of every robot, for a benchmark."""
+"""The inputs of planners on a real walk: every planning step of every robot, for a benchmark."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class PlanningTick:
         past: own windows [u_ini; y_ini] that end at k, (n, 18 T_ini).
         y_des: desired outputs, (n, 6 N).
         before: windows that end at k−1 and plans of k−1, [u_ini; y_ini; u], (n, 18 T_ini + 12 N).
-        inputs: what each robot's planner gets of itself.
-        selections: what each robot's planner gets of its peers.
+        inputs: each robot's own data for its planner.
+        selections: the peers' data for each robot's planner.
         base_before: base of the outputs of the windows that end at k−1, (T_ini, 6).
     """
 
@@ -47,7 +47,7 @@ class PlanningTick:
 
 
 def record(config: Config, predictor: Predictor) -> list[PlanningTick]:
-    """Walk `config` in this process and keep what every planning step consumed."""
+    """Walk `config` in this process and record the inputs of every planning step."""
     names = robot_names(config.team.robots)
     samples: dict[str, dict[int, Measurement]] = {name: {} for name in names}
     plans: dict[str, dict[int, Plan]] = {name: {} for name in names}

@@ -1,9 +1,9 @@
-"""What the recorder takes in: real publishers over real Zenoh, messages/s, gaps, share of a core.
+"""The recorder's throughput with real publishers over Zenoh: messages/s, gaps, share of a core.
 
 Run: python -m benchmarks.recorder [--rate 20000] [--seconds 5] [--publishers 2] [--json FILE]
 
 Publishers are processes that send commands of a growing tick in real time, each on keys of its own,
-and wait for nobody; `quadriga record --now` writes them down. Gaps are looked for in the file.
+and never wait; `quadriga record --now` records them. Gaps are counted in the file.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from quadriga.team.endpoint import free_endpoint
 KEYS = 10  # of each publisher
 PROBE = "probe"  # sent until the recorder has heard every publisher
 PATIENCE = 60.0  # s, for every publisher to be heard, and for the recorder to close its file
-BURST = 0.001  # s, what is due is sent this often: as a world of many robots does
+BURST = 0.001  # s, period at which due messages are sent, as a world of many robots does
 
 
 def publish(
@@ -101,7 +101,7 @@ def measure(rate: float, seconds: float, publishers: int, folder: Path) -> dict[
 
 @contextmanager
 def recording(file: Path, config: Path) -> Iterator[int]:
-    """Run a recorder, whose process id is given; at the end of the block it closes the file."""
+    """Run a recorder and yield its process id; at the end of the block it closes the file."""
     recorder = subprocess.Popen(
         [
             sys.executable,
@@ -134,18 +134,18 @@ def await_probes(file: Path, publishers: int) -> None:
     """Wait until the recorder hears every publisher.
 
     Raises:
-        ChildProcessError: it does not, since it or a publisher has failed.
+        ChildProcessError: the recorder does not hear all, since it or a publisher has failed.
     """
     deadline = monotonic() + PATIENCE
-    while (heard := probed(file)) < publishers:
+    while (connected := count_publishers(file)) < publishers:
         if monotonic() > deadline:
             raise ChildProcessError(
-                f"the recorder heard {heard} of {publishers} publishers within {PATIENCE:g} s"
+                f"the recorder heard {connected} of {publishers} publishers within {PATIENCE:g} s"
             )
         sleep(0.1)
 
 
-def probed(file: Path) -> int:
+def count_publishers(file: Path) -> int:
     """How many publishers the recorder hears."""
     try:
         return len({entry.key for entry in Recording(file).entries()})
@@ -154,7 +154,7 @@ def probed(file: Path) -> int:
 
 
 def figures(file: Path, sent: int) -> dict[str, float]:
-    """What the file tells."""
+    """Figures of the recorded file."""
     ticks: defaultdict[str, list[int]] = defaultdict(list)
     times = []
     for key, tick, log_time, _ in Recording(file).entries():
@@ -162,7 +162,7 @@ def figures(file: Path, sent: int) -> dict[str, float]:
             continue
         ticks[key].append(tick)
         times.append(log_time)
-    gaps = sum(int((np.diff(found) != 1).sum()) + found[0] for found in ticks.values())
+    gaps = sum(int((np.diff(of_key) != 1).sum()) + of_key[0] for of_key in ticks.values())
     return {
         "sent": sent,
         "recorded": len(times),
@@ -180,11 +180,11 @@ if __name__ == "__main__":
     arguments.add_argument("--json", type=Path, default=None, metavar="FILE")
     options = arguments.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
-        found = measure(options.rate, options.seconds, options.publishers, Path(scratch))
+        result = measure(options.rate, options.seconds, options.publishers, Path(scratch))
     print(
-        f"{found['per_s']:,.0f} messages/s recorded of {found['asked_per_s']:,.0f} asked for; "
-        f"{found['recorded']:,.0f} of {found['sent']:,.0f} sent, {found['gaps']:.0f} gaps; "
-        f"{100 * found['core']:.0f} % of a core; load {found['load']:.1f}"
+        f"{result['per_s']:,.0f} messages/s recorded of {result['asked_per_s']:,.0f} asked for; "
+        f"{result['recorded']:,.0f} of {result['sent']:,.0f} sent, {result['gaps']:.0f} gaps; "
+        f"{100 * result['core']:.0f} % of a core; load {result['load']:.1f}"
     )
     if options.json is not None:
-        options.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+        options.json.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")

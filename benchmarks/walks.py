@@ -27,7 +27,7 @@ from quadriga.team.operator import reference_at
 
 
 def alone(config: Config, predictor: Predictor | None) -> dict[str, float]:
-    """Mean µs of a tick in this process: all, and its parts one after the other."""
+    """Mean time of a tick in this process, µs: the whole, and its parts one after the other."""
 
     def reference(tick: int) -> Reference | None:
         return reference_at(config, tick) if tick % REFERENCE_EPOCH_MS == 0 else None
@@ -62,8 +62,8 @@ def over_the_bus(
     Args:
         config: the team's configuration; its endpoint is replaced by a free one.
         file: of the predictor; None without a planner.
-        predictor: what is in it.
-        tell: called with how far the walk is.
+        predictor: the content of the file.
+        tell: called with the progress of the walk.
 
     Raises:
         ProcessError: a process failed or left too early.
@@ -116,7 +116,7 @@ class _TimedWalk(Agent):
 
 
 class _Watch:
-    """Notes when each truth arrives: how fast the world goes, whether or not it is recorded."""
+    """Notes when each ground truth arrives, to measure the world's speed without a recorder too."""
 
     def __init__(self, config: Config) -> None:
         self._bus = Bus.open(config.bus, config.team.name, "bench")
@@ -127,11 +127,11 @@ class _Watch:
 
     @property
     def seconds(self) -> float:
-        """World time of the newest truth."""
+        """World time of the newest ground truth."""
         return self._seen[-1][0] if self._seen else 0.0
 
     def factor(self) -> float:
-        """World time over time."""
+        """World time over elapsed time."""
         (world, clock), (world_end, clock_end) = self._seen[0], self._seen[-1]
         return (world_end - world) / (clock_end - clock)
 

@@ -1,4 +1,4 @@
-"""What a tick of the world costs by the size of the team: physics, sensors, falls."""
+"""Time of a tick of the world by the size of the team: physics, sensors, detection of falls."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The real-time world's account: how old the commands were that it used, how late it was itself."""
+"""The real-time world's report: the age of the commands that it used, and its own lateness."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from quadriga.shared.wire.messages import Status
 
 PERIOD_MS: Final = 1000
 MODE: Final = "realtime"
+LATE: Final = ""
+HELD: Final = "held"
+DAMPED: Final = "damped"
 _BIN_MS: Final = 0.02
 
 
@@ -20,12 +23,12 @@ class Deadlines:
     """Counts from the first tick on.
 
     Attributes:
-        late: of each robot ticks without a command of that tick, by name; those held and damped by
-            name and grade.
+        late: number of ticks by robot and grade: `LATE` counts every tick without a command of
+            that tick, `HELD` and `DAMPED` those of them at which the motors held or were damped.
     """
 
     def __init__(self, names: Iterable[str]) -> None:
-        self.late: Counter[str] = Counter()
+        self.late: Counter[tuple[str, str]] = Counter()
         self._ages = {name: Histogram(1.0) for name in names}
         self._jitter = Histogram(_BIN_MS)
         self._lateness_us: list[float] = []
@@ -33,15 +36,20 @@ class Deadlines:
     def note_age(self, robot: str, age_ms: int) -> None:
         """A tick has been taken with a robot's command of this age."""
         self._ages[robot].add(age_ms)
-        self.late[robot] += age_ms > 0
+        self.late[robot, LATE] += age_ms > 0
 
     def note_lateness(self, late_s: float) -> None:
         """The world went on this much later than its clock says."""
         self._jitter.add(1e3 * late_s)
         self._lateness_us.append(1e6 * late_s)
 
+    def describe_late(self) -> str:
+        """The counts of late ticks in words, "none" where no tick has been counted."""
+        counts = sorted(self.late.items())
+        return ", ".join(f"{' '.join(filter(None, key))} {n}" for key, n in counts) or "none"
+
     def status(self, tick: int, overruns: int) -> Status:
-        """All of it, as `<team>/sim/status` carries it.
+        """The report, as sent on `<team>/sim/status`.
 
         `ages_ms` holds median, p99 and max of `<robot>.command` and of the world's own `jitter`;
         counters are `<robot>.late`, `.held`, `.damped`, `ticks` and `overruns`; `tick_us` holds the
@@ -51,8 +59,7 @@ class Deadlines:
         for robot, histogram in self._ages.items():
             ages |= histogram.quantiles(f"{robot}.command")
         counters = {"overruns": overruns, "ticks": tick}
-        for name, count in sorted(self.late.items()):
-            robot, _, grade = name.partition(" ")
+        for (robot, grade), count in sorted(self.late.items()):
             counters[f"{robot}.{grade or 'late'}"] = count
         lateness, self._lateness_us = np.array(self._lateness_us), []
         return Status(tick, tick * 1_000_000, MODE, "", "", ages, counters, np.zeros(0), lateness)

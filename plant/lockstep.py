@@ -37,7 +37,7 @@ def _commands(server: PlantServer, stopped: Callable[[], bool]) -> dict[str, Com
             break
         packet = bus.get(min(left, POLL))
         if packet is None:
-            gone = waiting - bus.present(HERE)
+            gone = waiting - bus.members_at(HERE)
             _give_up(server, gone, codes.GONE, "gone")
             waiting -= gone
         elif robot := box.take(*packet, tick=tick, oldest=tick):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from quadriga.plant.deadlines import PERIOD_MS, Deadlines
+from quadriga.plant.deadlines import DAMPED, HELD, PERIOD_MS, Deadlines
 from quadriga.plant.late import FRESH, HOLD, grade, hold_joints
 from quadriga.plant.server import TOLD_TO_STOP, End, PlantServer
 from quadriga.shared.runtime.clock import Rate
@@ -28,11 +28,8 @@ def run_realtime(server: PlantServer, stopped: Callable[[], bool]) -> End:
         end = server.step(motors.commands())
         if server.plant.tick % PERIOD_MS == 0 or end is not None:
             server.publish_status(motors.deadlines.status(server.plant.tick, rate.overruns))
-    late = (
-        ", ".join(f"{name} {count}" for name, count in sorted(motors.deadlines.late.items()))
-        or "none"
-    )
     code, detail = end or TOLD_TO_STOP
+    late = motors.deadlines.describe_late()
     return End(code, f"{detail}; late ticks: {late}; overruns of the world: {rate.overruns}")
 
 
@@ -57,11 +54,11 @@ class _Motors:
                 chosen[name] = command
                 self._held.pop(name, None)
             elif command is None or state == HOLD:
-                self.deadlines.late[f"{name} held"] += 1
+                self.deadlines.late[name, HELD] += 1
                 if name not in self._held:
                     self._held[name] = hold_joints(server.plant.states()[name])
                 chosen[name] = self._held[name]
             else:
-                self.deadlines.late[f"{name} damped"] += 1
+                self.deadlines.late[name, DAMPED] += 1
                 self._held.pop(name, None)  # where it was then is no place to go back to
         return chosen

@@ -75,7 +75,7 @@ class PlantServer:
         self._send(Event(tick, tick * 1_000_000, kind, robot, truncate_text(detail), code))
 
     def publish_status(self, status: Status) -> None:
-        """Publish the plant's account of itself."""
+        """Publish the plant's report on itself."""
         self._put_status(encode(status))
 
     def step(self, commands: Mapping[str, Command]) -> End | None:

@@ -1,4 +1,4 @@
-"""SHELL of the sim server: one world, its robots' commands in, their sensors out."""
+"""SHELL of the sim server: receives the robots' commands, steps one world, sends sensor data."""
 
 from __future__ import annotations
 

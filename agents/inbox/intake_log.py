@@ -96,16 +96,16 @@ def has_rule(source: Source, order: Order) -> bool:
 
 def list_messages(inputs: Inputs) -> list[tuple[Source, Order]]:
     """Source and order of every message of a step but the state."""
-    found: list[tuple[str, str, Message]] = [
+    messages: list[tuple[str, str, Message]] = [
         *((PLAN.name, name, plan) for name, plan in inputs.plans),
         *((MEASUREMENT.name, name, sample) for name, sample in inputs.measurements),
         *((REFERENCE.name, OPERATOR, reference) for reference in inputs.references),
     ]
     if inputs.estop is not None:
-        found.append((ESTOP.name, ANYONE, inputs.estop))
+        messages.append((ESTOP.name, ANYONE, inputs.estop))
     if inputs.truth is not None:
-        found.append((TRUTH.name, SIM, inputs.truth))
-    return [((topic, sender), order_of(message)) for topic, sender, message in found]
+        messages.append((TRUTH.name, SIM, inputs.truth))
+    return [((topic, sender), order_of(message)) for topic, sender, message in messages]
 
 
 def format_message_id(source: Source, order: Order) -> str:

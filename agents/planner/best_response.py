@@ -1,4 +1,4 @@
-"""Whether the agents' best responses to each other's last plans converge: a map and its radius."""
+"""The best-response map of the agents' plans; its spectral radius tells whether they converge."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from quadriga.shared.robot.a1 import Array
 
 
 def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
-    """How all agents' next plans follow from all present ones, without inequality constraints.
+    """The linear map from all agents' present plans to their next, without inequality constraints.
 
     U_i ← −H_ii⁻¹ G_iiᵀ Q̄ Σ_{j≠i} G_ij U_j over the stance legs of planning step `step`, with
     the G of its phase.
-    Square, of the number of stance forces of the whole team (150 per robot at N = 25).
+    Shape (s, s), s being the number of stance forces of the team (150 per robot at N = 25).
     """
     n, phase = predictor.meta.robots, phase_of(config, step, predictor.phases)
     problems = [

@@ -1,4 +1,4 @@
-"""A predictor for a team: out of its file, of this team's kind, and within the gates' limits."""
+"""Loads a predictor and checks that it fits the team and that its figures pass the gates."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _MATCHED: Final = ("robots", "stance_ms", "alternate_phase", "yokes", "interface
 def load_checked(path: Path, config: Config) -> tuple[Predictor, Provenance]:
     """Read a predictor and refuse any that is not for this team or has not passed its gates.
 
-    The gates are held against the limits of `config`; with other weights Q, R than those the
-    radius was computed for, it is computed anew.
+    The figures are compared with the limits of `config`. If the weights Q, R are not those that the
+    best-response radius was computed for, the radius is computed again.
 
     Raises:
         PredictorFileError: no such file, not a predictor, corrupt, fitted for another team, gait,
             horizon, interface or low level.
-        PredictorError: beyond a gate's limit.
+        PredictorError: a figure is beyond its gate's limit.
     """
     predictor, provenance = read(path)
     _check_meta(path, predictor.meta, PredictorMeta.of(config))
@@ -45,11 +45,11 @@ def _check_meta(path: Path, got: PredictorMeta, expected: PredictorMeta) -> None
     pairs = [(name, getattr(got, name), getattr(expected, name)) for name in _MATCHED]
     fitted = dict(got.controller)
     pairs += [(f"controller.{k}", fitted.get(k), wanted) for k, wanted in expected.controller]
-    for name, found, wanted in pairs:
-        if found != wanted:
+    for name, stored, wanted in pairs:
+        if stored != wanted:
             raise PredictorFileError(
                 f"predictor {path}: {name}",
-                repr(found),
+                repr(stored),
                 f"{wanted!r} as configured",
                 f"fitted for another setting; {REMEDY}",
             )

@@ -13,11 +13,11 @@ from quadriga.shared.runtime.jit import compiled
 
 
 class Coupling:
-    """What the peers do to one agent over a horizon in which they stand as scheduled.
+    """Effect of the peers on one agent's outputs over a horizon with a given stance schedule.
 
-    A swinging leg of a peer carries no force: its columns, a third of all, are left out, which
-    is exact. Single precision is off by 3e-7 of an effect, and is half as much memory to go
-    through.
+    A swinging leg of a peer carries no force: its columns, a third of all, are left out, which is
+    exact. Single precision changes an effect by 3e-7 of its size and halves the memory that is
+    read.
 
     Args:
         G: the peers' blocks G_ij side by side, (n − 1, 6 N, 18 T_ini + 12 N).
@@ -26,13 +26,15 @@ class Coupling:
 
     def __init__(self, G: Array, stance: Sequence[NDArray[np.bool_]]) -> None:
         width = G.shape[2] if len(G) else 0
-        kept = [
-            np.concatenate([np.arange(width - 3 * pattern.size), width - 3 * pattern.size + found])
-            for pattern, found in ((pattern, stance_columns(pattern)) for pattern in stance)
+        force_columns = [
+            np.concatenate(
+                [np.arange(width - 3 * legs.size), width - 3 * legs.size + stance_columns(legs)]
+            )
+            for legs in stance
         ]
-        places = [i * width + columns for i, columns in enumerate(kept)]
+        places = [i * width + columns for i, columns in enumerate(force_columns)]
         self._places = np.concatenate(places) if places else np.zeros(0, dtype=np.int64)
-        blocks = [block[:, columns] for block, columns in zip(G, kept, strict=True)]
+        blocks = [block[:, columns] for block, columns in zip(G, force_columns, strict=True)]
         rows = np.concatenate(blocks, axis=1) if blocks else np.zeros((0, 0))
         self._rows = np.ascontiguousarray(rows, dtype=np.float32)
 
@@ -50,7 +52,7 @@ def fill_deviations(
     known: NDArray[np.bool_],
     du: Array,
 ) -> None:
-    """Write a peer's [u_ini; y_ini; u] as deviations, flat; an unknown sample does not deviate.
+    """Write a peer's deviations [u_ini; y_ini; u] into `out`; those of unknown samples are zero.
 
     `out` is (18 T_ini + 12 N,); the rest is of `PeerData`, where forces are deviations already, and
     the base of the outputs, (T_ini, 6).

@@ -10,10 +10,10 @@ remains is
     tᵀ Λ t + λ_g aᵀ S_aa⁻¹ a + ‖u‖²_R,   Λ = Ω − Ω M (λ_g I + Mᵀ Ω M)⁻¹ Mᵀ Ω
 
 This holds for data without noise too; their M has only as many columns as the plant has states.
-With a small λ_g, z answers any wish and the forces do nothing. A large λ_g draws the forces,
-through aᵀ S_aa⁻¹ a, towards those that followed such a past in the data. Both are eq. 5's own.
-g, σ and S belong to scaled deviations, all else is in N, m, m/s, rad, rad/s.
-Bounds on y would constrain z: with them this is no longer the paper's problem.
+With a small λ_g, z alone meets any y_des and the forces have no effect. A large λ_g draws the
+forces, through aᵀ S_aa⁻¹ a, towards those that followed such a past in the data. Both are
+properties of eq. 5 itself. g, σ and S belong to scaled deviations, all else is in N, m, m/s, rad,
+rad/s. Bounds on y would constrain z: with them this is no longer the paper's problem.
 """
 
 from __future__ import annotations
@@ -37,8 +37,9 @@ def build_model(
 ) -> Condensed:
     """Eliminate g, σ and y for one choice of weights.
 
-    Past and y stack robots, rows and columns within each are a `Predictor`'s. That y leans
-    towards y_des is eq. 5's own: its g may choose among what the data allow.
+    Past and y are stacked robot by robot; rows and columns of each robot are ordered as in a
+    `Predictor`. The predicted y is drawn towards y_des, because eq. 5 lets g choose among the
+    trajectories that the data allow.
 
     Args:
         reduction: of the team's data.
@@ -47,7 +48,7 @@ def build_model(
         lambda_sigma: λ_σ of eq. 5.
 
     Returns:
-        The problem in all 12 n N forces of the team; `select` leaves those that may be non-zero.
+        The problem in all 12 n N forces of the team; `select` keeps those that may be non-zero.
 
     Raises:
         ConfigError: a weight that is not positive.

@@ -1,7 +1,7 @@
-"""A planning step whose optimum touches no bound, as one compiled call: most steps are such.
+"""A planning step whose optimum lies on no bound, as most do, computed in one compiled call.
 
-Between two steps the processor's caches are lost, so a step costs mostly as much as the code and
-memory it goes through. The arithmetic is that of `Planner.step` with a solver.
+The processor's caches are lost between two steps, so a step takes mostly the time to load its code
+and data. The arithmetic is that of `Planner.step` with a solver.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from quadriga.shared.runtime.jit import compiled
 
 
 class OwnWindow(NamedTuple):
-    """What a step consumes of the agent itself; see `PlannerInputs`."""
+    """The agent's own data for a step; see `PlannerInputs`."""
 
     u_ini: Array
     y_ini: Array
@@ -41,7 +41,7 @@ class _Prediction(NamedTuple):
 
 
 class _Minimiser(NamedTuple):
-    """v = −H⁻¹ G_uᵀ Q̄ (y_free − y_des), where it keeps to box and friction pyramid."""
+    """v = −H⁻¹ G_uᵀ Q̄ (y_free − y_des), valid inside the box and the friction pyramid."""
 
     gradient: Array
     minus_inverse: Array
@@ -82,8 +82,8 @@ class FreeStep:
         """The plan; None where a bound is active or an output is implausible.
 
         Args:
-            own: what the step consumes of the agent itself.
-            effect: what the peers do to its outputs, see `PeerTerms`.
+            own: the agent's own data for the step.
+            effect: of the peers on its outputs, see `PeerTerms`.
         """
         forces, outputs, usable = _free_step(own, effect, self._prediction, self._minimiser)
         return FreePlan(forces[0], forces[1], outputs[0], outputs[1]) if usable else None
@@ -94,7 +94,7 @@ def _free_step(
     own: OwnWindow, effect: Array | float, prediction: _Prediction, minimiser: _Minimiser
 ) -> tuple[Array, Array, bool]:
     """Forces u and du, (2, N, 12); outputs y and y_nominal, (2, N, 6); is the plan usable?"""
-    # Out of the tuples once: in a loop each access costs a count of references.
+    # Unpacked before the loops: each access to a tuple in a loop costs a reference count.
     u_ini, y_ini, stance_ini, y_base_ini, y_base, y_des = own
     Y_past, Y_v, columns, nominal, nominal_table = prediction
     gradient, minus_inverse, lower, upper, slope = minimiser

@@ -1,4 +1,4 @@
-"""Measures what a predictor must show before a team may walk on it."""
+"""Measures the figures that a predictor must reach before a team may walk with it."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _GAIN_TIMES = (0.1, 0.25)  # s
 
 
 def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode]) -> GateReport:
-    """Measure a predictor; `GateReport.check` then decides.
+    """Measure the figures of a predictor; `GateReport.check` compares them with their limits.
 
     Args:
         config: team, gait, controller and limits.
-        predictor: to be judged.
+        predictor: whose figures are measured.
         held_out: episodes that the fit has not seen.
 
     Raises:
@@ -55,7 +55,7 @@ def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode])
 def held_out_error(
     predictor: Predictor, held_out: Sequence[Episode]
 ) -> tuple[int, list[float], list[float], float]:
-    """Windows, RMSE per output, that of persistence, and the ratio of the scaled errors.
+    """Number of windows, RMSE per output, RMSE of persistence, and the ratio of scaled errors.
 
     Persistence holds the last measured output y, not its deviation.
     """
@@ -109,8 +109,8 @@ def coupling_table(predictor: Predictor) -> Array:
 def height_gains(config: Config, predictor: Predictor) -> Array:
     """Predicted over physical height response to a vertical force on one robot's stance feet.
 
-    Averaged over the gait's stance patterns in a phase; of all phases the gain farthest from 1.
-    Shape (n, 2): robot, time of `_GAIN_TIMES`.
+    Each gain is averaged over the stance patterns of a phase; among the phases the one farthest
+    from 1 counts. Shape (n, 2): robot, time of `_GAIN_TIMES`.
     """
     N, n = predictor.meta.N, predictor.meta.robots
     physical = physical_height(config.controller, predictor.meta.interface, N)
@@ -130,8 +130,8 @@ def height_gains(config: Config, predictor: Predictor) -> Array:
             ]
             gains[k, robot] = z[rows] / physical[rows]
     worst = np.abs(gains - 1.0).argmax(axis=0)
-    found: Array = np.take_along_axis(gains, worst[None], axis=0)[0]
-    return found
+    greatest: Array = np.take_along_axis(gains, worst[None], axis=0)[0]
+    return greatest
 
 
 def physical_height(controller: ControllerConfig, interface: str, N: int) -> Array:

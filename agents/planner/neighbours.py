@@ -35,9 +35,9 @@ class PeerData:
     Attributes:
         robot: the peer's name.
         index: its place in the team, 0-based.
-        status: fresh, shifted, held or lost; held and lost carry no arrays worth using.
+        status: fresh, shifted, held or lost; the arrays of a held or lost peer must not be used.
         step: step of the plan used, or None while the peer has never planned.
-        age: how many steps older than that of the newest plan allowed it is.
+        age: number of steps by which that plan is older than the newest one allowed.
         known: samples of the window that are measured or predicted, shape (T_ini,).
         du_ini: force deviations of the window, zero where unknown, shape (T_ini, 12), N.
         y_ini: outputs of the window, shape (T_ini, 6); meaningless where unknown.
@@ -74,7 +74,7 @@ class PeerSelection:
 
     @property
     def used(self) -> dict[str, int]:
-        """For each peer the step of the plan consumed; peers that never planned are left out."""
+        """Step of the plan used, by peer; peers that never planned are left out."""
         return {peer.robot: peer.step for peer in self.peers if peer.step is not None}
 
     @property
@@ -105,7 +105,7 @@ class Neighbours:
         self.names = tuple(self._indices)
 
     def initial(self) -> PeerMemory:
-        """No messages yet."""
+        """The memory before the first message."""
         return PeerMemory({name: PeerHistory() for name in self._indices})
 
     def remember(
@@ -136,17 +136,18 @@ class Neighbours:
     def select(
         self, memory: PeerMemory, last: int, first_step: int, *, window_step: int | None = None
     ) -> PeerSelection:
-        """What to use of each peer.
+        """Choose the plan and the window of each peer that a planning step uses.
 
-        Before its first plan has arrived a peer is taken to have planned no deviation at step
+        Before its first plan has arrived a peer is assumed to have planned no deviation at step
         first_step − 1, so that the first planning step needs nobody's plan.
 
         Args:
             memory: what has been remembered.
             last: newest step whose plans and samples are looked at; with the one-step delay k−1.
             first_step: the team's first planning step.
-            window_step: where the windows shall end; `last` is as in eq. 11, a later one brings
-                windows and plans forward, samples not measured yet taken from the plans.
+            window_step: planning step at which the windows end: `last`, as in eq. 11, or a later
+                one, which moves windows and plans forward and takes samples not measured yet from
+                the plans.
         """
         end = last if window_step is None else window_step
         peers = [
@@ -168,7 +169,7 @@ class Neighbours:
         )
 
     def _status(self, age: int) -> str:
-        """What becomes of a peer whose plan is `age` steps older than the newest one allowed."""
+        """Status of a peer whose newest plan is `age` steps older than the newest one allowed."""
         if age > patience(self._config):
             return LOST
         if age > self._config.planner.max_peer_age:
@@ -178,7 +179,7 @@ class Neighbours:
     def _select_peer(
         self, robot: str, history: PeerHistory, last: int, end: int, first_step: int
     ) -> PeerData:
-        """The peer's data, plans up to step `last`, from step `end` on."""
+        """The peer's data from step `end` on, from its plans up to step `last`."""
         config, planner, index = self._config, self._config.planner, self._indices[robot]
         usable = [plan for plan in history.plans if plan.step <= last]
         newest = usable[-1] if usable else None
@@ -209,7 +210,7 @@ class Neighbours:
         if len(measured) < T_ini:
             ticks = sample_starts(first_tick - SAMPLE_MS, T_ini)
             nominal = nominal_forces(scheduled_stance(self._config, index, ticks))
-            for plan in plans:  # ascending: the newest plan of a sample has the last word
+            for plan in plans:  # ascending, so that a newer plan overwrites older ones
                 ahead = (ticks - plan.tick) // SAMPLE_MS
                 covered = (ahead >= 0) & (ahead < len(plan.u))
                 known |= covered
@@ -226,5 +227,5 @@ class Neighbours:
 
 
 def _age(newest: Plan | None, last: int, first_step: int) -> int:
-    """Steps from a peer's newest plan to `last`; before its first one from the last without any."""
+    """Steps from a peer's newest plan to `last`; of a peer without a plan from first_step − 1."""
     return last - (first_step - 1 if newest is None else newest.step)

@@ -43,21 +43,21 @@ def remember(
 ) -> PeerMemory:
     """Add messages that have arrived by world time `tick`; forget what is too old to matter.
 
-    The order of arrival does not matter. Refused and counted are a second message for the same
-    tick or step, one of a robot that is no peer, one off the time grid or from the future, a plan
-    of another horizon, and implausible numbers (`is_plausible`).
+    The order of arrival does not matter. A message is refused and counted if it is a second one for
+    the same tick or step, comes from a robot that is no peer, is off the time grid or from the
+    future, is a plan of another horizon, or has implausible numbers (`is_plausible`).
     """
     peers, refused = dict(memory.peers), memory.refused
     oldest = tick - _span_ms(config)
     for robot, measurement in measurements:
         history = peers.get(robot)
-        kept = None
+        extended = None
         if history is not None and _is_usable_measurement(config, measurement, tick):
-            kept = _insert(history.measurements, measurement, oldest, _by_tick)
-        if history is None or kept is None:
+            extended = _insert(history.measurements, measurement, oldest, _by_tick)
+        if history is None or extended is None:
             refused += 1
         else:
-            peers[robot] = replace(history, measurements=kept)
+            peers[robot] = replace(history, measurements=extended)
     for robot, plan in plans:
         history = peers.get(robot)
         kept_plans = None
@@ -93,7 +93,7 @@ def _is_on_grid(config: Config, tick: int, grid_ms: int, now: int) -> bool:
 
 
 def _span_ms(config: Config) -> int:
-    """For how long messages are kept: the windows of the oldest plan that may still be used."""
+    """How long messages are kept, ms: back to the window of the oldest plan that may be used."""
     return SAMPLE_MS * config.planner.T_ini + step_ms(config) * (patience(config) + 2)
 
 
@@ -108,7 +108,7 @@ def _by_serial(plan: Plan) -> tuple[int, int]:
 def _insert(
     held: tuple[M, ...], new: M, oldest: K, order: Callable[[M], K]
 ) -> tuple[M, ...] | None:
-    """`held` with `new` in its place and without what is older; None if it is there already."""
+    """`held` with `new` sorted in, without items before `oldest`; None if it has `new` already."""
     place: int = bisect_left(held, order(new), key=order)
     if place < len(held) and order(held[place]) == order(new):
         return None

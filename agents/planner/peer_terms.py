@@ -1,4 +1,4 @@
-"""The peers' terms of eq. 11: made of what is known of each, held while one is silent."""
+"""The peers' terms of eq. 11, from their newest messages; those of a silent peer are held."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from quadriga.shared.runtime.record import record
 
 @record
 class PeerTerms:
-    """What the peers will do to an agent's outputs at one planning step (eq. 11).
+    """Effect of the peers on an agent's outputs at one planning step (eq. 11).
 
     Attributes:
         effect: Σ G_ij [u_ini; y_ini; u] over the peers, (6 N,).
         deviations: [u_ini; y_ini; u] of each peer with a usable plan, (18 T_ini + 12 N,).
         held: last share of the effect of each silent peer, (6 N,).
         steps: planning step, and step at which the peers' windows end.
-        used: for each peer the step of the plan consumed.
-        lost: peers given up; not empty means: stop.
-        ages: how many steps older than allowed each peer's plan is.
+        used: step of the plan used, by peer.
+        lost: peers given up; the agent stops if there are any.
+        ages: number of steps by which each peer's plan is older than the newest one allowed.
     """
 
     effect: Array | float = 0.0
@@ -52,13 +52,13 @@ class Peers:
     def __init__(self, config: Config, index: int, predictor: Predictor) -> None:
         self._config, self._index, self._predictor = config, index, predictor
         self._others = [j for j in range(config.team.robots) if j != index]
-        # What is set up once for each step of the gait's cycle: a memo, it changes no result.
+        # Memo of the couplings, one for each step of the gait's cycle; it changes no result.
         self._couplings: dict[tuple[int, int], Coupling] = {}
         self._cycle = walking_steps(config)
         behind = {0 if config.planner.compensation else 1}
         if config.planner.exchanges:
             behind.add(0)
-        # The first step comes again behind one that is of the walk as well.
+        # The cycle's first step is set up twice: later its plans also begin at a step of the walk.
         for step in (*self._cycle, self._cycle.stop):
             for steps in behind:
                 self._coupling(step, step - steps)
@@ -96,7 +96,7 @@ class Peers:
     def _last_share(self, before: PeerTerms, peer: PeerData) -> Array | None:
         """A silent peer's last share of the effect, (6 N,); None if it never sent a plan.
 
-        It belongs to the steps of its last deviations: legs that stood then swing now.
+        It is computed for the steps of the peer's last deviations: legs that stood then swing now.
         """
         part = before.deviations.get(peer.robot)
         if part is None:
@@ -110,7 +110,7 @@ class Peers:
         return np.zeros(len(self._others) * self._predictor.meta.width, dtype=np.float32)
 
     def _part(self, z: NDArray[np.float32], index: int) -> NDArray[np.float32]:
-        """Where a peer's deviations are in those of all."""
+        """The part of all peers' deviations `z` that belongs to one peer, as a view."""
         width = self._predictor.meta.width
         place = width * (index - (index > self._index))
         return z[place : place + width]
@@ -118,10 +118,10 @@ class Peers:
     def _coupling(self, step: int, window_step: int) -> Coupling:
         """The coupling at planning step `step` to plans that begin at `window_step`."""
         place = place_in(self._cycle, step), place_in(self._cycle, window_step)
-        found = self._couplings.get(place)
-        if found is None:
+        coupling = self._couplings.get(place)
+        if coupling is None:
             phase = phase_of(self._config, step, self._predictor.phases)
             G = self._predictor.G[phase][self._index, self._others]
             stance = [horizon_stance(self._config, j, window_step) for j in self._others]
-            found = self._couplings[place] = Coupling(G, stance)
-        return found
+            coupling = self._couplings[place] = Coupling(G, stance)
+        return coupling

@@ -14,6 +14,7 @@ from quadriga.agents.planner.neighbours import PeerSelection
 from quadriga.agents.planner.peer_terms import Peers, PeerTerms
 from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem, unpack
 from quadriga.agents.planner.qp_solver import (
+    NOMINAL,
     SOLVED,
     SOLVERS,
     Residuals,
@@ -27,6 +28,7 @@ from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walkin
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.codes import with_detail
 
 PEER_LOST: Final = "peer-lost"
 IMPLAUSIBLE: Final = "implausible"
@@ -34,7 +36,7 @@ IMPLAUSIBLE: Final = "implausible"
 
 @record
 class PlannerInputs:
-    """What one planning step k consumes of the agent itself; its time is t_k = step · step_ms.
+    """The agent's own data for planning step k, at time t_k = step · step_ms.
 
     Attributes:
         step: k.
@@ -81,13 +83,13 @@ class PlanResult:
 
     Attributes:
         status: "solved", or "nominal:<reason>": nominal forces because the QP has no solution,
-            a peer is lost or the outputs predicted are none that a robot can reach.
+            a peer is lost, or no robot can reach the predicted outputs.
         u: forces, swing legs exactly zero, (N, 12), N.
         du: their deviation from nominal, (N, 12), N.
         y: predicted outputs under u, (N, 6); the desired ones where the prediction is implausible.
         y_nominal: predicted outputs under nominal forces, for a plan that is faded, (N, 6).
-        used: for each peer the step of the plan consumed.
-        lost: peers given up; not empty means: stop.
+        used: step of the plan used, by peer.
+        lost: peers given up; the agent stops if there are any.
         residuals: optimality of the QP's solution.
         iterations: of the QP solver.
     """
@@ -105,7 +107,7 @@ class PlanResult:
 
 @record
 class _Setup:
-    """What one step of the gait's cycle needs; nominal forces of the horizon, (N, 12), N."""
+    """Set-up of one step of the gait's cycle; nominal forces of the horizon, (N, 12), N."""
 
     problem: PlannerProblem
     solver: Solver
@@ -129,7 +131,7 @@ class Planner:
         check_sizes(config, predictor)
         self._config, self._index, self._predictor = config, index, predictor
         self._cycle, self._peers = walking_steps(config), Peers(config, index, predictor)
-        # What is set up once for each step of the gait's cycle: a memo, it changes no result.
+        # Memo of the set-ups, one for each step of the gait's cycle; it changes no result.
         self._setups: dict[int, _Setup] = {}
         for step in self._cycle:
             self._setup(step)
@@ -154,24 +156,24 @@ class Planner:
         """Plan the horizon of one planning step, or plan it again with the peers' newer terms.
 
         Args:
-            state: what was planned last.
-            inputs: of the agent itself.
-            peers: what the others will do to it.
-            G_ii: instead of the predictor's own block, which costs a new set-up.
+            state: the last plan.
+            inputs: the agent's own data.
+            peers: the peers' terms of eq. 11.
+            G_ii: replaces the predictor's own block; the step is then set up anew.
         """
         setup = self._setup(inputs.step, G_ii)
         if setup.free is not None and not peers.lost:
             result = _plan_freely(setup.free, inputs, peers)
             if result is not None:
                 return PlannerState(inputs.step, result.du, state.solves + 1), result
-        # Whatever was measured: a number that overflows shows in the result.
+        # Any number may be measured; one that overflows shows in the result.
         with np.errstate(over="ignore", invalid="ignore"):
             return self._plan_by_solver(setup, state, inputs, peers)
 
     def problem_of(
         self, inputs: PlannerInputs, peers: PeerTerms, G_ii: Array | None = None
     ) -> SolvedQp | None:
-        """The QP of `step` for the same arguments; None where there is none: a peer is lost."""
+        """The QP of `step` for the same arguments; None if a peer is lost: then no QP is solved."""
         if peers.lost:
             return None
         setup = self._setup(inputs.step, G_ii)
@@ -198,7 +200,7 @@ class Planner:
             du, y, y_nominal = np.zeros_like(du), inputs.y_des, inputs.y_des
             status = IMPLAUSIBLE if status == SOLVED else status
         result = PlanResult(
-            status=SOLVED if status == SOLVED else f"nominal:{status}",
+            status=SOLVED if status == SOLVED else with_detail(NOMINAL, status),
             u=setup.nominal + du,
             du=du,
             y=y,
@@ -213,9 +215,9 @@ class Planner:
     def _mix_with_last(
         self, problem: PlannerProblem, x: Array, state: PlannerState, step: int
     ) -> Array:
-        """A solution with a share of the last plan, whose forces past its end are nominal.
+        """Mix a solution with a share of the last plan, which is nominal beyond its end.
 
-        Both satisfy the constraints on forces, which are convex, so their mixture does.
+        Both satisfy the constraints on forces; these are convex, so the mixture satisfies them too.
         """
         skipped = self._config.planner.applied * (step - state.step)
         last = np.zeros((self._config.planner.N, 12))
@@ -231,7 +233,7 @@ class Planner:
         return phase_of(self._config, step, self._predictor.phases)
 
     def _setup(self, step: int, G_ii: Array | None = None) -> _Setup:
-        """The set-up of a step: built anew for a `G_ii` that is given, else of the cycle's memo."""
+        """The set-up of a step: built anew if a `G_ii` is given, else from the memo."""
         if G_ii is not None:
             return self._build_setup(step, G_ii)
         place = place_in(self._cycle, step)

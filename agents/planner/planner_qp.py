@@ -36,9 +36,9 @@ class Condensed:
         F_des: shape (nv, p N).
         Y_v: shape (p N, nv).
         Y_past: shape (p N, P).
-        Y_des: what wishing does to the prediction, shape (p N, p N); None stands for nothing,
-            which is so for every formulation with a transition matrix.
-        gradient: of those, G_uᵀ Q̄ = −F_des, shape (nv, p N).
+        Y_des: effect of y_des on the predicted outputs, shape (p N, p N); None if there is none, as
+            in every formulation with a transition matrix.
+        gradient: of a formulation with a transition matrix, G_uᵀ Q̄ = −F_des, shape (nv, p N).
     """
 
     H: Array
@@ -64,9 +64,9 @@ class PlannerProblem:
         H: the cost's Hessian with that of the slacks, shape (nx, nx).
         columns: place of each v in the stacked forces, shape (nv,).
         A: rows of the friction cone, then of the output bounds, shape (m, nx).
-        lower, upper: bounds of [x; A x], shape (nx + m,); those of the output rows are for a free
-            response as desired.
-        bounded: places of the outputs that the output rows speak of, shape (mo,).
+        lower, upper: bounds of [x; A x], shape (nx + m,); those of the output rows hold for a free
+            response that equals y_des.
+        bounded: places of the outputs that the output rows bound, shape (mo,).
         slope: c of the friction pyramid |fx|, |fy| ≤ c fz.
     """
 
@@ -96,9 +96,9 @@ class PlannerProblem:
         return np.concatenate([f, np.zeros(slacks)]) if slacks else f
 
     def bounds(self, error: Array) -> tuple[Array | None, Array | None]:
-        """Bounds of [x; A x] with the free response y_free, shape (p N,), `error` from y_des.
+        """Bounds of [x; A x] for a free response that is off y_des by `error`, shape (p N,).
 
-        None where they do not depend on it.
+        None if they do not depend on the free response.
         """
         rows = len(self.bounded)
         if not rows:
@@ -140,7 +140,7 @@ def build_problem(
         config: weights, friction, bounds.
         G_u: columns that multiply the future forces, shape (6 N n, 12 N n).
         stance: scheduled stance over the horizon, shape (N n, 4).
-        G_past: columns that multiply the past, shape (6 N n, P); None: the past is none.
+        G_past: columns that multiply the past, shape (6 N n, P); None: without a past.
     """
     past = np.zeros((len(G_u), 0)) if G_past is None else G_past
     return constrain(config, condense(config, past, G_u, stance), stance)
@@ -151,8 +151,9 @@ def constrain(
 ) -> PlannerProblem:
     """Add friction cone, force bounds and output bounds to a cost.
 
-    The cone is a pyramid inside it: |fx|, |fy| ≤ c fz with c = mu/√2 and f = nominal + v, so
-    ±v_x − c v_z ≤ c nominal_z. Outputs are bounded in their deviation from the desired ones.
+    The friction cone is replaced by a pyramid inside it, |fx|, |fy| ≤ c fz with c = mu/√2. With
+    f = nominal + v that is ±v_x − c v_z ≤ c nominal_z. Outputs are bounded in their deviation from
+    the desired ones.
     """
     columns = stance_columns(stance)
     feet = len(columns) // 3

@@ -18,12 +18,17 @@ from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.jit import compiled
 
 SOLVED: Final = "solved"
+NOMINAL: Final = "nominal"  # code of a plan's status: no solution, hence the nominal forces
 _FAR: Final = 1e30  # DAQP's infinity
 _DAQP_STATUS: Final = MappingProxyType({
     1: SOLVED, -1: "infeasible", -2: "cycling", -3: "unbounded", -4: "iteration-limit",
     -5: "not-convex", -6: "overdetermined",
 })  # fmt: skip
-# Beyond these the answer is not used, whatever the solver says of itself.
+_OSQP_INFEASIBLE: Final = (
+    osqp.SolverStatus.OSQP_PRIMAL_INFEASIBLE,
+    osqp.SolverStatus.OSQP_PRIMAL_INFEASIBLE_INACCURATE,
+)
+# An answer with larger residuals is not used, whatever status the solver reports.
 _MAX_VIOLATION: Final = 1e-5  # N
 _MAX_STATIONARITY: Final = 1e-5  # relative to the terms of the gradient
 
@@ -33,8 +38,8 @@ class Residuals:
     """How well the Karush-Kuhn-Tucker conditions hold.
 
     Attributes:
-        stationarity: ‖H v + f + λ_box + Aᵀ λ_A‖∞ over the largest of its terms (at least 1); of
-            the closed form a bound of it.
+        stationarity: ‖H v + f + λ_box + Aᵀ λ_A‖∞ over the largest of its terms (at least 1); for
+            the closed form an upper bound of it.
         primal: largest violation of a bound [N].
         complementarity: largest |λ · distance to its bound|, over the same terms [N].
     """
@@ -46,7 +51,7 @@ class Residuals:
 
 @dataclass(frozen=True, slots=True)
 class QpSolution:
-    """What a solver answered; with any status but "solved" `x` is zero: no deviation."""
+    """A solver's answer; `x` is zero, that is no deviation, unless the status is "solved"."""
 
     status: str
     x: Array
@@ -60,10 +65,10 @@ class SolvedQp:
     """A QP of one step, min ½ xᵀ H x + fᵀ x, lower ≤ [x; A x] ≤ upper, with its answer.
 
     Attributes:
-        problem: H and A of it.
+        problem: whose H and A these are.
         f: linear term, shape (nx,).
         lower, upper: bounds, shape (nx + m,).
-        solution: what the solver answered.
+        solution: the solver's answer.
     """
 
     problem: PlannerProblem
@@ -93,7 +98,7 @@ class Solver(Protocol):
 
     @property
     def closed_form(self) -> ClosedForm | None:
-        """What answers as `solve` does wherever its x keeps to the bounds; None: nothing does."""
+        """The closed form, equal to `solve` wherever its x keeps to the bounds, if there is one."""
         ...
 
     def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> QpSolution:
@@ -140,7 +145,7 @@ class DaqpSolver:
 
     def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> QpSolution:
         """See `Solver`."""
-        if self._ready < 0:  # bounds that contradict each other are found at set-up
+        if self._ready < 0:  # contradictory bounds are detected at set-up
             return no_solution(self._problem, _DAQP_STATUS.get(self._ready, "failed"))
         if not math.isfinite(f @ f):
             return no_solution(self._problem, "not-finite")
@@ -172,7 +177,7 @@ class OsqpSolver:
 
     @property
     def closed_form(self) -> ClosedForm | None:
-        """See `Solver`: this one is to answer as the paper's does."""
+        """See `Solver`; None, so that OSQP gives every answer, as in the paper."""
         return None
 
     def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> QpSolution:
@@ -198,9 +203,10 @@ class OsqpSolver:
             adaptive_rho_interval=50,  # by iterations, never by time
         )
         result = solver.solve(raise_error=False)
-        status = result.info.status.replace(" ", "-")
-        status = "infeasible" if status.startswith("primal-infeasible") else status
-        return judge(self._problem, f, result.x, result.y, status, int(result.info.iter), low, high)
+        info = result.info
+        status = "infeasible" if info.status_val in _OSQP_INFEASIBLE else info.status
+        status = status.replace(" ", "-")
+        return judge(self._problem, f, result.x, result.y, status, int(info.iter), low, high)
 
 
 @compiled
@@ -247,13 +253,13 @@ def judge(
     lower: Array | None = None,
     upper: Array | None = None,
 ) -> QpSolution:
-    """Hold a solver's claim against the conditions of optimality; what fails is "inaccurate"."""
+    """Check an answer against the optimality conditions; one that fails is "inaccurate"."""
     if status != SOLVED:
         return no_solution(problem, status)
-    found = residuals(problem, f, v, multipliers, lower, upper)
-    if not (found.primal <= _MAX_VIOLATION and found.stationarity <= _MAX_STATIONARITY):
-        return replace(no_solution(problem, "inaccurate"), residuals=found)
-    return QpSolution(SOLVED, v, multipliers, found, iterations)
+    checked = residuals(problem, f, v, multipliers, lower, upper)
+    if not (checked.primal <= _MAX_VIOLATION and checked.stationarity <= _MAX_STATIONARITY):
+        return replace(no_solution(problem, "inaccurate"), residuals=checked)
+    return QpSolution(SOLVED, v, multipliers, checked, iterations)
 
 
 def residuals(

@@ -20,12 +20,13 @@ from quadriga.agents.planner.planner_qp import (
     stance_columns,
     unpack,
 )
-from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS, Residuals, Solver
+from quadriga.agents.planner.qp_solver import NOMINAL, SOLVED, SOLVERS, Residuals, Solver
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.a1 import Array
+from quadriga.shared.wire.codes import with_detail
 
 Formulation = Callable[[int, NDArray[np.bool_]], Condensed]  # of contact phase and stance
 
@@ -79,7 +80,7 @@ class TeamPlanner:
         solution = solver.solve(problem.linear_term(past, y_des), *problem.bounds(y_free - y_des))
         du, dy = unpack(problem, solution.x, y_free)
         return TeamResult(
-            SOLVED if solution.status == SOLVED else f"nominal:{solution.status}",
+            SOLVED if solution.status == SOLVED else with_detail(NOMINAL, solution.status),
             (nominal_forces(stance) + du).reshape(n, N, -1),
             (base + dy).reshape(n, N, -1),
             solution.residuals,
@@ -91,13 +92,13 @@ class TeamPlanner:
 
     def _problem(self, step: int, stance: NDArray[np.bool_]) -> tuple[PlannerProblem, Solver]:
         key = phase_of(self._config, step, self._phases), stance.tobytes()
-        found = self._problems.get(key)
-        if found is None:
+        entry = self._problems.get(key)
+        if entry is None:
             condensed = self._formulation(key[0], stance)
             problem = constrain(self._config.planner, condensed, stance)
-            found = problem, SOLVERS[self._config.planner.solver](problem)
-            self._problems[key] = found
-        return found
+            entry = problem, SOLVERS[self._config.planner.solver](problem)
+            self._problems[key] = entry
+        return entry
 
 
 def build_centralised(config: Config, predictor: Predictor) -> TeamPlanner:

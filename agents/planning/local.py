@@ -32,6 +32,7 @@ from quadriga.agents.time_grid import exchange_ms, first_step, patience, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.codes import with_detail
 from quadriga.shared.wire.messages import Measurement, Reference
 
 WINDOW_LOST: Final = "window-lost"  # stop: no plan of its own for as long as a peer may be silent
@@ -277,7 +278,7 @@ class LocalPlanning:
 
 
 def _peer_lost(names: tuple[str, ...]) -> str:
-    return f"{PEER_LOST}:{','.join(names)}"
+    return with_detail(PEER_LOST, ",".join(names))
 
 
 def _coupled_peers(config: Config, index: int, predictor: Predictor) -> frozenset[int]:

@@ -16,9 +16,10 @@ def cyclic_grams(
     """For each part: how many columns of `mosaic(signals, L)` lie in it, and their H Hᵀ.
 
     Column c of signal e has the place (places[e] + c) mod K in a cycle of K = len(part_of)
-    columns. Blocks slide as in `hankel.gram`, from one place to the next: with A_k(d) the sum of
-    w_c w_{c+d}ᵀ over the columns c at place k, block (a, a + d) of a part is the sum of
-    A_{k+a}(d) over the part's places k, but for a few columns at the ends of each signal.
+    columns. Blocks are computed from their neighbours as in `hankel.gram`, one place after the
+    other: with A_k(d) the sum of w_c w_{c+d}ᵀ over the columns c at place k, block (a, a + d) of a
+    part is the sum of A_{k+a}(d) over the part's places k, but for a few columns at the ends of
+    each signal.
 
     Args:
         signals: per episode shape (T, q).

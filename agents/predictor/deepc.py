@@ -1,4 +1,4 @@
-"""What a team's data say for DeePC (eq. 5), before any weight is chosen.
+"""The part of DeePC (eq. 5) that depends on a team's data alone and not on any weight.
 
 The data enter through their Gram matrix S alone. With a = [u_ini; u] and b = [y_ini; y] its
 Cholesky factor, forces first, gives every g that matters as two orthogonal parts: one that a
@@ -33,7 +33,7 @@ _RANK_TOLERANCE: Final = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Reduction:
-    """What the data say before any weight is chosen; scaled deviations, robots first.
+    """What the data determine independently of the weights; scaled deviations, robots first.
 
     Forces stack per robot and time-major first all T_ini samples of the past, then all N of the
     future; outputs likewise.
@@ -54,10 +54,10 @@ class Reduction:
 
 
 def reduce(episodes: Sequence[Episode], T_ini: int, N: int) -> Reduction:
-    """Split the data into what forces explain and what they leave open.
+    """Split the outputs in the data into a part that the forces explain and the rest.
 
     Args:
-        episodes: data of one team; those shorter than T_ini + N count for nothing.
+        episodes: data of one team; those shorter than T_ini + N are ignored.
         T_ini: estimation horizon.
         N: control horizon.
 
@@ -88,8 +88,8 @@ def reduce(episodes: Sequence[Episode], T_ini: int, N: int) -> Reduction:
     S_bb = S[np.ix_(b, b)]
     left = S_bb - response @ S_ab
     values, vectors = linalg.eigh(0.5 * (left + left.T), check_finite=False)
-    kept = values > _RANK_TOLERANCE * np.linalg.norm(S_bb)
-    spread = vectors[:, kept] * np.sqrt(values[kept])
+    significant = values > _RANK_TOLERANCE * np.linalg.norm(S_bb)
+    spread = vectors[:, significant] * np.sqrt(values[significant])
     return Reduction(
         n, T_ini, N, 0.5 * (inverse + inverse.T), np.ascontiguousarray(response), spread
     )

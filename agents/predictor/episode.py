@@ -1,4 +1,4 @@
-"""Raw stacked data of one uninterrupted walk, and its deviations, on which everything is fitted."""
+"""Raw stacked data of one uninterrupted walk, and their deviations, which all fits use."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Episode:
         return ((du / U_SCALE).reshape(self.samples, -1), (dy / Y_SCALE).reshape(self.samples, -1))
 
     def windows(self, T_ini: int, N: int) -> tuple[Array, Array]:
-        """Every window of deviations: what a predictor gets and what it should answer.
+        """Every window of deviations: a predictor's input and the output it should predict.
 
         Returns:
             z, shape (n, 18 T_ini + 12 N, C): per robot [u_ini; y_ini; u], time-major;
@@ -92,8 +92,8 @@ class Episode:
 def output_base(interface: str, reference: Reference) -> Array:
     """The outputs that deviations are counted from while `reference` is in force. Shape (6,).
 
-    With the interface "feedforward" the plant already follows the command, so that is the base;
-    with "force" it is standing still at nominal height.
+    With the interface "feedforward" the low level already follows the reference, so the base is the
+    commanded outputs; with "force" the base is standing still at nominal height.
     """
     if interface == "force":
         return np.array([STAND_HEIGHT, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -101,5 +101,5 @@ def output_base(interface: str, reference: Reference) -> Array:
 
 
 def commanded_outputs(reference: Reference) -> Array:
-    """The outputs the operator asks for: z, vx, vy, 0, 0, wz. Shape (6,)."""
+    """The commanded outputs: z, vx, vy, 0, 0, wz. Shape (6,)."""
     return np.array([reference.height, reference.vx, reference.vy, 0.0, 0.0, reference.wz])

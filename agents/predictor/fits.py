@@ -41,22 +41,22 @@ def fit_pinv(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, or of another team.
     """
-    found = solve_pinv(normal_equations(episodes, meta), meta)
-    return _one_phase(found, _without_penalty(meta, "pinv"))
+    solutions = solve_pinv(normal_equations(episodes, meta), meta)
+    return _one_phase(solutions, _without_penalty(meta, "pinv"))
 
 
 def fit_ridge(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     """Block-weighted ridge regression of G; with w = 1 the plain one.
 
     Row i minimises ‖Y_f^i − Σ_j G_ij Z_j‖² + ridge · M · (‖G_ii‖² + w² Σ_{j≠i} ‖G_ij‖²) with M
-    columns: what the peers are not clearly seen to do is not attributed to them, without which
-    the agents' best responses to each other's last plans diverge.
+    columns: effects that the data do not clearly show are not attributed to the peers. Without this
+    weight the agents' best responses to each other's last plans diverge.
 
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
     """
-    found = solve_ridge(normal_equations(episodes, meta), meta, meta.ridge)
-    return _one_phase(found, replace(meta, kind="ridge", phases=1))
+    solutions = solve_ridge(normal_equations(episodes, meta), meta, meta.ridge)
+    return _one_phase(solutions, replace(meta, kind="ridge", phases=1))
 
 
 def fit_gamma(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
@@ -65,45 +65,45 @@ def fit_gamma(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, of another team, or forces that do not excite.
     """
-    found = solve_gamma(normal_equations(episodes, meta), meta)
-    return _one_phase(found, _without_penalty(meta, "gamma"))
+    solutions = solve_gamma(normal_equations(episodes, meta), meta)
+    return _one_phase(solutions, _without_penalty(meta, "gamma"))
 
 
 def fit_causal(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """Block-weighted ridge with a block-lower-triangular U_f part: no force acts before its time.
+    """Block-weighted ridge with a block-lower-triangular U_f part: no force acts backwards.
 
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
     """
-    found = solve_causal(normal_equations(episodes, meta), meta, meta.ridge)
-    return _one_phase(found, replace(meta, kind="causal", phases=1))
+    solutions = solve_causal(normal_equations(episodes, meta), meta, meta.ridge)
+    return _one_phase(solutions, replace(meta, kind="causal", phases=1))
 
 
 def fit_arx(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     """One-step block-weighted ridge regression, rolled out over N steps by the whole team.
 
-    With yoked neighbours only, what reaches a robot through a neighbour's neighbour within the
-    horizon is cut off: G_ij is zero wherever i and j are not yoked.
+    With yoked neighbours only, the effect of a neighbour's neighbour within the horizon is left
+    out: G_ij is zero wherever i and j are not yoked.
 
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
     """
     check_episodes(episodes, meta)
     one_step = replace(meta, N=1)
-    found = solve_ridge(normal_equations(episodes, one_step), one_step, meta.ridge)
-    x = roll_out(found.x, meta)
+    solutions = solve_ridge(normal_equations(episodes, one_step), one_step, meta.ridge)
+    x = roll_out(solutions.x, meta)
     for i in range(meta.robots):
         strangers = [j for j in range(meta.robots) if j not in members_of(meta, i)]
         x[i].reshape(meta.robots, meta.width, -1)[strangers] = 0.0
-    return _one_phase(Solutions(x, found.condition), replace(meta, kind="arx", phases=1))
+    return _one_phase(Solutions(x, solutions.condition), replace(meta, kind="arx", phases=1))
 
 
 def fit_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     """One G for each phase of the gait, drawn towards the ridge fit of all data together.
 
     Row i of phase p minimises over its own windows the error plus phase_ridge · M_p times the
-    block-weighted square of the departure from the pooled fit: without data of its own a phase
-    has that of all.
+    block-weighted square of the departure from the pooled fit: a phase without data of its own gets
+    the pooled fit.
 
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
@@ -116,16 +116,16 @@ def fit_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
             continue
         explained = np.einsum("ab,ibk->aik", regression.zz, pooled, optimize=True)
         left = replace(regression, zy=regression.zy - explained)
-        found = solve_ridge(left, meta, meta.phase_ridge)
-        blocks.append(to_physical(pooled + found.x, meta))
-        condition = max(condition, found.condition)
+        solutions = solve_ridge(left, meta, meta.phase_ridge)
+        blocks.append(to_physical(pooled + solutions.x, meta))
+        condition = max(condition, solutions.condition)
     return Predictor(replace(meta, kind="phase"), np.stack(blocks), condition)
 
 
 def fit_hankel(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """G = Y_f [U_p; Y_p; U_f]† (eq. 6) as the paper has it; forms the Hankel matrices.
+    """G = Y_f [U_p; Y_p; U_f]† (eq. 6) as in the paper, from the Hankel matrices themselves.
 
-    The independent reference of the other fits; takes minutes where they take seconds.
+    An independent reference for the other fits; it takes minutes where they take seconds.
 
     Raises:
         PredictorError: no data, too little, or of another team.
@@ -157,8 +157,8 @@ FITS: Final[Mapping[str, Fit]] = {
 }
 
 
-def _one_phase(found: Solutions, meta: PredictorMeta) -> Predictor:
-    return Predictor(meta, to_physical(found.x, meta)[None], found.condition)
+def _one_phase(solutions: Solutions, meta: PredictorMeta) -> Predictor:
+    return Predictor(meta, to_physical(solutions.x, meta)[None], solutions.condition)
 
 
 def _without_penalty(meta: PredictorMeta, kind: str) -> PredictorMeta:

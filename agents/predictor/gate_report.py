@@ -1,4 +1,4 @@
-"""What a predictor has shown and the limits it was held against; stored in its file."""
+"""The figures of a predictor's gates and their limits; stored in the predictor's file."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from quadriga.shared.errors import PredictorError
 
 @dataclass(frozen=True, slots=True)
 class GateReport:
-    """Figures of a predictor and the limits they were held against.
+    """Figures of a predictor and the limits they were compared with.
 
     Attributes:
         windows: held-out windows predicted.
         rmse: held-out error per output over the horizon, all robots [m, m/s, rad, rad/s].
         rmse_persistence: the same for holding the last measured output.
         error: scaled error of all outputs together over that of persistence; must be < 1.
-        gain_times: when the height response is looked at [s].
+        gain_times: times after the step of force at which the height response is compared [s].
         gains: predicted over physical height response, per robot and time, of the worst phase.
         gain_limits: every gain must lie between these.
         radius: spectral radius of the best-response map, the worst of all stance patterns
             and phases.
         radius_limit: must be below this.
-        Q, R: planner weights the radius belongs to.
+        Q, R: planner weights that the radius was computed for.
         condition: number of the regression, penalty included; None if it is not known.
         coupling: norm of the scaled G_ij, the largest of all phases, per robot i and j.
         size: of G, bytes.
@@ -45,7 +45,7 @@ class GateReport:
     size: int = 0
 
     def to_dict(self) -> dict[str, Any]:
-        """A form that JSON can carry."""
+        """A dictionary that can be written as JSON."""
         return asdict(self)
 
     @classmethod
@@ -66,11 +66,11 @@ class GateReport:
         """Refuse the predictor if a figure is beyond its limit.
 
         Args:
-            kind: of planner that will use it; only where agents answer each other's plans does
-                the radius matter.
+            kind: of planner that will use it; the radius matters only if agents respond to each
+                other's plans.
 
         Raises:
-            PredictorError: with the figure and the limit.
+            PredictorError: a figure is beyond its limit; the message names both.
         """
         if not self.error < 1.0:
             raise PredictorError(

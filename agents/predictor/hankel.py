@@ -67,8 +67,9 @@ def columns(signals: Iterable[Array], L: int) -> int:
 def gram(signals: Sequence[Array], L: int) -> Array:
     """H Hᵀ of H = mosaic(signals, L), without forming H. Shape (L q, L q) for signals (T, q).
 
-    The diagonal blocks slide: S(a+1, b+1) = S(a, b) + w_{a+M} w_{b+M}ᵀ − w_a w_bᵀ with M columns,
-    so only the first block row needs products over all samples. Episodes shorter than L add none.
+    Each block follows from the one diagonally before it,
+    S(a+1, b+1) = S(a, b) + w_{a+M} w_{b+M}ᵀ − w_a w_bᵀ with M columns, so only the first block row
+    needs products over all samples. Episodes shorter than L add no columns.
     """
     q = signals[0].shape[1]
     S = np.zeros((L * q, L * q))
@@ -118,7 +119,7 @@ def excitation(inputs: Sequence[Array], order: int) -> Excitation:
     S = gram(inputs, order)
     floor = _RANK_TOLERANCE * max(float(np.linalg.norm(S)), np.finfo(float).tiny)
     S.flat[:: rows + 1] -= floor
-    try:  # all eigenvalues above the floor: one Cholesky says so 20 times sooner than they do
+    try:  # Cholesky shows 20 times faster that no eigenvalue is small
         linalg.cholesky(S.T, lower=True, overwrite_a=True, check_finite=False)
         rank = rows
     except linalg.LinAlgError:

@@ -13,9 +13,9 @@ from quadriga.agents.predictor.ridge import Solutions, condition_number, factori
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.a1 import N_OUTPUTS, Array
 
-# Rounding leaves the Gram matrix eigenvalues of up to 1e-16 · (number of rows) of the largest
-# where there should be none. Below 1e-12, which is 1e-6 in singular values of the data, they are
-# taken for zero.
+# Rounding turns eigenvalues of the Gram matrix that should be zero into up to 1e-16 · (number of
+# rows) of the largest. Below 1e-12, which is 1e-6 in singular values of the data, they count as
+# zero.
 RANK_TOLERANCE = 1e-12
 
 Solve = Callable[[Array, Array], tuple[Array, float]]
@@ -29,8 +29,8 @@ def solve_pinv(regression: Regression, meta: PredictorMeta) -> Solutions:
 def solve_gamma(regression: Regression, meta: PredictorMeta) -> Solutions:
     """γ-DDPC: with [Z_p; U_f; Y_f] = L Q, G = [L_31 L_32] [L_11 0; L_21 L_22]⁻¹, γ_3 = 0.
 
-    L is the Cholesky factor of the Gram matrix. Where Z_p has fewer independent rows than rows
-    (data without noise), L_11 is that of an independent selection of them, found by pivoting.
+    L is the Cholesky factor of the Gram matrix. If the rows of Z_p are not independent (data
+    without noise), L_11 belongs to an independent selection of them, found by pivoting.
 
     Raises:
         PredictorError: U_f is not exciting: L_22 is singular.
@@ -71,7 +71,7 @@ def solve_gamma(regression: Regression, meta: PredictorMeta) -> Solutions:
 def _solve_least_norm(A: Array, b: Array) -> tuple[Array, float]:
     floor = RANK_TOLERANCE * float(np.linalg.norm(A))
     norm = float(np.linalg.norm(A, 1))
-    try:  # every eigenvalue above the floor: a Cholesky factor says so long before they do
+    try:  # Cholesky shows much faster that no eigenvalue is small
         shifted = A.copy(order="F")
         shifted.flat[:: len(A) + 1] -= floor
         factorise(shifted)
@@ -80,9 +80,11 @@ def _solve_least_norm(A: Array, b: Array) -> tuple[Array, float]:
         return x, condition_number(norm, factor)
     except PredictorError:
         values, vectors = linalg.eigh(A, check_finite=False)
-        kept = values > floor
-        V = vectors[:, kept]
-        return V @ ((V.T @ b) / values[kept, None]), float(values[-1] / values[kept][0])
+        significant = values > floor
+        V = vectors[:, significant]
+        return V @ ((V.T @ b) / values[significant, None]), float(
+            values[-1] / values[significant][0]
+        )
 
 
 def _solve_groups(regression: Regression, meta: PredictorMeta, solve: Solve) -> Solutions:
@@ -91,8 +93,8 @@ def _solve_groups(regression: Regression, meta: PredictorMeta, solve: Solve) -> 
     x, condition = np.zeros((n, n * meta.width, outputs)), 0.0
     for robots, rows in _groups(meta):
         b = regression.zy[np.ix_(rows, robots)].reshape(len(rows), -1)
-        found, one = solve(regression.zz[np.ix_(rows, rows)], b)
-        x[np.ix_(robots, rows)] = found.reshape(len(rows), len(robots), -1).transpose(1, 0, 2)
+        solution, one = solve(regression.zz[np.ix_(rows, rows)], b)
+        x[np.ix_(robots, rows)] = solution.reshape(len(rows), len(robots), -1).transpose(1, 0, 2)
         condition = max(condition, one)
     return Solutions(x, condition)
 

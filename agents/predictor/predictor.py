@@ -12,13 +12,13 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
 
-# Keys of the controller that act only after something has gone wrong, not on the plant fitted.
+# Keys of the controller that act only in a failure and do not change the plant that is fitted.
 _SAFETY_KEYS: Final = ("damping", "fall_tilt", "max_failures")
 
 
 @dataclass(frozen=True, slots=True)
 class PredictorMeta:
-    """What a predictor was fitted for, where it may be used alone, and how it was fitted.
+    """The team and settings that a predictor was fitted for, and how; it fits no others.
 
     Attributes:
         kind: name of the fit, a key of `quadriga.agents.predictor.fits.FITS`.
@@ -66,9 +66,9 @@ class PredictorMeta:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """A form that JSON can carry, with keys of the controller under their first names.
+        """A dictionary that can be written as JSON, with the controller's keys as first named.
 
-        So a key's new name alone changes neither a predictor's file nor its digest.
+        So renaming a key changes neither a predictor's file nor its digest.
         """
         return asdict(self) | with_first_names({"controller": dict(self.controller)})
 
@@ -122,7 +122,7 @@ class Predictor:
         return self.meta.phases
 
     def block(self, i: int, j: int, phase: int = 0) -> Array:
-        """G_ij of a phase, what agent j does to agent i. Shape (6 N, 18 T_ini + 12 N)."""
+        """G_ij of a phase, the effect of agent j on agent i. Shape (6 N, 18 T_ini + 12 N)."""
         block: Array = self.G[phase, i, j]
         return block
 

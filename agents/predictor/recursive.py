@@ -1,12 +1,12 @@
-"""Correction of one robot's row of G from new windows: recursive least squares that forgets.
+"""Correction of one robot's row of G from new windows: recursive least squares with forgetting.
 
-Forgets only along the directions that new windows speak about (Kulhavý's directional forgetting):
-with the plain kind a team that stands or trots evenly would forget all that it does not excite,
-and its covariance would grow as λ^−k.
+It forgets only along the directions that new windows excite (Kulhavý's directional forgetting).
+With plain exponential forgetting a team that stands or trots evenly would forget all that it does
+not excite, and its covariance would grow as λ^−k.
 
-A changed plant (an unknown load) shows in what the predictor leaves unexplained. That is
-regressed on the robot's own [u_ini; y_ini; u], which corrects G_ii, or on those of all robots.
-The same correction serves every phase. All in scaled deviations, so that one prior fits all.
+A change of the plant, such as an unknown load, shows in the prediction error. That error is
+regressed on the robot's own [u_ini; y_ini; u], which corrects G_ii, or on those of all robots. The
+same correction serves every phase. All numbers are scaled deviations, so that one prior fits all.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ _NOTHING = 1e-12  # zᵀPz of a regressor that says nothing about anything not k
 
 @dataclass(frozen=True, slots=True)
 class Forgetting:
-    """How the recursion weighs old and new.
+    """How the recursion weighs old windows against new ones.
 
     Attributes:
-        factor: λ, what a window leaves of the older information on its own direction; 1: all.
+        factor: λ, share of the older information on its own direction that a window keeps; 1: all.
         prior: variance of an entry of the correction before the first window.
-        bound: largest mean variance; where it would be passed, nothing is forgotten.
+        bound: largest mean variance; nothing is forgotten where the variance would exceed it.
     """
 
     factor: float = 0.999
@@ -51,7 +51,7 @@ class Forgetting:
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """What is known so far of the departure of one robot's row from the predictor.
+    """The estimate so far of the difference between one robot's row of G and the predictor's.
 
     Attributes:
         robot: i, whose row it is.
@@ -60,7 +60,7 @@ class Correction:
         P: covariance over the noise variance, shape (k, k), exactly symmetric.
         updates: windows that were taken in.
         skipped: windows without new information.
-        refused: windows that were implausible themselves, or would have made D so.
+        refused: windows that were implausible, or would have made D implausible.
     """
 
     robot: int
@@ -72,14 +72,14 @@ class Correction:
     refused: int = 0
 
     def refuse(self) -> Correction:
-        """The same after one more window that was not taken in."""
+        """The same correction with one more refused window."""
         return replace(self, refused=self.refused + 1)
 
 
 def begin_correction(
     meta: PredictorMeta, robot: int, sources: Sequence[int], how: Forgetting
 ) -> Correction:
-    """No correction yet.
+    """The correction before the first window: zero.
 
     Raises:
         PredictorError: robots that are not in the team.
@@ -99,8 +99,8 @@ def take_in(
     """Take in one window that has been measured to its end.
 
     Args:
-        state: so far.
-        predictor: that is corrected, itself unchanged since the beginning.
+        state: the correction so far.
+        predictor: the one that is corrected; the same one in every call.
         z: [u_ini; y_ini; u] of all robots, deviations, shape (n, 18 T_ini + 12 N), N, m, ….
         y: measured output deviations of robot i, shape (6 N,).
         phase: of the window.
@@ -131,11 +131,11 @@ def update(state: Correction, z: Array, left: Array, how: Forgetting) -> Correct
     min Σ ‖left − D z‖² + ‖D‖² / prior; with one direction alone, exponentially weighted. Under a
     constant z the variance along it settles at (1 − λ) / λ and no other direction is touched.
 
-    A window after which an entry of D would be no number, or far from all a plant can be, is
-    refused: from then on everything that is planned would be.
+    A window is refused if after it an entry of D would be no finite number or far beyond any plant,
+    since every later plan would then be implausible too.
 
     Args:
-        state: so far.
+        state: the correction so far.
         z: scaled regressor, shape (k,).
         left: scaled outputs that the predictor does not explain, shape (6 N,).
         how: weights.
@@ -155,7 +155,7 @@ def update(state: Correction, z: Array, left: Array, how: Forgetting) -> Correct
 
 
 def block_correction(meta: PredictorMeta, state: Correction, place: int = 0) -> Array:
-    """What the correction adds to the block of one of its sources. (6 N, 18 T_ini + 12 N)."""
+    """The correction's addition to the block of one of its sources. (6 N, 18 T_ini + 12 N)."""
     z_scale, y_scale = scales(meta)
     columns = slice(place * meta.width, (place + 1) * meta.width)
     added: Array = state.D[:, columns] * y_scale[:, None] / z_scale

@@ -129,7 +129,7 @@ def scales(meta: PredictorMeta) -> tuple[Array, Array]:
 
 
 def past_first(meta: PredictorMeta, members: Sequence[int]) -> Index:
-    """Rows of `zz` of some robots, in time: all [u_ini; y_ini], then each sample's forces."""
+    """Rows of `zz` of some robots by time: all [u_ini; y_ini], then each sample's forces."""
     rows = np.arange(meta.robots * meta.width).reshape(meta.robots, -1)[list(members)]
     future = rows[:, meta.past :].reshape(len(members), meta.N, N_FORCES)
     return np.concatenate([rows[:, : meta.past].ravel(), future.transpose(1, 0, 2).ravel()])

@@ -16,7 +16,7 @@ from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
 
 @dataclass(frozen=True, slots=True)
 class Solutions:
-    """What a solver found.
+    """A solver's result.
 
     Attributes:
         x: scaled solutions, shape (n, n W, 6 N); zero in the rows of robots left out.
@@ -59,7 +59,7 @@ def solve_ridge(regression: Regression, meta: PredictorMeta, ridge: float) -> So
 
 
 def solve_causal(regression: Regression, meta: PredictorMeta, ridge: float) -> Solutions:
-    """The same with y at sample t explained by [u_ini; y_ini] and u_0 … u_t alone.
+    """Like `solve_ridge`, but [u_ini; y_ini] and u_0 … u_t alone explain y at sample t.
 
     With columns in the order of time the normal equations of sample t are a leading block of
     those of the last, and so are their Cholesky factors: one factor serves all N of them. u_k is
@@ -132,9 +132,9 @@ def _add_penalty(A: Array, penalty: Array | float) -> Array:
 def _solve_each(A: Array, b: Array, W: int, light: float, heavy: float) -> Array:
     """Solutions x_i of (A + D_i) x_i = b_i, D_i = light on block i and heavy on all others.
 
-    Eliminating one half of the blocks, all heavy there, leaves the same problem for each block of
-    the other half; so all n solutions cost 7/3 of one factorisation. Unlike correcting one common
-    factorisation for each block this loses no digits to a large ratio of the penalties.
+    One half of the blocks, all with the heavy penalty, is eliminated, which leaves the same problem
+    for the other half; so all n solutions cost 7/3 of one factorisation. Correcting one common
+    factorisation for each block would lose digits where the ratio of the penalties is large.
 
     Args:
         A: shape (n W, n W).
@@ -151,17 +151,20 @@ def _solve_each(A: Array, b: Array, W: int, light: float, heavy: float) -> Array
         factor = factorise(_add_penalty(A, light))
         return linalg.cho_solve((factor, True), b[:, 0], check_finite=False)[None]
     x = np.empty((n, n * W, k))
-    for kept, gone in ((slice(0, n // 2), slice(n // 2, n)), (slice(n // 2, n), slice(0, n // 2))):
-        K, D = (slice(s.start * W, s.stop * W) for s in (kept, gone))
+    for half, eliminated in (
+        (slice(0, n // 2), slice(n // 2, n)),
+        (slice(n // 2, n), slice(0, n // 2)),
+    ):
+        K, D = (slice(s.start * W, s.stop * W) for s in (half, eliminated))
         factor = factorise(_add_penalty(A[D, D], heavy))
         X, R = (
             linalg.solve_triangular(factor, rhs, lower=True, check_finite=False)
-            for rhs in (A[D, K], b[D, kept].reshape(D.stop - D.start, -1))
+            for rhs in (A[D, K], b[D, half].reshape(D.stop - D.start, -1))
         )
-        rest = b[K, kept] - (X.T @ R).reshape(K.stop - K.start, -1, k)
-        found = _solve_each(A[K, K] - X.T @ X, rest, W, light, heavy)
-        x[kept, K] = found
-        across = R - (X @ found.transpose(1, 0, 2).reshape(K.stop - K.start, -1))
+        rest = b[K, half] - (X.T @ R).reshape(K.stop - K.start, -1, k)
+        solution = _solve_each(A[K, K] - X.T @ X, rest, W, light, heavy)
+        x[half, K] = solution
+        across = R - (X @ solution.transpose(1, 0, 2).reshape(K.stop - K.start, -1))
         back = linalg.solve_triangular(factor, across, lower=True, trans=1, check_finite=False)
-        x[kept, D] = back.reshape(D.stop - D.start, -1, k).transpose(1, 0, 2)
+        x[half, D] = back.reshape(D.stop - D.start, -1, k).transpose(1, 0, 2)
     return x

@@ -1,4 +1,4 @@
-"""Predictor files: G, what it was fitted for, where it comes from, and what it has shown."""
+"""Predictor files: G, what it was fitted for, its provenance, and the figures of its gates."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Provenance:
         samples: of each training episode, at 100 Hz.
         held_out: samples of each episode held out.
         versions: of the packages that took part.
-        gates: figures it was accepted with.
+        gates: figures of its gates.
     """
 
     config_digest: str
@@ -55,13 +55,13 @@ class Provenance:
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that a fit depends on."""
-    found = {"python": platform.python_version()}
+    installed = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:
-            found[package] = metadata.version(package)
+            installed[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
-            found[package] = "not installed"
-    return found
+            installed[package] = "not installed"
+    return installed
 
 
 def predictor_sha256(predictor: Predictor) -> str:

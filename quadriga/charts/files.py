@@ -110,7 +110,7 @@ def _compact(element: ElementTree.Element) -> None:
 
 def _round(numbers: str) -> str:
     """All numbers of a text in tenths."""
-    return _POINT.sub(lambda found: f"{float(found[0]):.1f}".removesuffix(".0"), numbers)
+    return _POINT.sub(lambda match: f"{float(match[0]):.1f}".removesuffix(".0"), numbers)
 
 
 def _shorten(path: str) -> str:

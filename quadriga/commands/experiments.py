@@ -76,8 +76,8 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     _check_options(arguments)
     every, asked = load_experiments(arguments.names)
     chosen = [experiment for experiment in every if experiment.name in asked]
-    found = _look(arguments, chosen) if arguments.seeds else _publish(arguments, every, asked)
-    return int(arguments.require and not all(_meets(one, results) for one, results in found))
+    outcomes = _look(arguments, chosen) if arguments.seeds else _publish(arguments, every, asked)
+    return int(arguments.require and not all(_meets(one, results) for one, results in outcomes))
 
 
 def _look(
@@ -108,7 +108,7 @@ def _publish(
     from quadriga.experiments.published.catalogue import CHECKOUT
     from quadriga.experiments.published.publish import PAGE, publish
     from quadriga.experiments.published.requirement_table import build_requirement_table
-    from quadriga.experiments.published.walk_experiment import take_up_published
+    from quadriga.experiments.published.walk_experiment import unpack_published
 
     into, runs = arguments.into or CHECKOUT, arguments.out
     chosen = [experiment for experiment in every if experiment.name in asked]
@@ -120,18 +120,18 @@ def _publish(
     entries = publish(every, runs, into, renewed, say)
     if arguments.from_published:
         for experiment, plans in todo:
-            count = take_up_published(
+            count = unpack_published(
                 experiment, plans, into, runs, typed=arguments.typed, console=Console(stderr=True)
             )
             say(f"{experiment.name}: {count:,} published trials taken up")
     for experiment, plans in todo:
         _walk(arguments, experiment, plans, runs)
         entries = publish(every, runs, into, renewed, say)
-    found = [(one.experiment, one.results) for one in entries if one.experiment.name in asked]
-    for experiment, results in found:
+    shown = [(one.experiment, one.results) for one in entries if one.experiment.name in asked]
+    for experiment, results in shown:
         _show(experiment, [build_requirement_table(experiment, results)])
     print(into / PAGE)
-    return found
+    return shown
 
 
 def _meets(experiment: Experiment, results: Results) -> bool:

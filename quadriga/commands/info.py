@@ -19,8 +19,8 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     from quadriga.recordings.info import format_survey
     from quadriga.recordings.survey import survey
 
-    found = survey(arguments.file)
-    print("\n".join(format_survey(found)))
-    if found.error is not None:
-        raise found.error
+    result = survey(arguments.file)
+    print("\n".join(format_survey(result)))
+    if result.error is not None:
+        raise result.error
     return 0

@@ -121,9 +121,9 @@ def _draw_curves(axes: Axes, panel: SweepPanel, results: Results) -> bool:
         points = []
         for value, world in panel.points:
             line = results.find(world, name)
-            found = None if line is None else MEASURES["success"].of(line)
-            if found is not None:
-                points.append((to_number(value) + aside, found))
+            interval = None if line is None else MEASURES["success"].of(line)
+            if interval is not None:
+                points.append((to_number(value) + aside, interval))
         if points:
             drawn = True
             axes.errorbar(
@@ -148,7 +148,7 @@ def _collect_points(
     results: Results, measures: Sequence[str], names: Sequence[str]
 ) -> dict[World, list[_Point]]:
     """Of each world what there is to draw; rows are variants, or measures if there are several."""
-    found: dict[World, list[_Point]] = {}
+    points: dict[World, list[_Point]] = {}
     for world in (*results.worlds, POOLED):
         for measure in measures:
             for name in names:
@@ -161,8 +161,8 @@ def _collect_points(
                     row = row if len(names) == 1 else f"{row}  {name}"
                 else:
                     row = name
-                found.setdefault(world, []).append(_Point(row, name, measure, estimate))
-    return found
+                points.setdefault(world, []).append(_Point(row, name, measure, estimate))
+    return points
 
 
 def _draw_rows(
@@ -216,11 +216,11 @@ def _draw_rows(
     return figure
 
 
-def _reach(found: Interval) -> tuple[float, float]:
+def _reach(interval: Interval) -> tuple[float, float]:
     """How far the interval reaches below and above."""
-    low = found.value if found.low is None else found.low
-    high = found.value if found.high is None else found.high
-    return max(0.0, found.value - low), max(0.0, high - found.value)
+    low = interval.value if interval.low is None else interval.low
+    high = interval.value if interval.high is None else interval.high
+    return max(0.0, interval.value - low), max(0.0, high - interval.value)
 
 
 def _colours(results: Results) -> dict[str, str]:

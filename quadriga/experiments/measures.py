@@ -50,11 +50,11 @@ class Measure:
             return "∞"
         return format(value, self.digits if signed else self.digits.removeprefix("+"))
 
-    def format_interval(self, found: Interval) -> str:
+    def format_interval(self, interval: Interval) -> str:
         """Value and interval as text that no line ends in."""
-        text = self.format_value(found.value)
-        if found.low is not None and found.high is not None:
-            text += f" [{self.format_value(found.low)}, {self.format_value(found.high)}]"
+        text = self.format_value(interval.value)
+        if interval.low is not None and interval.high is not None:
+            text += f" [{self.format_value(interval.low)}, {self.format_value(interval.high)}]"
         return keep_together(text)
 
 
@@ -120,10 +120,10 @@ def _fewer(line: Line) -> Interval | None:
 
 def _ratio(name: str) -> Callable[[Line], Interval | None]:
     def of(line: Line) -> Interval | None:
-        found = None if line.beside is None else line.beside.ratios.get(name)
-        if found is None or found.median is None:
+        ratio = None if line.beside is None else line.beside.ratios.get(name)
+        if ratio is None or ratio.median is None:
             return None
-        return Interval(found.median, found.low, found.high)
+        return Interval(ratio.median, ratio.low, ratio.high)
 
     return of
 
@@ -132,8 +132,8 @@ def _read(
     read: Callable[[Tally], float | None], factor: float = 1.0
 ) -> Callable[[Line], Interval | None]:
     def of(line: Line) -> Interval | None:
-        found = read(line.tally)
-        return None if found is None else Interval(factor * found)
+        figure = read(line.tally)
+        return None if figure is None else Interval(factor * figure)
 
     return of
 

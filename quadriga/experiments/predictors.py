@@ -46,19 +46,19 @@ def prepare_predictors(configs: Iterable[Config], console: Console) -> dict[Conf
     Raises:
         PredictorFileError: a file cannot be read or written; all else refuses a predictor alone.
     """
-    found: dict[Config, Fitted] = {}
+    fitted: dict[Config, Fitted] = {}
     made: dict[tuple[Path, str], Fitted] = {}
     for config in configs:
         if config.planner.kind == "none":
-            found[config] = Fitted()
+            fitted[config] = Fitted()
             continue
         # Gates are those of the kind of planner, and their limits and Q, R of the configuration.
         limits = (config.planner.Q, config.planner.R, config.identification, config.planner.kind)
         key = (predictor_path(config), repr(limits))
         if key not in made:
             made[key] = _prepare(config, console)
-        found[config] = made[key]
-    return found
+        fitted[config] = made[key]
+    return fitted
 
 
 def file_sha256(path: Path) -> str:

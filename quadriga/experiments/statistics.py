@@ -46,8 +46,8 @@ def wilson(count: int, total: int) -> Bounds:
     """Wilson's score interval of a proportion: (0, 1) if nothing was counted."""
     if not total:
         return 0.0, 1.0
-    found = binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
-    return float(found.low), float(found.high)
+    interval = binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
+    return float(interval.low), float(interval.high)
 
 
 def mcnemar(pairs: Pairs) -> float:

@@ -28,7 +28,7 @@ def build_lines(
         groups[row.group].append(row)
     variants = dict.fromkeys(group.variant for group in wanted)
     of_variant = {
-        name: [row for group, found in groups.items() if group.variant == name for row in found]
+        name: [row for group, trials in groups.items() if group.variant == name for row in trials]
         for name in variants
     }
     base = of_variant.get(baseline, [])
@@ -39,14 +39,14 @@ def build_lines(
         return Line(world, name, of, len(rows), spent, tally_trials(rows), beside)
 
     lines = [
-        build_line(group.world, group.variant, found, wanted[group])
-        for group, found in groups.items()
-        if found
+        build_line(group.world, group.variant, trials, wanted[group])
+        for group, trials in groups.items()
+        if trials
     ]
     if pooled:
-        for name, found in of_variant.items():
+        for name, trials in of_variant.items():
             of = sum(count for group, count in wanted.items() if group.variant == name)
-            lines += [build_line(POOLED, name, found, of)] if found else []
+            lines += [build_line(POOLED, name, trials, of)] if trials else []
     return tuple(lines)
 
 

@@ -42,10 +42,10 @@ def parse_sweep(option: str) -> Sweep:
     Raises:
         ConfigError: no key, or no values.
     """
-    key, found, text = option.partition("=")
+    key, separator, text = option.partition("=")
     places = _PLACE.findall(text)
     labels = tuple(split_outside_brackets(places[0] if places else text, ","))
-    if not found or "." not in key or not labels or any(places[1:]):
+    if not separator or "." not in key or not labels or any(places[1:]):
         raise ConfigError(
             "--sweep",
             repr(option),

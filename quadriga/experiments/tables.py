@@ -19,8 +19,8 @@ Column = tuple[str, Callable[[Line], str]]  # its heading, and a line's cell
 
 
 def _success(line: Line) -> str:
-    found = MEASURES["success"].of(line)
-    return NOTHING if found is None else MEASURES["success"].format_interval(found)
+    interval = MEASURES["success"].of(line)
+    return NOTHING if interval is None else MEASURES["success"].format_interval(interval)
 
 
 def _of(read: Callable[[Tally], float | None], digits: str) -> Callable[[Line], str]:
@@ -45,12 +45,12 @@ COLUMNS: Final[Mapping[str, Column]] = {
     "success": ("success [%]", _success),
     "falls": ("falls", lambda line: str(line.tally.falls)),
     "stops": ("stops", lambda line: str(line.tally.stops)),
-    "time-to-fall": ("time to fall [s]", _of(lambda found: found.time_to_fall, ".2f")),
-    "vx": ("mean vx [m/s]", _of(lambda found: found.mean_vx, ".3f")),
-    "transport": ("cost of transport", _of(lambda found: found.cost_of_transport, ".2f")),
-    "cost": ("control cost", _of(lambda found: found.control_cost, ".0f")),
-    "p50": ("plan p50 [ms]", _of(lambda found: found.planner_ms_p50, ".2f")),
-    "p99": ("p99 [ms]", _of(lambda found: found.planner_ms_p99, ".2f")),
+    "time-to-fall": ("time to fall [s]", _of(lambda tally: tally.time_to_fall, ".2f")),
+    "vx": ("mean vx [m/s]", _of(lambda tally: tally.mean_vx, ".3f")),
+    "transport": ("cost of transport", _of(lambda tally: tally.cost_of_transport, ".2f")),
+    "cost": ("control cost", _of(lambda tally: tally.control_cost, ".0f")),
+    "p50": ("plan p50 [ms]", _of(lambda tally: tally.planner_ms_p50, ".2f")),
+    "p99": ("p99 [ms]", _of(lambda tally: tally.planner_ms_p99, ".2f")),
     "plans": ("plans", _plans),
     **{f"rmse-{name}": (f"RMSE {label_output(name)}", _rmse(name)) for name in ERRORS},
 }
@@ -106,8 +106,8 @@ def _ratios(line: Line, names: Sequence[str]) -> Iterator[str]:
     yield f"{_beside(line).upright:,}"
     for name in names:
         measure = MEASURES[name_ratio(name)]
-        found = measure.of(line)
-        yield NOTHING if found is None else measure.format_interval(found)
+        interval = measure.of(line)
+        yield NOTHING if interval is None else measure.format_interval(interval)
 
 
 def _beside(line: Line) -> Beside:
@@ -127,9 +127,9 @@ def _build(
     rows = []
     for line in lines:
         pooled = ("all",) * len(results.swept) if line.world == POOLED else ()
-        found = ("refused",) if line.tally.refused else tuple(cells(line))
-        fill = (NOTHING,) * (len(columns) - len(found))
-        rows.append((*line.world, *pooled, line.variant, *found, *fill))
+        shown = ("refused",) if line.tally.refused else tuple(cells(line))
+        fill = (NOTHING,) * (len(columns) - len(shown))
+        rows.append((*line.world, *pooled, line.variant, *shown, *fill))
     refused = dict.fromkeys(
         f"{line.variant} was refused: {line.tally.refused}." for line in lines if line.tally.refused
     )

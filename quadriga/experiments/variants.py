@@ -74,7 +74,7 @@ def parse_variants(options: Sequence[str], file: Path | None) -> tuple[Variant, 
     """
     from_file = {} if file is None else read_keys(read_toml(file), str(file))
     known: dict[str, Keys] = {**PLANNERS, **from_file}
-    found: dict[str, Keys] = {}
+    named: dict[str, Keys] = {}
     for text in [part for o in options for part in split_outside_brackets(o, ",")] or from_file:
         name, colon, keys = text.partition(":")
         if colon and not _NAME.fullmatch(name):
@@ -86,12 +86,12 @@ def parse_variants(options: Sequence[str], file: Path | None) -> tuple[Variant, 
                 f"names of {', '.join(known)}",
                 "or name:section.key=value;section.key=value",
             )
-        if name in found:
+        if name in named:
             raise ConfigError("--planners", f"{name} twice", "different names")
-        found[name] = _parse_keys(keys) if colon else known[name]
-    if not found:
+        named[name] = _parse_keys(keys) if colon else known[name]
+    if not named:
         raise ConfigError("--planners", "none", f"at least one of {', '.join(known)}")
-    return tuple(Variant(name, keys) for name, keys in found.items())
+    return tuple(Variant(name, keys) for name, keys in named.items())
 
 
 def combine_with_predictors(
@@ -107,15 +107,15 @@ def combine_with_predictors(
             raise ConfigError("--predictors", repr(name), f"names of {', '.join(PREDICTORS)}")
     if len(set(predictors)) < len(predictors):
         raise ConfigError("--predictors", ", ".join(predictors), "each once")
-    found: list[Variant] = []
+    combined: list[Variant] = []
     for variant in variants:
         if not predictors or variant.keys.get("planner.kind") == "none":
-            found.append(variant)
+            combined.append(variant)
             continue
         for name in predictors:
             keys = {**variant.keys, **PREDICTORS[name]}
-            found.append(Variant(f"{variant.name}+{name}", keys))
-    return tuple(found)
+            combined.append(Variant(f"{variant.name}+{name}", keys))
+    return tuple(combined)
 
 
 def read_keys(tables: Mapping[str, Any], where: str) -> dict[str, Keys]:

@@ -94,13 +94,13 @@ class _Scalars:
                 self._channel(f"/{item.robot}/tracking", self._tracked).log(payload, log_time=time)
 
     def _channel(self, topic: str, kind: ProtobufType) -> foxglove.Channel:
-        found = self._channels.get(topic)
-        if found is None:
+        channel = self._channels.get(topic)
+        if channel is None:
             schema = foxglove.Schema(name=kind.name, encoding="protobuf", data=kind.descriptor)
-            found = self._channels[topic] = foxglove.Channel(
+            channel = self._channels[topic] = foxglove.Channel(
                 topic, schema=schema, message_encoding="protobuf", context=self._context
             )
-        return found
+        return channel
 
 
 class _Drawing:

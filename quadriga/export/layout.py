@@ -52,8 +52,8 @@ class Layout:
             parts.append(np.repeat(row, rows, axis=0))
         if not rows:  # a plan of nothing
             return np.zeros((0, len(self.numbers)))
-        found: Array = np.concatenate(parts, axis=1) if parts else np.zeros((rows, 0))
-        return found if found.shape[1] == len(self.numbers) else None
+        numbers: Array = np.concatenate(parts, axis=1) if parts else np.zeros((rows, 0))
+        return numbers if numbers.shape[1] == len(self.numbers) else None
 
     @property
     def sampled(self) -> int:

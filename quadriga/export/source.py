@@ -48,7 +48,7 @@ class Source:
         """
         self.recording, self.config = recording, recorded_config(recording)
         self.left_out: Counter[str] = Counter()
-        found: defaultdict[tuple[type[Message], str], set[str]] = defaultdict(set)
+        names_of: defaultdict[tuple[type[Message], str], set[str]] = defaultdict(set)
         maps = {
             topic.name: [i.name for i in fields(topic.type) if i.metadata.get("kind") is dict]
             for topic in TABLE
@@ -66,12 +66,12 @@ class Source:
                 except MessageError:
                     continue  # counted when it is its turn
                 for name in maps[topic.name]:
-                    found[topic.type, name] |= getattr(message, name).keys()
+                    names_of[topic.type, name] |= getattr(message, name).keys()
         self.layouts = {
             kind: build_layout(
                 kind,
                 self.config,
-                {name: tuple(sorted(found[kind, name])) for name in maps[topic_name]},
+                {name: tuple(sorted(names_of[kind, name])) for name in maps[topic_name]},
             )
             for topic_name, kind in kinds.items()
         }

@@ -58,5 +58,5 @@ def _look_up(tick: Ticks, known: Ticks, values: Array) -> Array:
     newest = np.searchsorted(known[order], tick, side="right")
     at = np.concatenate([[0], 1 + order])[newest]
     at[(at > 0) & (np.concatenate([[-1], known])[at] != tick)] = 0
-    found: Array = padded[at]
-    return found
+    rows: Array = padded[at]
+    return rows

@@ -51,24 +51,24 @@ def behaviour(module: str, samples: Callable[[], Iterable[Array]]) -> str:
         QuadrigaError: there is no such module.
     """
     folder = cache_dir() / "behaviour"
-    kept = folder / f"{module.rpartition('.')[2]}-{_origin(module)}"
-    if kept.is_file():
-        return kept.read_text(encoding="ascii")
+    cached = folder / f"{module.rpartition('.')[2]}-{_origin(module)}"
+    if cached.is_file():
+        return cached.read_text(encoding="ascii")
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / ".lock").open("wb") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not kept.is_file():
-            write_text(kept, digest_of(samples()))
-            _forget(kept)
-    return kept.read_text(encoding="ascii")
+        if not cached.is_file():
+            write_text(cached, digest_of(samples()))
+            _forget(cached)
+    return cached.read_text(encoding="ascii")
 
 
 def digest_of(arrays: Iterable[Array]) -> str:
     """Digest of numbers and of nothing else; 16 hexadecimal digits."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for array in arrays:
-        found.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
-    return found.hexdigest()[:16]
+        digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
+    return digest.hexdigest()[:16]
 
 
 def numbers(*values: float | None) -> Array:
@@ -83,10 +83,10 @@ def sources_digest(module: str) -> str:
     Raises:
         QuadrigaError: there is no such module.
     """
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for path in followed_files(SOURCE, [module]):
-        found.update(f"\0{path.relative_to(SOURCE)}\0".encode() + path.read_bytes())
-    return found.hexdigest()[:16]
+        digest.update(f"\0{path.relative_to(SOURCE)}\0".encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def _origin(module: str) -> str:
@@ -96,8 +96,8 @@ def _origin(module: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _forget(kept: Path) -> None:
-    stem = kept.name.rpartition("-")[0]
-    found = sorted(kept.parent.glob(f"{stem}-*"), key=lambda path: path.stat().st_mtime_ns)
-    for old in found[:-_KEPT]:
+def _forget(cached: Path) -> None:
+    stem = cached.name.rpartition("-")[0]
+    files = sorted(cached.parent.glob(f"{stem}-*"), key=lambda path: path.stat().st_mtime_ns)
+    for old in files[:-_KEPT]:
         old.unlink(missing_ok=True)

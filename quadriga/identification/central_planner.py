@@ -11,7 +11,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.cache import data_path
 from quadriga.identification.dataset import read_data
 from quadriga.shared.config.sections import Config
-from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.blas import use_one_blas_thread
 
 
 def build_central_planner(
@@ -24,7 +24,7 @@ def build_central_planner(
     Raises:
         PredictorError: the predictor is of another team; there are no collected data for DeePC.
     """
-    one_blas_thread()
+    use_one_blas_thread()
     if config.planner.kind == "centralised":
         return build_centralised(config, predictor)
     planner = config.planner

@@ -47,12 +47,12 @@ def check_excitation(config: Config, training: Sequence[Episode]) -> None:
             f"at least {required} by (m+1)(T_ini+N+n)−1",
             "collect more: identification.seconds, or fewer falls",
         )
-    found = excitation([episode.scaled_deviations()[0] for episode in training], length + order)
-    if not found.persistent:
+    rank_test = excitation([episode.scaled_deviations()[0] for episode in training], length + order)
+    if not rank_test.persistent:
         raise PredictorError(
             "collected data",
-            f"a Hankel matrix of the inputs of rank {found.rank}",
-            f"rank {found.rows}: inputs persistently exciting of order {found.order}",
+            f"a Hankel matrix of the inputs of rank {rank_test.rank}",
+            f"rank {rank_test.rows}: inputs persistently exciting of order {rank_test.order}",
             "more noise (identification.noise) or shorter holds (identification.noise_hold_ms)",
         )
 

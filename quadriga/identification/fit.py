@@ -23,7 +23,7 @@ from quadriga.identification.fit_tables import build_comparison, build_report_ta
 from quadriga.identification.predictors import build_provenance, ensure_data
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.tables import Table, print_tables
 
@@ -78,7 +78,7 @@ def report_fit(config: Config, dataset: Dataset, name: str) -> FitReport | Unfit
         predictor, origin = read(path)  # whose limits are those of `config`: they name the file
         seconds = _read_fit_seconds(path, predictor_sha256(predictor))
     else:
-        one_blas_thread()
+        use_one_blas_thread()
         check_excitation(config, dataset.training)
         begun = monotonic()
         try:

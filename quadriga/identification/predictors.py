@@ -20,7 +20,7 @@ from quadriga.identification.dataset import Dataset, check_excitation, read_data
 from quadriga.progress import build_progress
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
-from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.blas import use_one_blas_thread
 
 
 def ensure_predictor(config: Config, console: Console) -> Path:
@@ -73,7 +73,7 @@ def fit(config: Config, dataset: Dataset, path: Path, console: Console) -> tuple
     Raises:
         PredictorError: too little data, not exciting, or refused by a gate.
     """
-    one_blas_thread()
+    use_one_blas_thread()
     check_excitation(config, dataset.training)
     with console.status("fitting the predictor"):
         predictor = fit_predictor(dataset.training, PredictorMeta.of(config))

@@ -17,7 +17,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import PLANNER
 from quadriga.shared.robot.a1 import Array
-from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.wire.messages import Event, Measurement, Plan, Reference
 from quadriga.sim_server.world.world import World
 
@@ -52,7 +52,7 @@ class Rollout:
         excitation: Callable[[str, int], Array] | None = None,
         planner: TeamPlanner | None = None,
     ) -> None:
-        one_blas_thread()
+        use_one_blas_thread()
         self.world = World(config)
         self.agents = {name: Agent(config, name, predictor) for name in self.world.names}
         self.states: dict[str, AgentState] = {n: a.initial() for n, a in self.agents.items()}

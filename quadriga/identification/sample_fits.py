@@ -18,7 +18,7 @@ from quadriga.identification.behaviour import numbers
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
-from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.blas import use_one_blas_thread
 
 _ROBOTS: Final = 3
 _SAMPLES: Final = 400  # of an episode
@@ -30,7 +30,7 @@ _KEYS: Final = {
 
 def sample_fits() -> Iterator[Array]:
     """Each fit's G and what the gates say of it."""
-    one_blas_thread()
+    use_one_blas_thread()
     config = load(None, _KEYS)
     first, second, held_out = (linear_episode(config, _SAMPLES, seed) for seed in range(3))
     for kind in FITS:

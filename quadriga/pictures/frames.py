@@ -41,7 +41,7 @@ def save_sheet(folder: Path, ticks: Ticks, pictures: Sequence[Image.Image]) -> N
     rows = -(-len(pictures) // columns)
     size = (columns * (width + _GAP) - _GAP, rows * (height + _GAP) - _GAP)
     sheet = Image.new("RGB", size, "white")
-    for i, picture in enumerate(_stamped(ticks, pictures)):
+    for i, picture in enumerate(_stamp(ticks, pictures)):
         row, column = divmod(i, columns)
         sheet.paste(picture, (column * (width + _GAP), row * (height + _GAP)))
     sheet.save(folder / SHEET)
@@ -49,7 +49,7 @@ def save_sheet(folder: Path, ticks: Ticks, pictures: Sequence[Image.Image]) -> N
 
 def save_clip(folder: Path, ticks: Ticks, pictures: Sequence[Image.Image]) -> None:
     """Write the clip `walk.webp`, as fast as the world was."""
-    first, *others = _stamped(ticks, pictures)
+    first, *others = _stamp(ticks, pictures)
     durations = [*np.diff(ticks).tolist(), PERIOD_MS]
     first.save(
         folder / CLIP,
@@ -62,7 +62,7 @@ def save_clip(folder: Path, ticks: Ticks, pictures: Sequence[Image.Image]) -> No
     )
 
 
-def _stamped(ticks: Ticks, pictures: Sequence[Image.Image]) -> list[Image.Image]:
+def _stamp(ticks: Ticks, pictures: Sequence[Image.Image]) -> list[Image.Image]:
     font = ImageFont.load_default(size=20)
     stamped = []
     for tick, picture in zip(ticks.tolist(), pictures, strict=True):

@@ -135,8 +135,8 @@ class PosedTeam:
 
     def _places(self, body: str) -> Array:
         legs: Sequence[str] = ("FL", "FR", "RL", "RR")
-        found = [
+        positions = [
             [self.physics.body(f"{name}/{body.format(leg=leg)}").xpos for leg in legs]
             for name in self.names
         ]
-        return np.array(found)
+        return np.array(positions)

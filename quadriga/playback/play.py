@@ -80,7 +80,7 @@ def play(
 
 
 def _refuse_live(bus: Bus, endpoint: str) -> None:
-    live = sorted(name for name in bus.present(HERE) if _MEMBER.fullmatch(name))
+    live = sorted(name for name in bus.members_at(HERE) if _MEMBER.fullmatch(name))
     if live:
         raise BusError(
             f"team {bus.team!r} at {endpoint}",

@@ -102,12 +102,12 @@ def _join(bus: Bus, config: Config, stopped: Callable[[], bool], *, at_once: boo
         HERE,
         members(config),
         config.bus.barrier_timeout,
-        lambda: stopped() or SIM in bus.present(HERE),
+        lambda: stopped() or SIM in bus.members_at(HERE),
     )
     if stopped():
         return ""
     sleep(_SETTLE)
-    walking, doubled = SIM in bus.present(READY), RECORDER in bus.present(HERE)
+    walking, doubled = SIM in bus.members_at(READY), RECORDER in bus.members_at(HERE)
     if walking or doubled or not config.recorder.enabled:
         return LATE
     return MEMBER if meet(bus, config, stopped) else ""

@@ -61,12 +61,12 @@ class Session:
             self._take(max(0.0, self._flushed + FLUSH - monotonic()))
             if late and monotonic() - self._begun > _LOOK and self._parts.messages:
                 late = False
-                self._say_missed()
+                self._report_missed()
             sleep(_GATHER)
         if late and self._parts.messages:
-            self._say_missed()
+            self._report_missed()
 
-    def _say_missed(self) -> None:
+    def _report_missed(self) -> None:
         first_ticks = self._parts.first_ticks()
         missed = _format_missed(first_ticks)
         if missed:
@@ -105,7 +105,7 @@ class Session:
             return
         self._parts.flush()
         self._flushed = monotonic()
-        there = SIM in self._bus.present(HERE)
+        there = SIM in self._bus.members_at(HERE)
         self._ended = self._seen and not there
         self._seen = self._seen or there
 

@@ -33,7 +33,7 @@ def missing_ticks(config: Config, ticks: Mapping[str, Ticks]) -> dict[str, int]:
     team, names = config.team.name, robot_names(config.team.robots)
     period = periods(config)
     states = [_recorded_ticks(ticks, STATE.key(team, name)) for name in names]
-    newest = max((int(found.max()) for found in states if len(found)), default=-1)
+    newest = max((int(of_robot.max()) for of_robot in states if len(of_robot)), default=-1)
     # No later than the configured end: a forged tick must not ask for years of messages.
     end = min(newest, end_of_world(config))
 
@@ -64,19 +64,19 @@ def repeated_ticks(ticks: Mapping[str, Ticks], topics: tuple[Topic, ...] = (STAT
     """Number of messages whose key and tick had been seen before: a second publisher."""
     names = tuple(f"/{topic.name}" for topic in topics)
     return sum(
-        len(found) - len(np.unique(found)) for key, found in ticks.items() if key.endswith(names)
+        len(of_key) - len(np.unique(of_key)) for key, of_key in ticks.items() if key.endswith(names)
     )
 
 
 def _first_tick(config: Config, ticks: Mapping[str, Ticks], key: str) -> int:
-    found = _recorded_ticks(ticks, key)
-    return int(found.min()) if len(found) else config.gait.stand_ms
+    recorded = _recorded_ticks(ticks, key)
+    return int(recorded.min()) if len(recorded) else config.gait.stand_ms
 
 
-def _count_missing(found: Ticks, first: int, period: int, last: int) -> int:
+def _count_missing(recorded: Ticks, first: int, period: int, last: int) -> int:
     """Ticks of `first`, `first + period`, … up to `last − period` that were not found."""
     expected = np.arange(first, last - period + 1, period)
-    return int(np.isin(expected, found, invert=True).sum())
+    return int(np.isin(expected, recorded, invert=True).sum())
 
 
 def _recorded_ticks(ticks: Mapping[str, Ticks], key: str) -> Ticks:

@@ -96,17 +96,17 @@ def _world(traces: Traces) -> dict[str, Any]:
     truth = traces.truth
     down = (truth.tilt > FALL_TILT) | (truth.y[..., 0] < FALL_HEIGHT)
     seen = {traces.robots[i] for i in np.flatnonzero(down.any(axis=0))}
-    told = {event.robot for event in traces.events if event.code == FALL}
+    reported = {event.robot for event in traces.events if event.code == FALL}
     if not len(truth.tick):  # then the robots' own word must do
-        told |= {
+        reported |= {
             r
-            for r, found in traces.statuses.items()
-            if any(code_of(s.reason) == FALL for s in found)
+            for r, statuses in traces.statuses.items()
+            if any(code_of(s.reason) == FALL for s in statuses)
         }
     end = next((event for event in reversed(traces.events) if event.kind == "stop"), None)
     return {
-        "fell": bool(seen | told),
-        "fallen": sorted(seen | told),
+        "fell": bool(seen | reported),
+        "fallen": sorted(seen | reported),
         "distance": distance(truth, 2 * traces.config.gait.stance_ms),
         "end": end.detail if end is not None else "",
         "end_code": end.code if end is not None else "",
@@ -130,7 +130,7 @@ def _tracking(traces: Traces) -> dict[str, Any]:
     return {
         "steady_from": begin / 1000.0,
         **{f"mean_{name}": _mean(y[..., OUTPUTS.index(name)]) for name in ("vx", "vy", "wz")},
-        "rmse": _with_height(_rmse(error), _joined(heights)),
+        "rmse": _with_height(_rmse(error), _concatenate(heights)),
         "rmse_per_robot": {
             robot: _with_height(_rmse(error[:, i : i + 1]), heights[i])
             for i, robot in enumerate(traces.robots)
@@ -158,10 +158,10 @@ def _estimator(traces: Traces) -> dict[str, Any]:
 
 def _agents(traces: Traces) -> dict[str, Any]:
     statuses = traces.statuses
-    last = {robot: found[-1] for robot, found in statuses.items() if found}
-    every = [status for found in statuses.values() for status in found]
-    planner_ms = _joined([status.planner_ms for status in every])
-    tick_us = _joined([status.tick_us for status in every])
+    last = {robot: of_robot[-1] for robot, of_robot in statuses.items() if of_robot}
+    every = [status for of_robot in statuses.values() for status in of_robot]
+    planner_ms = _concatenate([status.planner_ms for status in every])
+    tick_us = _concatenate([status.tick_us for status in every])
     return {
         "planner_solves": len(planner_ms),
         "planner_ms_median": _quantile(planner_ms, 0.5),
@@ -177,24 +177,27 @@ def _deadlines(traces: Traces) -> dict[str, Any]:
     """In real time what came late, by robot and of the world; else None."""
     if not traces.world:
         return {"realtime": None}
-    told = traces.world[-1]
-    ticks = told.counters.get("ticks", 0)
-    found: dict[str, Any] = {
-        "world": {"jitter_ms": _spread(told, "jitter"), "overruns": told.counters.get("overruns")}
+    sim_status = traces.world[-1]
+    ticks = sim_status.counters.get("ticks", 0)
+    by_member: dict[str, Any] = {
+        "world": {
+            "jitter_ms": _spread(sim_status, "jitter"),
+            "overruns": sim_status.counters.get("overruns"),
+        }
     }
     for robot in traces.robots:
         own = traces.statuses[robot]
-        late = told.counters.get(f"{robot}.late", 0)
-        found[robot] = {
+        late = sim_status.counters.get(f"{robot}.late", 0)
+        by_member[robot] = {
             "late": late,
             "late_share": late / ticks if ticks else None,
-            "held": told.counters.get(f"{robot}.held", 0),
-            "damped": told.counters.get(f"{robot}.damped", 0),
-            "command_age_ms": _spread(told, f"{robot}.command"),
+            "held": sim_status.counters.get(f"{robot}.held", 0),
+            "damped": sim_status.counters.get(f"{robot}.damped", 0),
+            "command_age_ms": _spread(sim_status, f"{robot}.command"),
             "deadlines_missed": own[-1].counters.get("deadlines_missed") if own else None,
             "jitter_ms": _spread(own[-1], "jitter") if own else {},
         }
-    return {"realtime": found}
+    return {"realtime": by_member}
 
 
 def _spread(status: Status, name: str) -> dict[str, float]:
@@ -250,5 +253,5 @@ def _quantile(values: Array, q: float) -> float | None:
     return float(np.quantile(values, q)) if values.size else None
 
 
-def _joined(parts: Sequence[Array]) -> Array:
+def _concatenate(parts: Sequence[Array]) -> Array:
     return np.concatenate([np.zeros(0), *parts])

@@ -77,7 +77,7 @@ def survey(path: Path) -> Survey:
         config: Config | None = recorded_config(source)
     except RecordingError as wrong:
         config, error = None, error or wrong
-    found = _read(source.entries(), periods(config or Config()))
+    fields = _read(source.entries(), periods(config or Config()))
     notes = source.notes() if isinstance(source, Recording) else source.notes
     damages = () if isinstance(source, Recording) else tuple(source.damages)
     return Survey(
@@ -88,7 +88,7 @@ def survey(path: Path) -> Survey:
         config=config,
         error=error,
         damages=damages,
-        **found,
+        **fields,
     )
 
 

@@ -128,7 +128,7 @@ def read_traces(recording: Recording, names: Container[str] | None = None) -> Tr
         cut=recording.cut,
         messages=dict(sorted(counts.items())),
         invalid=dict(sorted(invalid.items())),
-        ticks={key: np.array(found, dtype=np.int64) for key, found in sorted(ticks.items())},
+        ticks={key: np.array(recorded, dtype=np.int64) for key, recorded in sorted(ticks.items())},
         log_times=log_times,
         truth=build_truth_trace(decoded[Truth, ""], config),
         references=_references(decoded[Reference, ""]),
@@ -156,9 +156,9 @@ def in_force(references: tuple[Ticks, Array], tick: Ticks) -> Array:
         vx, vy, wz, height; shape (len(tick), 4), NaN where none was in force yet.
     """
     starts, values = references
-    found = np.searchsorted(starts, tick, side="right") - 1
+    index = np.searchsorted(starts, tick, side="right") - 1
     padded = np.vstack([values.reshape(-1, 4), np.full((1, 4), np.nan)])
-    return padded[found]
+    return padded[index]
 
 
 def _row(key: str) -> tuple[Any, str]:

@@ -57,7 +57,7 @@ def build_truth_trace(messages: Sequence[Truth], config: Config) -> TruthTrace:
     cos, sin = np.cos(yaw), np.sin(yaw)
     terrain = build_terrain(config, formation(n, config.team.spacing))
     outputs = [
-        pos[..., 2] - terrain.under(pos[..., 0], pos[..., 1], yaw),
+        pos[..., 2] - terrain.height_under_hips(pos[..., 0], pos[..., 1], yaw),
         cos * vel[..., 0] + sin * vel[..., 1],
         cos * vel[..., 1] - sin * vel[..., 0],
         roll, pitch, stack(messages, "base_omega", n, 3)[..., 2],

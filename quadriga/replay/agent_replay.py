@@ -24,7 +24,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.topics import PLAN
 
@@ -76,7 +76,7 @@ def replay_agent(
         QuadrigaError: as `quadriga.replay.team_replay.replay`.
     """
     begun = monotonic()
-    one_blas_thread()
+    use_one_blas_thread()
     recording = Recording(job.path)
     config = recorded_config(recording)
     agents = _build_agents(job, recording, config)
@@ -172,10 +172,10 @@ def _save_problem(job: ReplayJob, agent: Agent, verdict: ReplayVerdict) -> tuple
     if verdict.first is None or verdict.step is None:
         return ()
     about = f"{job.robot} at tick {verdict.first.tick}"
-    found = problems_of(agent, verdict.step.before, verdict.step.inputs, about)
+    problems = problems_of(agent, verdict.step.before, verdict.step.inputs, about)
     kind = PLANNER if verdict.first.name == PLAN.name else WHOLE_BODY
-    if kind not in found:
+    if kind not in problems:
         return ()
     path = job.out / f"replay-{job.robot}-{verdict.first.tick}-{kind}.npz"
-    save(path, found[kind])
+    save(path, problems[kind])
     return (path,)

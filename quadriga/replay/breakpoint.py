@@ -32,7 +32,7 @@ class Breakpoint:
         tick = inputs.state.tick
         if not self.reached and tick >= self.tick:
             self.reached = True
-            stop_here(agent, memory, inputs, comparison.recorded_at(tick))
+            stop_here(agent, memory, inputs, comparison.recorded_messages(tick))
 
 
 def stop_here(

@@ -78,15 +78,15 @@ class Comparison:
         self._sent, self._on_pair = log.sent, on_pair
         self.verdict = ReplayVerdict()
 
-    def recorded_at(self, tick: int) -> dict[str, Message]:
-        """What was recorded of a step that is still to be compared, by topic."""
-        found = {}
+    def recorded_messages(self, tick: int) -> dict[str, Message]:
+        """The recorded messages of a step that is still to be compared, by topic."""
+        messages = {}
         for name, at, exchange in tuple(self._sent):
             if name == PLAN.name or at == tick:
                 message = _decode_first(name, self._sent[name, at, exchange])
                 if message is not None and message.tick == tick:
-                    found[name] = message
-        return found
+                    messages[name] = message
+        return messages
 
     def add(self, step: ReplayedStep) -> None:
         """Compare the messages of one step."""

@@ -61,7 +61,7 @@ class Curves:
         values = [np.array([row[k] for row in rows]).reshape(-1, width) for k in (1, 2)]
         return np.array([row[0] for row in rows]), values[0], values[1]
 
-    def changed_most(self, kind: str) -> int:
+    def most_changed_component(self, kind: str) -> int:
         """The component that is farthest off, measured by how much it varies in the recording."""
         _, old, new = self.of(kind)
         if not len(old):
@@ -90,7 +90,7 @@ def draw(curves: Curves, title: str, path: Path) -> None:
 def _build_panels(curves: Curves, kind: str) -> tuple[Panel, Panel]:
     """Both values of the component that has changed most, and beside them their difference."""
     time, old, new = curves.of(kind)
-    column = curves.changed_most(kind)
+    column = curves.most_changed_component(kind)
     name = f"{_TITLES[kind]}: {_NAMES[kind][column]}"
     if not len(time):
         return Panel(f"{name}, none recorded", span=1.0), Panel("", span=1.0)

@@ -103,10 +103,10 @@ def problems_of(agent: Agent, before: AgentState, inputs: Inputs, about: str) ->
         about: which step this is, in words.
     """
     problems = agent.problems_of(before, inputs)
-    found = {WHOLE_BODY: _save_whole_body(problems, about)}
+    saved = {WHOLE_BODY: _save_whole_body(problems, about)}
     if problems.planner is not None:
-        found[PLANNER] = _save_planner(problems.planner, about)
-    return found
+        saved[PLANNER] = _save_planner(problems.planner, about)
+    return saved
 
 
 def _save_whole_body(problems: StepProblems, about: str) -> SavedQp:

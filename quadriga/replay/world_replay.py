@@ -155,7 +155,7 @@ def _choose_commands(
         valid = [] if name in silent else list(_decode_commands(command, entries))
         if valid:
             asked = [entry.log_time_ns for entry in entries if entry.key == state]
-            commands[name] = _choose_taken(valid, min(asked, default=0))
+            commands[name] = _choose_applied(valid, min(asked, default=0))
     return commands
 
 
@@ -166,7 +166,7 @@ def _decode_commands(key: str, entries: Iterable[ChunkEntry]) -> Iterator[tuple[
                 yield entry.log_time_ns, decode(entry.payload, Command)
 
 
-def _choose_taken(commands: Sequence[tuple[int, Command]], asked: int) -> Command:
+def _choose_applied(commands: Sequence[tuple[int, Command]], asked: int) -> Command:
     """Which of a robot's commands of one tick the world took, as it refuses early and stale ones.
 
     The one that was recorded closest to the state it answers; links differ in speed, so that it

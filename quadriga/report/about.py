@@ -82,11 +82,11 @@ def list_facts(run: Run) -> Iterator[tuple[str, str]]:
 
 def list_changed_keys(config: Config) -> list[tuple[str, str, str, str]]:
     """Keys whose values are not the defaults: key, value, default, meaning with unit."""
-    found = []
+    changed = []
     for name, value, usual, meta in departures(config, Config()):
         doc = meta["doc"] + ("" if meta["unit"] in ("-", "1") else f" [{meta['unit']}]")
-        found.append((name, _format(value), _format(usual), doc))
-    return found
+        changed.append((name, _format(value), _format(usual), doc))
+    return changed
 
 
 def describe_missing(run: Run) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.time_grid import step_ms
 from quadriga.report.run import Run
 from quadriga.report.samples import Samples, find_slip
@@ -109,7 +110,7 @@ def _assess_planning(run: Run, index: int, tick: int) -> Iterator[tuple[str, boo
     late = since > 2 * step_ms(config)
     yield (
         counted + (f", the last {since} ms before" if late else ""),
-        late or set(counts) != {"solved"},
+        late or set(counts) != {SOLVED},
     )
 
 

@@ -153,7 +153,7 @@ def _build_row(entry: TimelineEntry) -> list[Text]:
 
 def _build_trunks(run: Run) -> Iterator[Section]:
     robots = run.traces.robots
-    if any(len(run.measured(i)[0]) for i in range(len(robots))):
+    if any(len(run.outputs_of(i)[0]) for i in range(len(robots))):
         yield Section("trajectories", "Trajectories", list(_build_trajectories(run)))
         source = "true" if run.has_truth else "estimated"
         text = f"Each robot's {source} output, averaged over one gait period."

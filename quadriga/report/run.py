@@ -50,7 +50,7 @@ class Run:
         """Whether the simulator's truth was recorded."""
         return len(self.traces.truth.tick) > 0
 
-    def measured(self, index: int) -> tuple[Ticks, Array]:
+    def outputs_of(self, index: int) -> tuple[Ticks, Array]:
         """Ticks and outputs (·, 6) of a robot: the true ones, or else its own estimates."""
         if self.has_truth:
             return self.traces.truth.tick, self.traces.truth.y[:, index]
@@ -89,8 +89,8 @@ def _find_span(traces: Traces) -> tuple[int, int]:
     """First and last tick of what robots and world sent; of anything, if they sent nothing."""
     last, nothing = end_of_world(traces.config) + _FORGED, np.zeros(0, dtype=np.int64)
     for names in (_PACED, ("",)):
-        found = [ticks for key, ticks in traces.ticks.items() if key.endswith(names)]
-        ticks = np.concatenate([nothing, *found])
+        of_keys = [ticks for key, ticks in traces.ticks.items() if key.endswith(names)]
+        ticks = np.concatenate([nothing, *of_keys])
         ticks = ticks[ticks <= last]
         if len(ticks):
             return int(ticks.min()), int(ticks.max())

@@ -142,9 +142,9 @@ def _compute_tilt_rotation(quat_wxyz: Array) -> Array:
 def _look_up(tick: Ticks, known: Ticks, values: Any, otherwise: Any) -> Any:
     """Values at the ticks that are known, `otherwise` at the others; first axis is time."""
     _, here, there = np.intersect1d(tick, known, return_indices=True)
-    found = np.array(otherwise)
-    found[here] = values[there]
-    return found
+    chosen = np.array(otherwise)
+    chosen[here] = values[there]
+    return chosen
 
 
 def _look_up_newest(tick: Ticks, known: Ticks, values: Any, otherwise: Any) -> Any:

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.modes import DAMPING, ESTOP, STAND, WALK
+from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.wire.codes import FALL, code_of
@@ -54,24 +55,24 @@ class TimelineEntry:
 
 def build_timeline(traces: Traces, begin: int, end: int) -> tuple[TimelineEntry, ...]:
     """All entries of a run, by time."""
-    found = [
+    entries = [
         TimelineEntry(e.tick, e.tick, e.robot, e.kind, e.detail, e.code, passive=e.code == FALL)
         for e in traces.events
         if e.tick <= end
     ]
     fallen = {event.robot for event in traces.events if event.code == FALL}
     for robot, statuses in traces.statuses.items():
-        found += [entry for entry in _find_falls(robot, statuses) if robot not in fallen][:1]
-        found += _find_mode_changes(robot, [s for s in statuses if s.tick <= end])
-        found += _find_counts(robot, [s for s in statuses if s.tick <= end])
+        entries += [entry for entry in _find_falls(robot, statuses) if robot not in fallen][:1]
+        entries += _find_mode_changes(robot, [s for s in statuses if s.tick <= end])
+        entries += _find_counts(robot, [s for s in statuses if s.tick <= end])
     for robot, plans in traces.plans.items():
-        found += _find_failed_plans(robot, [p for p in plans if p.tick <= end], end)
-    found += _find_gaps(traces, end)
+        entries += _find_failed_plans(robot, [p for p in plans if p.tick <= end], end)
+    entries += _find_gaps(traces, end)
     if begin > 0:
-        found.append(TimelineEntry(begin, begin, "", "recording", "the recording begins here"))
+        entries.append(TimelineEntry(begin, begin, "", "recording", "the recording begins here"))
     if traces.cut:
-        found.append(TimelineEntry(end, end, "", "recording", traces.cut))
-    return tuple(sorted(found, key=lambda e: (e.tick, e.kind != FALL, e.robot, e.text)))
+        entries.append(TimelineEntry(end, end, "", "recording", traces.cut))
+    return tuple(sorted(entries, key=lambda e: (e.tick, e.kind != FALL, e.robot, e.text)))
 
 
 def _find_falls(robot: str, statuses: Sequence[Status]) -> Iterator[TimelineEntry]:
@@ -125,7 +126,7 @@ def _find_failed_plans(robot: str, plans: Sequence[Plan], end: int) -> Iterator[
             continue
         begin, stop = plans[first].tick, following.tick if following else plan.tick
         count, first = k + 1 - first, k + 1
-        if plan.status != "solved":
+        if plan.status != SOLVED:
             many = f"{count} plans" if count > 1 else "1 plan"
             text, code = f"{plan.status}, {many}", code_of(plan.status)
             yield TimelineEntry(begin, min(stop, end), robot, "plan", text, code)

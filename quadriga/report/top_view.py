@@ -56,11 +56,11 @@ def draw_top_view(traces: Traces) -> Figure:
 
 def _space_out(place: Array, instants: NDArray[np.int64], scale: float) -> list[Array | None]:
     """The topmost trunk at each instant, or None where its time would cover the one before."""
-    found: list[Array | None] = []
+    tops: list[Array | None] = []
     last = np.full(2, -np.inf)
     for k in instants:
         top: Array = place[k, int(np.argmax(place[k, :, 1]))]
         near = (scale * np.abs(top - last) < _NEAR).all()
-        found.append(None if near else top)
+        tops.append(None if near else top)
         last = last if near else top
-    return found
+    return tops

@@ -67,7 +67,7 @@ def draw_trajectory(run: Run, index: int, part: tuple[float, float] | None = Non
     traces, robot = run.traces, run.traces.robots[index]
     own, truth = traces.measurements[robot], traces.truth
     begin, _, planned = join_applied_samples(traces.plans[robot], traces.config.planner.applied)
-    asked, wanted = _read_wanted(run, index)
+    reference_tick, commanded = _read_commanded(run, index)
     panels = []
     for i in _ORDER:
         curves = []
@@ -77,7 +77,7 @@ def draw_trajectory(run: Run, index: int, part: tuple[float, float] | None = Non
         curves.append(
             Curve(begin + SAMPLE_MS / 1000, planned[:, i], "planned", gap=1.5e-3 * SAMPLE_MS)
         )
-        curves.append(Curve(asked / 1000, wanted[:, i], "asked"))
+        curves.append(Curve(reference_tick / 1000, commanded[:, i], "asked"))
         span = _SPANS[i] if part is None else 0.5 * _SPANS[i]
         panels.append(Panel(NAMES[i], curves, span=span, until=first_fall(run)))
     legend = [
@@ -99,11 +99,11 @@ def draw_reference(run: Run) -> Figure:
     for i in (1, 2, 0, 5):
         curves = []
         for index in range(len(run.traces.robots)):
-            tick, y = run.measured(index)
+            tick, y = run.outputs_of(index)
             mean = average_over_period(tick, y[:, i], period)
             curves.append(Curve(tick / 1000, mean, robot_style(index), gap=_GAP))
-        asked, wanted = _read_wanted(run, 0)
-        curves.append(Curve(asked / 1000, wanted[:, i], "asked"))
+        reference_tick, commanded = _read_commanded(run, 0)
+        curves.append(Curve(reference_tick / 1000, commanded[:, i], "asked"))
         panels.append(Panel(NAMES[i], curves, span=_SPANS[i] / 2, until=first_fall(run)))
     legend = [*robot_legend(run), ("asked", "asked for")]
     return draw_over_run(run, panels, legend, most=_share_points(run, 10))
@@ -161,11 +161,11 @@ def _share_points(run: Run, curves: int) -> int:
     return min(_MOST, max(_LEAST, _POINTS // max(1, curves * len(run.traces.robots))))
 
 
-def _read_wanted(run: Run, index: int) -> tuple[Ticks, Array]:
-    """Ticks and the outputs asked for then; shape (·, 6), NaN before the first reference."""
-    tick, _ = run.measured(index)
+def _read_commanded(run: Run, index: int) -> tuple[Ticks, Array]:
+    """Ticks and the outputs commanded then; shape (·, 6), NaN before the first reference."""
+    tick, _ = run.outputs_of(index)
     reference = in_force(run.traces.references, tick)
-    wanted = np.zeros((len(tick), len(OUTPUTS)))
-    wanted[:, _ASKED] = reference
-    wanted[np.isnan(reference).any(axis=1)] = np.nan
-    return tick, wanted
+    commanded = np.zeros((len(tick), len(OUTPUTS)))
+    commanded[:, _ASKED] = reference
+    commanded[np.isnan(reference).any(axis=1)] = np.nan
+    return tick, commanded

@@ -79,7 +79,7 @@ def _next_tick(bus: Bus, tick: int) -> tuple[int, bool]:
     """
     packet = bus.get(POLL)
     if packet is None:
-        return tick, members.SIM not in bus.present(HERE)
+        return tick, members.SIM not in bus.members_at(HERE)
     for key, payload in (packet, *bus.drain()):
         try:
             if key == TRUTH.key(bus.team):
@@ -114,7 +114,7 @@ def stop_team(config: Config, reason: str) -> None:
             head = None if packet is None else envelope(packet[1])
             if head is not None:
                 tick, stamp_ns = head
-            there = frozenset(names) & bus.present(HERE)
+            there = frozenset(names) & bus.members_at(HERE)
             if there > reached:  # at once, whoever is still absent: to hear it twice is no harm
                 put(encode(EStop(tick, stamp_ns, reason)))
                 reached = there

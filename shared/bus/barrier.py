@@ -36,7 +36,7 @@ def meet(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
     """
     bus.declare(HERE)
     present = bus.wait_for(HERE, members(config), config.bus.barrier_timeout, stopped)
-    if present and SIM in bus.present(READY):
+    if present and SIM in bus.members_at(READY):
         raise BusError(
             f"team {bus.team!r} at {config.bus.endpoint}",
             "a team that walks already",

@@ -182,7 +182,7 @@ class Bus:
         while self._declared:
             self._declared.popitem()[1].undeclare()  # type: ignore[no-untyped-call]
 
-    def present(self, stage: str) -> frozenset[str]:
+    def members_at(self, stage: str) -> frozenset[str]:
         """Names of the other processes that are at `stage` now."""
         return self._presence.at(stage)
 
@@ -200,7 +200,7 @@ class Bus:
         """
         wanted = frozenset(names) - {self.name}
         deadline = monotonic() + timeout
-        while absent := wanted - self.present(stage):
+        while absent := wanted - self.members_at(stage):
             if stopped():
                 return False
             if monotonic() > deadline:

@@ -14,7 +14,7 @@ class IdentificationConfig:
     seconds: float = key(
         0.0,
         "s",
-        "world time collected for training; 0 takes what the team's size asks for",
+        "world time collected for training; 0: chosen by the size of the team",
         low=0.0,
         high=3600.0,
     )
@@ -46,7 +46,8 @@ class IdentificationConfig:
     phase_ridge: float = key(
         30.0,
         "1",
-        "predictor 'phase': ridge on what a phase departs from the fit of all data",
+        "predictor 'phase': ridge on the difference between the fit of a phase and that of all "
+        "data",
         low=1e-12,
         high=1e6,
     )

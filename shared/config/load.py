@@ -98,8 +98,8 @@ def parse_assignment(text: str, option: str = "--set") -> tuple[str, Any]:
     Raises:
         ConfigError: there is no `=`.
     """
-    name, found, value = text.partition("=")
-    if not found:
+    name, separator, value = text.partition("=")
+    if not separator:
         raise ConfigError(option, repr(text), "section.key=value")
     try:
         return name.strip(), tomllib.loads(f"value = {value}")["value"]

@@ -14,7 +14,7 @@ class EstimatorConfig:
     kind: str = key(
         "kalman",
         "-",
-        "truth takes the simulator's word, for comparison only",
+        "truth: the simulator's ground truth, for comparison only",
         choices=("kalman", "truth"),
     )
     accel_sigma: float = key(0.3, "m/s²", "process noise of the velocity", low=1e-4, high=100.0)
@@ -25,7 +25,9 @@ class EstimatorConfig:
     trust_ramp: float = key(
         0.3, "1", "share of stance over which trust rises and falls", low=0.0, high=0.5
     )
-    contact_force: float = key(10.0, "N", "no trust in a foot loaded less", low=0.0, high=200.0)
+    contact_force: float = key(
+        10.0, "N", "a foot with less load is not trusted", low=0.0, high=200.0
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,12 +67,22 @@ class ControllerConfig:
     )
     mu: float = key(0.6, "1", "friction coefficient the QP may use", low=0.05, high=2.0)
     mu_min: float = key(
-        0.35, "1", "friction always counted on, slide as feet may", low=0.05, high=2.0
+        0.35,
+        "1",
+        "least friction coefficient the QP uses, even while feet slide",
+        low=0.05,
+        high=2.0,
     )
     mu_recovery: float = key(
-        2.0, "1/s", "how fast friction is counted on again after feet slid", low=0.0, high=10.0
+        2.0,
+        "1/s",
+        "rate at which the friction coefficient recovers after feet slid",
+        low=0.0,
+        high=10.0,
     )
-    slip_load: float = key(20.0, "N", "a foot that bears less may slide", low=0.0, high=200.0)
+    slip_load: float = key(
+        20.0, "N", "slip detection ignores a foot that bears less", low=0.0, high=200.0
+    )
     slip_speed: float = key(
         0.3,
         "m/s",
@@ -114,26 +126,31 @@ class ControllerConfig:
     liftoff_hold_ms: int = key(
         0,
         "ms",
-        "longest wait of a foot about to swing for those that shall stand; 0: none",
+        "longest time that lift-off waits for contact of the feet that are to stand; 0: none",
         low=0,
         high=1000,
     )
     reflex_ms: int = key(
         10,
         "ms",
-        "a swing foot that stumbles rises until so long after it is free; 0: never",
+        "a swing foot that is stopped rises until it has been free for this long; 0: no reflex",
         low=0,
         high=100,
     )
-    reflex_lift: float = key(1.0, "m/s", "speed of a rising foot that stumbled", low=0.0, high=3.0)
-    track_sinking_trunk: bool = key(
-        True, "-", "a descending foot goes down with the trunk; feet are asked to where legs reach"
+    reflex_lift: float = key(
+        1.0, "m/s", "upward speed of a swing foot that was stopped", low=0.0, high=3.0
     )
-    flight: bool = key(True, "-", "without contact the trunk is asked to fall freely")
+    track_sinking_trunk: bool = key(
+        True,
+        "-",
+        "a descending foot follows a sinking trunk; desired foot positions stay within the "
+        "legs' reach",
+    )
+    flight: bool = key(True, "-", "without contact the desired motion of the trunk is free fall")
     load_time: float = key(
         1.0,
         "s",
-        "filter of the load that the feet feel; 0: the robot counts on none",
+        "time constant of the estimate of the external load; 0: no load is assumed",
         low=0.0,
         high=100.0,
     )
@@ -143,7 +160,7 @@ class ControllerConfig:
     swing_acceleration: float = key(
         100.0,
         "m/s²",
-        "footholds of swings begun late are near enough for no more than this",
+        "a swing that begins late has a foothold so near that it needs no more than this",
         low=1.0,
         high=1e4,
     )

@@ -17,16 +17,16 @@ class PlannerConfig:
     preset: str = key(
         "usual",
         "-",
-        "usual: plans every 40 ms, as in the paper; fast: every 10 ms and with weights of its own, "
-        "for a network whose messages take less: replaces the defaults below",
+        "usual: plans every 40 ms, as in the paper; fast: every 10 ms and with weights of its "
+        "own, for a network that delivers messages in less time: replaces the defaults below",
         choices=("usual", "fast"),
     )
     kind: str = key(
         "distributed",
         "-",
-        "distributed: each agent plans with its peers' last plans (eq. 12); decentralised: without "
-        "its peers; centralised: one process plans for all (eq. 7); deepc: so does eq. 5; "
-        "none: nominal forces",
+        "distributed: each agent plans with its peers' last plans (eq. 12); decentralised: "
+        "without its peers; centralised: one process plans for all (eq. 7); deepc: one process "
+        "plans for all (eq. 5); none: nominal forces",
         choices=("distributed", "decentralised", "centralised", "deepc", "none"),
     )
     compensation: bool = key(
@@ -41,12 +41,16 @@ class PlannerConfig:
     adaptation: str = key(
         "none",
         "-",
-        "recursive: each agent corrects what its own forces do to it by what it measures, as with "
-        "a payload nobody told of (distributed and decentralised)",
+        "recursive: each agent corrects the predicted effect of its own forces from measurements, "
+        "as under an unknown payload (distributed and decentralised)",
         choices=("none", "recursive"),
     )
     forgetting: float = key(
-        0.995, "1", "adaptation: what a planning step leaves of older knowledge", low=0.5, high=1.0
+        0.995,
+        "1",
+        "adaptation: share of older information that a planning step keeps",
+        low=0.5,
+        high=1.0,
     )
     latency_ms: int = key(
         8,
@@ -67,8 +71,8 @@ class PlannerConfig:
     footholds: str = key(
         "measured",
         "-",
-        "velocity that footholds count on: measured, or as planned until the middle of the stance "
-        "to come, as far as the plan reaches",
+        "velocity from which footholds are computed: measured, or planned until the middle of the "
+        "next stance, as far as the plan reaches",
         choices=("measured", "planned"),
     )
     N: int = key(25, "samples", "control horizon", low=4, high=100)

@@ -9,7 +9,7 @@ from quadriga.shared.config.key import key
 
 @dataclass(frozen=True, slots=True)
 class ReferenceConfig:
-    """What the operator asks for once the team walks."""
+    """The reference of the operator once the team walks."""
 
     vx: float = key(0.5, "m/s", "forward speed", low=-1.0, high=1.2)
     vy: float = key(0.0, "m/s", "leftward speed", low=-0.5, high=0.5)
@@ -19,9 +19,9 @@ class ReferenceConfig:
     trace: str = key(
         "",
         "-",
-        "CSV with columns t [s], vx, vy, wz that replaces these three, over and over: a path with "
-        "a '/', which is read at once, its lines kept here with a ';' between them; or the name of "
-        "a file beside the scenarios",
+        "CSV with columns t [s], vx, vy, wz that replaces these three, repeated as long as the "
+        "walk lasts: a path with a '/', whose lines are read at once and stored here, separated "
+        "by ';'; or the name of a file beside the scenarios",
     )
     trace_shift: float = key(
         0.0,

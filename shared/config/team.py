@@ -9,7 +9,7 @@ from quadriga.shared.config.key import key
 
 @dataclass(frozen=True, slots=True)
 class TeamConfig:
-    """Who walks together."""
+    """The robots of the team."""
 
     name: str = key("team", "-", "first part of every key; teams on one network need own names")
     robots: int = key(3, "1", "number of robots r1 … rn", low=1, high=10)
@@ -58,7 +58,7 @@ class RuntimeConfig:
     priority: str = key(
         "realtime",
         "-",
-        "realtime: agents, planner and sim server go before ordinary processes (SCHED_RR) if the "
-        "user may do so; ordinary: they do not",
+        "realtime: agents, planner and sim server take precedence over ordinary processes "
+        "(SCHED_RR) if the user may do so; ordinary: they do not",
         choices=("realtime", "ordinary"),
     )

@@ -30,8 +30,8 @@ class WorldConfig:
     terrain: str = key(
         "flat",
         "-",
-        "what is under the feet; gravel: stones that lie fixed; pebbles: a layer of stones that "
-        "lie loose; slope: ramps up and down",
+        "kind of ground; gravel: fixed stones; pebbles: a layer of loose stones; slope: ramps up "
+        "and down",
         choices=("flat", "boxes", "gravel", "heightfield", "pebbles", "slope"),
     )
     terrain_height: float = key(
@@ -66,8 +66,8 @@ class WorldConfig:
     push_force: float = key(
         0.0,
         "N",
-        "a series of sideways pushes on the robots in turn; side, exact times and who is first "
-        "are drawn from the seed; 0: none",
+        "a series of sideways pushes on the robots in turn; side, exact times and the robot "
+        "pushed first are drawn from the seed; 0: none",
         low=0.0,
         high=5000.0,
     )
@@ -78,8 +78,10 @@ class WorldConfig:
         low=0.0,
         high=1.0,
     )
-    push_every: float = key(3.0, "s", "from push to push, and until the first", low=0.1, high=600.0)
-    push_duration: float = key(0.2, "s", "of each push of the series", low=1e-3, high=10.0)
+    push_every: float = key(
+        3.0, "s", "time between two pushes, and before the first", low=0.1, high=600.0
+    )
+    push_duration: float = key(0.2, "s", "duration of each push of the series", low=1e-3, high=10.0)
     weak_motor: str = key(
         "",
         "-",

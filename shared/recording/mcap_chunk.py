@@ -83,8 +83,8 @@ def messages_of(
         end = at + RECORD.size + length
         if key is not None:
             payload = chunk[at + _MESSAGE.size : end]
-            found = envelope(payload)
-            yield ChunkEntry(key, -1 if found is None else found[0], log_time, payload)
+            head = envelope(payload)
+            yield ChunkEntry(key, -1 if head is None else head[0], log_time, payload)
         at = end
 
 

@@ -128,13 +128,13 @@ class Recording:
 
     def notes(self) -> dict[str, dict[str, str]]:
         """What the writer noted at the end, by name: `COUNTS`, `LOST`, `SINCE`; {} after a kill."""
-        found: dict[str, dict[str, str]] = {}
+        notes: dict[str, dict[str, str]] = {}
         for opcode, content in self._records():
             if opcode == Opcode.METADATA:
                 record = Metadata.read(stream(content))
                 if record.name != PROFILE:
-                    found[record.name] = dict(record.metadata)
-        return found
+                    notes[record.name] = dict(record.metadata)
+        return notes
 
     def _damage_error(self, got: str) -> RecordingError:
         return RecordingError(

@@ -123,16 +123,16 @@ class Salvage:
 
     def _intact(self) -> Iterator[tuple[int, int, bytes]]:
         """Begin, end and content of every chunk that passes its checksum."""
-        found, file = 0, self._file
-        while (found := file.find(_PACKING, found)) >= 0:
-            at = found - _PACKING_AT
+        position, file = 0, self._file
+        while (position := file.find(_PACKING, position)) >= 0:
+            at = position - _PACKING_AT
             content = self._content(at) if at >= 0 else None
             if content is None:
-                found += 1
+                position += 1
                 continue
             end = at + _CHUNK.size + _CHUNK.unpack_from(file, at)[-1]
             yield at, end, content
-            found = end
+            position = end
 
     def _content(self, at: int) -> bytes | None:
         """Content of the chunk at a byte, None if it is none or damaged."""
@@ -203,21 +203,21 @@ class Salvage:
 
     def _read_metadata(self) -> bool:
         """Find the metadata; whether any trace of them was found."""
-        file, found = self._file, False
+        file, any_trace = self._file, False
         for tag in (_tag(PROFILE), *map(_tag, (COUNTS, LOST, SINCE))):
             at = -1
             while (at := file.find(tag, at + 1)) >= RECORD.size:
                 opcode, length = RECORD.unpack_from(file, at - RECORD.size)
                 if opcode != Opcode.METADATA:
-                    found = found or at < _HEADER
+                    any_trace = any_trace or at < _HEADER
                     continue
-                found = True
+                any_trace = True
                 record = self._metadata_at(at - RECORD.size, at + length)
                 if record is not None and record.name == PROFILE:
                     self.metadata = self.metadata or dict(record.metadata)
                 elif record is not None:
                     self.notes.setdefault(record.name, dict(record.metadata))
-        return found
+        return any_trace
 
     def _indexed_keys(self) -> dict[int, str]:
         """Keys by channel from the index at the file's end, if that is intact."""

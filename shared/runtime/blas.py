@@ -8,7 +8,7 @@ import scipy.linalg  # noqa: F401
 from threadpoolctl import threadpool_limits
 
 
-def one_blas_thread() -> None:
+def use_one_blas_thread() -> None:
     """Hold BLAS to one thread from now on.
 
     It sums in another order with another number of threads, so that the last bits of a plan would

@@ -35,12 +35,12 @@ class Histogram:
         """
         if not self._count:
             return {}
-        found: dict[str, float] = {}
+        quantiles: dict[str, float] = {}
         seen, bins = 0, sorted(self._bins)
         left = dict(QUANTILES)
         for place in bins:
             seen += self._bins[place]
             for key in [key for key, share in left.items() if seen >= share * self._count]:
                 del left[key]
-                found[f"{name}.{key}"] = place * self._width
-        return {**found, f"{name}.max": self._max}
+                quantiles[f"{name}.{key}"] = place * self._width
+        return {**quantiles, f"{name}.max": self._max}

@@ -42,10 +42,10 @@ def followed_files(root: Path, modules: Iterable[str]) -> Sequence[Path]:
         name, file = todo.pop()
         package = name if file.name == "__init__.py" else name.rpartition(".")[0]
         for imported in {*_parents(name), *_imports(package, file.read_text(encoding="utf-8"))}:
-            found = _file(root, imported)
-            if found is not None and found not in files:
-                files.add(found)
-                todo.append((imported, found))
+            path = _file(root, imported)
+            if path is not None and path not in files:
+                files.add(path)
+                todo.append((imported, path))
     return sorted(files)
 
 
@@ -90,10 +90,10 @@ def _statements(text: str) -> Iterator[ast.Import | ast.ImportFrom]:
         for end in range(first + 1, len(lines) + 1):
             statement = dedent("\n".join(lines[first:end]))
             try:
-                found = ast.parse(statement).body
+                parsed = ast.parse(statement).body
             except SyntaxError:
                 if "(" in statement or statement.endswith("\\"):
                     continue  # it may go on in the next line
                 break  # prose that begins as an import does
-            yield from (one for one in found if isinstance(one, ast.Import | ast.ImportFrom))
+            yield from (one for one in parsed if isinstance(one, ast.Import | ast.ImportFrom))
             break

@@ -85,7 +85,7 @@ def interrupts_held() -> Iterator[None]:
     """
     noted: list[int] = []
     handlers = {
-        number: signal.signal(number, lambda found, _frame: noted.append(found))
+        number: signal.signal(number, lambda received, _frame: noted.append(received))
         for number in _STOPS
     }
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

@@ -59,8 +59,8 @@ def decode(payload: bytes, kind: type[M]) -> M:
             wrong type or shape, or a number that is not finite.
     """
     layout = _layout(kind)
-    if layout.flat is not None and (found := layout.flat.read(payload)) is not None:
-        tick, stamp_ns, row = found
+    if layout.flat is not None and (fields := layout.flat.read(payload)) is not None:
+        tick, stamp_ns, row = fields
         if tick < MAX_TICK:
             made: M = layout.from_row(tick, stamp_ns, row)
             return made
@@ -166,10 +166,10 @@ _LAYOUTS: dict[type[Message], _Layout] = {}
 
 
 def _layout(kind: type[Message]) -> _Layout:
-    found = _LAYOUTS.get(kind)
-    if found is None:
-        found = _LAYOUTS[kind] = _Layout(kind)
-    return found
+    layout = _LAYOUTS.get(kind)
+    if layout is None:
+        layout = _LAYOUTS[kind] = _Layout(kind)
+    return layout
 
 
 def _checker(kind: type[Message], name: str, of: type, annotation: Any) -> Callable[[Any], Any]:

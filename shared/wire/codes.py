@@ -1,7 +1,8 @@
 """Codes that programs decide by; the prose beside them is for people alone.
 
 An event carries one of `EVENTS`. Statuses of plans and reasons to stop are written `code` or
-`code:detail` (`solved`, `nominal:infeasible`, `estop:dog on the track`): `code_of` takes the first.
+`code:detail` (`solved`, `nominal:infeasible`, `estop:dog on the track`): `with_detail` writes the
+second form, `code_of` reads the code of either.
 """
 
 from __future__ import annotations
@@ -55,6 +56,16 @@ _WORDS: Final = {
               ("gone", GONE), ("", SILENT)),
     "stop": (("signal", SIGNAL), ("fall of", FALLEN), ("", TIME_OVER)),
 }  # fmt: skip
+
+
+def with_detail(code: str, detail: str) -> str:
+    """A status or a reason to stop that has a detail: `code:detail`.
+
+    Args:
+        code: without a colon.
+        detail: any text.
+    """
+    return f"{code}:{detail}"
 
 
 def code_of(text: str) -> str:

@@ -11,10 +11,10 @@ from quadriga.shared.wire.topics import CONFIGURED, TABLE, Topic
 _HEAD = """\
 # Topics and messages
 
-What the processes of a team tell each other. A key on the bus is `<team>/<robot>/<topic>` where a
+The messages between the processes of a team. A key on the bus is `<team>/<robot>/<topic>` where a
 topic is one per robot, else `<team>/<topic>`; the planner and the sim server have a `status` under
 their own names. Every message also carries `tick` [ms] and `stamp_ns` [ns], the world's time of its
-content. Periods and ages are world time; the recorder takes what the last column says.
+content. Periods and ages are world time; the last column tells what is recorded.
 This page is generated: `python -m quadriga.shared.wire.markdown > docs/messages.md`.
 
 | topic | per robot | message | from | to | period | maximum age | recorded |

@@ -60,7 +60,7 @@ class Course:
         return _smooth(into / _RAMP)
 
     def edge(self, x: Array, y: Array) -> Array:
-        """Factor in [0, 1] by which ground that begins by itself ends at its outer borders."""
+        """Factor in [0, 1] that lowers the ground towards its outer borders alone."""
         return _smooth(self.extent.depth(x, y) / _RAMP)
 
     def needs(self, x: Array, y: Array) -> NDArray[np.bool_]:
@@ -72,16 +72,16 @@ class Course:
 
 
 def _smooth(s: Array) -> Array:
-    """From 0 to 1 as s goes from 0 to 1, without an edge."""
+    """A smooth step: 0 to 1 as s goes from 0 to 1."""
     s = np.clip(s, 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 
 def build_course(config: Config, places: Array) -> Course:
-    """The course of a configuration: its reference integrated over its time, and then some.
+    """The course of a configuration: its reference integrated over the walk, with some margin.
 
     Args:
-        config: the configuration; `reference` gives the way, `world.seconds` its length.
+        config: the configuration; `reference` determines the way, `world.seconds` its length.
         places: spawn positions of the trunks, shape (n, 2), m.
     """
     low, high = places.min(axis=0) - _HALF_BODY, places.max(axis=0) + _HALF_BODY
@@ -107,10 +107,10 @@ def build_course(config: Config, places: Array) -> Course:
 
 
 def _begins_backward(config: Config, way: Array) -> bool:
-    """Whether the team leaves the flat place backward: with a trace, in its first metre."""
+    """Whether the team leaves the flat place backward; a trace counts for its first metre."""
     if not config.reference.trace:
         return config.reference.vx < 0.0
-    # By then it comes to the end of the flat place.
+    # The time at which the team reaches the end of the flat place.
     left = np.linalg.norm(way, axis=1) >= _FLAT_AHEAD
     return bool(way[left.argmax() if left.any() else -1, 0] < 0.0)
 

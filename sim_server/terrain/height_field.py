@@ -1,4 +1,4 @@
-"""Ground given by its height over a grid: hills, ramps, or gravel of stones that lie fixed."""
+"""Ground given by its height over a grid: hills, ramps, or gravel whose stones do not move."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _SUNK: Final = 0.01  # m, how far below the ground plane the field starts: no do
 _BASE: Final = 0.05  # m, thickness below the lowest point
 
 _SMOOTH_CELL: Final = 0.05  # m, grid of the smooth field
-_SMOOTH_LENGTH: Final = 0.35  # m, distance at which its heights' correlation falls to 1/e
+_SMOOTH_LENGTH: Final = 0.35  # m, distance at which the correlation of its heights is 1/e
 
 _RAMP_CELL: Final = 0.04  # m, grid of the ramps
 _LEAST_CREST: Final = 0.5  # of the highest
 _RAMP_TURN: Final = math.radians(20.0)  # greatest angle between x and the way the ramps face
-_ROUNDED: Final = 0.08  # m, deviation of the filter that takes the edge off each crest
-_FILTER: Final = 3.0  # deviations that it reaches
+_ROUNDED: Final = 0.08  # m, standard deviation of the filter that rounds each crest
+_FILTER: Final = 3.0  # reach of the filter in standard deviations
 
 _GRAVEL_CELL: Final = 0.015  # m, grid of the gravel
 _STONE_CELL: Final = 0.035  # m, one stone per square of this size
@@ -35,7 +35,7 @@ _BED_LENGTH: Final = 0.15  # m, correlation length of the bed that the stones li
 
 @dataclass(frozen=True, slots=True)
 class HeightField:
-    """Heights over a regular grid, each cell two triangles; the plane z = 0 shows where higher.
+    """Heights over a regular grid, two triangles per cell; the plane z = 0 covers what is lower.
 
     Attributes:
         extent: the ground covered.
@@ -113,7 +113,7 @@ def build_gravel(course: Course, height: float, random: np.random.Generator) -> 
 def build_ramps(
     course: Course, height: float, random: np.random.Generator, *, slope: float
 ) -> HeightField:
-    """Ramps up and down again, one after the other, as wide as the ground.
+    """Ramps that lead up and down again, one after the other, as wide as the ground.
 
     Args:
         course: where the team starts and walks.
@@ -180,7 +180,7 @@ def _grid(extent: Rectangle, cell: float) -> tuple[Array, Array]:
 
 
 def _field(course: Course, x: Array, y: Array, z: Array, height: float) -> HeightField:
-    """The field whose highest point off the flat place is `height`; it rises from below ground."""
+    """The field, scaled so that its highest point off the flat place is `height`."""
     rise = course.rise(x, y)
     z = z * (height / (rise * z).max())
     return HeightField(course.extent, rise * (z + _SUNK) - _SUNK)

@@ -1,7 +1,7 @@
 """Loose stones near feet are bodies of the world; all others lie still and cost nothing.
 
-Thousands of free bodies would take longer than the robots. So the world has a few, and lends one to
-every stone that a low foot comes near; it goes back when the stone lies still and alone again.
+Thousands of free bodies would take longer to simulate than the robots. So the world has a few and
+lends one to every stone near a low foot, until the stone lies still and no foot is near.
 """
 
 from __future__ import annotations
@@ -14,27 +14,27 @@ import numpy as np
 from quadriga.shared.robot.a1 import FOOT_RADIUS, Array
 from quadriga.sim_server.terrain.pebbles import SIZES, Pebbles
 
-PERIOD: Final = 4  # ms between two looks
-_MARGIN: Final = 0.01  # m around foot and stone: what a foot covers until the next look, and more
-_LOW: Final = 0.03  # m from the top of the largest stone to a foot that comes near
-_LEAVE: Final = 0.02  # m farther away than where it woke, a stone may fall asleep
+PERIOD: Final = 4  # ms between two updates
+_MARGIN: Final = 0.01  # m around foot and stone; a foot moves less until the next update
+_LOW: Final = 0.03  # m from the top of the largest stone to a foot that counts as near
+_LEAVE: Final = 0.02  # m beyond the distance at which it got its body, a stone may lose it
 _STILL: Final = (0.02, 1.0)  # m/s, rad/s
 _NOBODY: Final = -1
 
 
 class LooseStones:
-    """Which stone has which body, and where all others lie.
+    """The assignment of bodies to stones, and the poses of all other stones.
 
     Attributes:
         pose: of every stone, as of when it last lay still, shape (s, 7), m, world.
         stone_of: the stone that each body is lent to, −1 for none, shape (p,).
-        without: how often a stone near a foot found no body. It then is not there for that foot:
-            to appear inside a foot would throw it away.
+        without: how often no body was left for a stone near a foot. That foot then passes through
+            the stone, because a stone that appears inside a foot would throw it away.
     """
 
     def __init__(self, pebbles: Pebbles, model: Any, physics: Any, robots: int) -> None:
         """Take over the bodies that `Pebbles.add_to` has added last."""
-        self._parked = pebbles.parked(robots)
+        self._parked = pebbles.parking_poses(robots)
         count = len(self._parked)
         self._q = physics.qpos[-7 * count :].reshape(count, 7)
         self._v = physics.qvel[-6 * count :].reshape(count, 6)
@@ -68,8 +68,8 @@ class LooseStones:
         return int(place[0] // self._near), int(place[1] // self._near)
 
     def _asleep_near(self, feet: Array) -> list[int]:
-        """Stones without a body that a foot is near to and cannot be inside of, in order."""
-        found: set[int] = set()
+        """Stones without a body that a foot is near, but not inside, in order."""
+        stones: set[int] = set()
         for x, y, z in feet.tolist():
             i, j = self._cell(np.array((x, y)))
             around = [
@@ -84,8 +84,8 @@ class LooseStones:
                 close = square < self._near**2
                 if z < self._on_top:
                     close &= square > self._touching**2
-                found.update(np.array(around)[close].tolist())
-        return sorted(found)
+                stones.update(np.array(around)[close].tolist())
+        return sorted(stones)
 
     def _wake(self, stone: int) -> None:
         free = np.flatnonzero((self._of_size == self._size[stone]) & (self.stone_of == _NOBODY))

@@ -1,4 +1,4 @@
-"""A layer of loose stones on flat ground: where each lies, and the few that can move at a time."""
+"""A layer of loose stones on flat ground: their poses, and the bodies of the few that can move."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _RGBA: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Pebbles:
-    """Stones as they lie before anybody has walked over them.
+    """Stones as they lie before the walk.
 
     Attributes:
         pose: centre and attitude wxyz of each stone, shape (s, 7), m, world.
@@ -45,11 +45,11 @@ class Pebbles:
 
     @property
     def reach(self) -> float:
-        """From the centre of the largest stone to its end, m."""
+        """Greatest half axis of the largest stones, m."""
         return float(self.half.max())
 
-    def parked(self, robots: int) -> Array:
-        """Where the stones that can move wait; those of one size after the other. Shape (p, 7)."""
+    def parking_poses(self, robots: int) -> Array:
+        """Poses of the unused bodies of stones, ordered by size, m, world. Shape (p, 7)."""
         count = len(SIZES) * -(-_PER_LEG * N_LEGS * robots // len(SIZES))
         parked = np.zeros((count, 7))
         parked[:, 0] = 4.0 * self.reach * np.arange(count)
@@ -57,8 +57,8 @@ class Pebbles:
         return parked
 
     def add_to(self, spec: mujoco.MjSpec, robots: int, friction: float) -> None:
-        """Add the bodies of stones that can move, after everything else: parked, without weight."""
-        parked = self.parked(robots)
+        """Add the bodies of stones that can move, parked and weightless, after everything else."""
+        parked = self.parking_poses(robots)
         for k, pose in enumerate(parked.tolist()):
             i = k * len(SIZES) // len(parked)
             body = spec.worldbody.add_body(name=f"pebble{k}", pos=pose[:3], gravcomp=1.0)
@@ -107,7 +107,7 @@ def build_pebbles(course: Course, height: float, random: np.random.Generator) ->
     centre = _lattice(course.extent, _CELL * longest, random)
     free = (0.5 * _CELL - 1.0) * longest
     size = random.integers(len(SIZES), size=len(centre))
-    # In its square; what a stone is smaller than the largest, it may lie farther off the middle.
+    # Each stone lies in its square; a smaller stone may lie farther off its middle.
     turn, away = random.uniform(0.0, 2.0 * np.pi, len(centre)), random.uniform(size=len(centre))
     away *= free + longest - half[size, 0]
     centre += np.stack([away * np.cos(turn), away * np.sin(turn)], axis=1)
@@ -123,7 +123,7 @@ def build_pebbles(course: Course, height: float, random: np.random.Generator) ->
 def _lattice(extent: Rectangle, cell: float, random: np.random.Generator) -> Array:
     """Middles of squares that fill a rectangle. Shape (s, 2), m, world.
 
-    The rows are turned and shifted against each other by chance, so that nobody walks along them.
+    The rows are turned and shifted at random, so that no robot walks along them.
     """
     (x_low, x_high), (y_low, y_high) = extent.sides
     reach = 0.5 * float(np.hypot(x_high - x_low, y_high - y_low))

@@ -1,4 +1,4 @@
-"""What is under the feet: flat ground, wooden blocks, stones, ramps or a smooth height field."""
+"""The ground: flat, with wooden blocks, stones or ramps, or a smooth height field."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Terrain:
 
     Attributes:
         relief: the blocks or the height field on the plane, or None; it never moves.
-        pebbles: stones that lie loose, or None. They do not count as height of the ground.
+        pebbles: loose stones, or None. They do not count as height of the ground.
     """
 
     relief: Blocks | HeightField | None
@@ -55,7 +55,7 @@ class Terrain:
         """Height of the ground at world positions x, y of any equal shape, m."""
         return np.zeros(np.shape(x)) if self.relief is None else self.relief.height(x, y)
 
-    def under(self, x: Array, y: Array, yaw: Array) -> Array:
+    def height_under_hips(self, x: Array, y: Array, yaw: Array) -> Array:
         """Mean height of the ground where a robot's feet stand under its hips, m.
 
         Args:

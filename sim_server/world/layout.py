@@ -1,4 +1,4 @@
-"""Where a robot's numbers are in MuJoCo's arrays: its row of `qpos`, `qvel` and `sensordata`."""
+"""Layout of a robot's rows of MuJoCo's arrays `qpos`, `qvel` and `sensordata`."""
 
 from __future__ import annotations
 

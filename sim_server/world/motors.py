@@ -1,4 +1,4 @@
-"""Motors: what they do with a command, and which of them weaken."""
+"""Motors: the torques they give for a command, and the ones that weaken."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class WeakMotor:
         robot: its index.
         joint: its index in `JOINT_NAMES`.
         start: tick, ms.
-        share: of the torque it would give if it were sound.
+        share: of the torque that a sound motor would give.
     """
 
     robot: int
@@ -46,13 +46,13 @@ class WeakMotor:
 
     @property
     def detail(self) -> str:
-        """What is announced when it weakens."""
+        """Detail of the event that announces the weakening."""
         return f"{_JOINTS[self.joint]} gives {100 * self.share:g} % of its torque"
 
 
 @compiled
 def drive(commands: Array, q: Array, v: Array, strength: Array, tau: Array) -> None:
-    """Fill `tau`, (n, 12), with what the motors give: tau + kp (q_des − q) + kd (v_des − v).
+    """Fill `tau`, (n, 12), with the motors' torques: tau + kp (q_des − q) + kd (v_des − v).
 
     Args:
         commands: rows of the robots' `Command`s, (n, 60).

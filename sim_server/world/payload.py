@@ -1,4 +1,4 @@
-"""The load on each robot: how heavy it is, and where on the trunk it lies."""
+"""The external load on each robot: its mass and its place on the trunk."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _STREAM: Final = 5  # of the seed
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """A robot's load.
+    """A robot's external load.
 
     Attributes:
         mass: kg; 0 if there is none.
@@ -28,14 +28,14 @@ class Load:
 
     @property
     def detail(self) -> str:
-        """What is announced about it."""
+        """Detail of the event that announces the load."""
         x, y = self.offset
         where = f", {1000 * x:+.0f} mm ahead, {1000 * y:+.0f} mm left" if x or y else ""
         return f"{self.mass:.6g} kg{where}"
 
 
 def build_loads(config: Config) -> tuple[Load, ...]:
-    """The load on each robot; each one's place has its own draw, whoever else carries something.
+    """The load on each robot; its place is drawn independently of the other robots' loads.
 
     Raises:
         ConfigError: `world.payload_on` does not parse or names no robot of the team.

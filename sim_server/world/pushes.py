@@ -1,4 +1,4 @@
-"""Pushes: those that are written out one by one, and a series of them drawn from the seed."""
+"""Pushes: those that the configuration lists, and a series drawn from the seed."""
 
 from __future__ import annotations
 
@@ -46,8 +46,9 @@ def parse_pushes(text: str, names: tuple[str, ...]) -> tuple[Push, ...]:
 def push_series(config: Config, random: np.random.Generator) -> tuple[Push, ...]:
     """The pushes of `world.push_force`: one every `push_every`, on the robots in turn.
 
-    Drawn are the robot that is first, the side of each push, its force within `push_spread`, and
-    by how much it comes later, up to one period of the gait: so it meets any phase of a step.
+    The seed determines the robot pushed first, the side of each push, its force within
+    `push_spread`, and a delay of up to one period of the gait, so that pushes come in any phase of
+    a step.
     """
     world, n = config.world, config.team.robots
     if world.push_force == 0.0:

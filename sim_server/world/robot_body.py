@@ -1,4 +1,4 @@
-"""One A1 as MuJoCo bodies, parsed from the same URDF that Pinocchio reads."""
+"""One A1 as MuJoCo bodies, built from the same URDF that Pinocchio reads."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class RobotBody:
             name = _child(joint, "child").get("link", "")
             kind = joint.get("type")
             if kind == "fixed" and not _mass(self._links[name]):
-                continue  # a frame only: neither MuJoCo nor the controller needs it
+                continue  # only a frame, which neither MuJoCo nor the controller needs
             pos = _origin(joint)
             child = body.add_body(name=prefix + name, pos=pos)
             if kind == "revolute":
@@ -126,7 +126,7 @@ def _add_foot(body: mujoco.MjsBody, name: str, friction: float) -> None:
 
 
 def _add_limb(body: mujoco.MjsBody, link: str, end: list[float]) -> None:
-    """A capsule to look at, from the link's origin to its child's; without mass or contact."""
+    """A visual capsule from the link's origin to its child's, without mass or contact."""
     radius = _LIMB_RADIUS.get(link.partition("_")[2])
     if radius is not None:
         body.add_geom(
@@ -170,7 +170,7 @@ def _numbers(text: str) -> list[float]:
 
 
 def _child(element: ET.Element, tag: str) -> ET.Element:
-    found = element.find(tag)
-    if found is None:
+    child = element.find(tag)
+    if child is None:
         raise ConfigError("A1 URDF", f"<{element.tag}> without <{tag}>", f"a <{tag}>")
-    return found
+    return child

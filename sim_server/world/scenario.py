@@ -1,4 +1,4 @@
-"""What happens to the team, and when: pushes, loads, weak motors; and the events that tell."""
+"""Disturbances of the team by tick: pushes, loads, weak motors; and their events."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from quadriga.sim_server.world.motors import WeakMotor, weak_motors
 from quadriga.sim_server.world.payload import Load
 from quadriga.sim_server.world.pushes import Push, all_pushes
 
-_PUSHES: Final = 3  # streams of the seed, each for itself: a new push draws no other motor
+_PUSHES: Final = 3  # separate streams of the seed, so that a new push changes no motor
 _MOTORS: Final = 4
 
 
@@ -62,7 +62,7 @@ def build_scenario(config: Config, loads: Sequence[Load]) -> Scenario:
 
     Args:
         config: the configuration.
-        loads: on each robot.
+        loads: the load on each robot.
 
     Raises:
         ConfigError: `world.push` or `world.weak_motor` does not parse or names an unknown robot.

@@ -1,4 +1,4 @@
-"""What a robot's sensors make of the true state: noise, bias, and nothing a real one lacks."""
+"""A robot's sensors: the ground truth with noise and bias, of quantities a real robot measures."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from quadriga.sim_server.world.layout import (
 )
 
 _STREAM: Final = 2  # of the seed: the terrain draws from another one
-# Columns of a robot's noise: those of its joints, its gyro, its accelerometer and its feet, in the
-# order of the fields of `State`, then its attitude's, which is a rotation and not a sum.
+# Columns of a robot's noise: joints, gyro, accelerometer and feet in the order of the fields of
+# `State`, then the attitude, whose noise is a rotation and is not added.
 _Q = slice(0, N_JOINTS)
 _V = slice(_Q.stop, _Q.stop + N_JOINTS)
 _TAU = slice(_V.stop, _V.stop + N_JOINTS)
@@ -31,7 +31,7 @@ _FOOT = slice(_ACCEL.stop, _ACCEL.stop + N_LEGS)
 _SUMS: Final = _FOOT.stop
 _TURN = slice(_FOOT.stop, _FOOT.stop + 3)
 
-# Where a state's row has its fields.
+# Places of the fields in a state's row.
 _STATE_Q: Final = State.CUTS["q_joint"]
 _STATE_V: Final = State.CUTS["v_joint"]
 _STATE_TAU: Final = State.CUTS["tau_joint"]
@@ -50,7 +50,7 @@ _SIGN: Final = np.array([[1, -1, -1, -1], [1, 1, 1, -1], [1, -1, 1, 1], [1, 1, -
 class Sensors:
     """The sensors of all robots; each robot's noise has its own stream of (seed, robot index).
 
-    So a robot's noise depends neither on how many others there are nor on what they do.
+    So a robot's noise depends neither on the number of robots nor on what the others do.
     """
 
     def __init__(self, config: SensorsConfig, seed: int, names: tuple[str, ...]) -> None:

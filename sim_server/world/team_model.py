@@ -92,7 +92,7 @@ def build_team_model(config: Config) -> TeamModel:
     """
     names = robot_names(config.team.robots)
     places, payload = spawn_positions(config), build_loads(config)
-    # Where it is flat must not depend on where exactly the robots stand.
+    # The flat place must not depend on where exactly the robots stand.
     terrain = build_terrain(config, formation(len(names), config.team.spacing))
     spec = mujoco.MjSpec()
     _set_physics(spec)
@@ -133,7 +133,7 @@ def _set_physics(spec: mujoco.MjSpec) -> None:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10.0
-    # A world that has become unstable must show as a fall, not start again from the spawn.
+    # An unstable simulation must end in a fall, not restart at the spawn.
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     spec.compiler.degree = False
 
@@ -144,7 +144,7 @@ def _set_visuals(spec: mujoco.MjSpec) -> None:
     spec.visual.headlight.diffuse = [0.4, 0.4, 0.4]
     spec.visual.quality.shadowsize = 4096
     spec.visual.map.shadowclip = 1.0
-    spec.stat.extent = 3.0  # m; shadows and clipping must not depend on how far the terrain goes
+    spec.stat.extent = 3.0  # m; shadows and clipping must not depend on the size of the terrain
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,

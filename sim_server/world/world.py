@@ -20,7 +20,7 @@ from quadriga.sim_server.world.scenario import build_scenario, event
 from quadriga.sim_server.world.sensors import Sensors
 from quadriga.sim_server.world.team_model import build_team_model
 
-MOTOR_DAMPING: Final = 2.0  # N·m·s/rad, what a motor does without a command
+MOTOR_DAMPING: Final = 2.0  # N·m·s/rad, damping of a motor without a command
 _FALL_COSINE: Final = math.cos(1.0)  # of the angle between the trunk's z axis and the vertical
 _FALL_HEIGHT: Final = 0.12  # m, trunk origin above the mean terrain under the hips
 _ZERO: Final = np.zeros(N_JOINTS)
@@ -41,10 +41,10 @@ class World:
     A tick is split at the point where commands enter: `mj_step2` takes the commands of tick t to
     positions and velocities at t + 1, then `mj_step1` evaluates everything that depends on those
     alone. So what is published for t + 1 has positions and rates at t + 1, while specific force,
-    contact forces and yoke forces are those that acted from t to t + 1, as a sensor would have it:
-    the forces of t + 1 itself depend on a command not yet given. This costs what `mj_step` costs,
-    and no sensor waits for `mj_step1`: it has time until the commands come.
-    The forces of tick 0 are those of motors without torque.
+    contact forces and yoke forces are those that acted from t to t + 1, as a real sensor would
+    measure them: the forces at t + 1 depend on a command not given yet. This costs as much as
+    `mj_step`, and no sensor waits for `mj_step1`, which runs while the agents compute their
+    commands. The forces of tick 0 are those of motors without torque.
 
     Raises:
         ConfigError: the payload, a push or a weak motor names no robot or does not parse, the
@@ -75,7 +75,7 @@ class World:
         self._strength = np.ones((n, N_JOINTS))
         self._fallen = [False] * n
         self._surely_up = _FALL_HEIGHT + self.team.terrain.top
-        # What is compiled is compiled, or loaded, now and not in the first tick.
+        # Compiled functions are compiled, or loaded, now and not in the first tick.
         drive(self._commanded, self._q, self._v, self._strength, np.empty_like(self._tau))
         self._sensors = Sensors(config.sensors, config.world.seed, self.names)
 
@@ -90,14 +90,14 @@ class World:
         self._states = self._measure()
 
     def states(self) -> dict[str, State]:
-        """Every robot's sensor message of this tick; the same bytes however often it is asked."""
+        """Every robot's sensor message of this tick; every call returns the same bytes."""
         return dict(self._states)
 
     def step(self, commands: Mapping[str, Command]) -> tuple[Event, ...]:
         """Advance by one tick under the motors' torques and return what happened.
 
-        Each motor applies tau + kp (q_des − q) + kd (v_des − v), limited to ±`TORQUE_LIMIT`, and
-        a weak one its share of that; those of a robot without a command damp their joints with
+        Each motor applies tau + kp (q_des − q) + kd (v_des − v), limited to ±`TORQUE_LIMIT`, and a
+        weak motor its share of that. The motors of a robot without a command damp its joints with
         `MOTOR_DAMPING`.
         """
         events = list(self._events.get(self.tick, ()))
@@ -118,9 +118,9 @@ class World:
         return (*events, *self._falls())
 
     def settle(self) -> None:
-        """Evaluate what depends on this tick's positions and velocities; again has no effect.
+        """Evaluate what depends on this tick's positions and velocities, once per tick.
 
-        The next step does it if nobody has; while the robots answer there is time for it.
+        The next step calls it if nobody has. While the robots answer there is time for it.
         """
         if self._settled:
             return
@@ -130,7 +130,7 @@ class World:
         self._settled = True
 
     def truth(self) -> Truth:
-        """The true state of this tick."""
+        """The ground truth of this tick."""
         self.settle()
         rotation = self.physics.xmat[self.team.trunks].reshape(-1, 3, 3)
         return Truth(
@@ -167,12 +167,14 @@ class World:
         events = []
         for i, (x, y, z, qw, qx, qy, qz) in enumerate(self._q[:, layout.POSE].tolist()):
             cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
-            # Asked this way round, a state that is not a number counts as a fall too.
+            # With this comparison a state that is not a number counts as a fall too.
             if (cosine >= _FALL_COSINE and z >= self._surely_up) or self._fallen[i]:
                 continue
             yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
-            # Not the ground under the trunk alone: a robot may stand astride of a block.
-            above = z - float(self.team.terrain.under(np.array(x), np.array(y), np.array(yaw)))
+            # The mean under the hips, since the trunk may be over a block between the feet.
+            above = z - float(
+                self.team.terrain.height_under_hips(np.array(x), np.array(y), np.array(yaw))
+            )
             if not (cosine >= _FALL_COSINE and above >= _FALL_HEIGHT):
                 self._fallen[i] = True
                 detail = f"tilt {math.acos(max(-1.0, cosine)):.2f} rad, height {above:.3f} m"

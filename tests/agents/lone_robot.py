@@ -27,11 +27,11 @@ class Robot:
         self.references = True
 
     def step(self, state: State | None = None, **inputs: Any) -> Outputs:
-        heard: tuple[Reference, ...] = ()
+        references: tuple[Reference, ...] = ()
         if self.references and self.tick % 100 == 0:
-            heard = (replace(asked(0.2), tick=self.tick),)
+            references = (replace(asked(0.2), tick=self.tick),)
         self.state, outputs = self.agent.step(
-            self.state, Inputs(state or standing(self.tick), references=heard, **inputs)
+            self.state, Inputs(state or standing(self.tick), references=references, **inputs)
         )
         self.tick += 1
         return outputs

@@ -164,8 +164,8 @@ def test_excitation_is_added_on_the_stance_feet_while_walking() -> None:
             continue
         tick = outputs.measurement.tick
         stance = scheduled_stance(ALONE, 0, np.array([tick - 10]))[0]
-        felt = noise * np.repeat(stance, 3) if tick > 300 else 0.0
-        np.testing.assert_allclose(outputs.measurement.u, nominal_forces(stance) + felt)
+        disturbance = noise * np.repeat(stance, 3) if tick > 300 else 0.0
+        np.testing.assert_allclose(outputs.measurement.u, nominal_forces(stance) + disturbance)
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ class Line:
     def drain(self) -> list[Packet]:
         return []
 
-    def present(self, stage: str) -> frozenset[str]:
+    def members_at(self, stage: str) -> frozenset[str]:
         return frozenset({"sim"})
 
     def publisher(self, key: str, *, droppable: bool) -> Callable[[bytes], None]:

@@ -84,7 +84,7 @@ def test_planned_footholds_count_on_the_way_to_the_middle_of_the_stance_to_come(
 ) -> None:
     seen = Watched(monkeypatch, footholds="planned").walk(800).asked
     assert len(seen) > 400
-    told, reached = set(), set()
+    speeds, reached = set(), set()
     for tick, schedule, task, plan in seen:
         ahead_ms = (1.0 - schedule.progress) * STANCE_MS + 0.5 * STANCE_MS
         assert task.ahead is not None
@@ -93,6 +93,6 @@ def test_planned_footholds_count_on_the_way_to_the_middle_of_the_stance_to_come(
         reached.add(len(planned) == wanted)
         np.testing.assert_allclose(task.ahead, planned.mean(axis=0), atol=1e-12)
         assert task.vy == 0.0
-        told.add(float(task.ahead[0]))
-    assert len(told) > 50
+        speeds.add(float(task.ahead[0]))
+    assert len(speeds) > 50
     assert reached == {True, False}, "plans that reach so far, and plans that end before"

@@ -83,10 +83,10 @@ def test_an_interrupt_leaves_no_process_and_no_file(tmp_path: Path) -> None:
     ) as bench:
         children = awaited_children(bench.pid, 2)
         bench.send_signal(signal.SIGINT)
-        _, said = bench.communicate(timeout=20.0)
+        _, errors = bench.communicate(timeout=20.0)
     assert bench.returncode == 130
-    assert "interrupted" in said
-    assert "Traceback" not in said
+    assert "interrupted" in errors
+    assert "Traceback" not in errors
     assert not any(lives(pid) for pid in children)
     assert not (tmp_path / "b.json").exists()
 

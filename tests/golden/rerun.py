@@ -10,7 +10,7 @@ from quadriga.agents.inbox.inbox import Inbox
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
-from quadriga.shared.runtime.blas import one_blas_thread
+from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN
 
@@ -24,7 +24,7 @@ def rerun(
 
     For lock-step only: there what an agent knows at a tick follows from the ticks of the messages.
     """
-    one_blas_thread()
+    use_one_blas_thread()
     agent = Agent(config, robot, predictor)
     arrivals = Inbox(config, robot, agent.peers)
     memory, sent = agent.initial(), []

@@ -108,10 +108,10 @@ def test_what_another_machine_may_do_to_the_last_bits_is_let_through_and_told() 
 
     near, far = command(2.0 + TOLERANCE), command(2.0 + 3.0 * TOLERANCE)
     assert not judge("r1", command(2.0), near, []).ok, "one machine, one result"
-    told = judge("r1", command(2.0), near, ["BLAS 'Zen' instead of 'SkylakeX'"])
-    assert told.ok
-    assert "not to the byte" in told.text
-    assert "Zen" in told.text
+    verdict = judge("r1", command(2.0), near, ["BLAS 'Zen' instead of 'SkylakeX'"])
+    assert verdict.ok
+    assert "not to the byte" in verdict.text
+    assert "Zen" in verdict.text
     beyond = judge("r1", command(2.0), far, ["BLAS 'Zen' instead of 'SkylakeX'"])
     assert not beyond.ok
     assert "tick 7, team/r1/command.tau[3]: recorded 2.0, recomputed 2.00000" in beyond.text

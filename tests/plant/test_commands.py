@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quadriga.plant.commands import CommandBox
+from quadriga.plant.commands import FOREIGN, STALE, CommandBox
 from quadriga.shared.wire.codec import MAX_TICK, encode
 from quadriga.shared.wire.messages import Command, Event
 
@@ -32,7 +32,7 @@ def test_the_command_of_the_tick_is_taken(box: CommandBox) -> None:
 @pytest.mark.parametrize("wrong", [4, 6, MAX_TICK - 1])
 def test_lock_step_discards_other_ticks(box: CommandBox, wrong: int) -> None:
     assert box.take(KEY, command(wrong), tick=5, oldest=5) == ""
-    assert box.refused == {"stale r1": 1}
+    assert box.refused == {(STALE, "r1"): 1}
     assert box.latest == {}
 
 
@@ -69,4 +69,4 @@ def test_what_is_malformed_is_dropped_and_counted(box: CommandBox, payload: byte
 def test_a_robot_of_another_team_or_none_is_foreign(box: CommandBox) -> None:
     for key in ("team/r3/command", "other/r1/command", "team/r1/state"):
         assert box.take(key, command(5), tick=5, oldest=5) == ""
-    assert box.refused == {"foreign": 3}
+    assert box.refused == {(FOREIGN, ""): 3}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from quadriga.plant.deadlines import Deadlines
+from quadriga.plant.deadlines import HELD, Deadlines
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Status
 
@@ -15,7 +15,7 @@ def test_ages_of_commands_and_lateness_of_the_world_are_told() -> None:
         deadlines.note_age("r1", 0)
         deadlines.note_age("r2", 3 if tick % 4 == 0 else 0)
         deadlines.note_lateness(5e-3 if tick == 100 else 1e-4)
-    deadlines.late["r2 held"] += 2
+    deadlines.late["r2", HELD] += 2
     status = deadlines.status(200, overruns=1)
     assert decode(encode(status), Status).counters == {
         "overruns": 1,
@@ -24,6 +24,7 @@ def test_ages_of_commands_and_lateness_of_the_world_are_told() -> None:
         "r2.late": 50,
         "r2.held": 2,
     }
+    assert deadlines.describe_late() == "r1 0, r2 50, r2 held 2"
     assert status.ages_ms["r1.command.max"] == 0.0
     assert [status.ages_ms[f"r2.command.{q}"] for q in ("median", "p99", "max")] == [0.0, 3.0, 3.0]
     assert abs(status.ages_ms["jitter.median"] - 0.1) <= 0.02

@@ -35,8 +35,8 @@ class Listener:
 
 
 def served(**world: Any) -> tuple[PlantServer, Listener]:
-    config, heard = configured(**world), Listener()
-    return PlantServer(config, World(config), cast("Bus", heard)), heard
+    config, listener = configured(**world), Listener()
+    return PlantServer(config, World(config), cast("Bus", listener)), listener
 
 
 @pytest.mark.parametrize(
@@ -45,32 +45,32 @@ def served(**world: Any) -> tuple[PlantServer, Listener]:
     ids=["text", "keys"],
 )
 def test_a_malformed_command_is_reported_in_few_words(body: dict[str, object]) -> None:
-    server, heard = served()
+    server, listener = served()
     server.commands.take(COMMAND.key("team", "r1"), msgpack.packb(body), tick=0, oldest=0)
     server.step({})
-    event = next(event for event in heard.events() if event.kind == "fault")
+    event = next(event for event in listener.events() if event.kind == "fault")
     assert event.detail.startswith("1 commands dropped: command: got ")
     assert len(event.detail) < 300
 
 
 def test_a_detail_is_cut_to_what_an_event_may_hold() -> None:
-    server, heard = served()
+    server, listener = served()
     server.announce(codes.SILENT, "r1", "x" * (MAX_TEXT + 1))
-    assert heard.events()[0].detail == "x" * (MAX_TEXT - 1) + "…"
+    assert listener.events()[0].detail == "x" * (MAX_TEXT - 1) + "…"
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
 def test_in_real_time_nothing_but_the_end_waits_for_who_does_not_listen(mode: str) -> None:
-    server, heard = served(mode=mode)
+    server, listener = served(mode=mode)
     server.publish()
     for code in (codes.PUSH, codes.BACK, codes.FALL, codes.SIGNAL):
         server.announce(code, "", "")
-    droppable = {key: drop for key, drop, _ in heard.packets[:2]}
+    droppable = {key: drop for key, drop, _ in listener.packets[:2]}
     assert droppable == {
         STATE.key("team", "r1"): mode == "realtime",
         TRUTH.key("team"): mode == "realtime",
     }
-    assert [drop for key, drop, _ in heard.packets if key == EVENT.key("team")] == [
+    assert [drop for key, drop, _ in listener.packets if key == EVENT.key("team")] == [
         *[mode == "realtime"] * 3,
         False,
     ]
@@ -101,13 +101,13 @@ class BlindPlant:
 
 @pytest.mark.parametrize("falls", [False, True])
 def test_any_plant_is_served(falls: bool) -> None:
-    config, heard = configured(seconds=2.0), Listener()
-    server = PlantServer(config, BlindPlant(falls=falls), cast("Bus", heard))
+    config, listener = configured(seconds=2.0), Listener()
+    server = PlantServer(config, BlindPlant(falls=falls), cast("Bus", listener))
     end = None
     while end is None:
         server.publish()
         end = server.step({})
-    assert {key for key, _, _ in heard.packets} <= {STATE.key("team", "r1"), EVENT.key("team")}
+    assert {key for key, _, _ in listener.packets} <= {STATE.key("team", "r1"), EVENT.key("team")}
     fallen, over = (codes.FALLEN, "fall of r1"), (codes.TIME_OVER, "end of world.seconds")
     assert end == (fallen if falls else over)
     assert server.plant.tick == (1 + FALL_LINGER_MS if falls else 2000)

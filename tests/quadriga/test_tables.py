@@ -9,10 +9,10 @@ from quadriga.tables import Table, align_columns, print_tables, printable
 
 def test_control_characters_do_not_reach_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     print_tables([Table("Events", ("what", "said"), (("stop", "\x1b]0;mine\x07\x1b[2J done"),))])
-    said = capsys.readouterr().out
-    assert "done" in said
-    assert "\x1b" not in said
-    assert "\x07" not in said
+    output = capsys.readouterr().out
+    assert "done" in output
+    assert "\x1b" not in output
+    assert "\x07" not in output
 
 
 def test_a_row_of_columns_is_one_line_that_a_terminal_only_shows() -> None:

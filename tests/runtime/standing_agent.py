@@ -40,7 +40,7 @@ def run(config: Config, robot: str) -> None:
         while not (stopped() or ended):
             packet = bus.get(POLL)
             if packet is None:
-                ended = SIM not in bus.present(HERE)
+                ended = SIM not in bus.members_at(HERE)
                 continue
             newest = None
             for key, payload in (packet, *bus.drain()):

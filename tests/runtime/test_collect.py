@@ -64,9 +64,9 @@ def test_an_interrupted_collection(tmp_path: Path, number: signal.Signals, statu
         os.killpg(collection.pid, number)
     else:
         collection.send_signal(number)
-    _, said = collection.communicate(timeout=WAIT)
+    _, errors = collection.communicate(timeout=WAIT)
     assert collection.returncode == status
-    assert "Traceback" not in said
+    assert "Traceback" not in errors
     while any(map(alive, workers)) and monotonic() < deadline:
         sleep(0.05)
     assert not [pid for pid in workers if alive(pid)]

@@ -65,15 +65,15 @@ def test_in_real_time_the_world_waits_for_no_frozen_listener(
             bus = watcher(team)
             await_tick(bus, 10)
             listener.send_signal(signal.SIGSTOP)
-            heard, longest, last = 0, 0.0, monotonic()
-            while heard < 5:  # one push a second
+            received, longest, last = 0, 0.0, monotonic()
+            while received < 5:  # one push a second
                 packet = bus.get(WAIT)
                 assert packet is not None
                 longest, last = max(longest, monotonic() - last), monotonic()
                 if packet[0] == EVENT.key(TEAM):
                     event = decode(packet[1], Event)
                     assert event.kind != "stop", event.detail
-                    heard += event.kind == "push"
+                    received += event.kind == "push"
         finally:
             listener.kill()
         running.watch(lambda: True)
@@ -167,17 +167,17 @@ def test_an_emergency_stop_waits_for_nobody(make_team: Make, watcher: Watcher) -
         stop = subprocess.Popen(
             [*launch.QUADRIGA, "estop", "--config", str(file)], stderr=subprocess.PIPE, text=True
         )
-        deadline, heard = monotonic() + WAIT, False
-        while not heard and monotonic() < deadline:
+        deadline, received = monotonic() + WAIT, False
+        while not received and monotonic() < deadline:
             packet = bus.get(1.0)
-            heard = packet is not None and packet[0].endswith("/estop")
-        assert heard
+            received = packet is not None and packet[0].endswith("/estop")
+        assert received
         assert stop.poll() is None, "it still looks for r3"
-        _, said = stop.communicate(timeout=WAIT)
+        _, errors = stop.communicate(timeout=WAIT)
         running.watch(lambda: True)
     assert stop.returncode == 2
-    assert "no r3 on the bus after 5 s" in said
-    assert "r1, r2 heard it at once" in said
+    assert "no r3 on the bus after 5 s" in errors
+    assert "r1, r2 heard it at once" in errors
 
 
 @pytest.mark.parametrize("verb", [("sim",), ("operate",), ("record", "-o", "RUN")])
@@ -187,12 +187,12 @@ def test_a_process_alone_names_the_absent(make_team: Make, verb: tuple[str, ...]
     file.write_text(to_toml(team.config), encoding="utf-8")
     words = [str(team.folder / "alone.mcap") if word == "RUN" else word for word in verb]
     row = launch.ProcessSpec("alone", (*launch.QUADRIGA, *words, "--config", str(file)), 5.0)
-    status, said = run_alone(row)
+    status, errors = run_alone(row)
     assert status == 2
     others = {"sim": "operator, r1, r2", "operate": "r1, r2, sim"}
     absent = others.get(verb[0], "operator, r1, r2, sim")
-    assert f"no {absent} at stage 'here' after 0.5 s" in said
-    assert said.count("\n") == 1
+    assert f"no {absent} at stage 'here' after 0.5 s" in errors
+    assert errors.count("\n") == 1
 
 
 def test_a_process_that_waits_for_the_others_can_be_stopped(make_team: Make) -> None:

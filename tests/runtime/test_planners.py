@@ -84,8 +84,9 @@ def first_difference(key: str, expected: list[bytes], got: list[bytes]) -> str:
             kind = {"command": Command, "measurement": Measurement, "plan": Plan}[
                 key.rpartition("/")[2]
             ]
-            said = [payload and decode(payload, kind) for payload in (one, other)]
-            return f"{key}, message {index}: {said[0]} in one process, {said[1]} over the bus"
+            messages = [payload and decode(payload, kind) for payload in (one, other)]
+            alone, bus = messages
+            return f"{key}, message {index}: {alone} in one process, {bus} over the bus"
     return ""
 
 

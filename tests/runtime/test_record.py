@@ -53,14 +53,14 @@ def test_recorders_die_beside_a_team_that_walks_on(make_team: Make) -> None:
             await_size(late, (late.stat().st_size if late.exists() else 0) + 100_000)
             os.kill(running.pids["sim"], signal.SIGTERM)
             running.watch(lambda: False)  # raises if any process of the team has failed
-        said = [other.communicate(timeout=WAIT)[1] for other in others]
+        errors = [other.communicate(timeout=WAIT)[1] for other in others]
     finally:
         for other in others:
             other.kill()
             other.wait()
-    assert [other.returncode for other in others] == [2, -signal.SIGKILL, 0], said
-    assert "got File too large, expected room for the recording" in said[0]
-    assert "joined late, has" in said[2]
+    assert [other.returncode for other in others] == [2, -signal.SIGKILL, 0], errors
+    assert "got File too large, expected room for the recording" in errors[0]
+    assert "joined late, has" in errors[2]
     recording = team.recording()
     recording.require_whole()
     end = list(recording.messages(Event))[-1]

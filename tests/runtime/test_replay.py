@@ -118,9 +118,9 @@ def test_a_planted_bit_in_a_state_is_found_at_its_tick(
     assert main(["replay", str(run), "--robot", "r1"]) == 0, "no input of r1"
     capsys.readouterr()
     assert main(["replay", str(run), "--robot", "r2"]) == 1
-    said = capsys.readouterr().out
-    assert "first difference: tick 702, command.tau[" in said
-    assert "inputs there: state of tick 702; mode walk" in said
+    output = capsys.readouterr().out
+    assert "first difference: tick 702, command.tau[" in output
+    assert "inputs there: state of tick 702; mode walk" in output
     saved = tmp_path / "replay-r2-702-command.npz"
     qp = load_qp(saved)
     np.testing.assert_allclose(qp.solve(), qp.x, atol=1e-6)
@@ -162,9 +162,9 @@ def test_a_change_is_drawn_instead_of_failing(
 ) -> None:
     options = ["--robot", "r2", "--set", "planner.R=[0.1,0.1,0.1]", "--out", str(tmp_path)]
     assert main(["replay", str(lockstep), *options]) == 0
-    said = capsys.readouterr().out
-    assert "changed: planner.R (0.2, 0.2, 0.05) → (0.1, 0.1, 0.1)" in said
-    assert "first difference: tick 320, plan.u[" in said
+    output = capsys.readouterr().out
+    assert "changed: planner.R (0.2, 0.2, 0.05) → (0.1, 0.1, 0.1)" in output
+    assert "first difference: tick 320, plan.u[" in output
     assert (tmp_path / "replay-r2.png").stat().st_size > 20_000
     # A value that is the recorded one is no change.
     assert main(["replay", str(lockstep), "--robot", "r2", "--set", "planner.N=25"]) == 0
@@ -183,12 +183,12 @@ LOST: dict[str, tuple[str, int, int, str]] = {
 def test_a_message_the_recorder_lost_is_named(
     lockstep: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
-    key, made, tick, said = LOST[name]
+    key, made, tick, output = LOST[name]
     run = tmp_path / "run.mcap"
     shutil.copy(lockstep.parent / "predictor.npz", tmp_path)
     rewritten(lockstep, run, without(key, made))
     assert main(["replay", str(run), "--robot", "r2"]) == 1
-    assert f"input missing from the recording: {said} (tick {tick})" in capsys.readouterr().out
+    assert f"input missing from the recording: {output} (tick {tick})" in capsys.readouterr().out
 
 
 def test_a_command_the_recorder_lost_is_counted_and_the_rest_is_equal(
@@ -231,8 +231,8 @@ def check_exact_up_to_a_loss(path: Path, outcome: ReplayOutcome) -> None:
     assert verdict.first is None
     assert not verdict.differing
     for kind in (Command, Measurement, Plan):
-        said = [m for m in recording.messages(kind, outcome.robot) if m.tick <= verdict.last]
-        assert verdict.equal[kind.__name__.lower()] == len(said)
+        output = [m for m in recording.messages(kind, outcome.robot) if m.tick <= verdict.last]
+        assert verdict.equal[kind.__name__.lower()] == len(output)
     for _, name in verdict.missing:
         tick = int(name.rpartition("tick ")[2]) if name.startswith("state of") else None
         assert tick not in {m.tick for m in recording.messages(State, outcome.robot)}

@@ -31,6 +31,6 @@ def test_a_walk_with_a_frozen_robot_comes_out_equal(
         os.kill(running.pids["sim"], signal.SIGTERM)
         running.watch(lambda: False)
     assert main(["resim", str(team.folder / "run.mcap")]) == 0
-    said = capsys.readouterr().out
-    assert "equal to the byte" in said
-    assert "only" not in said
+    output = capsys.readouterr().out
+    assert "equal to the byte" in output
+    assert "only" not in output

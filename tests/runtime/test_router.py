@@ -74,18 +74,18 @@ def test_a_router_stays_until_it_is_told_to_leave(make_team: Make) -> None:
 def test_a_router_for_one_walk_does_not_wait_for_ever(make_team: Make) -> None:
     team = make_team(bus__barrier_timeout=0.1)
     with router(team, "--once") as process:
-        _, said = process.communicate(timeout=WAIT)
+        _, errors = process.communicate(timeout=WAIT)
     assert process.returncode == 2
-    assert "barrier of team 'team', seen by router: got no sim at stage 'ready'" in said
+    assert "barrier of team 'team', seen by router: got no sim at stage 'ready'" in errors
 
 
 def test_a_port_that_is_taken(make_team: Make) -> None:
     team = make_team()
     with Bus.route(team.config.bus.endpoint, "other"), router(team) as process:
-        _, said = process.communicate(timeout=WAIT)
+        _, errors = process.communicate(timeout=WAIT)
     assert process.returncode == 2
-    assert "another team or program listens there" in said
-    assert said.count("\n") == 1
+    assert "another team or program listens there" in errors
+    assert errors.count("\n") == 1
 
 
 def test_the_walk_ends_when_the_router_dies(make_team: Make) -> None:
@@ -115,10 +115,10 @@ def left(pids: dict[str, int]) -> set[str]:
 def test_nobody_waits_for_a_router_for_ever(make_team: Make, name: str) -> None:
     team = make_team(bus__mode="client", bus__barrier_timeout=0.3, recorder__enabled=True)
     row = next(row for row in team.rows(standing=False) if row.name == name)
-    status, said = run_alone(row)
+    status, errors = run_alone(row)
     assert status == 2
-    assert "no router there" in said
-    assert said.count("\n") == 1
+    assert "no router there" in errors
+    assert errors.count("\n") == 1
 
 
 def test_waiting_for_a_router_can_be_interrupted(make_team: Make) -> None:

@@ -77,9 +77,9 @@ def start(out: Path) -> Iterator[Start]:
 
 def test_a_walk_ends_with_its_figures_and_status_0(out: Path, start: Start) -> None:
     walk = start("--seconds", "1.5")
-    said, complained = walk.communicate(timeout=4 * WAIT)
-    assert (walk.returncode, complained) == (0, "")
-    assert "falls" in said
+    output, errors = walk.communicate(timeout=4 * WAIT)
+    assert (walk.returncode, errors) == (0, "")
+    assert "falls" in output
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["fell"], summary["gaps"], summary["robots"]) == (False, 0, 2)
     assert len(list(Recording(out / "run.mcap").messages(Command, "r2"))) == 1500
@@ -89,9 +89,9 @@ def test_a_walk_ends_with_its_figures_and_status_0(out: Path, start: Start) -> N
 def test_a_fall_is_status_1_even_without_a_recording(start: Start) -> None:
     options = ("--seconds", "9", "--push", "r1:2000:90:0.1:0.2", "--set", "recorder.enabled=false")
     walk = start(*options)
-    said, _ = walk.communicate(timeout=4 * WAIT)
+    output, _ = walk.communicate(timeout=4 * WAIT)
     assert walk.returncode == 1
-    assert "fall r1" in said
+    assert "fall r1" in output
 
 
 def test_a_killed_agent_is_named_and_status_1(out: Path, start: Start) -> None:
@@ -99,9 +99,9 @@ def test_a_killed_agent_is_named_and_status_1(out: Path, start: Start) -> None:
     await_walking(out)
     agent = next(pid for pid, words in processes_of(out).items() if "--robot r2" in words)
     os.kill(agent, signal.SIGKILL)
-    _, complained = walk.communicate(timeout=WAIT)
+    _, errors = walk.communicate(timeout=WAIT)
     assert walk.returncode == 1
-    assert "process r2: got signal 9" in complained
+    assert "process r2: got signal 9" in errors
     assert not processes_of(out)
 
 
@@ -112,9 +112,9 @@ def test_ctrl_c_and_sigterm_stop_all_cleanly(
     walk = start("--seconds", "600")
     await_walking(out)
     walk.send_signal(number)
-    said, complained = walk.communicate(timeout=WAIT)
-    assert (walk.returncode, complained) == (130, "")
-    assert "interrupted; what was recorded is in" in said
+    output, errors = walk.communicate(timeout=WAIT)
+    assert (walk.returncode, errors) == (130, "")
+    assert "interrupted; what was recorded is in" in output
     assert not processes_of(out)
     recording = Recording(out / "run.mcap")
     ticks = [m.tick for m in recording.messages(Command, "r1")]
@@ -139,7 +139,7 @@ def test_a_folder_with_a_recording_is_not_overwritten(out: Path, start: Start) -
     out.mkdir()
     (out / "run.mcap").write_bytes(b"precious")
     walk = start()
-    _, complained = walk.communicate(timeout=WAIT)
+    _, errors = walk.communicate(timeout=WAIT)
     assert walk.returncode == 2
-    assert "expected a new folder" in complained
+    assert "expected a new folder" in errors
     assert (out / "run.mcap").read_bytes() == b"precious"

@@ -23,6 +23,7 @@ from quadriga.shared.runtime.record import record
 
 UNCONSTRAINED: Final = "unconstrained"
 CONSTRAINED: Final = "constrained"
+INFEASIBLE: Final = "infeasible"
 
 
 class Goal(NamedTuple):
@@ -145,4 +146,4 @@ class WholeBodySolution:
     @property
     def solved(self) -> bool:
         """Whether the torques may be used."""
-        return not self.status.startswith("infeasible")
+        return self.status in (UNCONSTRAINED, CONSTRAINED)

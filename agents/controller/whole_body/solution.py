@@ -12,6 +12,7 @@ from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms
 from quadriga.agents.controller.whole_body.assembly import build
 from quadriga.agents.controller.whole_body.problem import (
     CONSTRAINED,
+    INFEASIBLE,
     SOLUTION_SIZE,
     UNCONSTRAINED,
     Goal,
@@ -21,6 +22,7 @@ from quadriga.agents.controller.whole_body.problem import (
 )
 from quadriga.shared.robot.a1 import N_JOINTS, TORQUE_LIMIT, Array
 from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.wire.codes import with_detail
 
 _TOLERANCE: Final = 1e-9
 _UNBOUNDED: Final = 1e30  # DAQP's infinity
@@ -41,7 +43,7 @@ def solve(problem: WholeBodyProblem) -> tuple[Array, str]:
     if feasible:
         return tau, UNCONSTRAINED
     if not np.isfinite(tau).all():
-        return np.zeros(N_JOINTS), "infeasible:singular"
+        return np.zeros(N_JOINTS), with_detail(INFEASIBLE, "singular")
     rows = N_JOINTS + len(problem.c)
     upper = np.full(rows, _UNBOUNDED)
     lower = np.empty(rows)
@@ -52,7 +54,7 @@ def solve(problem: WholeBodyProblem) -> tuple[Array, str]:
         problem.H, problem.g, problem.C, upper, lower, np.zeros(rows, dtype=np.intc)
     )
     if flag != _OPTIMAL or not np.isfinite(tau).all():
-        return np.zeros(N_JOINTS), f"infeasible:{flag}"
+        return np.zeros(N_JOINTS), with_detail(INFEASIBLE, str(flag))
     return np.clip(tau, -TORQUE_LIMIT, TORQUE_LIMIT), CONSTRAINED
 
 

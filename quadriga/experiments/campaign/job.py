@@ -60,13 +60,13 @@ def walk_trial(
         )
     config, begun = with_seed(job.config, job.seed), monotonic()
     try:
-        found = job.fitted.refused or (walk or _evaluate)(config, job.fitted)
+        result = job.fitted.refused or (walk or _evaluate)(config, job.fitted)
     except PredictorFileError:
         raise  # a row would be kept, and the trial never be walked
     except PredictorError as error:
-        found = reason(error)
+        result = reason(error)
     shas = (config_sha256(config), job.fitted.sha256)
-    return build_outcome(job.group, job.seed, shas, found, monotonic() - begun, job.versions)
+    return build_outcome(job.group, job.seed, shas, result, monotonic() - begun, job.versions)
 
 
 def _evaluate(config: Config, fitted: Fitted) -> Figures:

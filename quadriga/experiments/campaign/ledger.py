@@ -52,8 +52,8 @@ class Ledger:
                 f"--out {folder}", "a folder in use", "one of no running campaign"
             ) from None
         try:
-            kept = read_manifest(folder) if (folder / FILE).is_file() else None
-            self.manifest = manifest if kept is None else kept.merged(manifest, folder)
+            before = read_manifest(folder) if (folder / FILE).is_file() else None
+            self.manifest = manifest if before is None else before.merge(manifest, folder)
             self.rows = read_rows(folder, self.manifest)
             write_text(folder / FILE, manifest_text(self.manifest))
             _mend(folder / ROWS, self.manifest)
@@ -129,7 +129,7 @@ def rows_of(text: bytes, name: str, manifest: Manifest) -> list[TrialOutcome]:
         ConfigError: a line is no row, or a trial stands there twice.
     """
     whole = text[: text.rfind(b"\n") + 1].decode("utf-8", errors="replace")
-    found: dict[tuple[object, int], TrialOutcome] = {}
+    rows_by_trial: dict[tuple[object, int], TrialOutcome] = {}
     lines = csv.reader(io.StringIO(whole))
     try:
         for cells in lines:
@@ -138,11 +138,11 @@ def rows_of(text: bytes, name: str, manifest: Manifest) -> list[TrialOutcome]:
                     raise ValueError("other columns")
                 continue
             row = from_cells(cells)
-            if (row.group, row.seed) in found:
+            if (row.group, row.seed) in rows_by_trial:
                 raise ValueError(f"a second row of {row.group.name}, seed {row.seed}")
             if row.versions != manifest.versions:
                 raise ValueError(f"a trial with code and versions {row.versions}")
-            found[row.group, row.seed] = row
+            rows_by_trial[row.group, row.seed] = row
     except (ValueError, csv.Error) as error:
         raise ConfigError(
             f"{name}, line {lines.line_num}",
@@ -150,7 +150,7 @@ def rows_of(text: bytes, name: str, manifest: Manifest) -> list[TrialOutcome]:
             "a row of this campaign",
             "edited by hand?",
         ) from None
-    return list(found.values())
+    return list(rows_by_trial.values())
 
 
 def rows_text(rows: Sequence[TrialOutcome], manifest: Manifest) -> str:

@@ -114,8 +114,8 @@ class Manifest:
                 _UNKNOWN if same is None else _REMEDY,
             )
 
-    def merged(self, more: Manifest, folder: Path) -> Manifest:
-        """This one with more to walk.
+    def merge(self, more: Manifest, folder: Path) -> Manifest:
+        """This manifest with the trials of another one added.
 
         Raises:
             ConfigError: trials of the two would not belong together.
@@ -127,10 +127,10 @@ class Manifest:
             raise ConfigError(name, f"trials with swept keys {mine}", f"{theirs}", _REMEDY)
         groups = {entry.group: entry for entry in self.groups}
         for entry in more.groups:
-            kept = groups.setdefault(entry.group, entry)
+            known = groups.setdefault(entry.group, entry)
             for what, old, new in (
-                ("configuration", kept.config_sha256, entry.config_sha256),
-                ("predictor", kept.predictor_sha256, entry.predictor_sha256),
+                ("configuration", known.config_sha256, entry.config_sha256),
+                ("predictor", known.predictor_sha256, entry.predictor_sha256),
             ):
                 if old != new:
                     raise ConfigError(
@@ -139,7 +139,7 @@ class Manifest:
                         f"of {new[:12]}",
                         _REMEDY,
                     )
-            groups[entry.group] = replace(kept, seeds=_union(kept.seeds, entry.seeds))
+            groups[entry.group] = replace(known, seeds=_union(known.seeds, entry.seeds))
         return replace(
             more,
             typed=(*self.typed, *(t for t in more.typed if t not in self.typed)),

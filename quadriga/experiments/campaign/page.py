@@ -91,8 +91,8 @@ def _build_panels(worlds: Sequence[World], k: int, axis: str) -> list[SweepPanel
         others = (*world[: 1 + k], *world[2 + k :])
         points.setdefault(others, []).append((world[1 + k], world))
     return [
-        SweepPanel(" · ".join(rest), axis, sorted(found, key=lambda point: order_values(point[:1])))
-        for rest, found in points.items()
+        SweepPanel(" · ".join(rest), axis, sorted(same, key=lambda point: order_values(point[:1])))
+        for rest, same in points.items()
     ]
 
 

@@ -85,11 +85,11 @@ def record_trial(config: Config, run_dir: Path, fitted: Fitted) -> Figures:
         ProcessError: a process failed.
     """
     (run_dir / RECORDING).unlink(missing_ok=True)  # of a walk that was interrupted
-    found = compute_figures(walk_over_bus(config, run_dir, fitted.path, fitted.sha256))
+    figures = compute_figures(walk_over_bus(config, run_dir, fitted.path, fitted.sha256))
     if fitted.path is not None:
         copy_predictor(fitted.path, run_dir)
     report_folder(run_dir, pictures=False, console=Console(quiet=True))
-    return found
+    return figures
 
 
 def run_dir_of(folder: Path, group: Group, seed: int) -> Path:
@@ -97,8 +97,8 @@ def run_dir_of(folder: Path, group: Group, seed: int) -> Path:
     return folder / RECORDINGS / f"{group.name}-{seed}"
 
 
-def _check_same(found: Figures, row: TrialOutcome, run_dir: Path) -> None:
-    again = min(found.fallen.values(), default=None), found.distance
+def _check_same(figures: Figures, row: TrialOutcome, run_dir: Path) -> None:
+    again = min(figures.fallen.values(), default=None), figures.distance
     before = row.time_to_fall_s, row.distance_m
     if again != before:
         raise ProcessError(

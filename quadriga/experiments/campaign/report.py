@@ -133,8 +133,8 @@ def read_report(folder: Path, baseline: str | None, worst: int) -> CampaignRepor
         versions=(manifest.versions,),
     )
     by_group = {group: [row for row in rows if row.group == group] for group in wanted}
-    found = {group: mine for group, mine in by_group.items() if mine}
-    return CampaignReport(folder, manifest, found, results, worst)
+    rows_by_group = {group: mine for group, mine in by_group.items() if mine}
+    return CampaignReport(folder, manifest, rows_by_group, results, worst)
 
 
 def _order_groups(manifest: Manifest) -> dict[Group, int]:

@@ -95,9 +95,9 @@ def walk_campaign(
         if todo:
             with (
                 TrialProgress(console, wanted, wanted - len(todo)) as progress,
-                closing(walk(todo)) as found,
+                closing(walk(todo)) as outcomes,
             ):
-                for _, row in found:
+                for _, row in outcomes:
                     ledger.append(row)
                     progress.advance(row)
         write_parquet(out / PARQUET, ledger.rows, ledger.manifest)

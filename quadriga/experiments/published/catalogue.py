@@ -20,8 +20,8 @@ _SUFFIX: Final = ".toml"
 
 def list_names() -> tuple[str, ...]:
     """The experiments there are, in the order of the page; new ones at its end."""
-    found = sorted(file.stem for file in FOLDER.glob(f"*{_SUFFIX}"))
-    return tuple(sorted(found, key=lambda n: _ORDER.index(n) if n in _ORDER else len(_ORDER)))
+    names = sorted(file.stem for file in FOLDER.glob(f"*{_SUFFIX}"))
+    return tuple(sorted(names, key=lambda n: _ORDER.index(n) if n in _ORDER else len(_ORDER)))
 
 
 def load_experiments(given: Sequence[str]) -> tuple[list[Experiment], list[str]]:

@@ -67,7 +67,7 @@ def read_experiment(path: Path) -> Experiment:
     table.check_one("baseline", baseline, known)
     names = _scenarios(table)
     labels = [scenarios.label(name) for name in names]
-    published = _published(table.table("publish", _TABLES), compared=len(variants) > 1)
+    published = _read_published(table.table("publish", _TABLES), compared=len(variants) > 1)
     return Experiment(
         name=path.stem,
         title=table.text("title"),
@@ -125,14 +125,14 @@ class _TomlTable:
     ) -> tuple[str, ...]:
         """Several texts, each once, or one of them alone."""
         value = self._body.get(name, default)
-        found = [value] if isinstance(value, str) else value
-        if not isinstance(found, (list, tuple)) or not all(isinstance(v, str) for v in found):
+        values = [value] if isinstance(value, str) else value
+        if not isinstance(values, (list, tuple)) or not all(isinstance(v, str) for v in values):
             raise ConfigError(f"{self.where}: {name}", repr(value), "a list of texts")
-        for one in found if known else ():
+        for one in values if known else ():
             self.check_one(name, one, known)
-        if len(set(found)) < len(found):
+        if len(set(values)) < len(values):
             raise ConfigError(f"{self.where}: {name}", repr(value), "each once")
-        return tuple(found)
+        return tuple(values)
 
     def table(self, name: str, known: Collection[str]) -> _TomlTable:
         return _TomlTable(f"{self.where}: {name}", self._body.get(name, {}), known)
@@ -164,19 +164,19 @@ def _variants(table: _TomlTable) -> tuple[Variant, ...]:
     common = flatten(table.mapping("common"))
     planners = table.texts("planners", ())
     with _name_file_in_errors(table, "planners"):
-        found = list(parse_variants([",".join(planners)], None)) if planners else []
+        variants = list(parse_variants([",".join(planners)], None)) if planners else []
     with _name_file_in_errors(table, "predictors"):
-        found = list(combine_with_predictors(found, table.texts("predictors", ())))
+        variants = list(combine_with_predictors(variants, table.texts("predictors", ())))
     for name, keys in read_keys(table.mapping("variants"), f"{table.where}: variants").items():
-        found.append(Variant(name, keys))
-    names = [variant.name for variant in found]
+        variants.append(Variant(name, keys))
+    names = [variant.name for variant in variants]
     if not names or len(set(names)) < len(names):
         raise ConfigError(
             f"{table.where}: planners and variants",
             ", ".join(names) or "none",
             "at least one, of different names",
         )
-    return tuple(Variant(variant.name, {**common, **variant.keys}) for variant in found)
+    return tuple(Variant(variant.name, {**common, **variant.keys}) for variant in variants)
 
 
 @contextmanager
@@ -206,17 +206,17 @@ def _parts(table: _TomlTable, names: tuple[str, ...]) -> tuple[Part, ...]:
         return (Part("", names),)
     labels = {scenarios.label(name): name for name in names}
     swept = table.table("sweep", labels)
-    found = []
+    parts = []
     for label, name in labels.items():
         mine = swept.table(label, ("keys", "axis"))
         keys = mine.text("keys")
         with _name_file_in_errors(mine, "keys"):
             sweep = parse_sweep(keys)
-        found.append(Part(label, (name,), sweep, mine.text("axis", sweep.name)))
-    return tuple(found)
+        parts.append(Part(label, (name,), sweep, mine.text("axis", sweep.name)))
+    return tuple(parts)
 
 
-def _published(table: _TomlTable, *, compared: bool) -> Published:
+def _read_published(table: _TomlTable, *, compared: bool) -> Published:
     return Published(
         outcome=table.texts("outcome", _OUTCOME, COLUMNS),
         falls=table.yes("falls", compared),

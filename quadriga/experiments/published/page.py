@@ -81,8 +81,8 @@ def build_overview(entries: Sequence[PageEntry], link: str) -> str:
         experiment = entry.experiment
         have, of = count_trials(experiment, entry.results)
         head = (f"[{experiment.name}]({link}{experiment.name})", _count(have, of))
-        found = judge_requirements(experiment, entry.results)
-        for k, verdict in enumerate(found):
+        verdicts = judge_requirements(experiment, entry.results)
+        for k, verdict in enumerate(verdicts):
             rows.append(
                 (
                     *(head if not k else ("", "")),
@@ -91,7 +91,7 @@ def build_overview(entries: Sequence[PageEntry], link: str) -> str:
                     format_word(verdict),
                 )
             )
-        if not found:
+        if not verdicts:
             rows.append((*head, "nothing: a comparison", NOTHING, NOTHING))
     columns = ("experiment", "trials", "required", "found, and where it stands worst", "verdict")
     return format_table(Table("", columns, tuple(rows)), left=len(columns))
@@ -111,14 +111,14 @@ def format_table(table: Table, left: int = 1) -> str:
 
 def build_tables(experiment: Experiment, results: Results) -> list[Table]:
     """Every table that is published of an experiment and that has a row."""
-    published, found = experiment.published, [build_requirement_table(experiment, results)]
+    published, tables = experiment.published, [build_requirement_table(experiment, results)]
     if published.outcome:
-        found.append(build_walks_table(results, published.outcome))
+        tables.append(build_walks_table(results, published.outcome))
     if published.falls:
-        found.append(build_falls_table(results))
+        tables.append(build_falls_table(results))
     if published.ratios:
-        found.append(build_ratios_table(results, published.ratios))
-    return [table for table in found if table.rows]
+        tables.append(build_ratios_table(results, published.ratios))
+    return [table for table in tables if table.rows]
 
 
 def _section(entry: PageEntry) -> Iterator[str]:
@@ -195,5 +195,5 @@ def replace_results(text: str, table: str) -> str | None:
     if text.count(BEGIN) != 1 or text.count(END) != 1:
         return None
     head, _, rest = text.partition(BEGIN)
-    _, found, tail = rest.partition(END)
-    return f"{head}{table}{tail}" if found else None
+    _, marker, tail = rest.partition(END)
+    return f"{head}{table}{tail}" if marker else None

@@ -112,23 +112,23 @@ def read_campaigns(experiment: Experiment, runs: Path) -> dict[Part, CampaignTri
     Raises:
         ConfigError: a folder is not what was written there.
     """
-    found: dict[Part, CampaignTrials] = {}
+    campaigns: dict[Part, CampaignTrials] = {}
     for part in experiment.parts:
         folder = experiment.folder(runs, part)
         if (folder / FILE).is_file():
             manifest = read_manifest(folder)
-            found[part] = (manifest, read_rows(folder, manifest))
-    return found
+            campaigns[part] = (manifest, read_rows(folder, manifest))
+    return campaigns
 
 
 def _draw_figures(experiment: Experiment, results: Results, into: Path) -> list[str]:
     """Figures that there is something to draw in, as paths from the page."""
-    found = []
+    paths = []
     (into / FIGURES).mkdir(parents=True, exist_ok=True)
     for name in experiment.published.figures:
         path = into / FIGURES / f"{experiment.name}-{name}.png"
         with atomic_write(path) as partial:
             drawn = draw_figure(name, experiment, results, partial)
         if drawn:
-            found.append(path.relative_to(into / PAGE.parent).as_posix())
-    return found
+            paths.append(path.relative_to(into / PAGE.parent).as_posix())
+    return paths

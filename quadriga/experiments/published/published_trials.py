@@ -63,10 +63,10 @@ def read_published_trials(experiment: Experiment, into: Path) -> Campaigns:
     Raises:
         ConfigError: a file is not what was written there.
     """
-    found = {part: read_published_manifest(experiment, part, into) for part in experiment.parts}
+    manifests = {part: read_published_manifest(experiment, part, into) for part in experiment.parts}
     return {
         part: (manifest, _rows(experiment, part, into, manifest))
-        for part, manifest in found.items()
+        for part, manifest in manifests.items()
         if manifest is not None
     }
 
@@ -123,7 +123,7 @@ def read_published_manifest(experiment: Experiment, part: Part, into: Path) -> M
         ConfigError: the file is not what was written there.
     """
     path = experiment.folder(into / TRIALS, part) / f"{FILE}.gz"
-    return manifest_of(_unpacked(path), str(path)) if path.is_file() else None
+    return manifest_of(_unpack(path), str(path)) if path.is_file() else None
 
 
 def _count(campaigns: Campaigns) -> int:
@@ -132,7 +132,7 @@ def _count(campaigns: Campaigns) -> int:
 
 def _rows(experiment: Experiment, part: Part, into: Path, manifest: Manifest) -> list[TrialOutcome]:
     path = experiment.folder(into / TRIALS, part) / f"{ROWS}.gz"
-    return rows_of(_unpacked(path), str(path), manifest)
+    return rows_of(_unpack(path), str(path), manifest)
 
 
 def _pack(path: Path, body: bytes) -> None:
@@ -145,7 +145,7 @@ def _pack(path: Path, body: bytes) -> None:
         write_bytes(path, gzip.compress(body, mtime=0))
 
 
-def _unpacked(path: Path) -> bytes:
+def _unpack(path: Path) -> bytes:
     try:
         return gzip.decompress(path.read_bytes())
     except (OSError, EOFError, zlib.error) as error:

@@ -20,10 +20,10 @@ _MARK: Final = {"met": "met", "missed": "**missed**", "open": "open"}
 
 def build_requirement_table(experiment: Experiment, results: Results) -> Table:
     """Requirements as rows, worlds as columns."""
-    found = judge_requirements(experiment, results)
-    worlds = list(dict.fromkeys(one.world for verdict in found for one in verdict.findings))
+    verdicts = judge_requirements(experiment, results)
+    worlds = list(dict.fromkeys(one.world for verdict in verdicts for one in verdict.findings))
     rows = []
-    for verdict in found:
+    for verdict in verdicts:
         cells = {finding.world: format_finding(verdict, finding) for finding in verdict.findings}
         rows.append(
             (

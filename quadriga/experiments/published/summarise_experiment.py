@@ -23,11 +23,11 @@ def summarise_experiment(experiment: Experiment, campaigns: Sequence[CampaignTri
     keys = {variant.name: dict(variant.keys) for variant in experiment.variants}
     groups, seeds = _groups_by_sweep(experiment), set(experiment.seeds)
     rows: list[TrialOutcome] = []
-    for manifest, found in campaigns:
+    for manifest, trials in campaigns:
         same = {name for name in keys if manifest.variants.get(name) == keys[name]}
         mine = groups.get(tuple(sweep.name for sweep in manifest.sweeps), set())
         rows += [
-            row for row in found if row.group in mine and row.variant in same and row.seed in seeds
+            row for row in trials if row.group in mine and row.variant in same and row.seed in seeds
         ]
     worlds = tuple(experiment.worlds())
     sweeps = any(part.sweep for part in experiment.parts)
@@ -59,11 +59,11 @@ def count_trials(experiment: Experiment, results: Results) -> tuple[int, int]:
 
 def _groups_by_sweep(experiment: Experiment) -> dict[tuple[str, ...], set[Group]]:
     """Its groups by what is swept in them: the same values of another key are other worlds."""
-    found: dict[tuple[str, ...], set[Group]] = {}
+    groups: dict[tuple[str, ...], set[Group]] = {}
     for part in experiment.parts:
         worlds = set(part.worlds())
         swept = tuple(sweep.name for sweep in part.sweeps)
-        found.setdefault(swept, set()).update(
+        groups.setdefault(swept, set()).update(
             group for group in experiment.groups() if group.world in worlds
         )
-    return found
+    return groups

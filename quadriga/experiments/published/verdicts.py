@@ -79,9 +79,11 @@ def judge_requirements(experiment: Experiment, results: Results) -> list[Require
     ]
 
 
-def compute_margin(requirement: Requirement, found: Interval) -> float | None:
+def compute_margin(requirement: Requirement, interval: Interval) -> float | None:
     """How far a figure is on the right side of the limit; None if it has no such bound."""
-    held = {"value": found.value, "lower": found.low, "upper": found.high}[requirement.bound]
+    held = {"value": interval.value, "lower": interval.low, "upper": interval.high}[
+        requirement.bound
+    ]
     if held is None:
         return None
     return held - requirement.limit if requirement.sense == "least" else requirement.limit - held
@@ -99,8 +101,8 @@ def describe_requirement(requirement: Requirement, baseline: str) -> str:
 
 def _worlds(experiment: Experiment, requirement: Requirement) -> Sequence[World]:
     each = experiment.worlds() if requirement.each else []
-    found = [w for w in each if not requirement.scenarios or w[0] in requirement.scenarios]
-    return [*found, POOLED] if requirement.pooled else found
+    chosen = [w for w in each if not requirement.scenarios or w[0] in requirement.scenarios]
+    return [*chosen, POOLED] if requirement.pooled else chosen
 
 
 def _judge(

@@ -56,7 +56,7 @@ def check_folders(experiment: Experiment, runs: Path) -> None:
             read_manifest(folder).check_versions(code_and_libraries(), folder)
 
 
-def take_up_published(
+def unpack_published(
     experiment: Experiment,
     plans: Sequence[PartPlan],
     into: Path,
@@ -83,7 +83,7 @@ def take_up_published(
         try:
             manifest.check_versions(code_and_libraries(), folder)  # before anything is collected
             fitted = prepare_predictors(plan.configs.values(), console)
-            manifest.merged(build_manifest(plan, fitted, typed), folder)
+            manifest.merge(build_manifest(plan, fitted, typed), folder)
         except ConfigError as error:
             raise ConfigError(
                 f"--from-published: {experiment.name}",

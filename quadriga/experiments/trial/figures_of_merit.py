@@ -102,7 +102,7 @@ def compute_figures(walk: Walk) -> Figures:
     squares[OVER_STANCE_FEET] = _height_squares(traces, begin, end)
     outputs = _output_cost(planner.Q, squares)
     forces = _mean(_force_cost(walk, begin, end, np.tile(planner.R, N_LEGS)))
-    every = [status for found in traces.statuses.values() for status in found]
+    every = [status for of_robot in traces.statuses.values() for status in of_robot]
     planner_ms = np.concatenate([np.zeros(0), *(status.planner_ms for status in every)])
     return Figures(
         seconds=end / 1000.0,
@@ -142,7 +142,7 @@ def _find_falls(traces: Traces) -> dict[str, float]:
 
 
 def _find_stops(traces: Traces, fallen: Mapping[str, float]) -> dict[str, str]:
-    last = {robot: found[-1] for robot, found in traces.statuses.items() if found}
+    last = {robot: of_robot[-1] for robot, of_robot in traces.statuses.items() if of_robot}
     return {r: s.reason for r, s in last.items() if s.reason and r not in fallen}
 
 
@@ -157,8 +157,8 @@ def _height_squares(traces: Traces, begin: int, end: int) -> float | None:
 
 def _output_cost(Q: Sequence[float], squares: Mapping[str, float | None]) -> float | None:
     """∑ q e², with the height over the stance feet: what the planner can do something about."""
-    found = [squares[OVER_STANCE_FEET], *(squares[name] for name in OUTPUTS[1:])]
-    terms = [q * square for q, square in zip(Q, found, strict=True) if square is not None]
+    ordered = [squares[OVER_STANCE_FEET], *(squares[name] for name in OUTPUTS[1:])]
+    terms = [q * square for q, square in zip(Q, ordered, strict=True) if square is not None]
     return sum(terms) if len(terms) == len(OUTPUTS) else None
 
 

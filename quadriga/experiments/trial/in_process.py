@@ -150,8 +150,8 @@ class _WalkLog:
                 np.array([[r.vx, r.vy, r.wz, r.height] for r in references]),
             ),
             measurements={
-                name: MeasurementTrace(ticks_of(found), np.array([s.y for s in found]))
-                for name, found in samples.items()
+                name: MeasurementTrace(ticks_of(of_robot), np.array([s.y for s in of_robot]))
+                for name, of_robot in samples.items()
             },
             plans={name: () for name in names},
             statuses=self._statuses(),
@@ -161,12 +161,12 @@ class _WalkLog:
 
     def _statuses(self) -> dict[str, tuple[Status, ...]]:
         """One status of each process, as of the end."""
-        found: dict[str, tuple[Status, ...]] = {}
+        statuses: dict[str, tuple[Status, ...]] = {}
         for name in (*robot_names(self._config.team.robots), PLANNER):
             out = None if self._last is None else self._last.outputs.get(name)
             mode, reason = ("", "") if out is None else (out.mode, out.reason)
             ms = np.array(self.planner_ms[name])
-            found[name] = (
+            statuses[name] = (
                 Status(0, 0, mode, reason, self._config.estimator.kind, {}, {}, ms, np.zeros(0)),
             )
-        return found
+        return statuses

@@ -57,8 +57,8 @@ def is_same_code(one: str, other: str) -> bool | None:
 
 
 def _parts(text: str) -> dict[str, str]:
-    found = (part.rpartition(" ") for part in text.split(", "))
-    return {name: value for name, _, value in found}
+    pairs = (part.rpartition(" ") for part in text.split(", "))
+    return {name: value for name, _, value in pairs}
 
 
 def _samples() -> Iterator[Array]:

@@ -78,8 +78,8 @@ class TrialOutcome:
 
     def rmse(self, error: str) -> float | None:
         """The RMSE of one of `ERRORS`."""
-        found: float | None = getattr(self, _column(error))
-        return found
+        value: float | None = getattr(self, _column(error))
+        return value
 
     def count_plans(self) -> dict[str, int]:
         """How many plans had which status."""
@@ -99,7 +99,7 @@ def build_outcome(
     group: Group,
     seed: int,
     shas: tuple[str, str],
-    found: Figures | str,
+    result: Figures | str,
     wall_s: float,
     versions: str,
 ) -> TrialOutcome:
@@ -109,7 +109,7 @@ def build_outcome(
         group: of the trial.
         seed: of the trial.
         shas: digests of its configuration and of its predictor.
-        found: its figures, or why it was refused.
+        result: its figures, or why it was refused.
         wall_s: how long it took.
         versions: of code and libraries.
     """
@@ -118,11 +118,11 @@ def build_outcome(
         "config_sha256": shas[0], "predictor_sha256": shas[1], "wall_s": wall_s,
         "versions": versions,
     }  # fmt: skip
-    if isinstance(found, str):
+    if isinstance(result, str):
         cells |= dict.fromkeys(name for name, kind in _KINDS.items() if "None" in kind)
         return TrialOutcome(
             **cells,
-            refused=_line(found),
+            refused=_line(result),
             success=False,
             fell=False,
             first_to_fall="",
@@ -131,26 +131,26 @@ def build_outcome(
             plans="",
             seconds=0.0,
         )
-    cells |= {_column(name): found.rmse[name] for name in ERRORS}
-    first = min(found.fallen, key=lambda robot: found.fallen[robot], default="")
+    cells |= {_column(name): result.rmse[name] for name in ERRORS}
+    first = min(result.fallen, key=lambda robot: result.fallen[robot], default="")
     return TrialOutcome(
         **cells,
         refused="",
-        success=not (found.fallen or found.stopped),
-        fell=bool(found.fallen),
-        time_to_fall_s=found.fallen.get(first),
+        success=not (result.fallen or result.stopped),
+        fell=bool(result.fallen),
+        time_to_fall_s=result.fallen.get(first),
         first_to_fall=first,
-        stopped=_line("; ".join(f"{robot}: {why}" for robot, why in found.stopped.items())),
-        mean_vx=found.mean["vx"],
-        distance_m=found.distance,
-        energy_j=found.work,
-        cost_of_transport=found.cost_of_transport,
-        control_cost=found.cost,
-        planner_ms_p50=found.planner_ms_median,
-        planner_ms_p99=found.planner_ms_p99,
-        solves=found.solves,
-        plans=", ".join(f"{name}={count}" for name, count in found.plans.items()),
-        seconds=found.seconds,
+        stopped=_line("; ".join(f"{robot}: {why}" for robot, why in result.stopped.items())),
+        mean_vx=result.mean["vx"],
+        distance_m=result.distance,
+        energy_j=result.work,
+        cost_of_transport=result.cost_of_transport,
+        control_cost=result.cost,
+        planner_ms_p50=result.planner_ms_median,
+        planner_ms_p99=result.planner_ms_p99,
+        solves=result.solves,
+        plans=", ".join(f"{name}={count}" for name, count in result.plans.items()),
+        seconds=result.seconds,
     )
 
 

@@ -54,5 +54,5 @@ def read_walk(path: Path) -> Walk:
     recording = Recording(path)
     traces = read_traces(recording, _NEEDED)
     samples = {r: tuple(recording.messages(Measurement, r)) for r in traces.robots}
-    plans = Counter(plan.status for found in traces.plans.values() for plan in found)
+    plans = Counter(plan.status for of_robot in traces.plans.values() for plan in of_robot)
     return Walk(traces, samples, plans)

@@ -74,7 +74,7 @@ def sample_trials() -> Iterator[Array]:
         seen: list[Array] = []
 
         def watch(tick: Tick, seen: list[Array] = seen) -> None:
-            seen.extend(sent(tick))
+            seen.extend(numbers_sent(tick))
 
         predictor = None if config.planner.kind == "none" else sample_predictor(config)
         walk = roll_out(config, predictor, _team_planner(config, predictor), watch)
@@ -84,7 +84,7 @@ def sample_trials() -> Iterator[Array]:
         yield from of_figures(compute_figures(walk))
 
 
-def sent(tick: Tick) -> Iterator[Array]:
+def numbers_sent(tick: Tick) -> Iterator[Array]:
     """The numbers of what agents sent at a tick, and how many events there were."""
     for out in tick.outputs.values():
         yield out.command.row
@@ -95,13 +95,13 @@ def sent(tick: Tick) -> Iterator[Array]:
     yield numbers(len(tick.events))
 
 
-def of_figures(found: Figures) -> Iterator[Array]:
+def of_figures(figures: Figures) -> Iterator[Array]:
     """Figures of merit but for those of wall time."""
-    yield numbers(found.seconds, found.cost, found.cost_outputs, found.cost_forces)
-    yield numbers(found.distance, found.work, found.cost_of_transport, len(found.stopped))
-    yield numbers(*found.fallen.values())
-    yield numbers(*found.mean.values(), *found.rmse.values())
-    yield numbers(*sorted(found.plans.values()))
+    yield numbers(figures.seconds, figures.cost, figures.cost_outputs, figures.cost_forces)
+    yield numbers(figures.distance, figures.work, figures.cost_of_transport, len(figures.stopped))
+    yield numbers(*figures.fallen.values())
+    yield numbers(*figures.mean.values(), *figures.rmse.values())
+    yield numbers(*sorted(figures.plans.values()))
 
 
 def sample_predictor(config: Config) -> Predictor:

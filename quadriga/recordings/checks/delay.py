@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.time_grid import step_ms
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.shared.config.sections import CENTRAL, Config
@@ -15,7 +16,6 @@ from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.wire.messages import Plan, Status
 
 GIVEN_UP: Final = "waits_given_up"  # the agent's count of messages it no longer waited for
-_SOLVED: Final = "solved"
 Violation = tuple[str, str]  # got, limit
 
 
@@ -129,7 +129,7 @@ class Delay:
                 return
             self._older += 1
             age = last - step
-            if plan.status == _SOLVED and age > planner.max_peer_age + planner.hold_steps:
+            if plan.status == SOLVED and age > planner.max_peer_age + planner.hold_steps:
                 oldest = last - planner.max_peer_age - planner.hold_steps
                 yield f"used step {step} of {peer}", f"step {oldest} or later"
 

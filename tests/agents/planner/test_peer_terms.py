@@ -40,11 +40,11 @@ def test_unknown_samples_of_a_peer_count_as_no_deviation(
 def test_a_silent_peers_terms_are_held_then_it_is_lost(small: Config, predictor: Predictor) -> None:
     planner, inputs = Planner(small, 0, predictor), inputs_of(small)
     push = np.tile([20.0, 0.0, 0.0], (8, 4))
-    heard = terms_of(small, planner, peer(small, du=push))
-    state, before = planner.step(planner.initial(), inputs, heard)
+    fresh = terms_of(small, planner, peer(small, du=push))
+    state, before = planner.step(planner.initial(), inputs, fresh)
     assert np.abs(before.du).max() > 0.01
     silent = peer(small, status=HELD, step=STEP - 5, age=4)
-    held = terms_of(small, planner, silent, before=heard)
+    held = terms_of(small, planner, silent, before=fresh)
     state, during = planner.step(state, inputs, held)
     np.testing.assert_array_equal(during.u, before.u)
     assert during.used == {"r2": STEP - 5}
@@ -71,17 +71,17 @@ def test_a_silent_peers_effect_is_held_while_the_legs_change(
     def terms(step: int, before: PeerTerms, *peers: PeerData) -> PeerTerms:
         return planner.peer_terms(before, PeerSelection(peers, step - 1), step, base)
 
-    heard = terms(STEP, NOTHING, talking, third)
-    now = heard
-    assert np.abs(heard.effect).max() > 1e-3
+    fresh = terms(STEP, NOTHING, talking, third)
+    now = fresh
+    assert np.abs(fresh.effect).max() > 1e-3
     for step in range(STEP + 1, STEP + 9):
         silent = peer(three, status=HELD, step=STEP - 1, age=step - STEP)
         now = terms(step, now, silent, third)
-        np.testing.assert_allclose(now.effect, heard.effect, atol=1e-7)
+        np.testing.assert_allclose(now.effect, fresh.effect, atol=1e-7)
     pushing = replace(third, y_ini=third.y_ini + 0.01)
     alone = terms(STEP + 9, NOTHING, peer(three), pushing)
     both = terms(STEP + 9, now, silent, pushing)
-    np.testing.assert_allclose(both.effect, heard.effect + alone.effect, atol=1e-7)
+    np.testing.assert_allclose(both.effect, fresh.effect + alone.effect, atol=1e-7)
     again = terms(STEP + 10, now, peer(three), third)
     np.testing.assert_allclose(again.effect, 0.0, atol=1e-7)
 

@@ -118,10 +118,10 @@ def test_every_answer_is_feasible_and_optimal(seed: int, step: int, size: float,
     solution = solver_of(problem).solve(f)
     assert solution.status == SOLVED
     found = residuals(problem, f, solution.x, solution.multipliers)
-    told = solution.residuals  # of the closed form a bound
-    assert found.stationarity <= told.stationarity * (1.0 + 1e-6) + 1e-12
-    assert told.stationarity < 1e-8
-    np.testing.assert_allclose(astuple(told)[1:], astuple(found)[1:], rtol=1e-6, atol=1e-12)
+    reported = solution.residuals  # of the closed form a bound
+    assert found.stationarity <= reported.stationarity * (1.0 + 1e-6) + 1e-12
+    assert reported.stationarity < 1e-8
+    np.testing.assert_allclose(astuple(reported)[1:], astuple(found)[1:], rtol=1e-6, atol=1e-12)
     assert found.complementarity < 1e-6
     du, _ = unpack(problem, solution.x, y_free)
     force = (nominal_forces(stance) + du).reshape(N, 4, 3)

@@ -142,9 +142,9 @@ def test_a_message_from_another_time_is_counted() -> None:
 def test_a_fallback_is_told_by_its_name_and_not_as_faded() -> None:
     u, y = np.ones((25, 12)), np.zeros((25, 6))
     residuals = Residuals(0.0, 0.0, 0.0)
-    for status, told in (("solved", "faded"), ("nominal:infeasible", "nominal:infeasible")):
+    for status, expected in (("solved", "faded"), ("nominal:infeasible", "nominal:infeasible")):
         result = PlanResult(status, u, np.zeros((25, 12)), y, y, {}, (), residuals, 0)
-        assert plan_message(result, 0.5, (8, 0), 320).status == told
+        assert plan_message(result, 0.5, (8, 0), 320).status == expected
         assert plan_message(result, 1.0, (8, 0), 320).status == status
 
 

@@ -39,7 +39,7 @@ def test_of_two_references_of_one_tick_the_first_heard_stays() -> None:
 def test_forgetting_changes_nothing_within_two_seconds(epochs: list[int], batch: int) -> None:
     """The memory against one that keeps everything, whatever order references come in."""
     known: tuple[Reference, ...] = ()
-    heard: dict[int, Reference] = {}
+    received: dict[int, Reference] = {}
     tick = 0
     for start in range(0, len(epochs), batch):
         new = tuple(
@@ -47,13 +47,13 @@ def test_forgetting_changes_nothing_within_two_seconds(epochs: list[int], batch:
             for i, epoch in enumerate(epochs[start : start + batch])
         )
         for item in new:
-            heard.setdefault(item.tick, item)
+            received.setdefault(item.tick, item)
         tick = max(tick, max(item.tick for item in new))
         known = remember_references(known, new, tick)
         ordered = [item.tick for item in known]
         assert ordered == sorted(set(ordered))
         for past in range(max(0, tick - 1900), tick + 1, 100):
-            due = [heard[t] for t in sorted(heard) if t <= past]
+            due = [received[t] for t in sorted(received) if t <= past]
             assert reference_at(known, past, HEIGHT)[0] == (due[-1] if due else reference(0))
 
 

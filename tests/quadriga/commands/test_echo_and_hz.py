@@ -23,8 +23,8 @@ def test_echo_is_one_readable_line_a_message(small: Path, run_command: RunComman
     assert "…" not in lines[0]
     assert len(re.findall(r"u=\[25×12:([^]]*)\]", lines[0])[0].split()) == 300
     _, lines, _ = run_command("echo", "sim/event", "--file", small)
-    said = "kind='fall' robot='r2' detail='tilt 1.0 rad' code='fall'"
-    assert lines[1] == f"    0.500 s  team/sim/event  {said}"
+    event_text = "kind='fall' robot='r2' detail='tilt 1.0 rad' code='fall'"
+    assert lines[1] == f"    0.500 s  team/sim/event  {event_text}"
 
 
 def test_echo_shows_what_is_no_message(tmp_path: Path, run_command: RunCommand) -> None:

@@ -70,8 +70,8 @@ def test_metadata_of_anybody_do_no_harm(
     tmp_path: Path, run_command: RunCommand, versions: str
 ) -> None:
     path = tmp_path / "odd.mcap"
-    told = build_metadata(CONFIG, "") | {"versions": versions, "topics": versions}
-    with RecordingWriter(path, told, 16, periods=periods(CONFIG)) as writer:
+    metadata = build_metadata(CONFIG, "") | {"versions": versions, "topics": versions}
+    with RecordingWriter(path, metadata, 16, periods=periods(CONFIG)) as writer:
         writer.write(
             "team/sim/event", encode(msg.Event(200, 0, "stop", "", "\x1b[2J\nend", "time-over")), 0
         )
@@ -86,8 +86,8 @@ def test_a_report_shows_metadata_of_anybody(
     tmp_path: Path, small: Path, run_command: RunCommand, versions: str
 ) -> None:
     path, source = tmp_path / "odd.mcap", Recording(small)
-    told = dict(source.metadata) | {"versions": versions}
-    with RecordingWriter(path, told, 16, periods=periods(CONFIG)) as writer:
+    metadata = dict(source.metadata) | {"versions": versions}
+    with RecordingWriter(path, metadata, 16, periods=periods(CONFIG)) as writer:
         for entry in source.entries():
             writer.write(entry.key, entry.payload, entry.log_time_ns)
     status, lines, err = run_command("report", path, "--html", tmp_path / "odd.html")
@@ -110,8 +110,8 @@ def test_a_configuration_that_is_none_is_one_clear_error(
 def test_a_key_that_nests_as_deeply_as_can_be_read_is_one_clear_error(tmp_path: Path) -> None:
     for depth in range(800, 1000, 5):
         path = tmp_path / f"{depth}.mcap"
-        told = {"config_json": f'{{"world": {{"seed": {"[" * depth}{"]" * depth}}}}}'}
-        with RecordingWriter(path, build_metadata(CONFIG, "") | told) as writer:
+        metadata = {"config_json": f'{{"world": {{"seed": {"[" * depth}{"]" * depth}}}}}'}
+        with RecordingWriter(path, build_metadata(CONFIG, "") | metadata) as writer:
             writer.write("team/r1/state", b"", 0)
         with pytest.raises(RecordingError):
             recorded_config(Recording(path))

@@ -118,5 +118,5 @@ def test_a_signal_among_the_first_imports_ends_a_process_quietly(number: signal.
     while not int(status.read_text().partition("SigBlk:")[2].split()[0], 16) & held:
         assert process.poll() is None, "signals are never held"
     process.send_signal(number)
-    _, said = process.communicate(timeout=30.0)
-    assert (process.returncode, said) == (130, "quadriga: interrupted\n")
+    _, errors = process.communicate(timeout=30.0)
+    assert (process.returncode, errors) == (130, "quadriga: interrupted\n")

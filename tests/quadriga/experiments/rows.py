@@ -13,7 +13,7 @@ def row(variant: str = "none", seed: int = 0, **changes: Any) -> TrialOutcome:
     """A walk to the end; `fell` is the time of a fall, `error` sets every RMSE."""
     fell, error = changes.pop("fell", None), changes.pop("error", 0.01)
     upright = fell is None
-    told: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "scenario": "steps", "variant": variant, "swept": (), "seed": seed,
         "config_sha256": "ab" * 32, "predictor_sha256": "", "refused": "", "success": upright,
         "fell": not upright, "time_to_fall_s": fell, "first_to_fall": "" if upright else "r2",
@@ -23,8 +23,8 @@ def row(variant: str = "none", seed: int = 0, **changes: Any) -> TrialOutcome:
         "versions": "code 1",
     }  # fmt: skip
     errors = (name.replace("-", "_") for name in ERRORS)
-    told |= {f"rmse_{name}": error if upright else None for name in errors}
-    return TrialOutcome(**told | changes)
+    fields |= {f"rmse_{name}": error if upright else None for name in errors}
+    return TrialOutcome(**fields | changes)
 
 
 def manifest(*variants: str, sweeps: tuple[str, ...] = (), **changes: Any) -> Manifest:
@@ -35,10 +35,10 @@ def manifest(*variants: str, sweeps: tuple[str, ...] = (), **changes: Any) -> Ma
         for values in swept
         for name in variants
     )
-    told: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "typed": ("quadriga campaign steps",), "baseline": variants[0],
         "variants": {name: {"planner.kind": name} for name in variants},
         "sweeps": tuple(SweepEntry(key, key) for key in sweeps), "groups": groups,
         "versions": "code 1",
     }  # fmt: skip
-    return Manifest(**told | changes)
+    return Manifest(**fields | changes)

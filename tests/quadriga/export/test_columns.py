@@ -81,9 +81,9 @@ def test_csv_says_the_same_as_parquet(
 ) -> None:
     for form in ("csv", "parquet"):
         assert main(["export", str(file), "--to", form, "-o", str(tmp_path / form)]) == 0
-    said = capsys.readouterr().out
-    assert "left out 1 messages of team/r1/state: not a valid message of a known topic" in said
-    assert "left out 1 messages of team/some/body/else" in said
+    output = capsys.readouterr().out
+    assert "left out 1 messages of team/r1/state: not a valid message of a known topic" in output
+    assert "left out 1 messages of team/some/body/else" in output
     paths = sorted((tmp_path / "csv").iterdir())
     assert len(paths) == 13
     for path in paths:

@@ -41,8 +41,8 @@ def test_mistakes(capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
         assert "overwrites nothing" in failed(capsys, file, "--to", form, "-o", there)
         assert there.read_text() == "precious"
         below = there / "out"
-        said = failed(capsys, file, "--to", form, "-o", below)
-        assert f"--output: got {below}: Not a directory" in said
+        output = failed(capsys, file, "--to", form, "-o", below)
+        assert f"--output: got {below}: Not a directory" in output
     assert "got team.robots" in failed(capsys, file, "--to", "csv", "--robots", "3")
     empty = tmp_path / "empty.mcap"
     with RecordingWriter(empty, build_metadata(Config(), "")):
@@ -66,9 +66,9 @@ def test_a_package_that_is_not_installed_is_named_with_its_remedy(
         if name.partition(".")[0] == package or name.startswith("quadriga.export."):
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
-    said = failed(capsys, file, "--to", form, "-o", tmp_path / "out")
-    assert f"--to {form}: got no Python package {package}" in said
-    assert "pip install -e '.[export]'" in said
+    output = failed(capsys, file, "--to", form, "-o", tmp_path / "out")
+    assert f"--to {form}: got no Python package {package}" in output
+    assert "pip install -e '.[export]'" in output
 
 
 @pytest.mark.parametrize("form", ["foxglove", "csv", "parquet"])
@@ -89,9 +89,9 @@ def test_without_an_output_it_goes_beside_the_recording(
     cut = tmp_path / "run.mcap"
     cut.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
     assert main(["export", str(cut), "--to", "csv"]) == 2
-    said = capsys.readouterr().out
-    assert said.startswith(str(tmp_path / "run-csv"))
-    assert "only as far as the recording goes: the file ends at byte" in said
+    output = capsys.readouterr().out
+    assert output.startswith(str(tmp_path / "run-csv"))
+    assert "only as far as the recording goes: the file ends at byte" in output
     assert (tmp_path / "run-csv" / "r1.state.csv").stat().st_size > 1000
 
 

@@ -69,8 +69,8 @@ def test_the_report_is_printed_and_kept_beside_the_predictor(capsys: Said) -> No
     out = capsys.readouterr().out
     path = predictor_path(config_of())
     assert out.splitlines()[-1] == str(path)
-    for told in ("best-response radius", "persistence", "Coupling", "digest", "seeds 5–6"):
-        assert told in out
+    for phrase in ("best-response radius", "persistence", "Coupling", "digest", "seeds 5–6"):
+        assert phrase in out
     kept = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     predictor, provenance = read(path)
     assert kept["refused"] == ""

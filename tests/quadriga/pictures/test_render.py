@@ -57,14 +57,14 @@ def test_instants_cover_the_run_and_its_end() -> None:
 
 
 def test_renders_sheet_and_clip(write_run: WriteRun) -> None:
-    said: list[str] = []
+    messages: list[str] = []
     run = write_run(run_config(2, 0.5))
-    paths = render(run, said.append)
+    paths = render(run, messages.append)
     with Image.open(paths[0]) as sheet:
         pixels = np.asarray(sheet.convert("RGB")).astype(int)
     assert pixels.shape == (4 * 360 + 3 * 6, 2 * 640 + 6, 3)
-    if said:
-        pytest.skip(said[0])
+    if messages:
+        pytest.skip(messages[0])
     red = (pixels[..., 0] > 90) & (pixels[..., 1:].max(axis=2) < 60)
     assert red.mean() > 0.002  # robot 1's trunk
     with Image.open(paths[1]) as clip:
@@ -76,12 +76,12 @@ def test_without_opengl_stick_figures_and_one_line(
     write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MUJOCO_GL", "disable")
-    said: list[str] = []
+    messages: list[str] = []
     run = write_run(run_config(2, 0.5))
-    assert render(run, said.append) == (run / "walk.png",)
-    assert len(said) == 1
-    assert "\n" not in said[0]
-    assert "stick figures" in said[0]
+    assert render(run, messages.append) == (run / "walk.png",)
+    assert len(messages) == 1
+    assert "\n" not in messages[0]
+    assert "stick figures" in messages[0]
     with Image.open(run / "walk.png") as sheet:
         assert sheet.width == 2 * 640 + 6
         assert len(np.unique(np.asarray(sheet.convert("L")))) > 50

@@ -70,7 +70,7 @@ def test_echo_hears_the_bus(config: Config, world: Bus) -> None:
     lines = out.splitlines()
     assert (listener.returncode, err, len(lines)) == (0, "", 6)
     assert {line.split()[2] for line in lines} == {"band/r1/state", "band/r1/new"}
-    assert world.present(HERE) == frozenset()  # it has never said that it is a member
+    assert world.members_at(HERE) == frozenset()  # it has never said that it is a member
 
 
 def test_hz_counts_what_comes_and_what_does_not(config: Config, world: Bus) -> None:
@@ -93,9 +93,9 @@ def test_a_listener_to_nobody_says_so_and_leaves_when_told(
 ) -> None:
     listener = listen(config, "echo", "state")
     assert listener.stderr is not None
-    said = listener.stderr.readline()
-    assert "nothing yet of state of team 'band'" in said
-    assert "linked to nobody" in said
+    line = listener.stderr.readline()
+    assert "nothing yet of state of team 'band'" in line
+    assert "linked to nobody" in line
     listener.send_signal(number)
     out, _ = listener.communicate(timeout=WAIT)
     assert (listener.returncode, out) == (0, "")

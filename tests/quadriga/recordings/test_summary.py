@@ -299,7 +299,7 @@ def test_what_came_late_in_real_time(write_run: WriteRun) -> None:
     ages |= {"jitter.median": 0.02, "jitter.p99": 0.2, "jitter.max": 3.0}
     counters = {"ticks": 6000, "overruns": 4, "r1.late": 300, "r1.held": 7, "r2.late": 0}
     nothing = np.zeros(0)
-    told = msg.Status(6000, 0, "realtime", "", "", ages, counters, nothing, nothing)
+    sim_status = msg.Status(6000, 0, "realtime", "", "", ages, counters, nothing, nothing)
     own = msg.Status(
         6001,
         0,
@@ -311,7 +311,7 @@ def test_what_came_late_in_real_time(write_run: WriteRun) -> None:
         nothing,
         nothing,
     )
-    run = write_run(run_config(), extra=[("team/sim/status", told), ("team/r1/status", own)])
+    run = write_run(run_config(), extra=[("team/sim/status", sim_status), ("team/r1/status", own)])
     summary = summarise(run)
     late = summary["realtime"]
     assert late["world"]["overruns"] == 4

@@ -28,7 +28,7 @@ def curves() -> Curves:
 
 def test_the_component_that_has_changed_most_is_shown(tmp_path: Path) -> None:
     found = curves()
-    assert found.changed_most("output") == 2
+    assert found.most_changed_component("output") == 2
     draw(found, "r1 of a/run.mcap: planner.mu=0.3", tmp_path / "a.png")
     assert (tmp_path / "a.png").stat().st_size > 10_000
 

@@ -80,7 +80,7 @@ def complaint(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str
 
 
 def test_mistakes_on_the_command_line(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for arguments, said in (
+    for arguments, output in (
         ((run, "--robot", "r2"), "--robot: got 'r2', expected one of r1"),
         ((run.parent / "no.mcap", "--all"), "no.mcap: got No such file"),
         ((run, "--all", "--break", "1"), "--break: got --all, expected --robot NAME"),
@@ -93,17 +93,17 @@ def test_mistakes_on_the_command_line(run: Path, capsys: pytest.CaptureFixture[s
         ((run, "--all", "--predictor", run), "expected agents that plan for themselves"),
         ((run, "--all", "--out", run), "--out"),
     ):
-        assert said in complaint(capsys, *arguments), said
+        assert output in complaint(capsys, *arguments), output
 
 
 def test_a_recording_of_another_version(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     future = rewritten(run, tmp_path / "future.mcap", config={"controller.kp_tail": 3.0})
-    said = complaint(capsys, future, "--all")
-    assert "configuration of " in said
-    assert "controller.kp_tail" in said
-    assert "recorded by another version of quadriga: use that one" in said
+    output = complaint(capsys, future, "--all")
+    assert "configuration of " in output
+    assert "controller.kp_tail" in output
+    assert "recorded by another version of quadriga: use that one" in output
     nothing = rewritten(run, tmp_path / "nothing.mcap", metadata={"config_json": ""})
     assert "metadata without a configuration" in complaint(capsys, nothing, "--all")
 
@@ -117,8 +117,8 @@ def test_recordings_that_lack_what_a_replay_needs(
     assert "no states of r1" in complaint(capsys, silent, "--all")
     late = rewritten(run, tmp_path / "late.mcap", lambda e: e.payload if e.tick > 1 else None)
     assert main(["replay", str(late), "--all"]) == 1
-    said = capsys.readouterr().out
-    assert "input missing from the recording: reference:operator:0 (tick 0); state of r1" in said
+    output = capsys.readouterr().out
+    assert "input missing from the recording: reference:operator:0 (tick 0); state of r1" in output
 
 
 def test_a_stop_that_could_not_be_read_is_handed_over_where_it_was_taken_in(tmp_path: Path) -> None:
@@ -166,12 +166,12 @@ def test_a_false_command_is_told_with_its_values(
     run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["replay", str(run), "--robot", "r1"]) == 1
-    said = capsys.readouterr().out
-    assert "r1: 5 of 5 commands differ; " in said
-    assert "first difference: tick 0, command.tau[0]: recorded 0.0, recomputed " in said
-    assert "inputs there: state of tick 0; reference of operator: 0; mode stand" in said
-    assert "replay-r1-0-command.npz" in said
-    assert "missing" not in said
+    output = capsys.readouterr().out
+    assert "r1: 5 of 5 commands differ; " in output
+    assert "first difference: tick 0, command.tau[0]: recorded 0.0, recomputed " in output
+    assert "inputs there: state of tick 0; reference of operator: 0; mode stand" in output
+    assert "replay-r1-0-command.npz" in output
+    assert "missing" not in output
 
 
 def test_the_predictor_is_found_by_its_digest(
@@ -181,9 +181,9 @@ def test_the_predictor_is_found_by_its_digest(
     own, other = tmp_path / "own.npz", tmp_path / "other.npz"
     sha256, _ = fitted(own, config), fitted(other, config, 0.1)
     recording = Recording(write(tmp_path / "run.mcap", config, sha256))
-    said = complaint(capsys, recording.path, "--all")
-    assert f"digest {sha256[:16]}" in said
-    assert "--predictor FILE" in said
+    output = complaint(capsys, recording.path, "--all")
+    assert f"digest {sha256[:16]}" in output
+    assert "--predictor FILE" in output
     assert find_predictor(recording, config, own)[1]
     assert not find_predictor(recording, config, other)[1]
     with pytest.raises(PredictorError, match="no such file"):

@@ -37,10 +37,10 @@ def test_a_world_with_pushes_payload_blocks_and_a_silent_robot_comes_out_equal(
 ) -> None:
     ticks = {entry.tick for entry in Recording(whole).entries({"command"}) if "r2" in entry.key}
     assert set(LATE) <= ticks, "commands that the world never used are in the file"
-    status, said = resim(capsys, whole)
-    assert status == 0, said
-    assert f"equal to the byte: {2 * TICKS + TICKS // 10} states and truths" in said
-    assert "× real time" in said
+    status, output = resim(capsys, whole)
+    assert status == 0, output
+    assert f"equal to the byte: {2 * TICKS + TICKS // 10} states and truths" in output
+    assert "× real time" in output
 
 
 def test_loose_stones_and_weak_motors_come_out_equal(
@@ -53,9 +53,9 @@ def test_loose_stones_and_weak_motors_come_out_equal(
         world__push_force=60.0,
         world__push_every=0.1,
     )
-    status, said = resim(capsys, write_lockstep(tmp_path / "run.mcap", scene))
-    assert status == 0, said
-    assert f"equal to the byte: {2 * TICKS + TICKS // 10} states and truths" in said
+    status, output = resim(capsys, write_lockstep(tmp_path / "run.mcap", scene))
+    assert status == 0, output
+    assert f"equal to the byte: {2 * TICKS + TICKS // 10} states and truths" in output
 
 
 def flipped(
@@ -88,11 +88,11 @@ def flipped(
 def test_one_flipped_bit_is_found_at_its_tick(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, change: Change, tick: int, found: str
 ) -> None:
-    status, said = resim(capsys, write_lockstep(tmp_path / "run.mcap", config(), change))
+    status, output = resim(capsys, write_lockstep(tmp_path / "run.mcap", config(), change))
     assert status == 1
-    assert f"first difference: tick {tick}, " in said
-    assert found in said
-    recorded, recomputed = said.partition("recorded ")[2].split(", recomputed ")
+    assert f"first difference: tick {tick}, " in output
+    assert found in output
+    recorded, recomputed = output.partition("recorded ")[2].split(", recomputed ")
     assert recorded != recomputed.split(" (")[0]
 
 
@@ -104,8 +104,8 @@ def test_a_difference_names_the_versions_that_may_explain_it(
     elsewhere = rewritten(
         path, tmp_path / "elsewhere.mcap", metadata={"versions": json.dumps(versions)}
     )
-    _, said = resim(capsys, elsewhere)
-    assert "other versions, which may be why: mujoco 3.1.4 (here " in said
+    _, output = resim(capsys, elsewhere)
+    assert "other versions, which may be why: mujoco 3.1.4 (here " in output
 
 
 @pytest.mark.parametrize(
@@ -127,10 +127,10 @@ def test_a_recording_with_gaps_is_one_clear_error(
     path = write_lockstep(
         tmp_path / "run.mcap", config(), lambda t, key, payload: None if lose(t, key) else payload
     )
-    status, said = resim(capsys, path)
+    status, output = resim(capsys, path)
     assert status == 2
-    assert message in said
-    assert said.count("\n") == 1
+    assert message in output
+    assert output.count("\n") == 1
 
 
 def test_a_cut_recording_is_compared_up_to_the_cut(
@@ -138,21 +138,21 @@ def test_a_cut_recording_is_compared_up_to_the_cut(
 ) -> None:
     content = whole.read_bytes()
     (tmp_path / "cut.mcap").write_bytes(content[: len(content) // 2])
-    status, said = resim(capsys, tmp_path / "cut.mcap")
+    status, output = resim(capsys, tmp_path / "cut.mcap")
     assert status == 2
-    assert "equal to the byte: " in said
-    assert "compared up to there only: " in said
-    assert "the file ends at byte" in said
-    assert "got a file that is cut after" in said
+    assert "equal to the byte: " in output
+    assert "compared up to there only: " in output
+    assert "the file ends at byte" in output
+    assert "got a file that is cut after" in output
 
 
 def test_what_is_not_lockstep_or_not_used_is_refused(
     capsys: pytest.CaptureFixture[str], whole: Path, tmp_path: Path
 ) -> None:
     path = write_lockstep(tmp_path / "run.mcap", config(world__mode="realtime"))
-    status, said = resim(capsys, path)
-    assert (status, said.count("\n")) == (2, 1)
-    assert "got a walk in real time, expected one in lock-step" in said
+    status, output = resim(capsys, path)
+    assert (status, output.count("\n")) == (2, 1)
+    assert "got a walk in real time, expected one in lock-step" in output
     assert main(["resim", str(whole), "--seed", "4"]) == 2
     assert "got world.seed" in capsys.readouterr().err
     assert main(["resim", str(tmp_path / "none.mcap")]) == 2

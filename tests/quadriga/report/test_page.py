@@ -110,7 +110,7 @@ class _Without:
 
 
 @pytest.mark.parametrize(
-    ("lost", "left_out", "said"),
+    ("lost", "left_out", "message"),
     [
         ((msg.Truth, msg.Event), {"paths", "estimator", "yokes"}, "No sim/truth, as of real"),
         ((msg.Plan,), set(), "No plan: planned curves"),
@@ -137,11 +137,11 @@ class _Without:
     ],
 )
 def test_what_is_absent_is_left_out_and_said_so(
-    write_run: WriteRun, lost: tuple[type[msg.Message], ...], left_out: Container[str], said: str
+    write_run: WriteRun, lost: tuple[type[msg.Message], ...], left_out: Container[str], message: str
 ) -> None:
     found = outline(write_run(run_config(2, 1.0), change=_Without(*lost)))
     assert found.sections == [name for name in SECTIONS if name not in left_out]
-    assert said in found.text
+    assert message in found.text
 
 
 def test_without_truth_the_agents_estimates_and_the_foot_sensors_are_shown(
@@ -245,9 +245,9 @@ def test_no_recording_is_one_clear_error(
     if content is not None:
         path.write_bytes(content)
     assert main(["report", str(path)]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("quadriga: ")
-    assert "Traceback" not in said
+    message = capsys.readouterr().err
+    assert message.startswith("quadriga: ")
+    assert "Traceback" not in message
 
 
 def test_an_empty_recording_and_a_page_that_cannot_be_written_are_errors(

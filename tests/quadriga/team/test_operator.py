@@ -62,7 +62,7 @@ def test_a_walk_ends_at_the_same_tick_for_who_is_behind(late: bool) -> None:
         sim.declare(HERE)
         assert operator.wait_for(HERE, {SIM}, 10.0, lambda: False)
         truth, event = sim.publisher(TRUTH.key("team")), sim.publisher(EVENT.key("team"))
-        heard = 0
+        newest = 0
         for tick in range(0, 800, 10):
             truth(
                 encode(
@@ -80,16 +80,16 @@ def test_a_walk_ends_at_the_same_tick_for_who_is_behind(late: bool) -> None:
                     )
                 )
             )
-            while not late and heard < tick:
-                heard, over = _next_tick(operator, heard)
+            while not late and newest < tick:
+                newest, over = _next_tick(operator, newest)
                 assert not over
         event(encode(Event(800, 800 * 10**6, "stop", "", "end of world.seconds", "time-over")))
         if late:
             sim.close()  # it leaves once all has arrived
         over = False
         while not over:
-            heard, over = _next_tick(operator, heard)
-        assert heard == 799
+            newest, over = _next_tick(operator, newest)
+        assert newest == 799
 
 
 def said_stop(reason: str, tick: int) -> EStop:
@@ -98,11 +98,11 @@ def said_stop(reason: str, tick: int) -> EStop:
     with Bus.open(config.bus, "team", SIM) as sim, Bus.open(config.bus, "team", "r1") as r1:
         r1.subscribe(ESTOP.key("team"))
         put, over = sim.publisher(TRUTH.key("team")), Flag()
-        told = encode(Event(tick, 0, "", "", "", ""))
+        event = encode(Event(tick, 0, "", "", "", ""))
 
         def tell() -> None:
             while not over.wait(0.02):
-                put(told)
+                put(event)
 
         threads = [Thread(target=tell), Thread(target=stop_team, args=(config, reason))]
         for thread in threads:

@@ -42,9 +42,9 @@ def test_a_file_that_cannot_be_written_costs_one_line(
     folder = write_run(run_config(1, 2.0), extra=event(codes.TIME_OVER, "", "end of world.seconds"))
     (folder / "summary.json").mkdir()
     assert main(["report", str(folder), "--no-render"]) == 2
-    said = capsys.readouterr().err
-    assert "summary.json: got Is a directory" in said
-    assert said.count("\n") == 1
+    errors = capsys.readouterr().err
+    assert "summary.json: got Is a directory" in errors
+    assert errors.count("\n") == 1
 
 
 def test_the_exit_status_of_a_report_tells_of_a_fall(

@@ -48,9 +48,9 @@ def test_a_scenario_loads_and_names_only_what_is_not_the_default(name: str) -> N
     given: dict[str, dict[str, Any]] = tomllib.loads(path(name).read_text(encoding="utf-8"))
     same = [f"{s}.{k}" for s, keys in given.items() for k, v in keys.items() if v == default[s][k]]
     assert same == []
-    said = description(name)
-    assert "the paper" in said
-    assert said.endswith(".")
+    text = description(name)
+    assert "the paper" in text
+    assert text.endswith(".")
 
 
 @pytest.mark.parametrize("name", PROMISED)
@@ -113,12 +113,13 @@ def test_a_wrong_name_is_one_error_that_lists_the_right_ones(
 
 
 @pytest.mark.parametrize(
-    ("text", "said"), [("world = 3\n", r"^world: "), ("[wrld]\nseed = 3\n", "did you mean 'world'")]
+    ("text", "message"),
+    [("world = 3\n", r"^world: "), ("[wrld]\nseed = 3\n", "did you mean 'world'")],
 )
-def test_a_file_over_a_scenario_is_checked_as_any(tmp_path: Path, text: str, said: str) -> None:
+def test_a_file_over_a_scenario_is_checked_as_any(tmp_path: Path, text: str, message: str) -> None:
     file = tmp_path / "wrong.toml"
     file.write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigError, match=said):
+    with pytest.raises(ConfigError, match=message):
         build(layers(file, {}, beneath=path("turn")))
 
 

@@ -142,11 +142,11 @@ def test_who_is_frozen_keeps_nobody_from_leaving(opened: Open, endpoint: str) ->
             assert sim.stdout is not None
             assert sim.stdout.readline() == b"\n"
             r1.send_signal(signal.SIGSTOP)
-            said = sim.communicate(b"\n", WAIT)
+            outputs = sim.communicate(b"\n", WAIT)
         finally:
             r1.kill()
             sim.kill()
-    assert (sim.returncode, *said) == (0, b"", b"")
+    assert (sim.returncode, *outputs) == (0, b"", b"")
     assert numbers(r2, 2000) == list(range(2000))
 
 
@@ -176,15 +176,15 @@ def test_who_calls_and_says_nothing_keeps_nobody_from_leaving(opened: Open, endp
 def test_presence_comes_and_goes_by_stage(opened: Open) -> None:
     sim, r1 = opened("sim"), opened("r1")
     meet(sim, r1)
-    assert sim.present(READY) == frozenset()
+    assert sim.members_at(READY) == frozenset()
     r1.declare(READY)
     assert sim.wait_for(READY, {"r1"}, WAIT, never)
-    assert sim.present(HERE) == {"r1"}
+    assert sim.members_at(HERE) == {"r1"}
     r1.close()
     deadline = monotonic() + WAIT
-    while sim.present(HERE) and monotonic() < deadline:
+    while sim.members_at(HERE) and monotonic() < deadline:
         sim.get(0.01)
-    assert sim.present(HERE) == sim.present(READY) == frozenset()
+    assert sim.members_at(HERE) == sim.members_at(READY) == frozenset()
 
 
 def test_a_barrier_names_the_absent(opened: Open) -> None:
@@ -291,7 +291,7 @@ def test_two_teams_at_one_router_do_not_mix(opened: Open, endpoint: str) -> None
         for team, sim, _ in teams:
             assert sim.get(WAIT) == (f"{team}/r1/x", team.encode())
             assert sim.get(0.1) is None
-            assert sim.present(HERE) == {"r1"}
+            assert sim.members_at(HERE) == {"r1"}
             assert not sim.duplicates(HERE)
         for _, sim, r1 in teams:
             r1.close()

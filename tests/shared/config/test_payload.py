@@ -23,7 +23,7 @@ def test_carriers_and_their_parts(text: str, parts: tuple[float, ...]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("r4", "'r4'"),
         ("", "''"),
@@ -35,8 +35,8 @@ def test_carriers_and_their_parts(text: str, parts: tuple[float, ...]) -> None:
         ("r1:nan", "0.001 … 1000"),
     ],
 )
-def test_a_wrong_carrier_names_the_key_and_what_is_wrong(text: str, said: str) -> None:
-    with pytest.raises(ConfigError, match=rf"^world\.payload_on: .*{said}"):
+def test_a_wrong_carrier_names_the_key_and_what_is_wrong(text: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=rf"^world\.payload_on: .*{message}"):
         carriers(text, NAMES)
 
 

@@ -60,7 +60,7 @@ def test_without_a_trace_there_is_none() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("", "nothing"),
         ("0,0,0,0\n1,0,0,0\n", "t,vx,vy,wz"),
@@ -74,10 +74,10 @@ def test_without_a_trace_there_is_none() -> None:
         ("t,vx,vy,wz\n0,0,0,0\n1,0,0.9,0\n", "vy of 0 … 0.9"),
     ],
 )
-def test_what_is_no_trace_is_one_clear_error(tmp_path: Path, text: str, said: str) -> None:
+def test_what_is_no_trace_is_one_clear_error(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "trace.csv"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigError, match=said) as caught:
+    with pytest.raises(ConfigError, match=message) as caught:
         traced(path)
     assert caught.value.name == f"reference.trace {path}"
 

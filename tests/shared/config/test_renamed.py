@@ -65,9 +65,9 @@ def test_so_is_one_on_the_command_line(
     capsys: pytest.CaptureFixture[str], old: str, new: str
 ) -> None:
     assert main(["config", "--set", f"{old}=1"]) != 0
-    said = capsys.readouterr().err.strip().splitlines()
-    assert len(said) == 1
-    assert f"{old}: got a name of an earlier version, expected {new}" in said[0]
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1
+    assert f"{old}: got a name of an earlier version, expected {new}" in lines[0]
 
 
 def test_names_lead_there_and_back() -> None:

@@ -46,6 +46,6 @@ def test_ordinary_is_ordinary() -> None:
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become a user without the right")
 def test_without_the_right_it_runs_all_the_same() -> None:
-    found, said = answer("realtime", "deny")
+    found, message = answer("realtime", "deny")
     assert found == ["False", "False", "True"]
-    assert said.startswith("no real-time scheduling (Operation not permitted)")
+    assert message.startswith("no real-time scheduling (Operation not permitted)")

@@ -65,6 +65,7 @@ def test_what_was_no_event_then_is_none_now(change: dict[str, Any]) -> None:
 
 
 def test_the_code_of_a_status_or_reason_stands_before_its_detail() -> None:
+    assert codes.with_detail("estop", "fall: a dog") == "estop:fall: a dog"
     assert codes.code_of("nominal:infeasible") == "nominal"
     assert codes.code_of("estop:fall: a dog") == "estop"
     assert (codes.code_of("solved"), codes.code_of("")) == ("solved", "")

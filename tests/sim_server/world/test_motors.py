@@ -35,7 +35,7 @@ def test_what_is_left_open_is_drawn_from_the_seed(joint: str, among: set[str]) -
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("r1:calf", "robot:joint:start"),
         ("r4:calf:0", "robot 'r4'"),
@@ -46,6 +46,6 @@ def test_what_is_left_open_is_drawn_from_the_seed(joint: str, among: set[str]) -
         ("r1:calf:0,", "robot:joint:start"),
     ],
 )
-def test_a_wrong_motor_names_the_key_and_what_is_wrong(text: str, said: str) -> None:
-    with pytest.raises(ConfigError, match=rf"^world\.weak_motor: .*{said}"):
+def test_a_wrong_motor_names_the_key_and_what_is_wrong(text: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=rf"^world\.weak_motor: .*{message}"):
         weak(text)

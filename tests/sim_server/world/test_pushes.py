@@ -24,7 +24,7 @@ def test_pushes_are_parsed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("r1:80:0:1", "robot:force"),
         ("r1:80:0:1:0.2:3", "robot:force"),
@@ -40,8 +40,8 @@ def test_pushes_are_parsed() -> None:
         (",", "robot:force"),
     ],
 )
-def test_a_wrong_push_names_the_key_and_what_is_wrong(text: str, said: str) -> None:
-    with pytest.raises(ConfigError, match=rf"^world\.push: .*{said}"):
+def test_a_wrong_push_names_the_key_and_what_is_wrong(text: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=rf"^world\.push: .*{message}"):
         parse_pushes(text, NAMES)
 
 

@@ -72,8 +72,8 @@ def test_a_motor_is_weak_from_its_tick_on_and_gives_what_is_announced() -> None:
     scenario = build_scenario(config, build_loads(config))
     assert scenario.weakenings() == {1000, 2000}
     assert (scenario.strength(999) == 1.0).all()
-    told = [event.detail for event in scenario.events if event.kind == "fault"]
-    assert told == ["FR_hip gives 50 % of its torque"] * 2
+    details = [event.detail for event in scenario.events if event.kind == "fault"]
+    assert details == ["FR_hip gives 50 % of its torque"] * 2
     for tick, share in ((1000, 0.5), (1999, 0.5), (2000, 0.5)):
         strength = scenario.strength(tick)
         assert strength[1, 3] == share

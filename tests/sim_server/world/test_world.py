@@ -175,8 +175,8 @@ def test_a_weak_motor_gives_its_share_of_the_torque_from_its_time_on() -> None:
         limited[8] *= 0.4 if tick >= 10 else 1.0
         np.testing.assert_array_equal(tau["r2"], limited)
         faults = [(e.code, e.robot, e.detail) for e in events if e.kind == "fault"]
-        told = [("weak-motor", "r2", "RL_calf gives 40 % of its torque")] if tick == 10 else []
-        assert faults == told
+        expected = [("weak-motor", "r2", "RL_calf gives 40 % of its torque")] if tick == 10 else []
+        assert faults == expected
         assert (encode(world.truth()) == encode(sound.truth())) == (tick < 10)
 
 
@@ -216,7 +216,7 @@ def test_a_robot_on_its_side_has_fallen_at_any_height() -> None:
 def test_trunk_height_counts_from_the_terrain_under_the_hips() -> None:
     world = World(configured(1, terrain="heightfield", terrain_height=0.3, seconds=8.0))
     x = np.linspace(2.0, 5.0, 3000)
-    under = world.team.terrain.under(x, np.zeros_like(x), np.zeros_like(x))
+    under = world.team.terrain.height_under_hips(x, np.zeros_like(x), np.zeros_like(x))
     world.physics.qpos[0] = x[under.argmax()]
     for above, fallen in ((0.125, ()), (0.115, ("r1",))):
         world.physics.qpos[2] = under.max() + above
@@ -232,7 +232,7 @@ def test_who_stands_astride_of_a_block_has_not_fallen() -> None:
     world = World(configured(1, terrain="boxes", terrain_height=0.15, seconds=8.0))
     terrain = world.team.terrain
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(1.5, 5, 0.02), np.arange(-1, 1, 0.02)))
-    astride = terrain.height(x, y) - terrain.under(x, y, np.zeros_like(x))
+    astride = terrain.height(x, y) - terrain.height_under_hips(x, y, np.zeros_like(x))
     place = astride.argmax()
     assert astride[place] > 0.145, "no such place"
     world.physics.qpos[:3] = x[place], y[place], 0.26

@@ -68,17 +68,17 @@ def test_a_campaign_survives_ctrl_c_and_kill_and_walks_nothing_twice(
         workers = children(process.pid)
         assert len(workers) >= 2
         process.send_signal(number)
-        said, _ = process.communicate(timeout=300.0)
+        output, _ = process.communicate(timeout=300.0)
         assert process.returncode == status
-        assert "Traceback" not in said
+        assert "Traceback" not in output
         await_gone(workers)
     kept = rows_of(out)
     assert 4 <= len(kept) < 12
     process = start(*words)
-    said, _ = process.communicate(timeout=300.0)
-    assert process.returncode == 0, said
-    assert f"{len(kept)} of 12 trials are walked already" in said
-    assert f"{12 - len(kept)} trials in" in said
+    output, _ = process.communicate(timeout=300.0)
+    assert process.returncode == 0, output
+    assert f"{len(kept)} of 12 trials are walked already" in output
+    assert f"{12 - len(kept)} trials in" in output
     done = rows_of(out)
     assert len(done) == 12
     assert kept.items() <= done.items()
@@ -109,9 +109,9 @@ def test_trials_of_another_configuration_or_code_are_not_mixed(
     body = json.loads(manifest.read_text(encoding="utf-8"))
     manifest.write_text(json.dumps(body | {"versions": "code 0"}), encoding="utf-8")
     assert main([*words, "--seeds", "0:2"]) == 2
-    told = capsys.readouterr().err
-    assert "trials with code and versions code 0" in told
-    assert told.count("\n") == 1
+    errors = capsys.readouterr().err
+    assert "trials with code and versions code 0" in errors
+    assert errors.count("\n") == 1
     manifest.write_text(json.dumps(body), encoding="utf-8")
     assert main([*words, "--seeds", "0:2"]) == 0
     assert sorted(seed for _, seed in rows_of(out)) == [0, 1]
@@ -173,6 +173,6 @@ def test_a_fall_ends_a_trial_and_its_recording_falls_too(
         (out / name).write_text(text.replace("quadriga 0", "quadriga 9"), encoding="utf-8")
     capsys.readouterr()
     assert main(["campaign", "--report", str(out), "--record-worst", "1"]) == 2
-    told = capsys.readouterr().err
-    assert "trials with code and versions" in told
-    assert told.count("\n") == 1
+    errors = capsys.readouterr().err
+    assert "trials with code and versions" in errors
+    assert errors.count("\n") == 1

@@ -103,9 +103,9 @@ def test_every_trial_is_finished_once_though_a_worker_is_killed(
         await_true(lambda: len(finished(out)) >= 2, process)
         first.send_signal(signal.SIGKILL)
         assert len(finished(out)) < 9, "half way"
-        said, _ = process.communicate(timeout=LONGEST)
-        assert process.returncode == 0, said
-    assert "Traceback" not in said
+        output, _ = process.communicate(timeout=LONGEST)
+        assert process.returncode == 0, output
+    assert "Traceback" not in output
     shipped = list((tmp_path / "elsewhere" / "quadriga" / "shipped").iterdir())
     assert len(shipped) == 2, "a predictor, and the data that DeePC plans with"
     assert main(["campaign", *words, "--jobs", "1", "--out", str(tmp_path / "local")]) == 0
@@ -118,8 +118,8 @@ def test_a_cluster_made_here_goes_with_the_campaign(words: list[str], tmp_path: 
     out = tmp_path / "out"
     variant = ("--planners", "plain:planner.kind=none", "--seeds", "0:2")
     process = start(words[0], *variant, "--robots", "1", "--dask", "--jobs", "1", "--out", str(out))
-    said, _ = process.communicate(timeout=LONGEST)
-    assert process.returncode == 0, said
+    output, _ = process.communicate(timeout=LONGEST)
+    assert process.returncode == 0, output
     assert len(finished(out)) == 2
 
 
@@ -135,6 +135,6 @@ def test_without_the_extra_or_a_scheduler_it_costs_one_line(
     with monkeypatch.context() as patch:
         patch.setattr(walk_trials, "import_module", missing)
         assert main([*options, "--dask"]) == 2
-    told = capsys.readouterr().err
-    assert "--dask: got no package 'distributed', expected the extra 'campaign'" in told
-    assert told.count("\n") == 1
+    errors = capsys.readouterr().err
+    assert "--dask: got no package 'distributed', expected the extra 'campaign'" in errors
+    assert errors.count("\n") == 1

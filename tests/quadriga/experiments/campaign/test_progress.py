@@ -14,13 +14,13 @@ from tests.quadriga.experiments.rows import row
 
 
 def test_a_line_now_and_then_says_how_long_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock, said = ManualClock(), io.StringIO()
+    clock, output = ManualClock(), io.StringIO()
     monkeypatch.setattr(progress, "monotonic", clock.monotonic)
-    with TrialProgress(Console(file=said, width=100), 10, 2) as shown:
+    with TrialProgress(Console(file=output, width=100), 10, 2) as shown:
         for seed in range(4):
             clock.sleep(50.0)
             shown.advance(row("none", seed, fell=1.0 if seed == 0 else None))
-    assert said.getvalue().splitlines() == [
+    assert output.getvalue().splitlines() == [
         "2 of 10 trials are walked already",
         "4/10 trials, 1 fell, 5 min left",
         "6/10 trials, 1 fell, 3 min left",

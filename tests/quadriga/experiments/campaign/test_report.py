@@ -41,8 +41,8 @@ def test_the_page_says_what_the_rows_say(capsys: Said, tmp_path: Path) -> None:
     assert "r2 fell at 2.50 s" in found.text
     assert "Did not fall where the baseline did: seeds 0 … 3." in found.text
     assert "c/configs/steps-none.toml --seed 0 --out" in found.text
-    told = capsys.readouterr()
-    assert "Falls against none" in told.out
+    output = capsys.readouterr()
+    assert "Falls against none" in output.out
     tables = (tmp_path / "c" / "report.md").read_text(encoding="utf-8")
     assert (
         "| steps | none | 10 | 60.0\N{NO-BREAK SPACE}[31.3,\N{NO-BREAK SPACE}83.2] | 4 | 0 |"
@@ -77,9 +77,9 @@ def test_what_is_no_campaign_costs_one_line(capsys: Said, tmp_path: Path) -> Non
         (["x.toml", "--dask", "y.toml"], "--dask: got 'y.toml'"),
     ):
         assert main(["campaign", *options]) == 2
-        told = capsys.readouterr().err
-        assert message in told
-        assert told.count("\n") == 1
+        output = capsys.readouterr().err
+        assert message in output
+        assert output.count("\n") == 1
 
 
 def test_a_manifest_survives_json(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ def checkout(folder: Path) -> Path:
 
 def experiment_of(*scenarios: str, **changes: Any) -> Experiment:
     """Variants `none` and `mine` in these scenarios, seeds 0 … 9."""
-    told: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "name": "small", "title": "Small", "question": "Is it so?",
         "parts": (Part("", scenarios),),
         "variants": (
@@ -43,7 +43,7 @@ def experiment_of(*scenarios: str, **changes: Any) -> Experiment:
         ),
         "requirements": (Requirement("success", "least", 97.0, variants=("mine",)),),
     }  # fmt: skip
-    return Experiment(**told | changes)
+    return Experiment(**fields | changes)
 
 
 def rows_of(groups: Iterable[Group], seeds: Iterable[int], fate: Fate) -> list[TrialOutcome]:
@@ -63,7 +63,7 @@ def manifest_of(experiment: Experiment, part: int = 0, **changes: Any) -> Manife
     """Of one of its campaigns, as its file says."""
     sweeps = tuple(SweepEntry(s.key, s.name) for s in experiment.parts[part].sweeps)
     worlds = set(experiment.parts[part].worlds())
-    told: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "typed": ("quadriga experiments",), "baseline": experiment.baseline,
         "variants": {variant.name: dict(variant.keys) for variant in experiment.variants},
         "sweeps": sweeps, "versions": "code 1",
@@ -72,7 +72,7 @@ def manifest_of(experiment: Experiment, part: int = 0, **changes: Any) -> Manife
             for g in experiment.groups() if g.world in worlds
         ),
     }  # fmt: skip
-    return Manifest(**told | changes)
+    return Manifest(**fields | changes)
 
 
 def write_runs(

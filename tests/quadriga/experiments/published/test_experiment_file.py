@@ -90,7 +90,7 @@ def test_what_is_swept_makes_a_campaign_of_each_scenario(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ("title", "titel", r"small.toml: a key: got 'titel', .*did you mean 'title'"),
         ('"Is it so?"', '""', "question: got '', expected text"),
@@ -142,9 +142,9 @@ def test_what_is_swept_makes_a_campaign_of_each_scenario(tmp_path: Path) -> None
         ("title", "= title", "TOML"),
     ],
 )
-def test_a_mistake_is_one_clear_error(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_a_mistake_is_one_clear_error(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert old in SMALL
-    with pytest.raises(ConfigError, match=said):
+    with pytest.raises(ConfigError, match=message):
         read_experiment(written(tmp_path, SMALL.replace(old, new)))
 
 

@@ -38,9 +38,9 @@ def test_walked_published_and_gone_on_with(capsys: Said, experiment: Path, tmp_p
     words = ["experiments", str(experiment), "--into", str(into), "--out", str(runs)]
     page = into / "docs" / "results.md"
     assert main([*words, "--jobs", "1"]) == 0
-    told = capsys.readouterr()
-    assert "soft: success ≥ 97 %" in told.out
-    assert told.out.endswith(f"{page}\n")
+    output = capsys.readouterr()
+    assert "soft: success ≥ 97 %" in output.out
+    assert output.out.endswith(f"{page}\n")
     text = page.read_text(encoding="utf-8")
     assert "4\N{NO-BREAK SPACE}of\N{NO-BREAK SPACE}4" in text
     assert str(tmp_path) not in text
@@ -110,9 +110,9 @@ def test_ctrl_c_stops_at_once_and_keeps_what_is_done(experiment: Path, tmp_path:
     await_true(lambda: len(finished(runs / "looks" / "tiny")) >= 1, process)
     workers = children(process.pid)
     process.send_signal(signal.SIGINT)
-    said, _ = process.communicate(timeout=300.0)
-    assert process.returncode == 130, said
-    assert "Traceback" not in said
+    output, _ = process.communicate(timeout=300.0)
+    assert process.returncode == 130, output
+    assert "Traceback" not in output
     await_gone(workers)
     assert 1 <= len(finished(runs / "looks" / "tiny")) < 400
 
@@ -142,7 +142,7 @@ def test_a_mistake_costs_one_line(capsys: Said, experiment: Path, tmp_path: Path
         ([name, *where, "--dask", "paper"], "--dask: got 'paper'"),
     ):
         assert main(["experiments", *words]) == 2
-        told = capsys.readouterr().err
-        assert message in told
-        assert told.count("\n") == 1
+        output = capsys.readouterr().err
+        assert message in output
+        assert output.count("\n") == 1
     assert not runs.exists()

@@ -39,8 +39,8 @@ def line(
     rows += [row(seed=successes + k, fell=1.0) for k in range(falls)]
     ratios = {} if ratio is None else {"roll": ratio}
     beside = None if fell is None and ratio is None else Beside(fell or NOBODY, 0, ratios)
-    told = Line(("steps",), "mine", len(rows), len(rows), 1.0, tally_trials(rows), beside)
-    return replace(told, **changes)
+    line = Line(("steps",), "mine", len(rows), len(rows), 1.0, tally_trials(rows), beside)
+    return replace(line, **changes)
 
 
 def found(measure: str, of: Line) -> tuple[float | None, ...] | None:
@@ -121,18 +121,18 @@ def judge(requirement: Requirement, *lines: Line) -> list[RequirementVerdict]:
 
 
 @pytest.mark.parametrize(
-    ("falls", "word", "said"),
+    ("falls", "word", "text"),
     [
         (3, "met", "97.0 [91.5, 99.0] met by 0.0"),  # at the limit is met
         (4, "missed", "96.0 [90.2, 98.4] **missed** by 1.0"),
     ],
 )
-def test_at_least_97_of_100(falls: int, word: str, said: str) -> None:
+def test_at_least_97_of_100(falls: int, word: str, text: str) -> None:
     asked = Requirement("success", "least", 97.0, variants=("mine",), scenarios=("steps",))
     (verdict,) = judge(asked, line(100 - falls, falls))
     (finding,) = verdict.findings
     assert (verdict.word, finding.word, finding.whole) == (word, word, True)
-    assert format_finding(verdict, finding).replace("\N{NO-BREAK SPACE}", " ") == said
+    assert format_finding(verdict, finding).replace("\N{NO-BREAK SPACE}", " ") == text
 
 
 def test_below_is_not_at() -> None:
