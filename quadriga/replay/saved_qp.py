@@ -24,7 +24,7 @@ import numpy as np
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, StepProblems
 from quadriga.agents.planner.qp_solver import SolvedQp
-from quadriga.shared.errors import RecordingError
+from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.robot.a1 import TORQUE_LIMIT, Array
 
 WHOLE_BODY: Final = "command"  # the topic that is made of it
@@ -64,7 +64,7 @@ def save(path: Path, qp: SavedQp) -> None:
     Raises:
         RecordingError: it cannot be written.
     """
-    try:
+    with name_file_errors(RecordingError, path, "a new file"):
         np.savez(
             path,
             H=qp.H,
@@ -75,8 +75,6 @@ def save(path: Path, qp: SavedQp) -> None:
             x=qp.x,
             about=np.array(qp.about),
         )
-    except OSError as error:
-        raise RecordingError(str(path), error.strerror or str(error), "a new file") from None
 
 
 def load(path: Path) -> SavedQp:

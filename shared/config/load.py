@@ -15,7 +15,7 @@ from quadriga.shared.config.presets import PRESETS, preset_keys
 from quadriga.shared.config.reference_trace import ROW_END, inline_trace
 from quadriga.shared.config.renamed import RENAMED
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import ConfigError, name_file_errors
 
 
 def load(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
@@ -122,13 +122,8 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises:
         ConfigError: it cannot be read, or is no TOML.
     """
-    try:
+    with name_file_errors(ConfigError, path, "a readable TOML file"):
         text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ConfigError(str(path), reason, "a readable TOML file") from None
-    except UnicodeDecodeError:
-        raise ConfigError(str(path), "bytes that are not UTF-8", "a TOML file") from None
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
