@@ -161,6 +161,22 @@ def in_force(references: tuple[Ticks, Array], tick: Ticks) -> Array:
     return padded[found]
 
 
+def tracking_errors(traces: Traces, begin: int, end: int | None = None) -> tuple[Array, Array]:
+    """The true outputs from tick `begin` to tick `end`, if any, and those less what was asked for.
+
+    Returns:
+        Both of shape (K, n, 6), of the K samples at which a reference was in force.
+    """
+    truth = traces.truth
+    reference = in_force(traces.references, truth.tick)
+    chosen = (truth.tick >= begin) & np.isfinite(reference).all(axis=1)
+    if end is not None:
+        chosen &= truth.tick <= end
+    demanded = np.zeros((int(chosen.sum()), 1, len(OUTPUTS)))
+    demanded[:, 0, [1, 2, 5, 0]] = reference[chosen]
+    return truth.y[chosen], truth.y[chosen] - demanded
+
+
 def _row(key: str) -> tuple[Any, str]:
     try:
         return topic_of(key)
@@ -217,3 +233,18 @@ def _references(messages: Sequence[Reference]) -> tuple[Ticks, Array]:
 
 def _measurements(messages: Sequence[Measurement]) -> MeasurementTrace:
     return MeasurementTrace(ticks_of(messages), stack(messages, "y", 6))
+
+
+def times_of(statuses: Sequence[Status], field: str) -> Array:
+    """All that `planner_ms` or `tick_us` of some statuses hold, shape (K,)."""
+    return np.concatenate([np.zeros(0), *(getattr(status, field) for status in statuses)])
+
+
+def mean_of(values: Array) -> float | None:
+    """The mean, None of nothing."""
+    return float(values.mean()) if values.size else None
+
+
+def quantile_of(values: Array, q: float) -> float | None:
+    """The q-quantile, None of nothing."""
+    return float(np.quantile(values, q)) if values.size else None
