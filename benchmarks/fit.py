@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import os
 import resource
 from dataclasses import asdict, dataclass, replace
@@ -21,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.children import result_of
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.fits import FITS, fit
 from quadriga.agents.predictor.predictor import PredictorMeta
@@ -46,7 +46,7 @@ SIZES = (Size(3, 5_250, 1.0, None), Size(5, 12_000, 3.0, 0.5), Size(10, 20_000, 
 
 @dataclass(frozen=True)
 class Measured:
-    """One fit: wall and processor time, peak memory of its process and what that had before."""
+    """One fit: wall and processor time, and peak memory of its process."""
 
     robots: int
     samples: int
@@ -54,7 +54,6 @@ class Measured:
     seconds: float
     processor_seconds: float
     peak_gb: float
-    before_gb: float
 
 
 def random_episodes(robots: int, samples: int) -> list[Episode]:
@@ -76,10 +75,10 @@ def measure(robots: int, samples: int, kind: str) -> Measured:
         config, team=replace(config.team, robots=robots), identification=identification
     )
     meta, episodes = PredictorMeta.of(config), random_episodes(robots, samples)
-    before, used, begun = peak_gb(), processor_time(), monotonic()
+    used, begun = processor_time(), monotonic()
     fit(episodes, meta)
     seconds, used = monotonic() - begun, processor_time() - used
-    return Measured(robots, samples, kind, seconds, used, peak_gb(), before)
+    return Measured(robots, samples, kind, seconds, used, peak_gb())
 
 
 def processor_time() -> float:
@@ -101,17 +100,16 @@ def main() -> None:
     parser.add_argument("--sizes", nargs="+", type=int, default=[s.robots for s in SIZES])
     parser.add_argument("--repeats", type=int, default=3)
     arguments = parser.parse_args()
-    context = multiprocessing.get_context("spawn")
     print(
         f"{'n':>3} {'T':>6} {'fit':8} {'best s':>8} {'all':24} {'CPU s':>7} {'peak GB':>8}  budget"
     )
     rows = []
     for size in (s for s in SIZES if s.robots in arguments.sizes):
         for kind in arguments.kinds:
-            runs = []
-            for _ in range(arguments.repeats):
-                with context.Pool(1) as pool:
-                    runs.append(pool.apply(measure, (size.robots, size.samples, kind)))
+            runs = [
+                result_of(measure, size.robots, size.samples, kind)
+                for _ in range(arguments.repeats)
+            ]
             best = min(run.seconds for run in runs)
             used = min(run.processor_seconds for run in runs)
             peak = max(run.peak_gb for run in runs)
