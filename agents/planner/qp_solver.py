@@ -133,13 +133,11 @@ class DaqpSolver:
 
     @property
     def closed_form(self) -> ClosedForm | None:
-        """See `Solver`."""
         exact = self._closed.residuals.stationarity <= _MAX_STATIONARITY
         usable = exact and self._ready >= 0 and not len(self._problem.bounded)
         return self._closed if usable else None
 
     def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> QpSolution:
-        """See `Solver`."""
         if self._ready < 0:  # bounds that contradict each other are found at set-up
             return no_solution(self._problem, _DAQP_STATUS.get(self._ready, "failed"))
         if not math.isfinite(f @ f):
@@ -176,7 +174,6 @@ class OsqpSolver:
         return None
 
     def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> QpSolution:
-        """See `Solver`."""
         if not np.isfinite(f).all():
             return no_solution(self._problem, "not-finite")
         low = self._problem.lower if lower is None else lower

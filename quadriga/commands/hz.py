@@ -14,7 +14,6 @@ from quadriga.shared.runtime.signals import stop_flag
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("hz", run, "print how often messages come, live or from a recording")
     command.add_argument("keys", nargs="*", metavar="KEY", help=f"{KEY_HELP} (all)")
     command.add_argument(

@@ -27,7 +27,7 @@ from quadriga.shared.wire.messages import (
     Status,
     Truth,
 )
-from quadriga.shared.wire.topics import COMMAND, INPUTS, STATE, Topic, topic_of
+from quadriga.shared.wire.topics import COMMAND, INPUTS, STATE, Topic, find_topic
 
 # Up to 1 kHz each: only their ticks are read.
 _TIMED_ONLY: Final = (STATE.name, COMMAND.name, INPUTS.name)
@@ -103,7 +103,7 @@ def read_traces(recording: Recording, names: Container[str] | None = None) -> Tr
         counts[key] += 1
         row = rows.get(key)
         if row is None:
-            row = rows[key] = _row(key)
+            row = rows[key] = find_topic(key)
         topic, robot = row
         if topic is None or tick < 0:
             invalid[key] += 1
@@ -175,13 +175,6 @@ def tracking_errors(traces: Traces, begin: int, end: int | None = None) -> tuple
     demanded = np.zeros((int(chosen.sum()), 1, len(OUTPUTS)))
     demanded[:, 0, [1, 2, 5, 0]] = reference[chosen]
     return truth.y[chosen], truth.y[chosen] - demanded
-
-
-def _row(key: str) -> tuple[Any, str]:
-    try:
-        return topic_of(key)
-    except MessageError:
-        return None, ""
 
 
 def estimate_errors(traces: Traces, index: int) -> tuple[Ticks, Array]:

@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import sys
 import zipfile
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import daqp
 import numpy as np
@@ -64,17 +64,9 @@ def save(path: Path, qp: SavedQp) -> None:
     Raises:
         RecordingError: it cannot be written.
     """
+    arrays: dict[str, Any] = asdict(qp)
     with name_file_errors(RecordingError, path, "a new file"):
-        np.savez(
-            path,
-            H=qp.H,
-            f=qp.f,
-            A=qp.A,
-            lower=qp.lower,
-            upper=qp.upper,
-            x=qp.x,
-            about=np.array(qp.about),
-        )
+        np.savez(path, **arrays)
 
 
 def load(path: Path) -> SavedQp:

@@ -13,7 +13,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
-from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.reader import M, Recording
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command, Event, Message
@@ -111,18 +111,21 @@ class _Silent:
         self.robots: set[str] = set()
 
     def update(self, entries: Iterable[ChunkEntry]) -> None:
-        for event in _decode_events(self._key, entries):
+        for _, event in _decode_valid(Event, self._key, entries):
             if event.code == codes.BACK:
                 self.robots.discard(event.robot)
             elif event.code in (codes.SILENT, codes.GONE):
                 self.robots.add(event.robot)
 
 
-def _decode_events(key: str, entries: Iterable[ChunkEntry]) -> Iterator[Event]:
+def _decode_valid(
+    kind: type[M], key: str, entries: Iterable[ChunkEntry]
+) -> Iterator[tuple[int, M]]:
+    """Log time and content of a key's messages; what is none, the world dropped or never sent."""
     for entry in entries:
         if entry.key == key:
-            with suppress(MessageError):  # of a foreign publisher: the world's own are valid
-                yield decode(entry.payload, Event)
+            with suppress(MessageError):
+                yield entry.log_time_ns, decode(entry.payload, kind)
 
 
 def _compare(world: World, config: Config, entries: Iterable[ChunkEntry]) -> int | Difference:
@@ -152,18 +155,11 @@ def _choose_commands(
     """What each robot that was not silent commanded in a tick, by robot in the team's order."""
     commands = {}
     for name, (state, command) in keys.items():
-        valid = [] if name in silent else list(_decode_commands(command, entries))
+        valid = [] if name in silent else list(_decode_valid(Command, command, entries))
         if valid:
             asked = [entry.log_time_ns for entry in entries if entry.key == state]
             commands[name] = _choose_taken(valid, min(asked, default=0))
     return commands
-
-
-def _decode_commands(key: str, entries: Iterable[ChunkEntry]) -> Iterator[tuple[int, Command]]:
-    for entry in entries:
-        if entry.key == key:
-            with suppress(MessageError):  # the world dropped it, too
-                yield entry.log_time_ns, decode(entry.payload, Command)
 
 
 def _choose_taken(commands: Sequence[tuple[int, Command]], asked: int) -> Command:

@@ -48,6 +48,7 @@ class Recording:
             RecordingError: no such file, an empty one, or not a recording of this project.
         """
         self.path, self.cut = path, ""
+        self.damages: tuple[()] = ()  # none can be told apart: `Salvage` does
         with (
             name_file_errors(RecordingError, path, "a recording", "did the walk start?"),
             path.open("rb") as file,
@@ -124,6 +125,7 @@ class Recording:
         if self.cut:
             raise self._damage_error(self.cut)
 
+    @property
     def notes(self) -> dict[str, dict[str, str]]:
         """What the writer noted at the end, by name: `COUNTS`, `LOST`, `SINCE`; {} after a kill."""
         found: dict[str, dict[str, str]] = {}
