@@ -141,7 +141,8 @@ def team(
     options: Options, robots: int, seconds: float, console: Console
 ) -> tuple[Config, Path | None, Predictor | None]:
     """A team that walks on flat ground, its predictor's file and the predictor."""
-    from quadriga.identification.predictors import ensure_predictor, load_predictor
+    from quadriga.agents.planner.checked_predictor import load_checked
+    from quadriga.identification.predictors import ensure_predictor
     from quadriga.shared.config.load import load
 
     config = load(
@@ -150,7 +151,7 @@ def team(
     if options.planner == "none":
         return config, None, None
     path = ensure_predictor(config, console)
-    return config, path, load_predictor(path, config)
+    return config, path, load_checked(path, config)[0]
 
 
 PARTS: dict[str, Callable[[Options, Console, Tell], Part]] = {

@@ -30,9 +30,10 @@ from benchmarks.page import targets
 from benchmarks.planner_contenders import AS_WRITTEN, Case, Contender, Deepc, Local, Team
 from benchmarks.planner_peer import AVAILABLE, CvxpyDeepc
 from benchmarks.planner_ticks import PlanningTick, record
+from quadriga.agents.planner.checked_predictor import load_checked
 from quadriga.agents.planner.planner_qp import PlannerProblem
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.identification.predictors import ensure_data, ensure_predictor, load_predictor
+from quadriga.identification.predictors import ensure_data, ensure_predictor
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
@@ -112,7 +113,7 @@ def walked(
 ) -> tuple[Config, Predictor, list[list[PlanningTick]]]:
     """A team, its predictor, and the planning steps of its walks."""
     config = load(None, {"team.robots": robots, "world.seconds": seconds})
-    predictor = load_predictor(ensure_predictor(config, console), config)
+    predictor = load_checked(ensure_predictor(config, console), config)[0]
     worlds = [replace(config.world, terrain=terrain) for terrain in WALKS]
     return config, predictor, [record(replace(config, world=w), predictor) for w in worlds]
 

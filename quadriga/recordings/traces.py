@@ -161,20 +161,25 @@ def in_force(references: tuple[Ticks, Array], tick: Ticks) -> Array:
     return padded[found]
 
 
-def tracking_errors(traces: Traces, begin: int, end: int | None = None) -> tuple[Array, Array]:
-    """The true outputs from tick `begin` to tick `end`, if any, and those less what was asked for.
+def demanded_outputs(traces: Traces, tick: Ticks) -> Array:
+    """The outputs asked for at each tick. Shape (len(tick), 6), NaN where nothing was yet."""
+    reference = in_force(traces.references, tick)
+    demanded = np.zeros((len(tick), len(OUTPUTS)))
+    demanded[:, [1, 2, 5, 0]] = reference
+    demanded[np.isnan(reference).any(axis=1)] = np.nan
+    return demanded
+
+
+def tracking_errors(traces: Traces, begin: int, end: float = np.inf) -> tuple[Array, Array]:
+    """True outputs from tick `begin` to tick `end`, and those less what was asked for.
 
     Returns:
-        Both of shape (K, n, 6), of the K samples at which a reference was in force.
+        Both of shape (K, n, 6), of the K samples at which something was asked for.
     """
     truth = traces.truth
-    reference = in_force(traces.references, truth.tick)
-    chosen = (truth.tick >= begin) & np.isfinite(reference).all(axis=1)
-    if end is not None:
-        chosen &= truth.tick <= end
-    demanded = np.zeros((int(chosen.sum()), 1, len(OUTPUTS)))
-    demanded[:, 0, [1, 2, 5, 0]] = reference[chosen]
-    return truth.y[chosen], truth.y[chosen] - demanded
+    demanded = demanded_outputs(traces, truth.tick)
+    chosen = (begin <= truth.tick) & (truth.tick <= end) & np.isfinite(demanded[:, 0])
+    return truth.y[chosen], truth.y[chosen] - demanded[chosen, None]
 
 
 def estimate_errors(traces: Traces, index: int) -> tuple[Ticks, Array]:
