@@ -8,10 +8,8 @@ walk the world and other robots run in between, so the agent finds them cold.
 
 from __future__ import annotations
 
-import gc
 from collections import defaultdict
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,6 +25,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.clock import monotonic_ns
+from quadriga.shared.runtime.collector import collector_off
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import State
 
@@ -63,17 +62,6 @@ def measure(
                 "stages": dict(zip(STAGES, np.median(stages, axis=0).tolist(), strict=True)),
             }
     return figures
-
-
-@contextmanager
-def collector_off() -> Iterator[None]:
-    """No garbage collection within the block, as in an agent's process while it walks."""
-    gc.collect()
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
 
 
 def _replay(

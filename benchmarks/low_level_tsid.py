@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.children import result_of
-from benchmarks.low_level import collector_off
 from benchmarks.low_level_ticks import AgentTick, TsidCase
 from quadriga.agents.agent import Agent
 from quadriga.agents.controller.controller import Controller, ControllerOutputs, Task
@@ -32,6 +31,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.clock import monotonic_ns
+from quadriga.shared.runtime.collector import collector_off
 from quadriga.shared.runtime.jit import compiled
 
 

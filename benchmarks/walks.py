@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
-from benchmarks.low_level import collector_off
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256
@@ -18,6 +17,7 @@ from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
+from quadriga.shared.runtime.collector import collector_off
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Truth
 from quadriga.shared.wire.topics import TRUTH

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -26,6 +24,7 @@ from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.blas import one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.runtime.collector import collector_off
 from quadriga.shared.wire.topics import PLAN
 
 _SHOWN_EVERY: Final = 100  # ticks
@@ -87,7 +86,7 @@ def replay_agent(
     curves = Curves(config.planner.applied) if agents.changed else None
     comparison = Comparison(log, None if curves is None else curves.add)
     inputs = RecordedInputs(config, agents.recorded, inbox, log)
-    with _without_garbage_collection():  # a long log need not be looked through again and again
+    with collector_off():  # a long log need not be looked through again and again
         _replay_steps(agents, inputs, comparison, show, stop_at)
     verdict = comparison.finish()
     wall = monotonic() - begun
@@ -149,15 +148,6 @@ def _replay_steps(
         before = memory
         memory, outputs = agent.step(memory, step.inputs)
         comparison.add(ReplayedStep(before, step.inputs, outputs))
-
-
-@contextmanager
-def _without_garbage_collection() -> Iterator[None]:
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
 
 
 def _draw_curves(job: ReplayJob, curves: Curves, changed: str) -> Path:
