@@ -17,6 +17,7 @@ import os
 import resource
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -44,18 +45,6 @@ class Size:
 SIZES = (Size(3, 5_250, 1.0, None), Size(5, 12_000, 3.0, 0.5), Size(10, 20_000, 12.0, None))
 
 
-@dataclass(frozen=True)
-class Measured:
-    """One fit: wall and processor time, and peak memory of its process."""
-
-    robots: int
-    samples: int
-    kind: str
-    seconds: float
-    processor_seconds: float
-    peak_gb: float
-
-
 def random_episodes(robots: int, samples: int) -> list[Episode]:
     """White forces and white outputs: no fit is easier for it, none is meant to be good."""
     rng = np.random.default_rng(0)
@@ -67,8 +56,8 @@ def random_episodes(robots: int, samples: int) -> list[Episode]:
     return episodes
 
 
-def measure(robots: int, samples: int, kind: str) -> Measured:
-    """Fit once, in a process of its own."""
+def measure(robots: int, samples: int, kind: str) -> dict[str, Any]:
+    """Fit once: wall and processor time, and peak memory of this process."""
     config = Config()
     identification = replace(config.identification, predictor=kind)
     config = replace(
@@ -78,7 +67,10 @@ def measure(robots: int, samples: int, kind: str) -> Measured:
     used, begun = processor_time(), monotonic()
     fit(episodes, meta)
     seconds, used = monotonic() - begun, processor_time() - used
-    return Measured(robots, samples, kind, seconds, used, peak_gb())
+    return {
+        "robots": robots, "samples": samples, "kind": kind, "seconds": seconds,
+        "processor_seconds": used, "peak_gb": peak_gb(),
+    }  # fmt: skip
 
 
 def processor_time() -> float:
@@ -110,10 +102,10 @@ def main() -> None:
                 result_of(measure, size.robots, size.samples, kind)
                 for _ in range(arguments.repeats)
             ]
-            best = min(run.seconds for run in runs)
-            used = min(run.processor_seconds for run in runs)
-            peak = max(run.peak_gb for run in runs)
-            every = " ".join(f"{run.seconds:.2f}" for run in runs)
+            best = min(run["seconds"] for run in runs)
+            used = min(run["processor_seconds"] for run in runs)
+            peak = max(run["peak_gb"] for run in runs)
+            every = " ".join(f"{run['seconds']:.2f}" for run in runs)
             within = best <= size.seconds and peak <= (size.gigabytes or np.inf)
             verdict = ("kept" if within else "MISSED") if kind == "ridge" else "-"
             print(
@@ -121,7 +113,7 @@ def main() -> None:
                 f"{used:7.2f} {peak:8.2f}  {verdict}",
                 flush=True,
             )
-            rows += [asdict(run) for run in runs]
+            rows += runs
     if arguments.out:
         report = {
             "runs": rows,

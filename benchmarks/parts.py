@@ -83,14 +83,12 @@ def recorder(options: Options, _console: Console, _tell: Tell) -> Part:
 
 def fit(options: Options, _console: Console, _tell: Tell) -> Part:
     """The predictor's fit for a small team; `python -m benchmarks.fit` does the large ones."""
-    from dataclasses import asdict
-
     from benchmarks.children import result_of
     from benchmarks.fit import SIZES, measure
 
     size = SIZES[0]
     samples = 2100 if options.quick else size.samples
-    return asdict(result_of(measure, size.robots, samples, "ridge"))
+    return dict(result_of(measure, size.robots, samples, "ridge"))
 
 
 def walks(options: Options, console: Console, tell: Tell) -> Part:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from difflib import get_close_matches
 
 
 class QuadrigaError(Exception):
@@ -84,3 +85,9 @@ def system_reason(error: OSError | UnicodeDecodeError) -> str:
     if isinstance(error, UnicodeDecodeError):
         return "bytes that are not UTF-8"
     return error.strerror or str(error)
+
+
+def did_you_mean(got: object, known: Iterable[str]) -> str:
+    """The known name that is like the one got, as a likely cause; "" if none is."""
+    close = get_close_matches(str(got), list(known), 1)
+    return f"did you mean {close[0]!r}?" if close else ""

@@ -57,7 +57,7 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
             "one in lock-step",
             "which command moved the motors in which tick is not recorded in real time",
         )
-    world, silent = World(config), _Silent(config.team.name)
+    world, silent = World(config), set[str]()
     keys = {
         name: (STATE.key(config.team.name, name), COMMAND.key(config.team.name, name))
         for name in world.names
@@ -65,7 +65,7 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
     compared, lost = 0, ""
     for tick, entries in by_tick(recording, _NAMES):
         if lost:
-            if not any(_is_of_world(entry) for entry in entries):
+            if not any(topic_of(entry.key)[0] in (STATE, TRUTH) for entry in entries):
                 continue  # nothing of the world's came after
             if not recording.cut:
                 raise RecordingError(
@@ -81,9 +81,9 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
             yield WorldComparison(tick, compared, difference=result)
             return
         compared += result
-        silent.update(entries)
-        commands = _choose_commands(keys, entries, silent.robots)
-        absent = [name for name in world.names if name not in {*commands, *silent.robots}]
+        _update_silent(silent, config.team.name, entries)
+        commands = _choose_commands(keys, entries, silent)
+        absent = [name for name in world.names if name not in {*commands, *silent}]
         if absent:
             lost = f"no command of {', '.join(absent)} at tick {tick}"
         else:
@@ -99,23 +99,13 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
         )
 
 
-def _is_of_world(entry: ChunkEntry) -> bool:
-    return topic_of(entry.key)[0] in (STATE, TRUTH)
-
-
-class _Silent:
-    """The robots that the world does not wait for, by its events."""
-
-    def __init__(self, team: str) -> None:
-        self._key = EVENT.key(team)
-        self.robots: set[str] = set()
-
-    def update(self, entries: Iterable[ChunkEntry]) -> None:
-        for _, event in _decode_valid(Event, self._key, entries):
-            if event.code == codes.BACK:
-                self.robots.discard(event.robot)
-            elif event.code in (codes.SILENT, codes.GONE):
-                self.robots.add(event.robot)
+def _update_silent(silent: set[str], team: str, entries: Iterable[ChunkEntry]) -> None:
+    """Take down the robots that the world no longer waits for, or waits for again."""
+    for _, event in _decode_valid(Event, EVENT.key(team), entries):
+        if event.code == codes.BACK:
+            silent.discard(event.robot)
+        elif event.code in (codes.SILENT, codes.GONE):
+            silent.add(event.robot)
 
 
 def _decode_valid(
