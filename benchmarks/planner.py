@@ -20,12 +20,12 @@ from time import thread_time
 from typing import Protocol
 
 import numpy as np
-import osqp
 from rich.console import Console
 from rich.table import Table
 from scipy import sparse
 
 from benchmarks import blas_threads
+from benchmarks.as_written import TIGHT, WarmOsqp
 from benchmarks.page import targets
 from benchmarks.planner_contenders import AS_WRITTEN, Case, Contender, Deepc, Local, Team
 from benchmarks.planner_peer import AVAILABLE, CvxpyDeepc
@@ -166,25 +166,12 @@ def measure(
 
 def reference(problem: PlannerProblem, f: Array) -> Array:
     """The minimiser by OSQP at 1e-9."""
-    solver = osqp.OSQP()
-    A = sparse.csc_matrix(np.vstack([np.eye(len(f)), problem.A]))
-    P = sparse.csc_matrix(np.triu(problem.H))
-    solver.setup(
-        P,
-        f,
-        A,
-        problem.lower,
-        problem.upper,
-        verbose=False,
-        eps_abs=1e-9,
-        eps_rel=1e-9,
-        max_iter=100_000,
-    )
-    result = solver.solve(raise_error=False)
-    if result.info.status != "solved":
-        raise RuntimeError(f"the reference did not converge: {result.info.status}")
-    v: Array = result.x
-    return v
+    A = sparse.csc_array(np.vstack([np.eye(len(f)), problem.A]))
+    solver = WarmOsqp(sparse.csc_array(np.triu(problem.H)), A, TIGHT)
+    x, status, _ = solver.solve(f, problem.lower, problem.upper)
+    if status != "solved":
+        raise RuntimeError(f"the reference did not converge: {status}")
+    return x
 
 
 def judge(config: Config, case: Case, exact: Array, u: Array) -> tuple[float, float, float]:
