@@ -11,6 +11,9 @@ problem; the gap is relative to what the plan improves on nominal forces.
 
 from __future__ import annotations
 
+from benchmarks import blas_threads  # before numpy
+
+# isort: split
 import argparse
 import json
 from collections.abc import Sequence
@@ -24,7 +27,6 @@ from rich.console import Console
 from rich.table import Table
 from scipy import sparse
 
-from benchmarks import blas_threads
 from benchmarks.as_written import TIGHT, WarmOsqp
 from benchmarks.page import targets
 from benchmarks.planner_contenders import AS_WRITTEN, Case, Contender, Deepc, Local, Team
