@@ -61,31 +61,27 @@ def _compare(config: Config, found: list[TsidCase]) -> dict[str, Any] | None:
         import tsid  # noqa: F401
     except ImportError:
         return None
-    with collector_off():
-        return _turns(config, found)
-
-
-def _turns(config: Config, found: list[TsidCase]) -> dict[str, Any]:
     from benchmarks.low_level_peer import Tsid
 
     # TSID weighs turning like moving, and a foot like the trunk: so do both here.
     weights = Controller(config).weights._replace(tilt_length=1.0, swing_weight=1.0)
     ours, peer = _Ours(weights), Tsid(weights)
     times, differences = np.empty((2, len(found))), []
-    for case in found[:20]:
-        ours.solve(case)
-    for k, case in enumerate(found):
-        peer.set(case)
-        answers: list[Array] = [np.empty(0), np.empty(0)]
-        order: list[tuple[int, Callable[[TsidCase], object], Callable[[], Array]]] = [
-            (0, ours.solve, ours.torques), (1, peer.solve, peer.torques),
-        ]  # fmt: skip
-        for which, solve, torques in order if k % 2 else reversed(order):
-            begun = monotonic_ns()
-            solve(case)
-            times[which, k] = 1e-3 * (monotonic_ns() - begun)
-            answers[which] = torques()
-        differences.append(np.abs(answers[0] - answers[1]).max())
+    with collector_off():
+        for case in found[:20]:
+            ours.solve(case)
+        for k, case in enumerate(found):
+            peer.set(case)
+            answers: list[Array] = [np.empty(0), np.empty(0)]
+            order: list[tuple[int, Callable[[TsidCase], object], Callable[[], Array]]] = [
+                (0, ours.solve, ours.torques), (1, peer.solve, peer.torques),
+            ]  # fmt: skip
+            for which, solve, torques in order if k % 2 else reversed(order):
+                begun = monotonic_ns()
+                solve(case)
+                times[which, k] = 1e-3 * (monotonic_ns() - begun)
+                answers[which] = torques()
+            differences.append(np.abs(answers[0] - answers[1]).max())
     median, p99 = np.median(times, axis=1), np.percentile(times, 99, axis=1)
     return {
         "ours_us": float(median[0]),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from statistics import fmean
 from typing import Any, Final
 
 from rich.table import Table
@@ -33,7 +34,7 @@ def headline(parts: dict[str, Part]) -> dict[str, Any]:
         "recorder_msgs_per_s": recorder.get("per_s"),
         "recorder_gaps": recorder.get("gaps"),
         "recorder_core_share": recorder.get("core"),
-        "recorder_cost": 1.0 - _mean(cost["with"]) / _mean(cost["without"]) if cost else None,
+        "recorder_cost": 1.0 - fmean(cost["with"]) / fmean(cost["without"]) if cost else None,
     }
 
 
@@ -146,8 +147,8 @@ def _walks(part: Part) -> list[str]:
         lines.append("  " + _memory(row["memory_mb"]))
     if cost := part["recorder"]:
         lines.append(
-            f"n = {cost['robots']}: {_mean(cost['with']):.2f} × real time with recorder, "
-            f"{_mean(cost['without']):.2f} without"
+            f"n = {cost['robots']}: {fmean(cost['with']):.2f} × real time with recorder, "
+            f"{fmean(cost['without']):.2f} without"
         )
     return lines
 
@@ -162,10 +163,6 @@ def _memory(found: dict[str, dict[str, float]]) -> str:
     cells = (f"{name} {m['rss']:.0f} ({m['pss']:.0f})" for name, m in shown.items() if m)
     total = sum(m.get("pss", 0.0) for m in found.values())
     return f"MB (of it own): {', '.join(cells)}; all {total:.0f}"
-
-
-def _mean(values: list[float]) -> float:
-    return sum(values) / len(values)
 
 
 LINES: Final[dict[str, Callable[[Part], list[str]]]] = {

@@ -121,7 +121,7 @@ def _world(traces: Traces) -> dict[str, Any]:
 def _tracking(traces: Traces) -> dict[str, Any]:
     begin = steady_from(traces)
     y, error = tracking_errors(traces, begin)
-    heights = [_height_errors(traces, robot, begin) for robot in traces.robots]
+    heights = [stance_height_errors(traces, robot, begin) for robot in traces.robots]
     return {
         "steady_from": begin / 1000.0,
         **{f"mean_{name}": mean_of(y[..., OUTPUTS.index(name)]) for name in ("vx", "vy", "wz")},
@@ -131,11 +131,6 @@ def _tracking(traces: Traces) -> dict[str, Any]:
             for i, robot in enumerate(traces.robots)
         },
     }
-
-
-def _height_errors(traces: Traces, robot: str, begin: int) -> Array:
-    tick, error = stance_height_errors(traces, robot)
-    return error[tick >= begin]
 
 
 def _estimator(traces: Traces) -> dict[str, Any]:

@@ -200,16 +200,15 @@ def estimate_errors(traces: Traces, index: int) -> tuple[Ticks, Array]:
     return tick, error
 
 
-def stance_height_errors(traces: Traces, robot: str) -> tuple[Ticks, Array]:
+def stance_height_errors(traces: Traces, robot: str, begin: int = 0, end: float = np.inf) -> Array:
     """A robot's height over its stance feet, as it measures it, less the one asked for.
 
     Returns:
-        Ticks (K,) at which one was asked for, and errors (K,), m.
+        Errors (K,), m, of the samples from tick `begin` to tick `end` at which one was asked for.
     """
     own = traces.measurements[robot]
     error = own.y[:, OUTPUTS.index("z")] - in_force(traces.references, own.tick)[:, 3]
-    asked = np.isfinite(error)
-    return own.tick[asked], error[asked]
+    return error[(begin <= own.tick) & (own.tick <= end) & np.isfinite(error)]
 
 
 def _fits(truth: Truth, config: Config) -> bool:

@@ -97,7 +97,8 @@ def compute_figures(walk: Walk) -> Figures:
     begin = steady_from(traces)
     y, error = tracking_errors(traces, begin, end)
     squares = {name: mean_of(error[..., i] ** 2) for i, name in enumerate(OUTPUTS)}
-    squares[OVER_STANCE_FEET] = _height_squares(traces, begin, end)
+    heights = [stance_height_errors(traces, robot, begin, end) for robot in traces.robots]
+    squares[OVER_STANCE_FEET] = mean_of(np.concatenate(heights) ** 2)
     outputs = _output_cost(planner.Q, squares)
     forces = mean_of(_force_cost(walk, begin, end, np.tile(planner.R, N_LEGS)))
     every = [status for found in traces.statuses.values() for status in found]
@@ -142,13 +143,6 @@ def _find_falls(traces: Traces) -> dict[str, float]:
 def _find_stops(traces: Traces, fallen: Mapping[str, float]) -> dict[str, str]:
     last = {robot: found[-1] for robot, found in traces.statuses.items() if found}
     return {r: s.reason for r, s in last.items() if s.reason and r not in fallen}
-
-
-def _height_squares(traces: Traces, begin: int, end: int) -> float | None:
-    """Mean square of the height over the stance feet less the one asked for, m²."""
-    found = [stance_height_errors(traces, robot) for robot in traces.robots]
-    kept = [error[(tick >= begin) & (tick <= end)] for tick, error in found]
-    return mean_of(np.concatenate(kept) ** 2)
 
 
 def _output_cost(Q: Sequence[float], squares: Mapping[str, float | None]) -> float | None:
