@@ -82,4 +82,4 @@ bench-planner: $(STAMP)
 
 # Whether the recorder keeps up with 20,000 messages a second; some ten seconds.
 bench-recorder: $(STAMP)
-	$(BIN)/python -m benchmarks.recorder $(ARGS)
+	$(BIN)/python -m benchmarks recorder $(ARGS)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from collections import Counter
 from collections.abc import Callable
 from typing import Final
@@ -24,6 +23,7 @@ from quadriga.shared.members import PLANNER, SIM
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
+from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import decode, encode
@@ -58,9 +58,7 @@ def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None
         if not meet(bus, config, stopped):
             return
         rehearse_central(config, Central(config, planner))
-        gc.collect()
-        gc.freeze()
-        gc.disable()
+        end_collection()
         take_priority(config.runtime.priority)
         bus.declare(READY)
         shell.work(stopped)

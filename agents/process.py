@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Callable
 from typing import Final
 
@@ -20,6 +19,7 @@ from quadriga.shared.errors import BusError
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
+from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import encode
@@ -58,9 +58,7 @@ def run(
             return
         rehearse(config, Agent(config, robot, predictor))
         shell = _Shell(config, agent, inbox, bus)
-        gc.collect()
-        gc.freeze()
-        gc.disable()  # a collection in mid-step costs more than the step
+        end_collection()
         take_priority(config.runtime.priority)
         bus.declare(READY)
         shell.walk(stopped)

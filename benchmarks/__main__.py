@@ -77,17 +77,16 @@ def describe_machine() -> dict[str, Any]:
     """The machine's properties that the figures depend on."""
     from benchmarks.children import result_of
     from quadriga.shared.config.sections import Config
+    from quadriga.shared.runtime.arithmetic import arithmetic
     from quadriga.shared.runtime.scheduling import take_priority
 
     realtime = result_of(
         take_priority, Config().runtime.priority
     )  # what this process starts would inherit it
-    cpus = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    models = [line.partition(":")[2].strip() for line in cpus if line.startswith("model name")]
     return {
         "date": datetime.fromtimestamp(1e-9 * wall_ns(), UTC).isoformat(timespec="seconds"),
         "cores": len(os.sched_getaffinity(0)),
-        "processor": models[0] if models else "?",
+        "processor": arithmetic()["cpu"],
         "python": platform.python_version(),
         **{name: version(name) for name in _VERSIONS},
         "scheduling": "realtime" if realtime else "ordinary",

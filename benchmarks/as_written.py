@@ -72,7 +72,7 @@ class PaperQp:
             [-sparse.csc_array(G_u), sparse.eye_array(outputs)],
             [_force_rows(config, steps), None],
         ]
-        self._solver = _Warm(P, sparse.block_array(rows), settings)
+        self._solver = WarmOsqp(P, sparse.block_array(rows), settings)
         self._forces = forces
 
     def solve(self, y_free: Array, y_des: Array, stance: Stance, nominal: Array) -> Written:
@@ -84,7 +84,7 @@ class PaperQp:
             stance: scheduled stance, shape (n, N, 4).
             nominal: forces that deviations are counted from, shape (n, N, 12), N.
         """
-        lower, upper = _force_bounds(self._config, stance, nominal)
+        lower, upper = force_bounds(self._config, stance, nominal)
         Q = _Q(self._config, len(y_des) // N_OUTPUTS)
         x, status, iterations = self._solver.solve(
             np.concatenate([np.zeros(self._forces), -Q * y_des]),
@@ -137,14 +137,14 @@ class DeepcQp:
             [None, -Y, sparse.csc_array(Y_f), None],
             [_force_rows(config, n * N), None, None, None],
         ]
-        self._solver = _Warm(P, sparse.block_array(rows), settings)
+        self._solver = WarmOsqp(P, sparse.block_array(rows), settings)
         self._free = U_p.shape[1] + len(Y_p)
 
     def solve(self, past: Array, y_des: Array, stance: Stance, nominal: Array) -> Written:
         """One tick; `past` stacks [u_ini; y_ini] per robot, shape (18 n T_ini,); see `PaperQp`."""
         n, T_ini = len(stance), self._config.T_ini
         u_ini, y_ini = np.split(past.reshape(n, -1), [N_FORCES * T_ini], axis=1)
-        lower, upper = _force_bounds(self._config, stance, nominal)
+        lower, upper = force_bounds(self._config, stance, nominal)
         known = np.concatenate(
             [
                 u_ini.ravel() / U_SCALE,
@@ -161,7 +161,7 @@ class DeepcQp:
         return _unpack(x, stance, status, iterations)
 
 
-class _Warm:
+class WarmOsqp:
     """One OSQP object: set up at the first tick, then updated; it warm-starts from its last x."""
 
     def __init__(self, P: sparse.sparray, A: sparse.sparray, settings: Mapping[str, float]) -> None:
@@ -197,7 +197,7 @@ def _force_rows(config: PlannerConfig, steps: int) -> sparse.sparray:
     return sparse.vstack([sparse.eye_array(3 * feet), sparse.kron(sparse.eye_array(feet), cone)])
 
 
-def _force_bounds(config: PlannerConfig, stance: Stance, nominal: Array) -> tuple[Array, Array]:
+def force_bounds(config: PlannerConfig, stance: Stance, nominal: Array) -> tuple[Array, Array]:
     """Bounds of `_force_rows`: a box and the friction cone in stance, exactly zero in swing."""
     vertical = nominal.reshape(*stance.shape, 3)[..., 2]
     box = np.where(stance[..., None], np.array(config.deviation_max), 0.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,14 +18,13 @@ _GREY: Final = "0.55"
 
 def draw(parts: dict[str, Part], path: Path) -> Path:
     """Write the picture and return its path."""
-    panels: list[tuple[Callable[[Axes, Part], None], Part]] = [
-        (panel, parts[name]) for name, panel in PANELS if name in parts
-    ]
+    panels = [row for row in PANELS if row[0] in parts]
     rows = max(1, (len(panels) + 1) // 2)
     figure = Figure(figsize=(9.0, 3.2 * rows), layout="constrained")
     axes = figure.subplots(rows, 2, squeeze=False).ravel()
-    for axis, (panel, part) in zip(axes, panels, strict=False):
-        panel(axis, part)
+    for axis, (name, panel, title) in zip(axes, panels, strict=False):
+        panel(axis, parts[name])
+        axis.set_title(title, fontsize=9, loc="left")
         _tidy(axis)
     for axis in axes[len(panels) :]:
         axis.set_axis_off()
@@ -48,7 +46,6 @@ def _factor(axis: Axes, part: Part) -> None:
     axis.set_xticks(sizes)
     axis.set_xlabel("robots")
     axis.set_ylabel("real-time factor")
-    axis.set_title("walks over the bus, recorded", fontsize=9, loc="left")
 
 
 def _shares(axis: Axes, part: Part) -> None:
@@ -65,8 +62,6 @@ def _shares(axis: Axes, part: Part) -> None:
     axis.set_xticks(place, [str(row["robots"]) for row in rows])
     axis.set_xlabel("robots")
     axis.set_ylabel("one tick [ms]")
-    axis.legend(fontsize=8, frameon=False)
-    axis.set_title("in one process, and over the bus", fontsize=9, loc="left")
 
 
 def _low_level(axis: Axes, part: Part) -> None:
@@ -79,7 +74,6 @@ def _low_level(axis: Axes, part: Part) -> None:
     axis.set_xlabel("µs, medians of the stages")
     axis.set_ylim(-0.5, 2.3)
     axis.legend(fontsize=8, frameon=False, ncols=3, loc="upper left")
-    axis.set_title("a robot's tick, low level", fontsize=9, loc="left")
 
 
 def _bus(axis: Axes, part: Part) -> None:
@@ -92,8 +86,6 @@ def _bus(axis: Axes, part: Part) -> None:
     axis.set_xticks(place, [str(row["robots"]) for row in rows])
     axis.set_xlabel("robots")
     axis.set_ylabel("one tick [µs]")
-    axis.legend(fontsize=8, frameon=False)
-    axis.set_title("messages alone, states and commands", fontsize=9, loc="left")
 
 
 def _world(axis: Axes, part: Part) -> None:
@@ -101,7 +93,6 @@ def _world(axis: Axes, part: Part) -> None:
     names = [f"{row['robots']} {row['terrain']}" for row in rows]
     axis.barh(names[::-1], [row["median"] for row in rows][::-1], 0.6, color=_COLOURS[0])
     axis.set_xlabel("µs")
-    axis.set_title("a step of the world, by robots", fontsize=9, loc="left")
 
 
 def _memory(axis: Axes, part: Part) -> None:
@@ -117,20 +108,24 @@ def _memory(axis: Axes, part: Part) -> None:
         color=_COLOURS[0],
         label="its share of it",
     )
-    axis.set_xlabel("MB")
-    axis.legend(fontsize=8, frameon=False)
-    axis.set_title(f"memory while {row['robots']} walk", fontsize=9, loc="left")
+    axis.set_xlabel(f"MB, while {row['robots']} walk")
 
 
 def _tidy(axis: Axes) -> None:
     axis.spines[["top", "right"]].set_visible(False)
     axis.grid(color="0.92", linewidth=0.6)
     axis.set_axisbelow(True)
+    if axis.get_legend() is None and axis.get_legend_handles_labels()[0]:
+        axis.legend(fontsize=8, frameon=False)
     if axis.get_ylabel():
         axis.yaxis.set_major_locator(MaxNLocator(5))
 
 
 PANELS: Final = (
-    ("walks", _factor), ("walks", _shares), ("low-level", _low_level), ("bus", _bus),
-    ("world", _world), ("walks", _memory),
-)  # fmt: skip
+    ("walks", _factor, "walks over the bus, recorded"),
+    ("walks", _shares, "in one process, and over the bus"),
+    ("low-level", _low_level, "a robot's tick, low level"),
+    ("bus", _bus, "messages alone, states and commands"),
+    ("world", _world, "a step of the world, by robots"),
+    ("walks", _memory, "memory"),
+)

@@ -13,14 +13,15 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import os
 import resource
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from benchmarks.children import result_of
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.fits import FITS, fit
 from quadriga.agents.predictor.predictor import PredictorMeta
@@ -44,19 +45,6 @@ class Size:
 SIZES = (Size(3, 5_250, 1.0, None), Size(5, 12_000, 3.0, 0.5), Size(10, 20_000, 12.0, None))
 
 
-@dataclass(frozen=True)
-class Measured:
-    """One fit: wall and processor time, and memory of its process, at its peak and before."""
-
-    robots: int
-    samples: int
-    kind: str
-    seconds: float
-    processor_seconds: float
-    peak_gb: float
-    before_gb: float
-
-
 def random_episodes(robots: int, samples: int) -> list[Episode]:
     """Data of white forces and white outputs: they make no fit faster, and no fit useful."""
     rng = np.random.default_rng(0)
@@ -68,18 +56,21 @@ def random_episodes(robots: int, samples: int) -> list[Episode]:
     return episodes
 
 
-def measure(robots: int, samples: int, kind: str) -> Measured:
-    """Fit once, in a process of its own."""
+def measure(robots: int, samples: int, kind: str) -> dict[str, Any]:
+    """Fit once: wall and processor time, and peak memory of this process."""
     config = Config()
     identification = replace(config.identification, predictor=kind)
     config = replace(
         config, team=replace(config.team, robots=robots), identification=identification
     )
     meta, episodes = PredictorMeta.of(config), random_episodes(robots, samples)
-    before, used, begun = peak_gb(), processor_time(), monotonic()
+    used, begun = processor_time(), monotonic()
     fit(episodes, meta)
     seconds, used = monotonic() - begun, processor_time() - used
-    return Measured(robots, samples, kind, seconds, used, peak_gb(), before)
+    return {
+        "robots": robots, "samples": samples, "kind": kind, "seconds": seconds,
+        "processor_seconds": used, "peak_gb": peak_gb(),
+    }  # fmt: skip
 
 
 def processor_time() -> float:
@@ -101,21 +92,20 @@ def main() -> None:
     parser.add_argument("--sizes", nargs="+", type=int, default=[s.robots for s in SIZES])
     parser.add_argument("--repeats", type=int, default=3)
     arguments = parser.parse_args()
-    context = multiprocessing.get_context("spawn")
     print(
         f"{'n':>3} {'T':>6} {'fit':8} {'best s':>8} {'all':24} {'CPU s':>7} {'peak GB':>8}  budget"
     )
     rows = []
     for size in (s for s in SIZES if s.robots in arguments.sizes):
         for kind in arguments.kinds:
-            runs = []
-            for _ in range(arguments.repeats):
-                with context.Pool(1) as pool:
-                    runs.append(pool.apply(measure, (size.robots, size.samples, kind)))
-            best = min(run.seconds for run in runs)
-            used = min(run.processor_seconds for run in runs)
-            peak = max(run.peak_gb for run in runs)
-            every = " ".join(f"{run.seconds:.2f}" for run in runs)
+            runs = [
+                result_of(measure, size.robots, size.samples, kind)
+                for _ in range(arguments.repeats)
+            ]
+            best = min(run["seconds"] for run in runs)
+            used = min(run["processor_seconds"] for run in runs)
+            peak = max(run["peak_gb"] for run in runs)
+            every = " ".join(f"{run['seconds']:.2f}" for run in runs)
             within = best <= size.seconds and peak <= (size.gigabytes or np.inf)
             verdict = ("kept" if within else "MISSED") if kind == "ridge" else "-"
             print(
@@ -123,7 +113,7 @@ def main() -> None:
                 f"{used:7.2f} {peak:8.2f}  {verdict}",
                 flush=True,
             )
-            rows += [asdict(run) for run in runs]
+            rows += runs
     if arguments.out:
         report = {
             "runs": rows,

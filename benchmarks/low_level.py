@@ -8,10 +8,8 @@ the world and other robots run in between and empty the caches.
 
 from __future__ import annotations
 
-import gc
 from collections import defaultdict
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,11 +25,13 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.clock import monotonic_ns
+from quadriga.shared.runtime.collector import collector_off
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import State
 
 STAGES: Final = ("decode", "sense", "gait, plan", "terms, references, QP", "encode")
 _L2: Final = Path("/sys/devices/system/cpu/cpu0/cache/index2/size")
+_Stopwatch = defaultdict[str, int]  # nanoseconds spent, by name
 _SIZE: Final = 8 << 20  # B, more than any L2 cache, where the system does not state its size
 
 
@@ -47,7 +47,7 @@ def measure(
     first = config.gait.stand_ms
     figures: dict[str, Any] = {"ticks": len(ticks) - first, "robots": config.team.robots}
     agent = Agent(config, "r1", predictor)
-    watch = _Stopwatch()
+    watch = _Stopwatch(int)
     timed = Agent(config, "r1", predictor)
     timed._controller = _TimedController(config, watch)
     between = {"hot": lambda: None, "cold": _evict()}
@@ -63,17 +63,6 @@ def measure(
                 "stages": dict(zip(STAGES, np.median(stages, axis=0).tolist(), strict=True)),
             }
     return figures
-
-
-@contextmanager
-def collector_off() -> Iterator[None]:
-    """No garbage collection within the block, as in an agent's process while it walks."""
-    gc.collect()
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
 
 
 def _replay(
@@ -97,7 +86,7 @@ def _time_stages(
     times, memory = np.empty((len(ticks), len(STAGES))), agent.initial()
     for k, tick in enumerate(ticks):
         evict()
-        watch.ns.clear()
+        watch.clear()
         begun = monotonic_ns()
         state = decode(tick.payload, State)
         decoded = monotonic_ns()
@@ -105,7 +94,7 @@ def _time_stages(
         stepped = monotonic_ns()
         encode(outputs.command)
         ended = monotonic_ns()
-        sense, act = watch.ns["sense"], watch.ns["act"]
+        sense, act = watch["sense"], watch["act"]
         times[k] = decoded - begun, sense, stepped - decoded - sense - act, act, ended - stepped
     return 1e-3 * times
 
@@ -128,13 +117,6 @@ def _evict() -> Callable[[], object]:
     return np.ones(size // 8).sum
 
 
-class _Stopwatch:
-    """Nanoseconds spent per name since it was cleared."""
-
-    def __init__(self) -> None:
-        self.ns: defaultdict[str, int] = defaultdict(int)
-
-
 class _TimedController(Controller):
     """A controller whose halves are timed."""
 
@@ -145,7 +127,7 @@ class _TimedController(Controller):
     def sense(self, memory: Memory | None, state: State, schedule: Schedule, dt: float) -> Sensed:
         begun = monotonic_ns()
         sensed = super().sense(memory, state, schedule, dt)
-        self._watch.ns["sense"] += monotonic_ns() - begun
+        self._watch["sense"] += monotonic_ns() - begun
         return sensed
 
     def act(
@@ -153,5 +135,5 @@ class _TimedController(Controller):
     ) -> ControllerOutputs:
         begun = monotonic_ns()
         outputs = super().act(sensed, schedule, task, dt, new_sample=new_sample)
-        self._watch.ns["act"] += monotonic_ns() - begun
+        self._watch["act"] += monotonic_ns() - begun
         return outputs

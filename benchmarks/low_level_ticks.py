@@ -11,9 +11,7 @@ from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Reference
-from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS
-from quadriga.team.operator import reference_at
+from quadriga.team.operator import references_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,11 +41,7 @@ class TsidCase:
 
 def record(config: Config, predictor: Predictor | None) -> list[AgentTick]:
     """Walk `config` in this process and record the inputs of r1 at every tick."""
-
-    def reference(tick: int) -> Reference | None:
-        return reference_at(config, tick) if tick % REFERENCE_EPOCH_MS == 0 else None
-
-    rollout = Rollout(config, predictor, reference)
+    rollout = Rollout(config, predictor, references_of(config))
     agent = _RecordingAgent(rollout.agents["r1"])
     rollout.agents["r1"] = agent
     for _ in rollout.ticks(round(1000 * config.world.seconds)):

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.children import result_of
-from benchmarks.low_level import collector_off
 from benchmarks.low_level_ticks import AgentTick, TsidCase
 from quadriga.agents.agent import Agent
 from quadriga.agents.controller.controller import Controller, ControllerOutputs, Task
@@ -32,6 +31,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.clock import monotonic_ns
+from quadriga.shared.runtime.collector import collector_off
 from quadriga.shared.runtime.jit import compiled
 
 
@@ -61,31 +61,27 @@ def _compare(config: Config, cases: list[TsidCase]) -> dict[str, Any] | None:
         import tsid  # noqa: F401
     except ImportError:
         return None
-    with collector_off():
-        return _turns(config, cases)
-
-
-def _turns(config: Config, cases: list[TsidCase]) -> dict[str, Any]:
     from benchmarks.low_level_peer import Tsid
 
     # TSID gives rotation and translation, and feet and trunk, one weight: so do both here.
     weights = Controller(config).weights._replace(tilt_length=1.0, swing_weight=1.0)
     ours, peer = _Ours(weights), Tsid(weights)
     times, differences = np.empty((2, len(cases))), []
-    for case in cases[:20]:
-        ours.solve(case)
-    for k, case in enumerate(cases):
-        peer.set(case)
-        answers: list[Array] = [np.empty(0), np.empty(0)]
-        order: list[tuple[int, Callable[[TsidCase], object], Callable[[], Array]]] = [
-            (0, ours.solve, ours.torques), (1, peer.solve, peer.torques),
-        ]  # fmt: skip
-        for which, solve, torques in order if k % 2 else reversed(order):
-            begun = monotonic_ns()
-            solve(case)
-            times[which, k] = 1e-3 * (monotonic_ns() - begun)
-            answers[which] = torques()
-        differences.append(np.abs(answers[0] - answers[1]).max())
+    with collector_off():
+        for case in cases[:20]:
+            ours.solve(case)
+        for k, case in enumerate(cases):
+            peer.set(case)
+            answers: list[Array] = [np.empty(0), np.empty(0)]
+            order: list[tuple[int, Callable[[TsidCase], object], Callable[[], Array]]] = [
+                (0, ours.solve, ours.torques), (1, peer.solve, peer.torques),
+            ]  # fmt: skip
+            for which, solve, torques in order if k % 2 else reversed(order):
+                begun = monotonic_ns()
+                solve(case)
+                times[which, k] = 1e-3 * (monotonic_ns() - begun)
+                answers[which] = torques()
+            differences.append(np.abs(answers[0] - answers[1]).max())
     median, p99 = np.median(times, axis=1), np.percentile(times, 99, axis=1)
     return {
         "ours_us": float(median[0]),

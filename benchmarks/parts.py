@@ -83,14 +83,12 @@ def recorder(options: Options, _console: Console, _tell: Tell) -> Part:
 
 def fit(options: Options, _console: Console, _tell: Tell) -> Part:
     """The predictor's fit for a small team; `python -m benchmarks.fit` measures large ones."""
-    from dataclasses import asdict
-
     from benchmarks.children import result_of
     from benchmarks.fit import SIZES, measure
 
     size = SIZES[0]
     samples = 2100 if options.quick else size.samples
-    return asdict(result_of(measure, size.robots, samples, "ridge"))
+    return dict(result_of(measure, size.robots, samples, "ridge"))
 
 
 def walks(options: Options, console: Console, tell: Tell) -> Part:
@@ -141,7 +139,8 @@ def team(
     options: Options, robots: int, seconds: float, console: Console
 ) -> tuple[Config, Path | None, Predictor | None]:
     """A team that walks on flat ground, its predictor's file and the predictor."""
-    from quadriga.identification.predictors import ensure_predictor, load_predictor
+    from quadriga.agents.planner.checked_predictor import load_checked
+    from quadriga.identification.predictors import ensure_predictor
     from quadriga.shared.config.load import load
 
     config = load(
@@ -150,7 +149,7 @@ def team(
     if options.planner == "none":
         return config, None, None
     path = ensure_predictor(config, console)
-    return config, path, load_predictor(path, config)
+    return config, path, load_checked(path, config)[0]
 
 
 PARTS: dict[str, Callable[[Options, Console, Tell], Part]] = {

@@ -11,6 +11,7 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.as_written import force_bounds
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
 from quadriga.agents.predictor.hankel import split
 from quadriga.shared.config.sections import PlannerConfig
@@ -67,11 +68,9 @@ class CvxpyDeepc:
         self._u_ini.value = past[:count] / U_SCALE
         self._y_ini.value = past[count:] / np.tile(Y_SCALE, self._config.T_ini)
         self._y_des.value, self._nominal.value = y_des, nominal.reshape(-1, 3)
-        box = np.where(stance.reshape(-1, 1), np.array(self._config.deviation_max), 0.0)
-        least = np.where(stance.ravel(), self._config.force_min - nominal.reshape(-1, 3)[:, 2], 0.0)
-        low = -box
-        low[:, 2] = np.maximum(low[:, 2], least)
-        self._box_low.value, self._box_high.value = low, box
+        low, high = force_bounds(self._config, stance, nominal)
+        self._box_low.value = low[: nominal.size].reshape(-1, 3)
+        self._box_high.value = high[: nominal.size].reshape(-1, 3)
         self._problem.solve(warm_start=True)
         u: Array = self._u.value.ravel()
         return u

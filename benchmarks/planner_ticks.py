@@ -18,7 +18,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import Array, robot_names
 from quadriga.shared.wire.messages import Measurement, Plan, Reference
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
-from quadriga.team.operator import reference_at
+from quadriga.team.operator import reference_at, references_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +51,7 @@ def record(config: Config, predictor: Predictor) -> list[PlanningTick]:
     names = robot_names(config.team.robots)
     samples: dict[str, dict[int, Measurement]] = {name: {} for name in names}
     plans: dict[str, dict[int, Plan]] = {name: {} for name in names}
-
-    def reference(tick: int) -> Reference | None:
-        return reference_at(config, tick) if tick % REFERENCE_EPOCH_MS == 0 else None
-
-    rollout = Rollout(config, predictor, reference)
+    rollout = Rollout(config, predictor, references_of(config))
     for tick in rollout.ticks(round(1000 * config.world.seconds)):
         for name, out in tick.outputs.items():
             if out.measurement is not None:

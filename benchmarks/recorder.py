@@ -1,20 +1,15 @@
 """The recorder's throughput with real publishers over Zenoh: messages/s, gaps, share of a core.
 
-Run: python -m benchmarks.recorder [--rate 20000] [--seconds 5] [--publishers 2] [--json FILE]
-
 Publishers are processes that send commands of a growing tick in real time, each on keys of its own,
 and never wait; `quadriga record --now` records them. Gaps are counted in the file.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import signal
 import subprocess
 import sys
-import tempfile
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -170,21 +165,3 @@ def figures(file: Path, sent: int) -> dict[str, float]:
         "per_s": (len(times) - 1) / max(1e-9 * (times[-1] - times[0]), 1e-9),
         "bytes": file.stat().st_size,
     }
-
-
-if __name__ == "__main__":
-    arguments = argparse.ArgumentParser(description=__doc__)
-    arguments.add_argument("--rate", type=float, default=20_000.0)
-    arguments.add_argument("--seconds", type=float, default=5.0)
-    arguments.add_argument("--publishers", type=int, default=2)
-    arguments.add_argument("--json", type=Path, default=None, metavar="FILE")
-    options = arguments.parse_args()
-    with tempfile.TemporaryDirectory() as scratch:
-        result = measure(options.rate, options.seconds, options.publishers, Path(scratch))
-    print(
-        f"{result['per_s']:,.0f} messages/s recorded of {result['asked_per_s']:,.0f} asked for; "
-        f"{result['recorded']:,.0f} of {result['sent']:,.0f} sent, {result['gaps']:.0f} gaps; "
-        f"{100 * result['core']:.0f} % of a core; load {result['load']:.1f}"
-    )
-    if options.json is not None:
-        options.json.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")

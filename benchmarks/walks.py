@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
-from benchmarks.low_level import collector_off
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256
@@ -18,21 +17,18 @@ from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
+from quadriga.shared.runtime.collector import collector_off
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Reference, Truth
-from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, TRUTH
+from quadriga.shared.wire.messages import Truth
+from quadriga.shared.wire.topics import TRUTH
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
-from quadriga.team.operator import reference_at
+from quadriga.team.operator import references_of
 
 
 def alone(config: Config, predictor: Predictor | None) -> dict[str, float]:
     """Mean time of a tick in this process, µs: the whole, and its parts one after the other."""
-
-    def reference(tick: int) -> Reference | None:
-        return reference_at(config, tick) if tick % REFERENCE_EPOCH_MS == 0 else None
-
-    rollout = Rollout(config, predictor, reference)
+    rollout = Rollout(config, predictor, references_of(config))
     timed = [_TimedWalk(Agent(config, n, predictor, monotonic_ns)) for n in rollout.world.names]
     rollout.agents = dict(zip(rollout.world.names, timed, strict=True))
     with collector_off():

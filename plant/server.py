@@ -71,8 +71,7 @@ class PlantServer:
 
     def announce(self, code: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""
-        tick, kind = self.plant.tick, codes.EVENTS[code].kind
-        self._send(Event(tick, tick * 1_000_000, kind, robot, truncate_text(detail), code))
+        self._send(Event.of(self.plant.tick, code, robot, truncate_text(detail)))
 
     def publish_status(self, status: Status) -> None:
         """Publish the plant's report on itself."""

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from difflib import get_close_matches
+
 
 class QuadrigaError(Exception):
     """Base of every error that is shown to a user as one line, without a traceback.
@@ -53,3 +57,37 @@ class NewerRecordingError(RecordingError):
 
 class ProcessError(QuadrigaError):
     """A process of the team failed or did not start."""
+
+
+@contextmanager
+def name_file_errors(
+    kind: type[QuadrigaError], name: object, expected: str, cause: str = ""
+) -> Iterator[None]:
+    """Name the file that the system refuses within the block.
+
+    Args:
+        kind: of the error that is raised instead of the system's.
+        name: the file or folder.
+        expected: what would have been right.
+        cause: the likely cause or the remedy; may be empty.
+
+    Raises:
+        QuadrigaError: of this kind; a file cannot be read or written, or its text is not UTF-8.
+    """
+    try:
+        yield
+    except (OSError, UnicodeDecodeError) as error:
+        raise kind(str(name), system_reason(error), expected, cause) from None
+
+
+def system_reason(error: OSError | UnicodeDecodeError) -> str:
+    """Why the system, or the decoding of its text, refuses a file."""
+    if isinstance(error, UnicodeDecodeError):
+        return "bytes that are not UTF-8"
+    return error.strerror or str(error)
+
+
+def did_you_mean(got: object, known: Iterable[str]) -> str:
+    """The known name that is like the one got, as a likely cause; "" if none is."""
+    close = get_close_matches(str(got), list(known), 1)
+    return f"did you mean {close[0]!r}?" if close else ""

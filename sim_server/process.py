@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Callable
 
 from quadriga.plant.lockstep import run_lockstep
@@ -12,6 +11,7 @@ from quadriga.shared.bus.barrier import meet, start_together
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import SIM
+from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.topics import topics_for
@@ -39,9 +39,7 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
         server = PlantServer(config, world, bus)
         if not (meet(bus, config, stopped) and start_together(bus, config, stopped)):
             return
-        gc.collect()
-        gc.freeze()
-        gc.disable()  # a collection in mid-tick costs more than the tick
+        end_collection()
         take_priority(config.runtime.priority)
         loop = run_realtime if config.world.mode == "realtime" else run_lockstep
         end = loop(server, stopped)

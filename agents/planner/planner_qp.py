@@ -20,7 +20,6 @@ from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
 
 NO_BOUNDS = "none"
 HARD = "hard"
-SOFT = "soft"
 
 
 @dataclass(frozen=True, slots=True)

@@ -138,7 +138,6 @@ class DaqpSolver:
 
     @property
     def closed_form(self) -> ClosedForm | None:
-        """See `Solver`."""
         exact = self._closed.residuals.stationarity <= _MAX_STATIONARITY
         usable = exact and self._ready >= 0 and not len(self._problem.bounded)
         return self._closed if usable else None
@@ -181,7 +180,6 @@ class OsqpSolver:
         return None
 
     def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> QpSolution:
-        """See `Solver`."""
         if not np.isfinite(f).all():
             return no_solution(self._problem, "not-finite")
         low = self._problem.lower if lower is None else lower

@@ -76,9 +76,7 @@ class Adapter:
             y_base: base of the outputs at their ends, shape (samples, 6).
         """
         if known is None:
-            known = begin_correction(
-                self._predictor.meta, self._index, (self._index,), self._forgetting
-            )
+            known = begin_correction(self._predictor.meta, self._index, self._forgetting)
         T_ini, gait = self._config.planner.T_ini, self._config.gait
         stance = np.array([sample.stance for sample in own]) > 0.5
         u, y = np.array([sample.u for sample in own]), np.array([sample.y for sample in own])

@@ -10,18 +10,15 @@ import numpy as np
 
 from quadriga.agents.predictor.arx import roll_out
 from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.hankel import split
 from quadriga.agents.predictor.least_squares import solve_gamma, solve_pinv
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.regression import (
     check_episodes,
     normal_equations,
     normal_equations_by_phase,
-    robots_first,
     to_physical,
 )
 from quadriga.agents.predictor.ridge import Solutions, members_of, solve_causal, solve_ridge
-from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS
 
 Fit = Callable[[Sequence[Episode], PredictorMeta], Predictor]
 
@@ -120,31 +117,6 @@ def fit_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
         blocks.append(to_physical(pooled + solutions.x, meta))
         condition = max(condition, solutions.condition)
     return Predictor(replace(meta, kind="phase"), np.stack(blocks), condition)
-
-
-def fit_hankel(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """G = Y_f [U_p; Y_p; U_f]† (eq. 6) as in the paper, from the Hankel matrices themselves.
-
-    An independent reference for the other fits; it takes minutes where they take seconds.
-
-    Raises:
-        PredictorError: no data, too little, or of another team.
-    """
-    check_episodes(episodes, meta)
-    u, y = zip(*(episode.scaled_deviations() for episode in episodes), strict=True)
-    parts = split(u, y, meta.T_ini, meta.N)
-    Z = np.concatenate([parts.U_p, parts.Y_p, parts.U_f])
-    G = parts.Y_f @ np.linalg.pinv(Z)
-    n, m, p = meta.robots, N_FORCES, N_OUTPUTS
-    past_u, past_y, future_u = np.split(
-        np.arange(len(Z)), [n * m * meta.T_ini, n * (m + p) * meta.T_ini]
-    )
-    columns_of = np.concatenate(
-        [robots_first(x, n, d) for x, d in ((past_u, m), (past_y, p), (future_u, m))], axis=1
-    ).ravel()
-    rows_of = robots_first(np.arange(len(G)), n, p)
-    x = G[rows_of[:, None, :], columns_of[:, None]]
-    return _one_phase(Solutions(x, float(np.linalg.cond(Z)) ** 2), _without_penalty(meta, "pinv"))
 
 
 FITS: Final[Mapping[str, Fit]] = {

@@ -5,14 +5,13 @@ With plain exponential forgetting a team that stands or trots evenly would forge
 not excite, and its covariance would grow as λ^−k.
 
 A change of the plant, such as an unknown load, shows in the prediction error. That error is
-regressed on the robot's own [u_ini; y_ini; u], which corrects G_ii, or on those of all robots. The
-same correction serves every phase. All numbers are scaled deviations, so that one prior fits all.
+regressed on the robot's own [u_ini; y_ini; u], which corrects G_ii. The same correction serves
+every phase. All numbers are scaled deviations, so that one prior fits all.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,16 +54,14 @@ class Correction:
 
     Attributes:
         robot: i, whose row it is.
-        sources: the robots j whose blocks G_ij are corrected, ascending.
-        D: scaled correction [ΔG_ij …], shape (6 N, k), k = (18 T_ini + 12 N) · sources.
-        P: covariance over the noise variance, shape (k, k), exactly symmetric.
+        D: scaled correction ΔG_ii, shape (6 N, W), W = 18 T_ini + 12 N.
+        P: covariance over the noise variance, shape (W, W), exactly symmetric.
         updates: windows that were taken in.
         skipped: windows without new information.
         refused: windows that were implausible, or would have made D implausible.
     """
 
     robot: int
-    sources: tuple[int, ...]
     D: Array
     P: Array
     updates: int = 0
@@ -76,21 +73,16 @@ class Correction:
         return replace(self, refused=self.refused + 1)
 
 
-def begin_correction(
-    meta: PredictorMeta, robot: int, sources: Sequence[int], how: Forgetting
-) -> Correction:
+def begin_correction(meta: PredictorMeta, robot: int, how: Forgetting) -> Correction:
     """The correction before the first window: zero.
 
     Raises:
-        PredictorError: robots that are not in the team.
+        PredictorError: a robot that is not in the team.
     """
-    chosen = tuple(sorted(set(sources)))
-    if not chosen or not set((robot, *chosen)) <= set(range(meta.robots)):
-        raise PredictorError(
-            "robots of the correction", f"{robot} and {list(sources)}", f"0 … {meta.robots - 1}"
-        )
-    size = meta.width * len(chosen)
-    return Correction(robot, chosen, np.zeros((N_OUTPUTS * meta.N, size)), how.prior * np.eye(size))
+    if not 0 <= robot < meta.robots:
+        raise PredictorError("robot of the correction", f"{robot}", f"0 … {meta.robots - 1}")
+    D, P = np.zeros((N_OUTPUTS * meta.N, meta.width)), how.prior * np.eye(meta.width)
+    return Correction(robot, D, P)
 
 
 def take_in(
@@ -120,7 +112,7 @@ def take_in(
         raise PredictorError("window", "NaN or infinity", "finite numbers")
     left = y - np.einsum("jab,jb->a", predictor.G[phase, state.robot], z)
     z_scale, y_scale = scales(meta)
-    return update(state, (z[list(state.sources)] / z_scale).ravel(), left / y_scale, how)
+    return update(state, z[state.robot] / z_scale, left / y_scale, how)
 
 
 def update(state: Correction, z: Array, left: Array, how: Forgetting) -> Correction:
@@ -154,9 +146,8 @@ def update(state: Correction, z: Array, left: Array, how: Forgetting) -> Correct
     return replace(state, D=D, P=P, updates=state.updates + 1)
 
 
-def block_correction(meta: PredictorMeta, state: Correction, place: int = 0) -> Array:
-    """The correction's addition to the block of one of its sources. (6 N, 18 T_ini + 12 N)."""
+def block_correction(meta: PredictorMeta, state: Correction) -> Array:
+    """The correction's addition to G_ii, in physical units. Shape (6 N, 18 T_ini + 12 N)."""
     z_scale, y_scale = scales(meta)
-    columns = slice(place * meta.width, (place + 1) * meta.width)
-    added: Array = state.D[:, columns] * y_scale[:, None] / z_scale
+    added: Array = state.D * y_scale[:, None] / z_scale
     return added

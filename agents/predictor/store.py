@@ -16,7 +16,7 @@ import numpy as np
 
 from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.shared.errors import PredictorFileError
+from quadriga.shared.errors import PredictorFileError, name_file_errors
 from quadriga.shared.runtime.atomic import atomic_write
 
 FORMAT: Final = 2
@@ -87,14 +87,10 @@ def save(path: Path, predictor: Predictor, provenance: Provenance) -> str:
         "meta": predictor.meta.to_dict(),
         "provenance": asdict(provenance),
     }
-    try:
+    with name_file_errors(PredictorFileError, path, "a file that can be written"):
         path.parent.mkdir(parents=True, exist_ok=True)
         with atomic_write(path) as partial, partial.open("wb") as file:
             np.savez(file, G=predictor.G, document=np.array(json.dumps(document, sort_keys=True)))
-    except OSError as error:
-        raise PredictorFileError(
-            str(path), error.strerror or str(error), "a file that can be written"
-        ) from None
     return digest
 
 

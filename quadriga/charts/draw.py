@@ -58,11 +58,11 @@ def draw_panels(
     figure.text(LEFT / WIDTH, 1.0 - 0.5 * head / total, title, va="center", fontsize=TEXT)
     for k, line in enumerate(lines):
         add_legend(figure, line, above=1.0 - (head + _LEGEND * k) / total)
-    width = WIDTH / grid.columns - grid.left - _RIGHT
+    width = WIDTH / grid.columns - LEFT - _RIGHT
     for number, (row, tall) in enumerate(zip(rows, heights, strict=True)):
         top += _ABOVE + tall
         for k, panel in enumerate(row):
-            left = grid.left + k * WIDTH / grid.columns
+            left = LEFT + k * WIDTH / grid.columns
             place = (left / WIDTH, 1.0 - top / total, width / WIDTH, tall / total)
             axes = figure.add_axes(place)
             _fill(axes, panel, grid, (width, tall))

@@ -85,7 +85,6 @@ class PanelGrid:
         end: time at the right end, s.
         columns: panels in a row.
         height: of a panel of curves, points.
-        left: room for the names of rows and values, points.
         across: the horizontal axis, with its unit.
         points: that a curve may have at most.
     """
@@ -94,6 +93,5 @@ class PanelGrid:
     end: float
     columns: int = 1
     height: float = 90.0
-    left: float = LEFT
     across: str = TIME
     points: int = 1600

@@ -12,7 +12,6 @@ from quadriga.shared.errors import ConfigError
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("agent", run, "the agent of one robot")
     command.add_argument("--robot", required=True, metavar="NAME", help="r1 … rn")
     add_predictor(command)

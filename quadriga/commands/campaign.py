@@ -19,7 +19,6 @@ SEEDS: Final = "0:20"  # of a campaign that names none
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("campaign", run, "walk variants in the same worlds, and report on them")
     option = command.add_argument
     option("scenarios", nargs="*", metavar="SCENARIO", help="a scenario's name, or its TOML file")

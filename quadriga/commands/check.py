@@ -10,7 +10,6 @@ from quadriga.shared.config.sections import Config
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     add_file(add_command("check", run, "hold every message of a recording against the rules"))
 
 

@@ -9,7 +9,6 @@ from quadriga.shared.config.sections import Config
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("config", run, "print the configuration in force as TOML")
     command.add_argument("--markdown", action="store_true", help="as documentation instead")
 

@@ -13,7 +13,6 @@ from quadriga.shared.runtime.signals import stop_flag
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("echo", run, "print messages, live or from a recording, one line each")
     command.add_argument("key", nargs="+", metavar="KEY", help=KEY_HELP)
     command.add_argument("--full", action="store_true", help="every number of every array")

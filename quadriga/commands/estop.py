@@ -9,7 +9,6 @@ from quadriga.shared.config.sections import Config
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("estop", run, "stop the team at once: every joint is damped")
     command.add_argument("--reason", default="operator", help="told to every agent")
 

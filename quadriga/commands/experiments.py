@@ -23,7 +23,6 @@ LOOKS: Final = "looks"  # the folder of walks that are not published
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command(
         "experiments", run, "walk what README and docs tell results of, and publish them"
     )

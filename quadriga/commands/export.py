@@ -11,7 +11,6 @@ from quadriga.shared.config.sections import Config
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("export", run, "convert a recording for other tools")
     add_file(command)
     command.add_argument(

@@ -9,7 +9,6 @@ from quadriga.shared.config.sections import Config
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command(
         "fit", run, "fit the predictor, hold it against its gates and report on it"
     )

@@ -14,7 +14,6 @@ from quadriga.shared.runtime.signals import stop_flag
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("hz", run, "print how often messages come, live or from a recording")
     command.add_argument("keys", nargs="*", metavar="KEY", help=f"{KEY_HELP} (all)")
     command.add_argument(
@@ -29,11 +28,13 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 
 
 def _print_recorded(arguments: argparse.Namespace) -> int:
-    from quadriga.recordings.listen import config_of, entries_from_file
+    from quadriga.recordings.listen import entries_from_file
     from quadriga.recordings.rates import Rates
+    from quadriga.recordings.readable import config_or_default, open_readable
     from quadriga.shared.config.timing import periods
 
-    rates = Rates(periods(config_of(arguments.file)))
+    source, _ = open_readable(arguments.file)
+    rates = Rates(periods(config_or_default(source)))
     try:
         for entry in entries_from_file(arguments.file, arguments.keys):
             rates.add(entry)

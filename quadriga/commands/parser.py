@@ -38,7 +38,7 @@ from quadriga.commands import (
 )
 from quadriga.commands.command import Run
 from quadriga.commands.config_options import build_config_options, read_config
-from quadriga.shared.errors import ConfigError, ProcessError, QuadrigaError
+from quadriga.shared.errors import ConfigError, ProcessError, QuadrigaError, system_reason
 from quadriga.shared.runtime.signals import die_with_parent, interrupt_on_sigterm
 
 FAILED: Final = 1  # a robot fell or a process failed
@@ -75,7 +75,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout = None
         return 0
     except OSError as error:  # a disk that is full, a folder that is read-only
-        what, reason = error.filename or "a file or a connection", error.strerror or str(error)
+        what, reason = error.filename or "a file or a connection", system_reason(error)
         return _complain(ConfigError(str(what), reason, "one that can be used"), WRONG)
     return status
 

@@ -12,7 +12,6 @@ from quadriga.shared.errors import ConfigError
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command(
         "plan", run, "the planner of the whole team (planner.kind centralised, deepc)"
     )

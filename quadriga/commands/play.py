@@ -10,7 +10,6 @@ from quadriga.shared.config.sections import Config
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("play", run, "put a recording back on the bus")
     command.epilog = (
         "Keys in a terminal: space pauses, right arrow plays one planning step, q quits."

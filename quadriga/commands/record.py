@@ -24,7 +24,6 @@ _NAMED: Final = 5  # keys with losses that are named at the end
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("record", run, "record the traffic of a team to an MCAP file")
     option = command.add_argument
     option(

@@ -11,7 +11,6 @@ from quadriga.shared.config.sections import Config
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("recover", run, "write what is readable of a damaged recording")
     add_file(command, "that is cut or damaged")
     command.add_argument(

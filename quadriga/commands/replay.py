@@ -12,7 +12,6 @@ from quadriga.shared.errors import ConfigError
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command(
         "replay", run, "run recorded agents again and compare what they say to the byte"
     )

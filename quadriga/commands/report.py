@@ -12,7 +12,6 @@ from quadriga.shared.errors import ConfigError
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("report", run, "show what came of a recorded walk")
     command.add_argument(
         "run", type=Path, metavar="FILE|DIR", help="a recording, or the folder of a run.mcap"

@@ -10,7 +10,6 @@ from quadriga.shared.config.sections import Config
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("resim", run, "re-simulate a recorded world and compare it to the byte")
     add_file(command, "of a lock-step walk")
 

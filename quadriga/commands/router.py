@@ -9,7 +9,6 @@ from quadriga.shared.config.sections import Config
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("router", run, "the router between processes in client mode")
     command.add_argument("--listen", metavar="ENDPOINT", help="where (bus.endpoint)")
     command.add_argument("--once", action="store_true", help="leave when the team has walked")

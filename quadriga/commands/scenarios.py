@@ -9,7 +9,6 @@ from quadriga.shared.config.sections import Config
 
 
 def add(add_command: AddCommand) -> None:
-    """The command; it has no options."""
     add_command("scenarios", run, "list the scenarios that can be walked, and what they are")
 
 

@@ -12,7 +12,6 @@ from quadriga.shared.config.sections import Config
 
 
 def add(add_command: AddCommand) -> None:
-    """The command and its options."""
     command = add_command("walk", run, "start all processes, walk, and show what came of it")
     command.add_argument("--out", type=Path, metavar="DIR", help="run folder (runs/<date>-<time>)")
     add_no_render(command)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -228,7 +228,7 @@ def _colours(results: Results) -> dict[str, str]:
     return {name: _COLOURS[k % len(_COLOURS)] for k, name in enumerate(results.variants)}
 
 
-def _clean(panel: Axes, axis: str) -> None:
-    panel.grid(axis="both" if axis == "both" else "x", color="0.9", linewidth=0.6)
+def _clean(panel: Axes, axis: Literal["x", "both"]) -> None:
+    panel.grid(axis=axis, color="0.9", linewidth=0.6)
     panel.set_axisbelow(True)
     panel.spines[["top", "right"]].set_visible(False)

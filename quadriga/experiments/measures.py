@@ -73,19 +73,15 @@ def name_ratio(error: str) -> str:
     return f"ratio-{error}"
 
 
-def _success(line: Line) -> Interval | None:
-    return _share(line.tally.successes, line.tally.trials)
+def _share(count: Callable[[Tally], int]) -> Callable[[Line], Interval | None]:
+    def of(line: Line) -> Interval | None:
+        found, total = count(line.tally), line.tally.trials
+        if not total:
+            return None
+        low, high = wilson(found, total)
+        return Interval(100 * found / total, 100 * low, 100 * high)
 
-
-def _fall_rate(line: Line) -> Interval | None:
-    return _share(line.tally.falls, line.tally.trials)
-
-
-def _share(count: int, total: int) -> Interval | None:
-    if not total:
-        return None
-    low, high = wilson(count, total)
-    return Interval(100 * count / total, 100 * low, 100 * high)
+    return of
 
 
 def _falls(line: Line) -> Interval | None:
@@ -147,9 +143,10 @@ def _greatest(name: str) -> Measure:
 
 
 MEASURES: Final[Mapping[str, Measure]] = {
-    "success": Measure("success", "%", ".1f", _success),
+    "success": Measure("success", "%", ".1f", _share(lambda tally: tally.successes)),
     "falls": Measure("number of falls", "", ".0f", _falls, interval=False),
-    "fall-rate": Measure("share of walks with a fall", "%", ".1f", _fall_rate),
+    "fall-rate": Measure("share of walks with a fall", "%", ".1f",
+                         _share(lambda tally: tally.falls)),
     "fall-difference": Measure("fall rate less that of {}", "points", "+.1f", _difference,
                                paired=True),
     "fall-ratio": Measure("falls over those of {}", "", ".2f", _fall_ratio, paired=True,

@@ -97,7 +97,9 @@ def build_plan(
         for name, path in files.items()
     }
     configs = {}
-    for name, points, variant in product(files, _points(sweeps), variants):
+    for name, points, variant in product(
+        files, product(*(sweep.values for sweep in sweeps)), variants
+    ):
         keys = dict(zip((sweep.key for sweep in sweeps), points, strict=True))
         for key in variant.keys.keys() & {*keys, *_OURS, *_keys_of_presets(keys)}:
             raise ConfigError(
@@ -167,7 +169,3 @@ def _keys_of_presets(swept: Iterable[str]) -> set[str]:
     """Keys that a swept preset would take back from a variant."""
     sections = [section for section in PRESETS if f"{section}.preset" in swept]
     return {f"{section}.{key}" for section in sections for key in preset_keys(section)}
-
-
-def _points(sweeps: Sequence[Sweep]) -> Iterable[tuple[tuple[str, Any], ...]]:
-    return product(*(sweep.values for sweep in sweeps))

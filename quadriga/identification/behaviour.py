@@ -9,8 +9,9 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import platform
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import cache
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Final
@@ -37,15 +38,15 @@ _KEPT: Final = 20  # digests of earlier code in the cache: a few for who goes ba
 
 
 @cache
-def behaviour(module: str, samples: Callable[[], Iterable[Array]]) -> str:
-    """Digest of the numbers that samples give; 16 hexadecimal digits.
+def behaviour(module: str) -> str:
+    """Digest of the numbers that a module's `samples` give; 16 hexadecimal digits.
 
     They are run only if no process of this machine has run them with this code, these libraries
     and this arithmetic before; a process that finds another at it waits.
 
     Args:
-        module: that `samples` runs; all it imports is the code that the digest depends on.
-        samples: gives arrays of any shape, the same ones each time.
+        module: whose `samples()` gives arrays of any shape, the same ones each time; all it imports
+            is the code that the digest depends on. It is imported only if they are run.
 
     Raises:
         QuadrigaError: there is no such module.
@@ -58,7 +59,7 @@ def behaviour(module: str, samples: Callable[[], Iterable[Array]]) -> str:
     with (folder / ".lock").open("wb") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not cached.is_file():
-            write_text(cached, digest_of(samples()))
+            write_text(cached, digest_of(import_module(module).samples()))
             _forget(cached)
     return cached.read_text(encoding="ascii")
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -14,7 +13,6 @@ from quadriga.identification.behaviour import behaviour
 from quadriga.shared.config.renamed import with_first_names
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.places import cache_file
 
@@ -43,7 +41,7 @@ def data_key(config: Config) -> str:
         "planner": {k: planner[k] for k in ("interface", *horizon)},
         "identification": ident,
     }
-    code = behaviour("quadriga.identification.sample_collection", _collections)
+    code = behaviour("quadriga.identification.sample_collection")
     libraries = {name: version(name) for name in _LIBRARIES}
     return _digest([with_first_names(sections), code, libraries])
 
@@ -55,7 +53,7 @@ def predictor_key(config: Config) -> str:
         "identification": asdict(config.identification),
         "planner": {k: planner[k] for k in ("N", "T_ini", "applied", "Q", "R", "interface")},
     }
-    code = behaviour("quadriga.identification.sample_fits", _fits)
+    code = behaviour("quadriga.identification.sample_fits")
     return _digest([data_key(config), with_first_names(sections), code])
 
 
@@ -90,16 +88,3 @@ def await_predictor(path: Path, timeout: float) -> None:
 
 def _digest(parts: list[Any]) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
-
-
-# Imported when they are run: who only looks for a file needs no simulator.
-def _collections() -> Iterator[Array]:
-    from quadriga.identification.sample_collection import sample_collections
-
-    return sample_collections()
-
-
-def _fits() -> Iterator[Array]:
-    from quadriga.identification.sample_fits import sample_fits
-
-    return sample_fits()

@@ -12,7 +12,7 @@ from quadriga.agents.planner.checked_predictor import load_checked
 from quadriga.agents.planner.gates import run_gates
 from quadriga.agents.predictor.fits import fit as fit_predictor
 from quadriga.agents.predictor.gate_report import GateReport
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.predictor.store import Provenance, save, versions
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.collect import collect, training_seconds
@@ -92,12 +92,3 @@ def build_provenance(config: Config, dataset: Dataset, report: GateReport) -> Pr
         versions=versions(),
         gates=report,
     )
-
-
-def load_predictor(path: Path, config: Config) -> Predictor:
-    """The predictor in a file, if it is for this team and passes its gates.
-
-    Raises:
-        PredictorError: see `quadriga.agents.planner.checked_predictor.load_checked`.
-    """
-    return load_checked(path, config)[0]

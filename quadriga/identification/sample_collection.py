@@ -1,4 +1,4 @@
-"""Short walks of data collection, and fits of small data: what cached files depend on."""
+"""Short walks of data collection: what cached data depend on besides their configuration."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _WALKS: Final[tuple[dict[str, Any], ...]] = (
 )
 
 
-def sample_collections() -> Iterator[Array]:
+def samples() -> Iterator[Array]:
     """The episodes of a second's walks, each with another low level."""
     for keys in _WALKS:
         episode = collect_episode(load(None, _WALK | keys), 0, _SECONDS)

@@ -28,7 +28,7 @@ _KEYS: Final = {
 }  # fmt: skip
 
 
-def sample_fits() -> Iterator[Array]:
+def samples() -> Iterator[Array]:
     """Each fit's G and what the gates say of it."""
     use_one_blas_thread()
     config = load(None, _KEYS)

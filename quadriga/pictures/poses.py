@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Final
 
 import mujoco
 import numpy as np
@@ -21,8 +20,6 @@ from quadriga.shared.wire.messages import State, Truth
 from quadriga.shared.wire.topics import STATE, TRUTH
 from quadriga.sim_server.world.layout import NQ
 from quadriga.sim_server.world.team_model import TeamModel, build_team_model
-
-_HALF_LENGTH: Final = 0.4  # m, of a robot with its legs
 
 
 @dataclass(frozen=True, slots=True)

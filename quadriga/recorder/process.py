@@ -15,7 +15,7 @@ from quadriga.shared.bus.barrier import meet, members
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
-from quadriga.shared.errors import RecordingError
+from quadriga.shared.errors import RecordingError, system_reason
 from quadriga.shared.members import RECORDER, SIM
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.signals import stop_on_signals
@@ -84,7 +84,7 @@ def run(
     except OSError as error:
         raise RecordingError(
             str(paths[-1]),
-            error.strerror or str(error),
+            system_reason(error),
             "room for the recording",
             "`quadriga recover` makes a whole file of what is there",
         ) from None

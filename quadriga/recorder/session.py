@@ -9,9 +9,10 @@ from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.members import PLANNER, SIM
-from quadriga.shared.recording.mcap_chunk import name_of, robot_of
+from quadriga.shared.recording.mcap_chunk import name_of
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
+from quadriga.shared.wire.topics import find_topic
 
 FLUSH: Final = 0.05  # s wall between two flushes: a kill loses what has come since the last
 QUIET: Final = 0.2  # s wall without a message after which nothing more is under way
@@ -71,7 +72,7 @@ class Session:
         missed = _format_missed(first_ticks)
         if missed:
             self._say(missed)
-        robots = {robot for robot in map(robot_of, first_ticks) if robot}
+        robots = {find_topic(key)[1] for key in first_ticks} - {""}
         strangers = robots - {*robot_names(self._robots), PLANNER}
         if strangers:
             self._say(

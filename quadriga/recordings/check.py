@@ -17,7 +17,7 @@ from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.salvage import Salvage
 from quadriga.shared.recording.writer import COUNTS
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.topics import Topic, topic_of
+from quadriga.shared.wire.topics import Topic, find_topic
 from quadriga.tables import align_columns
 
 _WIDE = 96  # characters of a value that are shown
@@ -67,7 +67,7 @@ def _decode_valid(
     entries: Iterator[ChunkEntry], schema: Finding, times: Finding
 ) -> Iterator[CheckedMessage]:
     """The valid messages; what breaks a rule goes to the findings `schema` and `times`."""
-    rows: dict[str, tuple[Topic, str] | None] = {}
+    rows: dict[str, tuple[Topic | None, str]] = {}
     last = foreign = 0
     for key, tick, log_time, payload in entries:
         times.looked += 1
@@ -77,28 +77,21 @@ def _decode_valid(
             )
         last = log_time
         if key not in rows:
-            rows[key] = _find_row(key)
-        row = rows[key]
-        if row is None:
+            rows[key] = find_topic(key)
+        topic, robot = rows[key]
+        if topic is None:
             foreign += 1
             continue
         schema.looked += 1
         try:
-            message = decode(payload, row[0].type)
+            message = decode(payload, topic.type)
         except MessageError as error:
             got = f"{error.name} {error.got}"
             schema.add_objection(tick, key, got[:_WIDE], error.expected[:_WIDE])
             continue
-        yield CheckedMessage(key, row[1], row[0].name, message)
+        yield CheckedMessage(key, robot, topic.name, message)
     if foreign:
         schema.notes.append(f"{foreign} of keys outside the table, not looked at")
-
-
-def _find_row(key: str) -> tuple[Topic, str] | None:
-    try:
-        return topic_of(key)
-    except MessageError:
-        return None
 
 
 def _check_whole(
@@ -106,11 +99,11 @@ def _check_whole(
 ) -> Finding:
     """Whether the file is as it was written."""
     whole = Finding("whole", "messages", messages)
-    notes = source.notes() if isinstance(source, Recording) else source.notes
+    notes = source.notes
     written = notes.get(COUNTS, {}).get("messages", str(messages))
     missing = max(int(written) - messages, 0) if written.isdecimal() else 0
     whole.looked += missing
-    for damage in source.damages if isinstance(source, Salvage) else ():
+    for damage in source.damages:
         whole.add_objection(-1, "", str(damage), "a readable file", 0)
     if error is not None:
         whole.add_objection(-1, "", error.got, error.expected, 0)

@@ -60,9 +60,9 @@ def end_of_world(config: Config) -> int:
     return round(1000 * config.world.seconds)
 
 
-def repeated_ticks(ticks: Mapping[str, Ticks], topics: tuple[Topic, ...] = (STATE, COMMAND)) -> int:
-    """Number of messages whose key and tick had been seen before: a second publisher."""
-    names = tuple(f"/{topic.name}" for topic in topics)
+def repeated_ticks(ticks: Mapping[str, Ticks]) -> int:
+    """Number of states and commands whose key and tick had been seen before: a second publisher."""
+    names = (f"/{STATE.name}", f"/{COMMAND.name}")
     return sum(
         len(of_key) - len(np.unique(of_key)) for key, of_key in ticks.items() if key.endswith(names)
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.recordings.key_patterns import KeyPattern, key_patterns
-from quadriga.recordings.readable import config_or_default, open_readable
+from quadriga.recordings.readable import open_readable
 from quadriga.shared.bus.zenoh_bus import POLL, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
@@ -43,16 +43,6 @@ def entries_from_file(path: Path, keys: Sequence[str]) -> Generator[ChunkEntry]:
     if keys and not any(chosen.values()):
         known = ", ".join(sorted(chosen)) or "no message at all"
         raise RecordingError(str(path), f"no key that fits {' '.join(keys)}", f"some of {known}")
-
-
-def config_of(path: Path) -> Config:
-    """The configuration of a recorded walk; the default if the file has lost it.
-
-    Raises:
-        RecordingError: nothing can be read of the file.
-    """
-    source, _ = open_readable(path)
-    return config_or_default(source)
 
 
 def entries_from_bus(

@@ -9,11 +9,11 @@ from typing import Final
 
 from quadriga.recordings.readable import config_or_default, open_readable
 from quadriga.shared.config.timing import periods
-from quadriga.shared.errors import RecordingError
+from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.salvage import Damage, Salvage
 from quadriga.shared.recording.sequence import TickTrack
-from quadriga.shared.recording.writer import COUNTS, LOST, PROFILE, RecordingWriter, reason
+from quadriga.shared.recording.writer import COUNTS, LOST, PROFILE, RecordingWriter
 from quadriga.shared.runtime.clock import wall_ns
 from quadriga.tables import align_columns
 
@@ -68,13 +68,13 @@ def recover(path: Path, out: Path | None) -> Recovery | None:
         )
     out = out or path.with_name(f"{path.stem}.recovered{path.suffix}")
     expected = periods(config_or_default(source))
-    try:
-        with RecordingWriter(out, source.metadata, periods=expected) as writer:
-            for entry in source.entries():
-                writer.write(entry.key, entry.payload, entry.log_time_ns)
-            writer.note(RECOVERED, _describe_source(source, path))
-    except OSError as failure:
-        raise RecordingError(str(out), reason(failure), "room for the recovered file") from None
+    with (
+        name_file_errors(RecordingError, out, "room for the recovered file"),
+        RecordingWriter(out, source.metadata, periods=expected) as writer,
+    ):
+        for entry in source.entries():
+            writer.write(entry.key, entry.payload, entry.log_time_ns)
+        writer.note(RECOVERED, _describe_source(source, path))
     counts = source.notes.get(COUNTS, {}).get("messages", "")
     return Recovery(
         out=out,

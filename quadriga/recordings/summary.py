@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import isnan
 from pathlib import Path
 from typing import Any, Final
@@ -17,9 +17,12 @@ from quadriga.recordings.traces import (
     OVER_STANCE_FEET,
     Traces,
     estimate_errors,
-    in_force,
+    mean_of,
+    quantile_of,
     read_traces,
     stance_height_errors,
+    times_of,
+    tracking_errors,
 )
 from quadriga.recordings.truth import distance
 from quadriga.shared.recording.reader import Recording
@@ -34,8 +37,6 @@ __all__ = ["RECORDING", "SUMMARY", "steady_from", "summarise", "summary_of"]
 RECORDING: Final = "run.mcap"
 SUMMARY: Final = "summary.json"
 SETTLING_MS: Final = 1000  # after the speed ramp's end, until the steady part begins
-FALL_TILT: Final = 1.0  # rad
-FALL_HEIGHT: Final = 0.12  # m above the terrain
 
 
 def summarise(run_dir: Path, traces: Traces | None = None) -> dict[str, Any]:
@@ -94,8 +95,7 @@ def steady_from(traces: Traces) -> int:
 
 def _world(traces: Traces) -> dict[str, Any]:
     truth = traces.truth
-    down = (truth.tilt > FALL_TILT) | (truth.y[..., 0] < FALL_HEIGHT)
-    seen = {traces.robots[i] for i in np.flatnonzero(down.any(axis=0))}
+    seen = {traces.robots[i] for i in np.flatnonzero(truth.down.any(axis=0))}
     reported = {event.robot for event in traces.events if event.code == FALL}
     if not len(truth.tick):  # then the robots' own word must do
         reported |= {
@@ -119,28 +119,18 @@ def _world(traces: Traces) -> dict[str, Any]:
 
 
 def _tracking(traces: Traces) -> dict[str, Any]:
-    truth, begin = traces.truth, steady_from(traces)
-    reference = in_force(traces.references, truth.tick)
-    steady = (truth.tick >= begin) & np.isfinite(reference).all(axis=1)
-    wanted = np.zeros((len(truth.tick), len(OUTPUTS)))
-    wanted[:, [1, 2, 5, 0]] = reference
-    y = truth.y[steady]
-    error = y - wanted[steady, None]
-    heights = [_height_errors(traces, robot, begin) for robot in traces.robots]
+    begin = steady_from(traces)
+    y, error = tracking_errors(traces, begin)
+    heights = [stance_height_errors(traces, robot, begin) for robot in traces.robots]
     return {
         "steady_from": begin / 1000.0,
-        **{f"mean_{name}": _mean(y[..., OUTPUTS.index(name)]) for name in ("vx", "vy", "wz")},
-        "rmse": _with_height(_rmse(error), _concatenate(heights)),
+        **{f"mean_{name}": mean_of(y[..., OUTPUTS.index(name)]) for name in ("vx", "vy", "wz")},
+        "rmse": _with_height(_rmse(error), np.concatenate(heights)),
         "rmse_per_robot": {
             robot: _with_height(_rmse(error[:, i : i + 1]), heights[i])
             for i, robot in enumerate(traces.robots)
         },
     }
-
-
-def _height_errors(traces: Traces, robot: str, begin: int) -> Array:
-    tick, error = stance_height_errors(traces, robot)
-    return error[tick >= begin]
 
 
 def _estimator(traces: Traces) -> dict[str, Any]:
@@ -158,16 +148,15 @@ def _estimator(traces: Traces) -> dict[str, Any]:
 
 def _agents(traces: Traces) -> dict[str, Any]:
     statuses = traces.statuses
-    last = {robot: of_robot[-1] for robot, of_robot in statuses.items() if of_robot}
-    every = [status for of_robot in statuses.values() for status in of_robot]
-    planner_ms = _concatenate([status.planner_ms for status in every])
-    tick_us = _concatenate([status.tick_us for status in every])
+    last = {robot: found[-1] for robot, found in statuses.items() if found}
+    every = [status for found in statuses.values() for status in found]
+    planner_ms, tick_us = times_of(every, "planner_ms"), times_of(every, "tick_us")
     return {
         "planner_solves": len(planner_ms),
-        "planner_ms_median": _quantile(planner_ms, 0.5),
-        "planner_ms_p99": _quantile(planner_ms, 0.99),
-        "tick_us_median": _quantile(tick_us, 0.5),
-        "tick_us_p99": _quantile(tick_us, 0.99),
+        "planner_ms_median": quantile_of(planner_ms, 0.5),
+        "planner_ms_p99": quantile_of(planner_ms, 0.99),
+        "tick_us_median": quantile_of(tick_us, 0.5),
+        "tick_us_p99": quantile_of(tick_us, 0.99),
         "counters": {robot: dict(status.counters) for robot, status in last.items()},
         "stop_reasons": {robot: status.reason for robot, status in last.items() if status.reason},
     }
@@ -232,26 +221,14 @@ def _traffic(traces: Traces) -> dict[str, Any]:
 
 def _rmse(error: Array) -> dict[str, float | None]:
     """Root mean square over samples and robots of errors of shape (T, n, 6), by output."""
-    return {name: _root(_mean(error[..., i] ** 2)) for i, name in enumerate(OUTPUTS)}
+    return {name: _root(mean_of(error[..., i] ** 2)) for i, name in enumerate(OUTPUTS)}
 
 
 def _with_height(rmse: Mapping[str, float | None], errors: Array) -> dict[str, float | None]:
     """RMSE by name of `ERRORS`, with that of the height over the stance feet."""
-    every = {**rmse, OVER_STANCE_FEET: _root(_mean(errors**2))}
+    every = {**rmse, OVER_STANCE_FEET: _root(mean_of(errors**2))}
     return {name: every[name] for name in ERRORS}
 
 
 def _root(value: float | None) -> float | None:
     return None if value is None else value**0.5
-
-
-def _mean(values: Array) -> float | None:
-    return float(values.mean()) if values.size else None
-
-
-def _quantile(values: Array, q: float) -> float | None:
-    return float(np.quantile(values, q)) if values.size else None
-
-
-def _concatenate(parts: Sequence[Array]) -> Array:
-    return np.concatenate([np.zeros(0), *parts])

@@ -26,13 +26,9 @@ def print_summary(summary: dict[str, Any], console: Console) -> None:
     table.add_column()
     for name, figure in list_figures(summary):
         text = printable(figure)
-        marked = f"[red]{escape(text)}[/red]" if _is_bad(name, text) else escape(text)
-        table.add_row(name, marked)
+        bad = name == "recording" or (name == "falls" and text != "none")
+        table.add_row(name, f"[red]{escape(text)}[/red]" if bad else escape(text))
     console.print(table)
-
-
-def _is_bad(name: str, text: str) -> bool:
-    return name == "recording" or (name == "falls" and text != "none")
 
 
 def _build_title(summary: dict[str, Any]) -> str:

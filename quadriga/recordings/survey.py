@@ -13,7 +13,6 @@ from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.mcap_chunk import ChunkEntry, name_of
-from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.salvage import Damage
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.wire.codec import decode
@@ -77,18 +76,16 @@ def survey(path: Path) -> Survey:
         config: Config | None = recorded_config(source)
     except RecordingError as wrong:
         config, error = None, error or wrong
-    fields = _read(source.entries(), periods(config or Config()))
-    notes = source.notes() if isinstance(source, Recording) else source.notes
-    damages = () if isinstance(source, Recording) else tuple(source.damages)
+    found = _read(source.entries(), periods(config or Config()))
     return Survey(
         path=path,
         size=path.stat().st_size,
         metadata=source.metadata,
-        notes=notes,
+        notes=source.notes,
         config=config,
         error=error,
-        damages=damages,
-        **fields,
+        damages=tuple(source.damages),
+        **found,
     )
 
 

@@ -27,7 +27,7 @@ from quadriga.shared.wire.messages import (
     Status,
     Truth,
 )
-from quadriga.shared.wire.topics import COMMAND, INPUTS, STATE, Topic, topic_of
+from quadriga.shared.wire.topics import COMMAND, INPUTS, STATE, Topic, find_topic
 
 # Up to 1 kHz each: only their ticks are read.
 _TIMED_ONLY: Final = (STATE.name, COMMAND.name, INPUTS.name)
@@ -103,7 +103,7 @@ def read_traces(recording: Recording, names: Container[str] | None = None) -> Tr
         counts[key] += 1
         row = rows.get(key)
         if row is None:
-            row = rows[key] = _row(key)
+            row = rows[key] = find_topic(key)
         topic, robot = row
         if topic is None or tick < 0:
             invalid[key] += 1
@@ -161,11 +161,25 @@ def in_force(references: tuple[Ticks, Array], tick: Ticks) -> Array:
     return padded[index]
 
 
-def _row(key: str) -> tuple[Any, str]:
-    try:
-        return topic_of(key)
-    except MessageError:
-        return None, ""
+def demanded_outputs(traces: Traces, tick: Ticks) -> Array:
+    """The outputs asked for at each tick. Shape (len(tick), 6), NaN where nothing was yet."""
+    reference = in_force(traces.references, tick)
+    demanded = np.zeros((len(tick), len(OUTPUTS)))
+    demanded[:, [1, 2, 5, 0]] = reference
+    demanded[np.isnan(reference).any(axis=1)] = np.nan
+    return demanded
+
+
+def tracking_errors(traces: Traces, begin: int, end: float = np.inf) -> tuple[Array, Array]:
+    """True outputs from tick `begin` to tick `end`, and those less what was asked for.
+
+    Returns:
+        Both of shape (K, n, 6), of the K samples at which something was asked for.
+    """
+    truth = traces.truth
+    demanded = demanded_outputs(traces, truth.tick)
+    chosen = (begin <= truth.tick) & (truth.tick <= end) & np.isfinite(demanded[:, 0])
+    return truth.y[chosen], truth.y[chosen] - demanded[chosen, None]
 
 
 def estimate_errors(traces: Traces, index: int) -> tuple[Ticks, Array]:
@@ -186,16 +200,15 @@ def estimate_errors(traces: Traces, index: int) -> tuple[Ticks, Array]:
     return tick, error
 
 
-def stance_height_errors(traces: Traces, robot: str) -> tuple[Ticks, Array]:
+def stance_height_errors(traces: Traces, robot: str, begin: int = 0, end: float = np.inf) -> Array:
     """A robot's height over its stance feet, as it measures it, less the one asked for.
 
     Returns:
-        Ticks (K,) at which one was asked for, and errors (K,), m.
+        Errors (K,), m, of the samples from tick `begin` to tick `end` at which one was asked for.
     """
     own = traces.measurements[robot]
     error = own.y[:, OUTPUTS.index("z")] - in_force(traces.references, own.tick)[:, 3]
-    asked = np.isfinite(error)
-    return own.tick[asked], error[asked]
+    return error[(begin <= own.tick) & (own.tick <= end) & np.isfinite(error)]
 
 
 def _fits(truth: Truth, config: Config) -> bool:
@@ -217,3 +230,18 @@ def _references(messages: Sequence[Reference]) -> tuple[Ticks, Array]:
 
 def _measurements(messages: Sequence[Measurement]) -> MeasurementTrace:
     return MeasurementTrace(ticks_of(messages), stack(messages, "y", 6))
+
+
+def times_of(statuses: Sequence[Status], field: str) -> Array:
+    """All that `planner_ms` or `tick_us` of some statuses hold, shape (K,)."""
+    return np.concatenate([np.zeros(0), *(getattr(status, field) for status in statuses)])
+
+
+def mean_of(values: Array) -> float | None:
+    """The mean, None of nothing."""
+    return float(values.mean()) if values.size else None
+
+
+def quantile_of(values: Array, q: float) -> float | None:
+    """The q-quantile, None of nothing."""
+    return float(np.quantile(values, q)) if values.size else None

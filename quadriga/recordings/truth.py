@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from quadriga.sim_server.terrain.terrain import build_terrain
 from quadriga.sim_server.world.team_model import formation
 
 Ticks = NDArray[np.int64]
+_FALL_TILT: Final = 1.0  # rad
+_FALL_HEIGHT: Final = 0.12  # m above the terrain
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +45,11 @@ class TruthTrace:
     yoke_force: Array
     y: Array
     tilt: Array
+
+    @property
+    def down(self) -> NDArray[np.bool_]:
+        """Whether a robot lies on the ground, shape (T, n)."""
+        return (self.tilt > _FALL_TILT) | (self.y[..., 0] < _FALL_HEIGHT)
 
 
 def build_truth_trace(messages: Sequence[Truth], config: Config) -> TruthTrace:

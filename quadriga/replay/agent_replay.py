@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -26,6 +24,7 @@ from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.runtime.collector import collector_off
 from quadriga.shared.wire.topics import PLAN
 
 _SHOWN_EVERY: Final = 100  # ticks
@@ -53,15 +52,6 @@ class ReplayJob:
     out: Path
 
 
-@dataclass(frozen=True, slots=True)
-class _Agents:
-    """The agent as it was recorded, as it is now, and what was changed, as text."""
-
-    recorded: Agent
-    current: Agent
-    changed: str
-
-
 def replay_agent(
     job: ReplayJob, show: Show = lambda doing, tick: None, stop_at: Breakpoint | None = None
 ) -> ReplayOutcome:
@@ -79,16 +69,14 @@ def replay_agent(
     use_one_blas_thread()
     recording = Recording(job.path)
     config = recorded_config(recording)
-    agents = _build_agents(job, recording, config)
-    inbox = Inbox(config, job.robot, agents.recorded.peers)
-    log = read_agent_log(
-        recording, config, agents.recorded, inbox, lambda tick: show("reading", tick)
-    )
-    curves = Curves(config.planner.applied) if agents.changed else None
+    recorded, current, changed = _build_agents(job, recording, config)
+    inbox = Inbox(config, job.robot, recorded.peers)
+    log = read_agent_log(recording, config, recorded, inbox, lambda tick: show("reading", tick))
+    curves = Curves(config.planner.applied) if changed else None
     comparison = Comparison(log, None if curves is None else curves.add)
-    inputs = RecordedInputs(config, agents.recorded, inbox, log)
-    with _without_garbage_collection():  # a long log need not be looked through again and again
-        _replay_steps(agents, inputs, comparison, show, stop_at)
+    inputs = RecordedInputs(config, recorded, inbox, log)
+    with collector_off():  # a long log need not be looked through again and again
+        _replay_steps(current, inputs, comparison, show, stop_at, changed=bool(changed))
     verdict = comparison.finish()
     wall = monotonic() - begun
     if stop_at is not None and not stop_at.reached:
@@ -100,13 +88,13 @@ def replay_agent(
         )
     files: tuple[Path, ...] = ()
     if curves is not None:
-        files = (_draw_curves(job, curves, agents.changed),)
+        files = (_draw_curves(job, curves, changed),)
     elif verdict.first is not None:
-        files = _save_problem(job, agents.current, verdict)
+        files = _save_problem(job, current, verdict)
     outcome = ReplayOutcome(
         job.robot,
         verdict,
-        agents.changed,
+        changed,
         seconds=(verdict.last + 1) / 1000,
         wall=wall,
         inputs="" if verdict.step is None else format_inputs(verdict.step),
@@ -116,29 +104,31 @@ def replay_agent(
     return outcome
 
 
-def _build_agents(job: ReplayJob, recording: Recording, config: Config) -> _Agents:
+def _build_agents(job: ReplayJob, recording: Recording, config: Config) -> tuple[Agent, Agent, str]:
+    """The agent as it was recorded, as it is now, and what was changed, as text."""
     predictor, same = find_predictor(recording, config, job.predictor)
     recorded = Agent(config, job.robot, predictor)
     new = change_config(config, job.given)
     changed = format_changes(config, new) + ("" if same else f" predictor {job.predictor}")
     current = Agent(new, job.robot, predictor) if changed else recorded
     check_agents(recorded, current)
-    return _Agents(recorded, current, changed.strip())
+    return recorded, current, changed.strip()
 
 
 def _replay_steps(
-    agents: _Agents,
+    agent: Agent,
     inputs: RecordedInputs,
     comparison: Comparison,
     show: Show,
     stop_at: Breakpoint | None,
+    *,
+    changed: bool,
 ) -> None:
     """Step the agent over everything it took in; up to what is missing unless it is changed."""
-    agent = agents.current
     memory = agent.initial()
     for step in inputs.steps():
-        comparison.add_missing(step.tick, step.missing)
-        if step.missing and not agents.changed:
+        comparison.verdict.missing += [(step.tick, name) for name in step.missing]
+        if step.missing and not changed:
             return  # nothing after it could be equal but by chance
         if step.inputs is None:
             continue
@@ -149,15 +139,6 @@ def _replay_steps(
         before = memory
         memory, outputs = agent.step(memory, step.inputs)
         comparison.add(ReplayedStep(before, step.inputs, outputs))
-
-
-@contextmanager
-def _without_garbage_collection() -> Iterator[None]:
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
 
 
 def _draw_curves(job: ReplayJob, curves: Curves, changed: str) -> Path:

@@ -109,10 +109,6 @@ class Comparison:
                     verdict.first = find_difference(tick, topic.name, recorded[0], message)
                     verdict.step = step
 
-    def add_missing(self, tick: int, names: Sequence[str]) -> None:
-        """Note inputs of a step that are not in the recording."""
-        self.verdict.missing += [(tick, name) for name in names]
-
     def _show_pair(self, name: str, recorded: Sequence[bytes], message: Message) -> None:
         if self._on_pair is None:
             return

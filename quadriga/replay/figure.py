@@ -11,7 +11,7 @@ import numpy as np
 from quadriga.charts.draw import draw_panels
 from quadriga.charts.files import save_png
 from quadriga.charts.panels import Curve, Panel, PanelGrid
-from quadriga.shared.errors import RecordingError
+from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.robot.a1 import JOINT_NAMES, OUTPUTS, Array, Leg
 from quadriga.shared.wire.messages import Command, Measurement, Message, Plan
 from quadriga.shared.wire.topics import SAMPLE_MS
@@ -80,11 +80,8 @@ def draw(curves: Curves, title: str, path: Path) -> None:
     begin, end = (times.min(), times.max()) if len(times) else (0.0, 0.0)
     grid = PanelGrid(float(begin), float(end), columns=2, height=140.0)
     legend = [(_RECORDED, "recorded"), (_RECOMPUTED, "recomputed")]
-    try:
+    with name_file_errors(RecordingError, path, "a file that can be written"):
         save_png(draw_panels(panels, grid, legend=legend, title=title), path)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise RecordingError(str(path), reason, "a file that can be written") from None
 
 
 def _build_panels(curves: Curves, kind: str) -> tuple[Panel, Panel]:

@@ -13,7 +13,7 @@ import numpy as np
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256, read
 from quadriga.shared.config.sections import CENTRAL, Config
-from quadriga.shared.errors import PredictorError, RecordingError
+from quadriga.shared.errors import PredictorError, RecordingError, name_file_errors
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.places import cache_dir, cache_files
 
@@ -27,12 +27,9 @@ def copy_predictor(predictor: Path, run_dir: Path) -> None:
         RecordingError: it cannot be written.
     """
     target = run_dir / PREDICTOR
-    try:
+    with name_file_errors(RecordingError, target, "room for the predictor"):
         target.unlink(missing_ok=True)
         shutil.copyfile(predictor, target)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise RecordingError(str(target), reason, "room for the predictor") from None
 
 
 def find_predictor(

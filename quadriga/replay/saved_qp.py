@@ -15,16 +15,16 @@ from __future__ import annotations
 
 import sys
 import zipfile
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import daqp
 import numpy as np
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, StepProblems
 from quadriga.agents.planner.qp_solver import SolvedQp
-from quadriga.shared.errors import RecordingError
+from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.robot.a1 import TORQUE_LIMIT, Array
 
 WHOLE_BODY: Final = "command"  # the topic that is made of it
@@ -64,19 +64,9 @@ def save(path: Path, qp: SavedQp) -> None:
     Raises:
         RecordingError: it cannot be written.
     """
-    try:
-        np.savez(
-            path,
-            H=qp.H,
-            f=qp.f,
-            A=qp.A,
-            lower=qp.lower,
-            upper=qp.upper,
-            x=qp.x,
-            about=np.array(qp.about),
-        )
-    except OSError as error:
-        raise RecordingError(str(path), error.strerror or str(error), "a new file") from None
+    arrays: dict[str, Any] = asdict(qp)
+    with name_file_errors(RecordingError, path, "a new file"):
+        np.savez(path, **arrays)
 
 
 def load(path: Path) -> SavedQp:

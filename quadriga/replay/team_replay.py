@@ -15,7 +15,7 @@ from quadriga.progress import build_progress
 from quadriga.replay.agent_replay import ReplayJob, replay_agent
 from quadriga.replay.breakpoint import Breakpoint
 from quadriga.replay.outcome import ReplayOutcome
-from quadriga.shared.errors import ConfigError, QuadrigaError, RecordingError
+from quadriga.shared.errors import ConfigError, QuadrigaError, RecordingError, name_file_errors
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.a1 import robot_names
@@ -125,9 +125,6 @@ def _choose_robots(robots: tuple[str, ...], names: tuple[str, ...]) -> tuple[str
 
 def _make_folder(path: Path, out: Path | None) -> Path:
     folder = out or path.parent
-    try:
+    with name_file_errors(RecordingError, f"--out {folder}", "a folder that can be made"):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise RecordingError(f"--out {folder}", reason, "a folder that can be made") from None
     return folder

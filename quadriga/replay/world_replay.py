@@ -13,7 +13,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
-from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.reader import M, Recording
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command, Event, Message
@@ -57,7 +57,7 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
             "one in lock-step",
             "which command moved the motors in which tick is not recorded in real time",
         )
-    world, silent = World(config), _Silent(config.team.name)
+    world, silent = World(config), set[str]()
     keys = {
         name: (STATE.key(config.team.name, name), COMMAND.key(config.team.name, name))
         for name in world.names
@@ -65,7 +65,7 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
     compared, lost = 0, ""
     for tick, entries in by_tick(recording, _NAMES):
         if lost:
-            if not any(_is_of_world(entry) for entry in entries):
+            if not any(topic_of(entry.key)[0] in (STATE, TRUTH) for entry in entries):
                 continue  # nothing of the world's came after
             if not recording.cut:
                 raise RecordingError(
@@ -81,9 +81,9 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
             yield WorldComparison(tick, compared, difference=result)
             return
         compared += result
-        silent.update(entries)
-        commands = _choose_commands(keys, entries, silent.robots)
-        absent = [name for name in world.names if name not in {*commands, *silent.robots}]
+        _update_silent(silent, config.team.name, entries)
+        commands = _choose_commands(keys, entries, silent)
+        absent = [name for name in world.names if name not in {*commands, *silent}]
         if absent:
             lost = f"no command of {', '.join(absent)} at tick {tick}"
         else:
@@ -99,30 +99,23 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
         )
 
 
-def _is_of_world(entry: ChunkEntry) -> bool:
-    return topic_of(entry.key)[0] in (STATE, TRUTH)
+def _update_silent(silent: set[str], team: str, entries: Iterable[ChunkEntry]) -> None:
+    """Take down the robots that the world no longer waits for, or waits for again."""
+    for _, event in _decode_valid(Event, EVENT.key(team), entries):
+        if event.code == codes.BACK:
+            silent.discard(event.robot)
+        elif event.code in (codes.SILENT, codes.GONE):
+            silent.add(event.robot)
 
 
-class _Silent:
-    """The robots that the world does not wait for, by its events."""
-
-    def __init__(self, team: str) -> None:
-        self._key = EVENT.key(team)
-        self.robots: set[str] = set()
-
-    def update(self, entries: Iterable[ChunkEntry]) -> None:
-        for event in _decode_events(self._key, entries):
-            if event.code == codes.BACK:
-                self.robots.discard(event.robot)
-            elif event.code in (codes.SILENT, codes.GONE):
-                self.robots.add(event.robot)
-
-
-def _decode_events(key: str, entries: Iterable[ChunkEntry]) -> Iterator[Event]:
+def _decode_valid(
+    kind: type[M], key: str, entries: Iterable[ChunkEntry]
+) -> Iterator[tuple[int, M]]:
+    """Log time and content of a key's messages; what is none, the world dropped or never sent."""
     for entry in entries:
         if entry.key == key:
-            with suppress(MessageError):  # of a foreign publisher: the world's own are valid
-                yield decode(entry.payload, Event)
+            with suppress(MessageError):
+                yield entry.log_time_ns, decode(entry.payload, kind)
 
 
 def _compare(world: World, config: Config, entries: Iterable[ChunkEntry]) -> int | Difference:
@@ -152,21 +145,14 @@ def _choose_commands(
     """What each robot that was not silent commanded in a tick, by robot in the team's order."""
     commands = {}
     for name, (state, command) in keys.items():
-        valid = [] if name in silent else list(_decode_commands(command, entries))
+        valid = [] if name in silent else list(_decode_valid(Command, command, entries))
         if valid:
             asked = [entry.log_time_ns for entry in entries if entry.key == state]
-            commands[name] = _choose_applied(valid, min(asked, default=0))
+            commands[name] = _choose_taken(valid, min(asked, default=0))
     return commands
 
 
-def _decode_commands(key: str, entries: Iterable[ChunkEntry]) -> Iterator[tuple[int, Command]]:
-    for entry in entries:
-        if entry.key == key:
-            with suppress(MessageError):  # the world dropped it, too
-                yield entry.log_time_ns, decode(entry.payload, Command)
-
-
-def _choose_applied(commands: Sequence[tuple[int, Command]], asked: int) -> Command:
+def _choose_taken(commands: Sequence[tuple[int, Command]], asked: int) -> Command:
     """Which of a robot's commands of one tick the world took, as it refuses early and stale ones.
 
     The one that was recorded closest to the state it answers; links differ in speed, so that it

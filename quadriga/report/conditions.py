@@ -79,8 +79,7 @@ def _assess_feet(window: Samples) -> Iterator[tuple[str, bool]]:
         yield from [("not recorded", False)] * 3
         return
     slip = find_slip(window)
-    speed = np.where(window.stance & window.contact, np.nan_to_num(window.foot_speed), 0.0)
-    leg = Leg(int(speed.max(axis=0).argmax())).name
+    leg = Leg(int(slip.max(axis=0).argmax())).name
     fastest = float(slip.max())
     unknown = not np.isfinite(window.foot_speed).any()
     yield ("unknown" if unknown else f"{fastest:.2f} m/s, {leg}"), fastest > SLIP

@@ -28,7 +28,7 @@ from quadriga.report.top_view import draw_top_view
 from quadriga.report.trouble_figure import draw_trouble
 from quadriga.report.troubles import Trouble, find_troubles
 from quadriga.shared.config.sections import CENTRAL
-from quadriga.shared.errors import RecordingError
+from quadriga.shared.errors import RecordingError, name_file_errors
 
 PAGE: Final = "report.html"
 _TROUBLES: Final = 6  # shown in full
@@ -48,12 +48,8 @@ def write_page(run: Run, path: Path) -> Path:
     Raises:
         RecordingError: the file cannot be written.
     """
-    try:
+    with name_file_errors(RecordingError, path, "a file that can be written"):
         path.write_text(build_page(run), encoding="utf-8")
-    except OSError as error:
-        raise RecordingError(
-            str(path), error.strerror or str(error), "a file that can be written"
-        ) from None
     return path
 
 

@@ -13,6 +13,7 @@ from quadriga.agents.time_grid import step_ms
 from quadriga.charts.colours import BARS, robot_style
 from quadriga.charts.draw import draw_panels
 from quadriga.charts.panels import Bars, Curve, Mark, Panel, PanelGrid
+from quadriga.recordings.traces import quantile_of, times_of
 from quadriga.report.run import Run
 from quadriga.report.trunk_figures import draw_over_run, mark_falls, robot_legend
 from quadriga.shared.config.sections import CENTRAL
@@ -20,6 +21,7 @@ from quadriga.shared.members import PLANNER
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import REFERENCE
+from quadriga.tables import format_number
 
 _BINS: Final = 60  # of a histogram
 _SENT_S: Final = 0.3  # statuses further apart than this are not joined
@@ -108,10 +110,9 @@ def list_times(run: Run) -> list[tuple[str, ...]]:
             continue
         cells = [name]
         for field, digits in (("planner_ms", ".2f"), ("tick_us", ".0f")):
-            values = np.concatenate([np.zeros(0), *(getattr(s, field) for s in statuses)])
+            values = times_of(statuses, field)
             cells.append(f"{len(values):,}")
-            for q in (0.5, 0.99, 1.0):
-                cells.append(format(np.quantile(values, q), digits) if len(values) else "–")
+            cells += [format_number(quantile_of(values, q), digits) for q in (0.5, 0.99, 1.0)]
         rows.append(tuple(cells))
     return rows
 
@@ -151,10 +152,7 @@ def draw_time_histograms(run: Run) -> Figure:
         ("planner_ms", "planner solves by ms"),
         ("tick_us", "control ticks by µs"),
     ):
-        times = [
-            np.concatenate([np.zeros(0), *(getattr(s, field) for s in run.traces.statuses[robot])])
-            for robot in run.traces.robots
-        ]
+        times = [times_of(run.traces.statuses[robot], field) for robot in run.traces.robots]
         every = np.concatenate(times)
         if not len(every):
             panels.append(Panel(f"{title}: none recorded", span=1.0))

@@ -159,8 +159,5 @@ def _look_up_newest(tick: Ticks, known: Ticks, values: Any, otherwise: Any) -> A
 
 
 def find_slip(samples: Samples) -> Array:
-    """Speed of the fastest foot that should stand and does, 0 without any. Shape (M,), m/s."""
-    standing = samples.stance & samples.contact
-    speed = np.where(standing, np.nan_to_num(samples.foot_speed), 0.0)
-    fastest: Array = speed.max(axis=1, initial=0.0)
-    return fastest
+    """Speed of each foot that should stand and does, of others 0. Shape (M, 4), m/s."""
+    return np.where(samples.stance & samples.contact, np.nan_to_num(samples.foot_speed), 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from quadriga.agents.modes import DAMPING, ESTOP, STAND, WALK
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import Ticks
+from quadriga.shared.config.timing import periods
 from quadriga.shared.wire.codes import FALL, code_of
 from quadriga.shared.wire.messages import Plan, Status
 from quadriga.shared.wire.topics import MEASUREMENT, STATE, TRUTH
@@ -134,11 +136,10 @@ def _find_failed_plans(robot: str, plans: Sequence[Plan], end: int) -> Iterator[
 
 def _find_gaps(traces: Traces, end: int) -> Iterator[TimelineEntry]:
     """Stretches for which nothing of a topic with a fixed rate was recorded."""
-    team = traces.config.team.name
-    wanted = [(TRUTH.key(team), "", 10)]
-    for robot in traces.robots:
-        wanted += [(STATE.key(team, robot), robot, 1), (MEASUREMENT.key(team, robot), robot, 10)]
-    for key, robot, period in wanted:
+    team, every = traces.config.team.name, periods(traces.config)
+    wanted = [(TRUTH, ""), *product((STATE, MEASUREMENT), traces.robots)]
+    for topic, robot in wanted:
+        key, period = topic.key(team, robot), every[topic.name]
         ticks: Ticks = np.unique(traces.ticks.get(key, np.zeros(0, dtype=np.int64)))
         ticks = ticks[ticks <= end]
         for k in np.flatnonzero(np.diff(ticks) > _GAP_PERIODS * period).tolist():

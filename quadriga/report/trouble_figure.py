@@ -30,7 +30,7 @@ def draw_trouble(run: Run, trouble: Trouble) -> Figure:
         samples, style = run.samples[robot], robot_style(index)
         time = samples.tick / 1000
         tilt.append(Curve(time, samples.tilt, style, gap=_GAP))
-        slip.append(Curve(time, find_slip(samples), style, gap=_GAP))
+        slip.append(Curve(time, find_slip(samples).max(axis=1), style, gap=_GAP))
         torque.append(Curve(time, 100 * samples.torque, style, gap=_GAP))
     falling = [(TILT, "unusual"), (run.traces.config.controller.fall_tilt, "fall")]
     panels = [

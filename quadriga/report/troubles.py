@@ -6,12 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
 from quadriga.charts.thinning import find_spells
 from quadriga.report.conditions import Condition, assess_robot
 from quadriga.report.run import Run
-from quadriga.report.samples import Samples
+from quadriga.report.samples import Samples, find_slip
 from quadriga.report.timeline import TimelineEntry
 from quadriga.report.window import (
     BEFORE_MS,
@@ -108,9 +106,7 @@ def _find_signs(robot: str, window: Samples) -> Iterator[Sign]:
             yield Sign(int(window.tick[spells[0][0]]), robot, f"{text}, {ms} ms in all")
 
     yield from first(find_spells(window.tilt > TILT), f"tilts more than {TILT:g} rad")
-    for leg in Leg:
-        standing = window.stance[:, leg] & window.contact[:, leg]
-        speed = np.where(standing, np.nan_to_num(window.foot_speed[:, leg]), 0.0)
+    for leg, speed in zip(Leg, find_slip(window).T, strict=True):
         fastest = f"{leg.name} slips at up to {speed.max(initial=0.0):.2f} m/s"
         yield from first(find_spells(speed > SLIP), fastest)
         yield from first(find_lost_stance(window, leg), f"{leg.name} finds no ground in its stance")

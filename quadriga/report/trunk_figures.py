@@ -11,7 +11,7 @@ from quadriga.charts.colours import robot_style
 from quadriga.charts.draw import Legend, draw_panels
 from quadriga.charts.panels import Curve, Mark, Panel, PanelGrid
 from quadriga.recordings.applied_plans import join_applied_samples
-from quadriga.recordings.traces import estimate_errors, in_force
+from quadriga.recordings.traces import demanded_outputs, estimate_errors
 from quadriga.recordings.truth import Ticks
 from quadriga.report.run import Run
 from quadriga.shared.config.yokes import yoke_pairs
@@ -22,7 +22,6 @@ from quadriga.shared.wire.topics import SAMPLE_MS
 NAMES: Final = ("z [m]", "vx [m/s]", "vy [m/s]", "roll [rad]", "pitch [rad]", "wz [rad/s]")
 _SPANS: Final = (0.04, 0.3, 0.2, 0.1, 0.1, 0.4)
 _ORDER: Final = (0, 3, 1, 4, 2, 5)  # of the panels, two in a row: z roll, vx pitch, vy wz
-_ASKED: Final = (1, 2, 5, 0)  # outputs that a reference asks for, in its order
 _GAP: Final = 0.05  # s without a sample, after which a curve is not joined
 _POINTS: Final = 60_000  # of all trajectories together, so that the page stays small
 _LEAST: Final = 200  # points of one curve
@@ -67,7 +66,8 @@ def draw_trajectory(run: Run, index: int, part: tuple[float, float] | None = Non
     traces, robot = run.traces, run.traces.robots[index]
     own, truth = traces.measurements[robot], traces.truth
     begin, _, planned = join_applied_samples(traces.plans[robot], traces.config.planner.applied)
-    reference_tick, commanded = _read_commanded(run, index)
+    reference_tick, _ = run.outputs_of(index)
+    commanded = demanded_outputs(traces, reference_tick)
     panels = []
     for i in _ORDER:
         curves = []
@@ -96,13 +96,14 @@ def draw_reference(run: Run) -> Figure:
     """What was asked of the team, and every robot's mean over one gait period."""
     panels = []
     period = 2 * run.traces.config.gait.stance_ms
+    reference_tick, _ = run.outputs_of(0)
+    commanded = demanded_outputs(run.traces, reference_tick)
     for i in (1, 2, 0, 5):
         curves = []
         for index in range(len(run.traces.robots)):
             tick, y = run.outputs_of(index)
             mean = average_over_period(tick, y[:, i], period)
             curves.append(Curve(tick / 1000, mean, robot_style(index), gap=_GAP))
-        reference_tick, commanded = _read_commanded(run, 0)
         curves.append(Curve(reference_tick / 1000, commanded[:, i], "asked"))
         panels.append(Panel(NAMES[i], curves, span=_SPANS[i] / 2, until=first_fall(run)))
     legend = [*robot_legend(run), ("asked", "asked for")]
@@ -159,13 +160,3 @@ def average_over_period(tick: Ticks, values: Array, period_ms: int) -> Array:
 def _share_points(run: Run, curves: int) -> int:
     """Points that each of so many curves of each robot may have."""
     return min(_MOST, max(_LEAST, _POINTS // max(1, curves * len(run.traces.robots))))
-
-
-def _read_commanded(run: Run, index: int) -> tuple[Ticks, Array]:
-    """Ticks and the outputs commanded then; shape (·, 6), NaN before the first reference."""
-    tick, _ = run.outputs_of(index)
-    reference = in_force(run.traces.references, tick)
-    commanded = np.zeros((len(tick), len(OUTPUTS)))
-    commanded[:, _ASKED] = reference
-    commanded[np.isnan(reference).any(axis=1)] = np.nan
-    return tick, commanded

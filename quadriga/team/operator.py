@@ -43,6 +43,15 @@ def reference_at(config: Config, tick: int) -> Reference:
     return Reference(tick, tick * 1_000_000, factor * vx, factor * vy, factor * wz, full.height)
 
 
+def references_of(config: Config) -> Callable[[int], Reference | None]:
+    """What the operator sends at a tick, as a rollout takes it: a reference at each epoch's begin.
+
+    Raises:
+        ConfigError: when it is called: the trace cannot be read, or is none.
+    """
+    return lambda tick: None if tick % EPOCH_MS else reference_at(config, tick)
+
+
 def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
     """Publish the reference, following the world's time, until the walk ends or it is stopped.
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.recordings.summary import RECORDING
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import ConfigError, name_file_errors
 from quadriga.shared.runtime.clock import wall_ns
 
 RUNS: Final = Path("runs")
@@ -25,13 +25,10 @@ def make_run_dir(out: Path | None) -> Path:
     """
     if out is not None and (out / RECORDING).exists():
         raise ConfigError(f"--out {out}", "a folder with a recording", "a new folder")
-    try:
+    with name_file_errors(ConfigError, f"--out {out or RUNS}", "a folder that can be made"):
         if out is None:
             return _make_dated_folder()
         out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ConfigError(f"--out {out or RUNS}", reason, "a folder that can be made") from None
     return out
 
 

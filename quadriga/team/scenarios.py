@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import ConfigError, name_file_errors
 from quadriga.shared.runtime.places import scenario_folder
 
 LABEL: Final = "world.scenario"  # the key that carries a scenario's name
@@ -50,11 +50,8 @@ def description(name: str) -> str:
         ConfigError: there is no such scenario, or its file cannot be read.
     """
     file = path(name)
-    try:
+    with name_file_errors(ConfigError, file, "a readable TOML file"):
         lines = file.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "bytes that are not UTF-8"
-        raise ConfigError(str(file), reason, "a readable TOML file") from None
     comment = []
     for line in lines:
         if not line.startswith("#"):

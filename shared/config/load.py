@@ -6,7 +6,6 @@ import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import Field, fields
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from quadriga.shared.config.presets import PRESETS, preset_keys
 from quadriga.shared.config.reference_trace import ROW_END, inline_trace
 from quadriga.shared.config.renamed import RENAMED
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import ConfigError, did_you_mean, name_file_errors
 
 
 def load(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
@@ -122,13 +121,8 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises:
         ConfigError: it cannot be read, or is no TOML.
     """
-    try:
+    with name_file_errors(ConfigError, path, "a readable TOML file"):
         text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ConfigError(str(path), reason, "a readable TOML file") from None
-    except UnicodeDecodeError:
-        raise ConfigError(str(path), "bytes that are not UTF-8", "a TOML file") from None
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -166,8 +160,7 @@ def _check_value(name: str, key: Field[Any], value: Any) -> Any:
 
 def _check_text(name: str, choices: tuple[str, ...], value: Any) -> str:
     if choices and value not in choices:
-        close = get_close_matches(str(value), choices, 1)
-        hint = f"did you mean {close[0]!r}?" if close else ""
+        hint = did_you_mean(value, choices)
         raise ConfigError(name, repr(value), f"one of {', '.join(choices)}", hint)
     if not isinstance(value, str) or not value.isprintable():
         raise ConfigError(name, repr(value), "text without control characters")
@@ -206,6 +199,5 @@ def _unknown_name(name: str, known: list[str], what: str) -> ConfigError:
         return ConfigError(
             name, "a name of an earlier version", RENAMED[name], "the key was renamed, not changed"
         )
-    close = get_close_matches(name, known, 1)
-    hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
+    hint = did_you_mean(name, known) or f"known: {', '.join(known)}"
     return ConfigError(name, "an unknown name", f"{what} of the configuration", hint)

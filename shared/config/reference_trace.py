@@ -12,13 +12,14 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.config.sections import Config, ReferenceConfig
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import ConfigError, name_file_errors
 from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.places import scenario_folder
 
 COLUMNS: Final = ("t", "vx", "vy", "wz")
 ROW_END: Final = ";"  # where a trace stands in a configuration, in one line
 _STREAM: Final = 6  # of the seed
+_READABLE: Final = "a file that can be read"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +64,8 @@ def trace_sha256(config: Config) -> str:
         ConfigError: the file cannot be read.
     """
     path = _trace_file(config)
-    try:
+    with name_file_errors(ConfigError, f"reference.trace {path}", _READABLE):
         return "" if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise ConfigError(
-            f"reference.trace {path}", error.strerror or str(error), "a file that can be read"
-        ) from None
 
 
 def inline_trace(path: Path) -> str:
@@ -106,11 +103,8 @@ def _read_trace(path: Path | None, given: str, begin: float) -> Trace:
 
 
 def _read_text(path: Path) -> str:
-    try:
+    with name_file_errors(ConfigError, f"reference.trace {path}", _READABLE):
         return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "bytes that are not UTF-8"
-        raise ConfigError(f"reference.trace {path}", reason, "a file that can be read") from None
 
 
 def _split_rows(text: str) -> list[list[str]]:

@@ -13,10 +13,9 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from quadriga.shared.errors import MessageError
 from quadriga.shared.recording.seal import newer_format_error
 from quadriga.shared.wire.envelope import envelope
-from quadriga.shared.wire.topics import TABLE, topic_of
+from quadriga.shared.wire.topics import TABLE, find_topic
 
 RECORD: Final = struct.Struct("<BQ")  # opcode, length
 _MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
@@ -105,18 +104,8 @@ def check_schema(schema: Schema, path: str) -> None:
 
 def name_of(key: str) -> str:
     """Name of a key's topic, "" if the table has none."""
-    try:
-        return topic_of(key)[0].name
-    except MessageError:
-        return ""
-
-
-def robot_of(key: str) -> str:
-    """The robot in a key, "" if it has none or the table does not know it."""
-    try:
-        return topic_of(key)[1]
-    except MessageError:
-        return ""
+    topic, _ = find_topic(key)
+    return "" if topic is None else topic.name
 
 
 def _wanted_key(key: str, names: Container[str] | None, keys: Container[str] | None) -> str | None:

@@ -16,10 +16,10 @@ from mcap.records import Chunk, DataEnd, Footer, Metadata
 from mcap.stream_reader import get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
-from quadriga.shared.errors import RecordingError
+from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.recording.mcap_chunk import CORRUPT, RECORD, ChunkEntry, messages_of, stream
 from quadriga.shared.recording.seal import unseal
-from quadriga.shared.recording.writer import PROFILE, reason
+from quadriga.shared.recording.writer import PROFILE
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Message
 from quadriga.shared.wire.topics import TABLE, topic_of
@@ -48,16 +48,15 @@ class Recording:
             RecordingError: no such file, an empty one, or not a recording of this project.
         """
         self.path, self.cut = path, ""
-        try:
-            with path.open("rb") as file:
-                head = file.read(len(MCAP0_MAGIC))
-                self._size = file.seek(0, SEEK_END)
-                file.seek(max(self._size - len(MCAP0_MAGIC), 0))
-                self.complete = file.tell() > 0 and file.read() == MCAP0_MAGIC
-        except OSError as error:
-            raise RecordingError(
-                str(path), reason(error), "a recording", "did the walk start?"
-            ) from None
+        self.damages: tuple[()] = ()  # none can be told apart: `Salvage` does
+        with (
+            name_file_errors(RecordingError, path, "a recording", "did the walk start?"),
+            path.open("rb") as file,
+        ):
+            head = file.read(len(MCAP0_MAGIC))
+            self._size = file.seek(0, SEEK_END)
+            file.seek(max(self._size - len(MCAP0_MAGIC), 0))
+            self.complete = file.tell() > 0 and file.read() == MCAP0_MAGIC
         if head != MCAP0_MAGIC:
             if not self._size:
                 raise RecordingError(str(path), "an empty file", "a recording")
@@ -126,6 +125,7 @@ class Recording:
         if self.cut:
             raise self._damage_error(self.cut)
 
+    @property
     def notes(self) -> dict[str, dict[str, str]]:
         """What the writer noted at the end, by name: `COUNTS`, `LOST`, `SINCE`; {} after a kill."""
         notes: dict[str, dict[str, str]] = {}

@@ -15,7 +15,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Footer, Metadata
 from mcap.writer import MCAP0_MAGIC
 
-from quadriga.shared.errors import NewerRecordingError, RecordingError
+from quadriga.shared.errors import NewerRecordingError, RecordingError, system_reason
 from quadriga.shared.recording.mcap_chunk import (
     CORRUPT,
     RECORD,
@@ -25,7 +25,7 @@ from quadriga.shared.recording.mcap_chunk import (
     stream,
 )
 from quadriga.shared.recording.seal import unseal
-from quadriga.shared.recording.writer import COUNTS, LOST, PROFILE, SINCE, reason
+from quadriga.shared.recording.writer import COUNTS, LOST, PROFILE, SINCE
 
 # A chunk record: opcode, length, first and last log time, size, checksum, "lz4", packed size.
 _CHUNK: Final = struct.Struct("<BQQQQII3sQ")
@@ -92,7 +92,7 @@ class Salvage:
         except ValueError:
             raise RecordingError(str(path), "an empty file", "a recording") from None
         except OSError as error:
-            raise RecordingError(str(path), reason(error), "a recording") from None
+            raise RecordingError(str(path), system_reason(error), "a recording") from None
         mine = self._read_metadata()
         if not (mine or any(name_of(entry.key) for entry in self.entries())):
             raise RecordingError(

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from quadriga.shared.errors import MessageError, RecordingError
+from quadriga.shared.errors import RecordingError, system_reason
 from quadriga.shared.recording.mcap_file import McapFile
 from quadriga.shared.recording.seal import seal
 from quadriga.shared.recording.sequence import TickTrack, lost_by_key
 from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.schema import json_schema
-from quadriga.shared.wire.topics import TABLE, Topic, topic_of
+from quadriga.shared.wire.topics import TABLE, Topic, find_topic
 
 PROFILE: Final = "quadriga"
 COUNTS: Final = f"{PROFILE}.counts"  # written at the end: what the writer counted
@@ -66,7 +66,7 @@ class RecordingWriter:
                 raise RecordingError(
                     str(path), "a file that exists", "a new one", "recordings are never overwritten"
                 ) from None
-            raise RecordingError(str(path), reason(error), "a writable folder") from None
+            raise RecordingError(str(path), system_reason(error), "a writable folder") from None
         self._mcap = McapFile(self._file, chunk_kib * 1024, PROFILE, "quadriga")
         self._metadata = seal(metadata)
         self._mcap.metadata(PROFILE, self._metadata)
@@ -141,16 +141,11 @@ class RecordingWriter:
         return self._mcap.schema(f"{PROFILE}.{topic.type.__name__}", text)
 
     def _channel(self, key: str) -> tuple[int, TickTrack]:
-        try:
-            name, encoding = topic_of(key)[0].name, "msgpack"
-            schema = self._schemas[name]
-        except MessageError:
+        topic, _ = find_topic(key)
+        if topic is None:
             name, schema, encoding = "", self._unknown, "application/octet-stream"
+        else:
+            name, schema, encoding = topic.name, self._schemas[topic.name], "msgpack"
         self._end_size += 2 * len(key) + 64  # of what is noted of it at the end
         track = TickTrack(self._periods.get(name, 0), self._after.get(key, -1))
         return self._mcap.channel(key, encoding, schema), track
-
-
-def reason(error: OSError) -> str:
-    """What an operating system's error says."""
-    return error.strerror or str(error)

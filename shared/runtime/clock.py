@@ -26,21 +26,6 @@ def sleep(seconds: float) -> None:
     time.sleep(max(seconds, 0.0))
 
 
-class ManualClock:
-    """A clock for tests: it moves when it is told to, and when somebody sleeps on it."""
-
-    def __init__(self) -> None:
-        self.now = 0.0
-
-    def monotonic(self) -> float:
-        """The present reading in seconds."""
-        return self.now
-
-    def sleep(self, seconds: float) -> None:
-        """Move on by `seconds`."""
-        self.now += max(seconds, 0.0)
-
-
 class Rate:
     """Paces a loop: turn k starts at `start + k · period`, and late turns are counted.
 

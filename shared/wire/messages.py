@@ -17,7 +17,7 @@ import numpy as np
 
 from quadriga.shared.robot.a1 import OUTPUTS, Array
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import code_of_schema_1
+from quadriga.shared.wire.codes import EVENTS, code_of_schema_1
 from quadriga.shared.wire.entries import FORCES, JOINTS, LEGS, ONE, WXYZ, XYZ
 
 Dim = int | str
@@ -247,6 +247,11 @@ class Event(Message):
     robot: str = plain(str, "the robot concerned, or empty")
     detail: str = plain(str, "free text")
     code: str = plain(str, "what happened, one of quadriga.shared.wire.codes.EVENTS")
+
+    @classmethod
+    def of(cls, tick: int, code: str, robot: str, detail: str) -> Event:
+        """The announcement of something that happened at `tick`, by its code."""
+        return cls(tick, tick * 1_000_000, EVENTS[code].kind, robot, detail, code)
 
     @classmethod
     def upgrade(cls, schema: int, body: dict[str, Any]) -> dict[str, Any] | None:

@@ -99,10 +99,18 @@ def topic_of(key: str) -> tuple[Topic, str]:
     Raises:
         MessageError: no row has this key.
     """
+    topic, robot = find_topic(key)
+    if topic is None:
+        raise MessageError("key", repr(key), "a key of the table of topics", "a foreign publisher?")
+    return topic, robot
+
+
+def find_topic(key: str) -> tuple[Topic | None, str]:
+    """As `topic_of`, but None and "" if no row has this key."""
     _, _, rest = key.partition("/")
     if rest in _BY_NAME and not _BY_NAME[rest].per_robot:
         return _BY_NAME[rest], ""
     robot, _, name = rest.partition("/")
     if name in _BY_NAME and _BY_NAME[name].per_robot:
         return _BY_NAME[name], robot
-    raise MessageError("key", repr(key), "a key of the table of topics", "a foreign publisher?")
+    return None, ""

@@ -70,20 +70,20 @@ def build_scenario(config: Config, loads: Sequence[Load]) -> Scenario:
     names, world = robot_names(config.team.robots), config.world
     pushes = all_pushes(config, np.random.default_rng((world.seed, _PUSHES)))
     weak = weak_motors(config, np.random.default_rng((world.seed, _MOTORS)))
-    events = [event(0, codes.START, "", f"{len(names)} robots, {config.team.yokes} yokes")]
-    events.append(event(0, codes.TERRAIN, "", _ground(config)))
+    events = [Event.of(0, codes.START, "", f"{len(names)} robots, {config.team.yokes} yokes")]
+    events.append(Event.of(0, codes.TERRAIN, "", _ground(config)))
     events += [
-        event(0, codes.PAYLOAD, name, load.detail)
+        Event.of(0, codes.PAYLOAD, name, load.detail)
         for name, load in zip(names, loads, strict=True)
         if load.mass > 0.0
     ]
-    events += [event(m.start, codes.WEAK_MOTOR, names[m.robot], m.detail) for m in weak]
+    events += [Event.of(m.start, codes.WEAK_MOTOR, names[m.robot], m.detail) for m in weak]
     for push in sorted(pushes, key=lambda item: item.start):
         detail = (
             f"{push.force:g} N towards {math.degrees(push.direction):g} deg"
             f" for {(push.stop - push.start) / 1000:g} s"
         )
-        events += [event(push.start, codes.PUSH, names[i], detail) for i in push.robots]
+        events += [Event.of(push.start, codes.PUSH, names[i], detail) for i in push.robots]
     return Scenario(n=len(names), pushes=pushes, weak=weak, events=tuple(events))
 
 
@@ -93,9 +93,3 @@ def _ground(config: Config) -> str:
         return "flat"
     grade = f" of {world.slope:g} deg" if world.terrain == "slope" else ""
     return f"{world.terrain}{grade} up to {world.terrain_height:g} m, seed {world.seed}"
-
-
-def event(tick: int, code: str, robot: str, detail: str) -> Event:
-    """The announcement of something that happened at `tick`, by its code."""
-    kind = codes.EVENTS[code].kind
-    return Event(tick, tick * 1_000_000, kind, robot, detail, code)

@@ -16,7 +16,7 @@ from quadriga.shared.wire.messages import Command, Event, State, Truth
 from quadriga.sim_server.terrain.loose import PERIOD, LooseStones
 from quadriga.sim_server.world import layout
 from quadriga.sim_server.world.motors import drive
-from quadriga.sim_server.world.scenario import build_scenario, event
+from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.sim_server.world.sensors import Sensors
 from quadriga.sim_server.world.team_model import build_team_model
 
@@ -178,5 +178,5 @@ class World:
             if not (cosine >= _FALL_COSINE and above >= _FALL_HEIGHT):
                 self._fallen[i] = True
                 detail = f"tilt {math.acos(max(-1.0, cosine)):.2f} rad, height {above:.3f} m"
-                events.append(event(self.tick, FALL, self.names[i], detail))
+                events.append(Event.of(self.tick, FALL, self.names[i], detail))
         return events

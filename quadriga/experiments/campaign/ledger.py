@@ -15,7 +15,7 @@ from typing import Any, Final, Self
 
 from quadriga.experiments.campaign.manifest import FILE, Manifest
 from quadriga.experiments.trial.outcome import TrialOutcome, column_names, from_cells, to_cells
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import ConfigError, name_file_errors, system_reason
 from quadriga.shared.runtime.atomic import write_text
 
 ROWS: Final = "trials.csv"
@@ -37,13 +37,9 @@ class Ledger:
     """
 
     def __init__(self, folder: Path, manifest: Manifest) -> None:
-        try:
+        with name_file_errors(ConfigError, f"--out {folder}", "a folder that can be made"):
             folder.mkdir(parents=True, exist_ok=True)
             self._lock = (folder / ".lock").open("wb")
-        except OSError as error:
-            raise ConfigError(
-                f"--out {folder}", error.strerror or str(error), "a folder that can be made"
-            ) from None
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -84,10 +80,8 @@ def read_manifest(folder: Path) -> Manifest:
         ConfigError: it is no campaign's folder, or another version's.
     """
     path = folder / FILE
-    try:
+    with name_file_errors(ConfigError, path, _WRITTEN):
         return manifest_of(path.read_bytes(), str(path))
-    except OSError as error:
-        raise ConfigError(str(path), error.strerror or str(error), _WRITTEN) from None
 
 
 def manifest_of(text: bytes, name: str) -> Manifest:
@@ -115,10 +109,8 @@ def read_rows(folder: Path, manifest: Manifest) -> list[TrialOutcome]:
         ConfigError: a line is no row, or a trial stands there twice.
     """
     path = folder / ROWS
-    try:
+    with name_file_errors(ConfigError, path, "a readable file"):
         text = path.read_bytes() if path.exists() else b""
-    except OSError as error:
-        raise ConfigError(str(path), error.strerror or str(error), "a readable file") from None
     return rows_of(text, str(path), manifest)
 
 
@@ -161,7 +153,7 @@ def rows_text(rows: Sequence[TrialOutcome], manifest: Manifest) -> str:
 
 @contextmanager
 def explain_write_errors(folder: Path) -> Iterator[None]:
-    """What cannot be written into a campaign's folder is one error; what was written is kept.
+    """What cannot be written into a folder is one error; what was written is kept.
 
     Raises:
         ConfigError: no place, or no permission.
@@ -170,9 +162,7 @@ def explain_write_errors(folder: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise ConfigError(
-            str(error.filename or folder),
-            error.strerror or str(error),
-            "a place that can be written to",
+            str(error.filename or folder), system_reason(error), "a place that can be written to"
         ) from None
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -139,7 +139,7 @@ class Manifest:
                         f"of {new[:12]}",
                         _REMEDY,
                     )
-            groups[entry.group] = replace(known, seeds=_union(known.seeds, entry.seeds))
+            groups[entry.group] = replace(known, seeds=tuple(sorted({*known.seeds, *entry.seeds})))
         return replace(
             more,
             typed=(*self.typed, *(t for t in more.typed if t not in self.typed)),
@@ -147,7 +147,3 @@ class Manifest:
             groups=tuple(groups.values()),
             versions=self.versions,  # of the same code by another name, perhaps
         )
-
-
-def _union(one: Sequence[int], other: Sequence[int]) -> tuple[int, ...]:
-    return tuple(sorted({*one, *other}))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,7 +29,7 @@ from quadriga.experiments.variants import (
 )
 from quadriga.recordings.traces import ERRORS
 from quadriga.shared.config.load import flatten, read_toml
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import ConfigError, did_you_mean
 from quadriga.team import scenarios
 
 _KEYS: Final = (
@@ -100,11 +99,8 @@ class _TomlTable:
     def check_one(self, what: str, got: Any, known: Collection[str]) -> None:
         """Refuse what is not among the known ones."""
         if got not in known:
-            close = get_close_matches(str(got), known, 1)
-            hint = f"did you mean {close[0]!r}?" if close else ""
-            raise ConfigError(
-                f"{self.where}: {what}", repr(got), f"one of {', '.join(known)}", hint
-            )
+            one_of, hint = f"one of {', '.join(known)}", did_you_mean(got, known)
+            raise ConfigError(f"{self.where}: {what}", repr(got), one_of, hint)
 
     def has(self, name: str) -> bool:
         return name in self._body

@@ -6,7 +6,7 @@ from collections.abc import Callable, Container, Sequence
 from pathlib import Path
 from typing import Final
 
-from quadriga.experiments.campaign.ledger import read_manifest, read_rows
+from quadriga.experiments.campaign.ledger import explain_write_errors, read_manifest, read_rows
 from quadriga.experiments.campaign.manifest import FILE
 from quadriga.experiments.published.experiment import Experiment, Part
 from quadriga.experiments.published.figures import draw_figure
@@ -25,7 +25,7 @@ from quadriga.experiments.published.published_trials import (
 )
 from quadriga.experiments.published.summarise_experiment import CampaignTrials, summarise_experiment
 from quadriga.experiments.results import Results
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import ConfigError, name_file_errors
 from quadriga.shared.runtime.atomic import atomic_write, write_text
 
 README: Final = "README.md"
@@ -52,7 +52,7 @@ def publish(
     """
     readme = read_readme(into)
     entries = []
-    try:
+    with explain_write_errors(into):
         for experiment in experiments:
             if experiment.name in renewed:
                 _renew(experiment, runs, into, say)
@@ -62,12 +62,6 @@ def publish(
             entries.append(PageEntry(experiment, results, figures))
         write_text(into / PAGE, build_page(entries))
         write_text(into / README, replace_results(readme, build_readme_table(entries)) or readme)
-    except OSError as error:
-        raise ConfigError(
-            str(error.filename or into),
-            error.strerror or str(error),
-            "a place that can be written to",
-        ) from None
     return entries
 
 
@@ -78,13 +72,9 @@ def read_readme(into: Path) -> str:
         ConfigError: it cannot be read, or has none.
     """
     path = into / README
-    try:
+    remedy = "--into says of which checkout"
+    with name_file_errors(ConfigError, path, "a README to publish in", remedy):
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "bytes that are not UTF-8"
-        raise ConfigError(
-            str(path), reason, "a README to publish in", "--into says of which checkout"
-        ) from None
     if replace_results(text, "") is None:
         raise ConfigError(
             str(path), "no place for results", f"{BEGIN} and, after it, {END}, each once"

@@ -7,16 +7,18 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces
-from quadriga.recordings.summary import FALL_HEIGHT, FALL_TILT, steady_from
+from quadriga.recordings.summary import steady_from
 from quadriga.recordings.traces import (
     ERRORS,
     OVER_STANCE_FEET,
     Traces,
-    in_force,
+    mean_of,
+    quantile_of,
     stance_height_errors,
+    times_of,
+    tracking_errors,
 )
 from quadriga.recordings.truth import distance
 from quadriga.shared.config.sections import Config
@@ -93,28 +95,25 @@ def compute_figures(walk: Walk) -> Figures:
     planner = config.planner
     end = round(1000 * min(fallen.values())) if fallen else int(truth.tick.max(initial=0))
     begin = steady_from(traces)
-    reference = in_force(traces.references, truth.tick)
-    steady = _within(truth.tick, begin, end) & np.isfinite(reference).all(axis=1)
-    demanded = np.zeros((len(truth.tick), 1, len(OUTPUTS)))
-    demanded[:, 0, [1, 2, 5, 0]] = reference
-    y, error = truth.y[steady], (truth.y - demanded)[steady]
-    squares = {name: _mean(error[..., i] ** 2) for i, name in enumerate(OUTPUTS)}
-    squares[OVER_STANCE_FEET] = _height_squares(traces, begin, end)
+    y, error = tracking_errors(traces, begin, end)
+    squares = {name: mean_of(error[..., i] ** 2) for i, name in enumerate(OUTPUTS)}
+    heights = [stance_height_errors(traces, robot, begin, end) for robot in traces.robots]
+    squares[OVER_STANCE_FEET] = mean_of(np.concatenate(heights) ** 2)
     outputs = _output_cost(planner.Q, squares)
-    forces = _mean(_force_cost(walk, begin, end, np.tile(planner.R, N_LEGS)))
+    forces = mean_of(_force_cost(walk, begin, end, np.tile(planner.R, N_LEGS)))
     every = [status for of_robot in traces.statuses.values() for status in of_robot]
-    planner_ms = np.concatenate([np.zeros(0), *(status.planner_ms for status in every)])
+    planner_ms = times_of(every, "planner_ms")
     return Figures(
         seconds=end / 1000.0,
         fallen=fallen,
         stopped=_find_stops(traces, fallen),
-        mean={name: _mean(y[..., i]) for i, name in enumerate(OUTPUTS)},
+        mean={name: mean_of(y[..., i]) for i, name in enumerate(OUTPUTS)},
         rmse={name: None if (of := squares[name]) is None else of**0.5 for name in ERRORS},
         cost=None if outputs is None or forces is None else outputs + forces,
         cost_outputs=outputs,
         cost_forces=forces,
-        planner_ms_median=_quantile(planner_ms, 0.5),
-        planner_ms_p99=_quantile(planner_ms, 0.99),
+        planner_ms_median=quantile_of(planner_ms, 0.5),
+        planner_ms_p99=quantile_of(planner_ms, 0.99),
         solves=len(planner_ms),
         plans=dict(sorted(walk.plans.items())),
         distance=(way := distance(truth, 2 * config.gait.stance_ms, end if fallen else None)),
@@ -134,7 +133,7 @@ def _find_falls(traces: Traces) -> dict[str, float]:
     """When each robot fell: what the world says, and what its truth shows, whichever is first."""
     truth = traces.truth
     times = {e.robot: e.tick / 1000.0 for e in reversed(traces.events) if e.code == FALL}
-    down = (truth.tilt > FALL_TILT) | (truth.y[..., 0] < FALL_HEIGHT)
+    down = truth.down
     for i in np.flatnonzero(down.any(axis=0)):
         robot, seen = traces.robots[i], float(truth.tick[down[:, i].argmax()]) / 1000.0
         times[robot] = min(seen, times.get(robot, seen))
@@ -144,15 +143,6 @@ def _find_falls(traces: Traces) -> dict[str, float]:
 def _find_stops(traces: Traces, fallen: Mapping[str, float]) -> dict[str, str]:
     last = {robot: of_robot[-1] for robot, of_robot in traces.statuses.items() if of_robot}
     return {r: s.reason for r, s in last.items() if s.reason and r not in fallen}
-
-
-def _height_squares(traces: Traces, begin: int, end: int) -> float | None:
-    """Mean square of the height over the stance feet less the one asked for, m²."""
-    parts = [np.zeros(0)]
-    for robot in traces.robots:
-        tick, error = stance_height_errors(traces, robot)
-        parts.append(error[_within(tick, begin, end)])
-    return _mean(np.concatenate(parts) ** 2)
 
 
 def _output_cost(Q: Sequence[float], squares: Mapping[str, float | None]) -> float | None:
@@ -172,15 +162,3 @@ def _force_cost(walk: Walk, begin: int, end: int, R: Array) -> Array:
             stance = np.array([sample.stance for sample in kept]) > 0.5
             parts.append((u - nominal_forces(stance)) ** 2 @ R)
     return np.concatenate(parts)
-
-
-def _within(tick: NDArray[np.int64], begin: int, end: int) -> NDArray[np.bool_]:
-    return (tick >= begin) & (tick <= end)
-
-
-def _mean(values: Array) -> float | None:
-    return float(values.mean()) if values.size else None
-
-
-def _quantile(values: Array, q: float) -> float | None:
-    return float(np.quantile(values, q)) if values.size else None

@@ -20,11 +20,11 @@ from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.members import PLANNER
 from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.runtime.clock import monotonic_ns
-from quadriga.shared.wire.messages import Event, Measurement, Reference, Status, Truth
+from quadriga.shared.wire.messages import Event, Measurement, Status, Truth
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 from quadriga.sim_server.world.layout import NV
 from quadriga.sim_server.world.world import World
-from quadriga.team.operator import reference_at
+from quadriga.team.operator import reference_at, references_of
 
 
 def roll_out(
@@ -42,7 +42,7 @@ def roll_out(
         watch: shown every tick.
     """
     timed = None if planner is None else _TimedPlanner(planner)
-    rollout = Rollout(config, None, lambda tick: _reference(config, tick), planner=timed)
+    rollout = Rollout(config, None, references_of(config), planner=timed)
     if config.planner.kind not in (*CENTRAL, "none"):
         rollout.agents = {n: Agent(config, n, predictor, monotonic_ns) for n in rollout.agents}
         rollout.states = {name: agent.initial() for name, agent in rollout.agents.items()}
@@ -60,11 +60,6 @@ def roll_out(
         log.planner_ms[PLANNER] = timed.ms
         log.plans += timed.plans
     return replace(log.build_walk(), work=meter.work)
-
-
-def _reference(config: Config, tick: int) -> Reference | None:
-    """The reference as the operator sends it."""
-    return reference_at(config, tick) if tick % REFERENCE_EPOCH_MS == 0 else None
 
 
 class _TimedPlanner(TeamPlanner):

@@ -7,14 +7,12 @@ so another `code`, whatever the code: then only equal sources tell that it is th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import lru_cache
 from importlib.metadata import version
 from typing import Final
 
 from quadriga.agents.predictor.store import versions
 from quadriga.identification.behaviour import behaviour, sources_digest
-from quadriga.shared.robot.a1 import Array
 from quadriga.shared.runtime.arithmetic import arithmetic_digest
 
 CODE: Final = "code"
@@ -29,16 +27,11 @@ def code_and_libraries() -> str:
     found = {
         **versions(),
         **{name: version(name) for name in ("numba", "example-robot-data")},
-        CODE: trial_code(),
+        CODE: behaviour(_SAMPLES),
         SOURCES: sources_digest(_SAMPLES),
         ARITHMETIC: arithmetic_digest(),
     }
     return ", ".join(f"{name} {value}" for name, value in found.items())
-
-
-def trial_code() -> str:
-    """Digest of what the code that a trial's figures depend on does."""
-    return behaviour(_SAMPLES, _samples)
 
 
 def is_same_code(one: str, other: str) -> bool | None:
@@ -59,10 +52,3 @@ def is_same_code(one: str, other: str) -> bool | None:
 def _parts(text: str) -> dict[str, str]:
     pairs = (part.rpartition(" ") for part in text.split(", "))
     return {name: value for name, _, value in pairs}
-
-
-def _samples() -> Iterator[Array]:
-    """Imported when they are run: most often the digest is known."""
-    from quadriga.experiments.trial.sample_trials import sample_trials
-
-    return sample_trials()

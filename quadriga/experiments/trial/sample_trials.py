@@ -7,14 +7,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.planner.deepc_qp import build_model
-from quadriga.agents.planner.team_planner import TeamPlanner, build_centralised, build_deepc
-from quadriga.agents.predictor.deepc import reduce
+from quadriga.agents.planner.team_planner import TeamPlanner
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.experiments.trial.figures_of_merit import Figures, compute_figures
 from quadriga.experiments.trial.in_process import roll_out
 from quadriga.identification.behaviour import numbers
+from quadriga.identification.central_planner import choose_central_planner
 from quadriga.identification.rollout import Tick
 from quadriga.identification.sample_fits import linear_episode
 from quadriga.shared.config.load import load
@@ -67,7 +66,7 @@ _TRIALS: Final[tuple[dict[str, Any], ...]] = (
 )  # fmt: skip
 
 
-def sample_trials() -> Iterator[Array]:
+def samples() -> Iterator[Array]:
     """All that robots sent and sensed in each trial, and the trial's figures."""
     for keys in _TRIALS:
         config = load(None, _KEYS | keys)
@@ -125,12 +124,8 @@ def sample_predictor(config: Config) -> Predictor:
 
 
 def _team_planner(config: Config, predictor: Predictor | None) -> TeamPlanner | None:
-    planner = config.planner
-    if predictor is None or planner.kind not in CENTRAL:
+    if predictor is None or config.planner.kind not in CENTRAL:
         return None
-    if planner.kind == "centralised":
-        return build_centralised(config, predictor)
-    episodes = [linear_episode(config, 300, seed) for seed in range(2)]
-    reduction = reduce(episodes, planner.T_ini, planner.N)
-    model = build_model(reduction, planner, planner.lambda_g, planner.lambda_sigma)
-    return build_deepc(config, model)
+    return choose_central_planner(
+        config, predictor, lambda: [linear_episode(config, 300, seed) for seed in range(2)]
+    )

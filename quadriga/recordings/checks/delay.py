@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Final
+
+import numpy as np
 
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.time_grid import step_ms
@@ -16,20 +18,8 @@ from quadriga.shared.robot.a1 import robot_names
 from quadriga.shared.wire.messages import Plan, Status
 
 GIVEN_UP: Final = "waits_given_up"  # the agent's count of messages it no longer waited for
+_NO_ARRAY: Final = np.zeros((0, 0))
 Violation = tuple[str, str]  # got, limit
-
-
-@dataclass(frozen=True, slots=True)
-class _PlanHead:
-    """A plan without its arrays."""
-
-    key: str
-    robot: str
-    tick: int
-    step: int
-    exchange: int
-    status: str
-    used: dict[str, int]
 
 
 class Delay:
@@ -55,36 +45,26 @@ class Delay:
         self._config, self._step_ms = config, step_ms(config)
         names = robot_names(config.team.robots)
         self._peers = {name: _peers(config, i, names) for i, name in enumerate(names)}
-        self._plans: list[_PlanHead] = []
+        self._plans: list[tuple[str, str, Plan]] = []
         self._steps: defaultdict[str, set[int]] = defaultdict(set)
         self._impatient: set[str] = set()
         self._older = 0
 
     def look(self, item: CheckedMessage) -> None:
-        """See `Check`."""
         plan = item.message
         if isinstance(plan, Status) and plan.counters.get(GIVEN_UP):
             self._impatient.add(item.robot)
         if isinstance(plan, Plan) and item.robot in self._peers:
             self._steps[item.robot].add(plan.step)
-            self._plans.append(
-                _PlanHead(
-                    item.key,
-                    item.robot,
-                    plan.tick,
-                    plan.step,
-                    plan.exchange,
-                    plan.status,
-                    dict(plan.used),
-                )
-            )
+            light = replace(plan, u=_NO_ARRAY, y=_NO_ARRAY)  # all of a long walk's are kept
+            self._plans.append((item.key, item.robot, light))
 
     def finish(self) -> None:
         """Hold every plan against the rule."""
-        for plan in self._plans:
+        for key, robot, plan in self._plans:
             self.finding.looked += 1
-            for got, limit in self._find_violations(plan):
-                self.finding.add_objection(plan.tick, plan.key, got, limit)
+            for got, limit in self._find_violations(robot, plan):
+                self.finding.add_objection(plan.tick, key, got, limit)
         if self._older:
             self.finding.notes.append(f"{self._older} older plans of peers used, and said so")
         if self._unproven and not self._whole:
@@ -93,7 +73,7 @@ class Delay:
             names = ", ".join(sorted(self._impatient))
             self.finding.notes.append(f"no longer waited for everyone: {names}")
 
-    def _find_violations(self, plan: _PlanHead) -> Iterator[Violation]:
+    def _find_violations(self, robot: str, plan: Plan) -> Iterator[Violation]:
         config = self._config
         if plan.tick != plan.step * self._step_ms:
             yield f"step {plan.step}", f"step {plan.tick / self._step_ms:g} at this tick"
@@ -106,17 +86,19 @@ class Delay:
             return
         last = plan.step if plan.exchange else plan.step - 1
         for peer, step in plan.used.items():
-            if peer not in self._peers[plan.robot]:
-                yield f"used a plan of {peer}", f"of {', '.join(self._peers[plan.robot]) or 'none'}"
+            if peer not in self._peers[robot]:
+                yield f"used a plan of {peer}", f"of {', '.join(self._peers[robot]) or 'none'}"
             elif step > last:
                 yield f"used step {step} of {peer}", f"step {last}"
             else:
-                yield from self._check_older(plan, peer, step, last)
-        for peer in self._peers[plan.robot]:
-            if peer not in plan.used and self._must_be_used(plan, peer, last):
+                yield from self._check_older(robot, plan, peer, step, last)
+        for peer in self._peers[robot]:
+            if peer not in plan.used and self._must_be_used(robot, peer, last):
                 yield f"used none of {peer}", f"step {last}"
 
-    def _check_older(self, plan: _PlanHead, peer: str, step: int, last: int) -> Iterator[Violation]:
+    def _check_older(
+        self, robot: str, plan: Plan, peer: str, step: int, last: int
+    ) -> Iterator[Violation]:
         """What is wrong with the use of a plan that is not newer than allowed."""
         steps, planner = self._steps[peer], self._config.planner
         if steps and step not in steps and step > min(steps):
@@ -124,7 +106,7 @@ class Delay:
                 yield f"used step {step} of {peer}, which is not recorded", f"step {last}"
             self._unproven += 1
         elif step < last:
-            if self._must_be_used(plan, peer, last):
+            if self._must_be_used(robot, peer, last):
                 yield f"used step {step} of {peer}", f"step {last}, which was there"
                 return
             self._older += 1
@@ -133,10 +115,10 @@ class Delay:
                 oldest = last - planner.max_peer_age - planner.hold_steps
                 yield f"used step {step} of {peer}", f"step {oldest} or later"
 
-    def _must_be_used(self, plan: _PlanHead, peer: str, last: int) -> bool:
+    def _must_be_used(self, robot: str, peer: str, last: int) -> bool:
         """Whether the peer's plan of step `last` was there, so that it must have been used."""
         lockstep = self._config.world.mode == "lockstep"
-        return lockstep and plan.robot not in self._impatient and last in self._steps[peer]
+        return lockstep and robot not in self._impatient and last in self._steps[peer]
 
 
 def _peers(config: Config, index: int, names: tuple[str, ...]) -> tuple[str, ...]:

@@ -27,7 +27,6 @@ class Friction:
         self._worst = 0.0
 
     def look(self, item: CheckedMessage) -> None:
-        """See `Check`."""
         plan = item.message
         if not isinstance(plan, Plan) or item.robot not in self._indices:
             return
@@ -77,7 +76,6 @@ class Torques:
         self._largest = 0.0
 
     def look(self, item: CheckedMessage) -> None:
-        """See `Check`."""
         command = item.message
         if not isinstance(command, Command):
             return

@@ -35,7 +35,6 @@ class Order:
         self._last: dict[str, tuple[int, int]] = {}
 
     def look(self, item: CheckedMessage) -> None:
-        """See `Check`."""
         message = item.message
         place = message.serial if isinstance(message, Plan) else (message.tick, 0)
         last = self._last.get(item.key, (-1, 0))
@@ -67,7 +66,6 @@ class Gaps:
         self._tracks: dict[str, tuple[str, TickTrack]] = {}
 
     def look(self, item: CheckedMessage) -> None:
-        """See `Check`."""
         row = self._tracks.get(item.key)
         if row is None:
             row = item.topic, TickTrack(self._periods[item.topic])
@@ -132,7 +130,6 @@ class Ages:
         self._oldest: dict[str, float] = {}
 
     def look(self, item: CheckedMessage) -> None:
-        """See `Check`."""
         tick, limit = item.message.tick, self._limits[item.topic]
         self.finding.looked += 1
         age = tick - self._last.get(item.key, tick)

@@ -107,7 +107,7 @@ def test_recover_makes_a_whole_file_and_says_what_is_lost(
     lost = sorted({e.tick for e in before} - {e.tick for e in after if e.key == "team/r1/state"})
     assert re.search(rf"team/r1/state +\d+  between ticks {lost[0] - 1}–", text)
     assert recovered.metadata == Recording(small).metadata
-    assert recovered.notes()["quadriga.recovered"]["from"] == "flipped.mcap"
+    assert recovered.notes["quadriga.recovered"]["from"] == "flipped.mcap"
     again = run_command("recover", path)
     assert (again[0], "never overwritten" in again[2]) == (2, True)
     assert run_command("recover", small) == (0, [f"{small} is whole: nothing to recover"], "")

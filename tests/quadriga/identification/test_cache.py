@@ -119,9 +119,9 @@ def test_keys_change_with_what_the_code_does(
     data, predictor = data_key(Config()), predictor_key(Config())
     asked: list[str] = []
 
-    def other(module: str, samples: Any) -> str:
+    def other(module: str) -> str:
         asked.append(module)
-        return "other" if module.endswith(part) else behaviour(module, samples)
+        return "other" if module.endswith(part) else behaviour(module)
 
     monkeypatch.setattr(cache, "behaviour", other)
     assert (data_key(Config()) == data) == predictor_alone

@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from quadriga.agents.planner.checked_predictor import load_checked
 from quadriga.agents.predictor.episode import SIGNALS
 from quadriga.agents.predictor.hankel import required_samples
 from quadriga.agents.predictor.store import read
 from quadriga.identification import predictors
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.dataset import Dataset, check_excitation, read_data, write_data
-from quadriga.identification.predictors import ensure_data, ensure_predictor, fit, load_predictor
+from quadriga.identification.predictors import ensure_data, ensure_predictor, fit
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
@@ -73,7 +74,7 @@ def limited(**changes: Any) -> Config:
 def test_a_predictor_is_collected_fitted_accepted_and_kept(cache: Path) -> None:
     path = predictor_path(TINY)
     assert path.is_relative_to(cache)
-    predictor = load_predictor(path, TINY)
+    predictor = load_checked(path, TINY)[0]
     assert predictor.G.shape == (1, 1, 1, 60, 18 * 4 + 12 * 10)
     _, provenance = read(path)
     dataset = read_data(data_path(TINY))

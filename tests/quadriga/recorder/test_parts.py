@@ -7,8 +7,8 @@ from pathlib import Path
 from quadriga.recorder.parts import Limits, Parts
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import LOST
-from quadriga.shared.runtime.clock import ManualClock
 from quadriga.shared.wire.codec import encode
+from tests.manual_clock import ManualClock
 from tests.shared.recording.test_reader import METADATA, state
 
 KEY = "team/r1/state"
@@ -30,7 +30,7 @@ def test_a_new_file_begins_when_its_time_is_over(tmp_path: Path) -> None:
     assert (parts.messages, parts.count_lost()) == (49, {KEY: 1})
     ticks = [[e.tick for e in Recording(path).entries()] for path in parts.paths]
     assert [t for part in ticks for t in part] == [k for k in range(50) if k != 20]
-    notes = [Recording(path).notes()[LOST] for path in parts.paths]
+    notes = [Recording(path).notes[LOST] for path in parts.paths]
     assert sorted(map(str, notes)) == sorted(map(str, ({}, {KEY: "1"}, {})))
 
 

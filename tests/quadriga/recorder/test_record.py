@@ -112,8 +112,8 @@ def test_joining_late_says_what_it_missed_and_counts_what_is_lost(
     assert "989 messages, 11 lost" in out
     recording = Recording(tmp_path / "run.mcap")
     recording.require_whole()
-    assert recording.notes()[LOST] == {"band/r1/state": "11"}
-    assert recording.notes()[SINCE] == {"band/r1/state": "4000"}
+    assert recording.notes[LOST] == {"band/r1/state": "11"}
+    assert recording.notes[SINCE] == {"band/r1/state": "4000"}
 
 
 def test_beside_a_team_s_own_recorder_nobody_is_doubled(
@@ -173,7 +173,7 @@ def test_parts_are_whole_small_and_together_everything(
         recording = Recording(path)
         recording.require_whole()
         assert recording.metadata["part"] == str(number)
-        assert recording.notes()[LOST] == {}
+        assert recording.notes[LOST] == {}
         found += [entry.payload for entry in recording.entries()]
     assert found == sent
     assert main(["record", "-o", str(tmp_path / "run.mcap"), "--max-size", "1"]) == 2

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from quadriga.shared.runtime.clock import ManualClock, Rate, monotonic, sleep
+from quadriga.shared.runtime.clock import Rate, monotonic, sleep
+from tests.manual_clock import ManualClock
 
 
 def rate(clock: ManualClock) -> Rate:

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from quadriga.experiments.campaign import progress
 from quadriga.experiments.campaign.progress import TrialProgress, format_duration
-from quadriga.shared.runtime.clock import ManualClock
+from tests.manual_clock import ManualClock
 from tests.quadriga.experiments.rows import row
 
 
