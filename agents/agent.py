@@ -38,7 +38,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.schedules import Schedules
 from quadriga.agents.tasks import Tasks
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array, robot_names
+from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import code_of, with_detail
 from quadriga.shared.wire.messages import Command, EStop, Measurement, Plan, Reference, State, Truth

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import GRAVITY, N_LEGS, TOTAL_MASS, Array
+from quadriga.shared.robot.a1 import TOTAL_MASS
+from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
 
 # Diagonal pairs in the leg order FL FR RL RR: row 0 stands in the first half cycle.
 _BITS = np.array([8, 4, 2, 1])

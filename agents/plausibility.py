@@ -11,7 +11,8 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.config.sections import PlannerConfig, ReferenceConfig
-from quadriga.shared.robot.a1 import GRAVITY, TOTAL_MASS, Array
+from quadriga.shared.robot.a1 import TOTAL_MASS
+from quadriga.shared.robot.conventions import GRAVITY, Array
 from quadriga.shared.wire.messages import Reference
 
 # N, each component of each foot's: ten times the weight on one foot, several times what the motors

@@ -12,15 +12,8 @@ from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.agents.planning.team import Central, CentralState
 from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import (
-    GRAVITY,
-    N_JOINTS,
-    N_LEGS,
-    N_OUTPUTS,
-    TOTAL_MASS,
-    q_stand,
-    robot_names,
-)
+from quadriga.shared.robot.a1 import TOTAL_MASS, q_stand
+from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS, N_LEGS, N_OUTPUTS, robot_names
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Measurement, Reference, State
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS

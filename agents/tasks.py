@@ -8,7 +8,7 @@ from quadriga.agents.controller.controller import Task
 from quadriga.agents.modes import WALK, Mode
 from quadriga.agents.planning.active_plan import Setpoint
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Reference
 from quadriga.shared.wire.topics import SAMPLE_MS
 

@@ -23,7 +23,7 @@ from quadriga.agents.controller.schedule import Schedule
 from quadriga.agents.controller.sensed import Sensed
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.clock import monotonic_ns
 from quadriga.shared.runtime.collector import collector_off
 from quadriga.shared.wire.codec import decode, encode

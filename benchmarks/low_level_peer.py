@@ -14,7 +14,8 @@ import pinocchio as pin
 import tsid
 
 from quadriga.agents.controller.whole_body.problem import Weights
-from quadriga.shared.robot.a1 import FOOT_FRAMES, N_JOINTS, TORQUE_LIMIT, Array
+from quadriga.shared.robot.a1 import TORQUE_LIMIT
+from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, Array
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from quadriga.agents.controller.whole_body.problem import Goal
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import encode
 from quadriga.team.operator import references_of
 

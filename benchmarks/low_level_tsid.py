@@ -29,7 +29,7 @@ from quadriga.agents.controller.whole_body.problem import N_WEIGHTS, SOLUTION_SI
 from quadriga.agents.controller.whole_body.solution import solve_closed_form, solve_goal
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.clock import monotonic_ns
 from quadriga.shared.runtime.collector import collector_off
 from quadriga.shared.runtime.jit import compiled

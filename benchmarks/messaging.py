@@ -20,7 +20,7 @@ from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import SIM
-from quadriga.shared.robot.a1 import N_JOINTS, robot_names
+from quadriga.shared.robot.conventions import N_JOINTS, robot_names
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.wire.codec import encode

@@ -38,7 +38,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.predictors import ensure_data, ensure_predictor
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 # Limits of the figures at n = 5.
 TARGETS = (

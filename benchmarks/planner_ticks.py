@@ -15,7 +15,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance, step_ms
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array, robot_names
+from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.wire.messages import Measurement, Plan, Reference
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 from quadriga.team.operator import reference_at, references_of

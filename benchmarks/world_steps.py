@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from quadriga.shared.config.load import load
-from quadriga.shared.robot.a1 import N_JOINTS, q_stand
+from quadriga.shared.robot.a1 import q_stand
+from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.runtime.clock import monotonic_ns
 from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.world.world import World

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.errors import MessageError
-from quadriga.shared.robot.a1 import N_JOINTS
+from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command
 from quadriga.shared.wire.topics import COMMAND

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.config.sections import WorldConfig
-from quadriga.shared.robot.a1 import N_JOINTS
+from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.wire.messages import Command, State
 
 FRESH: Final = "fresh"

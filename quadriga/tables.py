@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table as RichTable
 
-from quadriga.shared.robot.a1 import OUTPUTS
+from quadriga.shared.robot.conventions import OUTPUTS
 
 NOTHING: Final = "–"
 _WIDE: Final = 180  # characters a line may have where no terminal says how many there are

@@ -33,7 +33,7 @@ def _rehearse_lone_agent(config: Config) -> None:
     from quadriga.agents.agent import Agent
     from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
     from quadriga.agents.rehearsal import rehearse
-    from quadriga.shared.robot.a1 import N_OUTPUTS
+    from quadriga.shared.robot.conventions import N_OUTPUTS
 
     planner = replace(config.planner, kind="distributed", exchanges=0)
     alone = replace(config, team=replace(config.team, robots=1), planner=planner)

@@ -40,7 +40,8 @@ from quadriga.agents.controller.trunk_feedback import (
 )
 from quadriga.agents.controller.whole_body.problem import Goal, with_mu
 from quadriga.agents.controller.whole_body.solution import solve_closed_form
-from quadriga.shared.robot.a1 import GRAVITY, N_FORCES, N_LEGS, TOTAL_MASS, Array
+from quadriga.shared.robot.a1 import TOTAL_MASS
+from quadriga.shared.robot.conventions import GRAVITY, N_FORCES, N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
 
 

@@ -19,7 +19,7 @@ from quadriga.agents.controller.trunk_feedback import (
 )
 from quadriga.agents.controller.whole_body.problem import N_WEIGHTS, Weights
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 

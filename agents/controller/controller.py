@@ -33,7 +33,7 @@ from quadriga.agents.controller.whole_body.problem import (
 )
 from quadriga.agents.controller.whole_body.solution import solve, unpack
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.messages import State
 

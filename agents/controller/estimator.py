@@ -16,7 +16,8 @@ from quadriga.agents.controller.maths.rotation import cross, rotation_matrix
 from quadriga.agents.controller.memory import FilterState
 from quadriga.agents.controller.readings import Readings
 from quadriga.shared.config.sections import EstimatorConfig
-from quadriga.shared.robot.a1 import FOOT_RADIUS, GRAVITY, STAND_HEIGHT, Array
+from quadriga.shared.robot.a1 import FOOT_RADIUS, STAND_HEIGHT
+from quadriga.shared.robot.conventions import GRAVITY, Array
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import State, Truth
 

@@ -17,7 +17,7 @@ from quadriga.agents.controller.swing import (
     swing_reference,
 )
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import GRAVITY, Array
+from quadriga.shared.robot.conventions import GRAVITY, Array
 from quadriga.shared.runtime.jit import compiled
 
 _LONGEST = 0.37  # m, how far under the hip a foot is lowered; legs end at 0.4

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.agents.controller.maths.rows import places, row_size
-from quadriga.shared.robot.a1 import N_FORCES, N_LEGS, Array
+from quadriga.shared.robot.conventions import N_FORCES, N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.runtime.record import record
 

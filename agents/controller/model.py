@@ -8,7 +8,8 @@ import pinocchio as pin
 from quadriga.agents.controller.maths.links import link_table
 from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms, rigid_body_terms
 from quadriga.agents.controller.payload_estimate import add_load
-from quadriga.shared.robot.a1 import Array, q_stand
+from quadriga.shared.robot.a1 import q_stand
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 
 

@@ -28,7 +28,8 @@ from quadriga.agents.controller.readings import readings_of
 from quadriga.agents.controller.schedule import SCHEDULE, phase_of
 from quadriga.agents.controller.sensed import SENSED, feet_of, trunk_of
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import TOTAL_MASS, Array
+from quadriga.shared.robot.a1 import TOTAL_MASS
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from quadriga.agents.controller.maths.leg_kinematics import hip_neutral
 from quadriga.agents.controller.maths.rotation import heading
-from quadriga.shared.robot.a1 import FOOT_RADIUS, Array
+from quadriga.shared.robot.a1 import FOOT_RADIUS
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 _PLANE_DONE = 0.9  # of swing: the foot comes down vertically

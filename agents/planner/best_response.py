@@ -9,7 +9,7 @@ from quadriga.agents.planner.planner_qp import build_problem
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 
 def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:

@@ -27,7 +27,7 @@ from quadriga.agents.predictor.deepc import Reduction
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE
 from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 
 Index = NDArray[np.int64]
 

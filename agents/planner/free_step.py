@@ -15,7 +15,7 @@ from quadriga.agents.gait import NOMINAL_FORCES
 from quadriga.agents.planner.planner_qp import PlannerProblem
 from quadriga.agents.planner.qp_solver import ClosedForm, minimise_freely
 from quadriga.agents.plausibility import OUTPUT_MAX
-from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.jit import compiled
 
 

@@ -15,7 +15,8 @@ from quadriga.agents.predictor.regression import scaled_blocks
 from quadriga.agents.time_grid import gait_phase, horizon_stance, phase_of, walking_steps
 from quadriga.shared.config.sections import Config, ControllerConfig
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import N_LEGS, N_OUTPUTS, OUTPUTS, TOTAL_MASS, Array
+from quadriga.shared.robot.a1 import TOTAL_MASS
+from quadriga.shared.robot.conventions import N_LEGS, N_OUTPUTS, OUTPUTS, Array
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 _GAIN_FORCE = 10.0  # N, on the robot looked at

@@ -26,7 +26,7 @@ from quadriga.agents.plausibility import are_plausible_outputs
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import with_detail
 

@@ -14,7 +14,7 @@ import osqp
 from scipy import linalg, sparse
 
 from quadriga.agents.planner.planner_qp import PlannerProblem
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 SOLVED: Final = "solved"

@@ -25,7 +25,7 @@ from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codes import with_detail
 
 Formulation = Callable[[int, NDArray[np.bool_]], Condensed]  # of contact phase and stance

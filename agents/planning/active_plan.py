@@ -6,7 +6,7 @@ from dataclasses import field
 
 import numpy as np
 
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.topics import SAMPLE_MS
 

@@ -18,7 +18,7 @@ from quadriga.agents.predictor.recursive import (
 )
 from quadriga.agents.time_grid import gait_phase
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Measurement, Reference
 
 

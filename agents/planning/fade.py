@@ -9,7 +9,7 @@ import numpy as np
 from quadriga.agents.planner.planner import PlanResult
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.shared.config.sections import PlannerConfig
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Plan
 
 FADED: Final = "faded"  # status of a plan that is applied in part

@@ -30,7 +30,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.recursive import Correction
 from quadriga.agents.time_grid import exchange_ms, first_step, patience, step_ms
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import with_detail
 from quadriga.shared.wire.messages import Measurement, Reference

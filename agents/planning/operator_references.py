@@ -9,7 +9,7 @@ import numpy as np
 
 from quadriga.agents.predictor.episode import output_base
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Reference
 from quadriga.shared.wire.topics import SAMPLE_MS
 

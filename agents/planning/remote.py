@@ -22,7 +22,7 @@ from quadriga.agents.planning.operator_references import reference_at
 from quadriga.agents.predictor.episode import commanded_outputs
 from quadriga.agents.time_grid import first_step, horizon_stance, patience, step_ms
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import N_LEGS, Array
+from quadriga.shared.robot.conventions import N_LEGS, Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.messages import Measurement, Plan
 from quadriga.shared.wire.topics import SAMPLE_MS

@@ -12,7 +12,7 @@ from quadriga.agents.planning.operator_references import AHEAD_MS, remember_refe
 from quadriga.agents.planning.window import build_planner_inputs
 from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Measurement, Plan, Reference
 from quadriga.shared.wire.topics import MEASUREMENT, SAMPLE_MS
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from quadriga.agents.predictor.predictor import PredictorMeta
-from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 
 
 def roll_out(step: Array, meta: PredictorMeta) -> Array:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 
 def cyclic_grams(

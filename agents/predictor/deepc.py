@@ -23,7 +23,7 @@ from scipy import linalg
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.hankel import gram
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 
 Index = NDArray[np.int64]
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, STAND_HEIGHT, Array
+from quadriga.shared.robot.a1 import STAND_HEIGHT
+from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.wire.messages import Reference
 
 U_SCALE: Final = 10.0  # N

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy import linalg
 
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 # Singular values below 1e-6 of the largest count as zero (Gram eigenvalues are their squares).
 _RANK_TOLERANCE = 1e-12

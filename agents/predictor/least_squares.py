@@ -11,7 +11,7 @@ from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.predictor.regression import Index, Regression, past_first
 from quadriga.agents.predictor.ridge import Solutions, condition_number, factorise, members_of
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_OUTPUTS, Array
 
 # Rounding turns eigenvalues of the Gram matrix that should be zero into up to 1e-16 · (number of
 # rows) of the largest. Below 1e-12, which is 1e-6 in singular values of the data, they count as

@@ -19,7 +19,7 @@ import numpy as np
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.regression import scales
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_OUTPUTS, Array
 
 _LARGEST = 100.0  # of an entry of D; the largest ones of a predictor, as scaled, are about 1
 _NOTHING = 1e-12  # zᵀPz of a regressor that says nothing about anything not known

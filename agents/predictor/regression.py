@@ -14,7 +14,7 @@ from quadriga.agents.predictor.hankel import columns, gram
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.time_grid import gait_phase
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 Index = NDArray[np.int64]

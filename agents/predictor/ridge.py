@@ -11,7 +11,7 @@ from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.predictor.regression import Regression, past_first
 from quadriga.shared.config.yokes import neighbours
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 TIME: Final = "time [s]"
 LEFT: Final = 58.0  # points, for the values of the vertical axis

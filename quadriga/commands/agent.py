@@ -21,7 +21,7 @@ def add(add_command: AddCommand) -> None:
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Run the agent until the walk is over."""
     from quadriga.agents import process
-    from quadriga.shared.robot.a1 import robot_names
+    from quadriga.shared.robot.conventions import robot_names
 
     names = robot_names(config.team.robots)
     if arguments.robot not in names:

@@ -12,7 +12,7 @@ import numpy as np
 from quadriga.pictures.poses import PosedTeam
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.sim_server.terrain.terrain import Terrain
 
 WORLD: Final = "world"

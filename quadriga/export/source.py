@@ -11,7 +11,7 @@ from quadriga.export.layout import Layout, build_layout
 from quadriga.shared.errors import MessageError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Message
 from quadriga.shared.wire.topics import TABLE, topic_of

@@ -10,7 +10,7 @@ from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.recordings.traces import in_force, read_traces
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import OUTPUTS, Array
+from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.shared.wire.topics import MEASUREMENT, PLAN, REFERENCE, SAMPLE_MS, TRUTH
 
 NAMES: Final = (

@@ -17,7 +17,7 @@ from quadriga.identification.dataset import Dataset
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config, WorldConfig
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import N_FORCES, Array, robot_names
+from quadriga.shared.robot.conventions import N_FORCES, Array, robot_names
 from quadriga.shared.wire.messages import Reference
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 from quadriga.shared.wire.topics import SAMPLE_MS

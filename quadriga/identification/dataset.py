@@ -14,7 +14,7 @@ from quadriga.agents.predictor.episode import SIGNALS, Episode
 from quadriga.agents.predictor.hankel import excitation, required_samples
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
-from quadriga.shared.robot.a1 import N_FORCES, Array
+from quadriga.shared.robot.conventions import N_FORCES, Array
 from quadriga.shared.runtime.atomic import atomic_write
 
 _FIELDS: Final = (*SIGNALS, "first_tick")

@@ -12,7 +12,7 @@ from quadriga.charts.colours import PALETTE
 from quadriga.charts.draw import tidy_axes
 from quadriga.charts.files import save_png
 from quadriga.identification.fit_report import FitReport
-from quadriga.shared.robot.a1 import OUTPUTS
+from quadriga.shared.robot.conventions import OUTPUTS
 from quadriga.shared.wire.topics import SAMPLE_MS
 from quadriga.tables import LABELS, UNITS
 

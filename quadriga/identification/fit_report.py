@@ -15,7 +15,7 @@ from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance
 from quadriga.agents.time_grid import gait_phase
 from quadriga.shared.errors import PredictorError, QuadrigaError
-from quadriga.shared.robot.a1 import N_OUTPUTS, OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_OUTPUTS, OUTPUTS, Array
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 

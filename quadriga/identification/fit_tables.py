@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from quadriga.identification.fit_report import FitReport, Unfit, reason
-from quadriga.shared.robot.a1 import OUTPUTS, robot_names
+from quadriga.shared.robot.conventions import OUTPUTS, robot_names
 from quadriga.shared.wire.topics import SAMPLE_MS
 from quadriga.tables import LABELS, NOTHING, Table, format_number, format_output
 

@@ -16,7 +16,7 @@ from quadriga.agents.planning.team import Central, CentralState
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import PLANNER
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.wire.messages import Event, Measurement, Plan, Reference
 from quadriga.sim_server.world.world import World

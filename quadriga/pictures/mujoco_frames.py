@@ -19,7 +19,7 @@ from quadriga.pictures.frames import FRAME, clip_ticks, save_clip, save_sheet, s
 from quadriga.pictures.poses import PosedTeam, Poses, read_poses, truth_ticks
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 _AZIMUTH: Final = 145.0  # deg, seen from ahead and the left of a team that walks along x
 _ELEVATION: Final = -24.0  # deg

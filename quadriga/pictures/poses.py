@@ -14,7 +14,8 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import Array, q_stand, robot_names
+from quadriga.shared.robot.a1 import q_stand
+from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import State, Truth
 from quadriga.shared.wire.topics import STATE, TRUTH

@@ -13,7 +13,8 @@ from PIL import Image
 from quadriga.pictures.frames import FRAME, save_sheet, sheet_ticks
 from quadriga.pictures.poses import PosedTeam, read_poses, truth_ticks
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import TRUNK_BOX, Array
+from quadriga.shared.robot.a1 import TRUNK_BOX
+from quadriga.shared.robot.conventions import Array
 
 _DPI: Final = 100
 _CORNERS: Final = (

@@ -10,7 +10,7 @@ from quadriga.recorder.selection import KeyFilter
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.members import PLANNER, SIM
 from quadriga.shared.recording.mcap_chunk import name_of
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.wire.topics import find_topic
 

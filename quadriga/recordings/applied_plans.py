@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from quadriga.shared.robot.a1 import N_FORCES, OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_FORCES, OUTPUTS, Array
 from quadriga.shared.wire.messages import Plan
 from quadriga.shared.wire.topics import SAMPLE_MS
 

@@ -26,7 +26,7 @@ from quadriga.recordings.traces import (
 )
 from quadriga.recordings.truth import distance
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import OUTPUTS, Array
+from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.shared.runtime.histogram import QUANTILES
 from quadriga.shared.wire.codes import FALL, code_of
 from quadriga.shared.wire.messages import Status

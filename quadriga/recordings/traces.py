@@ -16,7 +16,7 @@ from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.members import PLANNER, SIM
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import OUTPUTS, Array, robot_names
+from quadriga.shared.robot.conventions import OUTPUTS, Array, robot_names
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import (
     Event,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Truth
 from quadriga.sim_server.terrain.terrain import build_terrain
 from quadriga.sim_server.world.team_model import formation

@@ -12,7 +12,7 @@ from quadriga.charts.draw import draw_panels
 from quadriga.charts.files import save_png
 from quadriga.charts.panels import Curve, Panel, PanelGrid
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.robot.a1 import JOINT_NAMES, OUTPUTS, Array, Leg
+from quadriga.shared.robot.conventions import JOINT_NAMES, OUTPUTS, Array, Leg
 from quadriga.shared.wire.messages import Command, Measurement, Message, Plan
 from quadriga.shared.wire.topics import SAMPLE_MS
 

@@ -25,7 +25,8 @@ import numpy as np
 from quadriga.agents.agent import Agent, AgentState, Inputs, StepProblems
 from quadriga.agents.planner.qp_solver import SolvedQp
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.robot.a1 import TORQUE_LIMIT, Array
+from quadriga.shared.robot.a1 import TORQUE_LIMIT
+from quadriga.shared.robot.conventions import Array
 
 WHOLE_BODY: Final = "command"  # the topic that is made of it
 PLANNER: Final = "plan"

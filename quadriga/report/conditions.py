@@ -23,7 +23,7 @@ from quadriga.report.window import (
     passive_since,
 )
 from quadriga.shared.config.sections import CENTRAL
-from quadriga.shared.robot.a1 import N_LEGS, Leg
+from quadriga.shared.robot.conventions import N_LEGS, Leg
 from quadriga.shared.wire.messages import Plan
 from quadriga.shared.wire.topics import REFERENCE, SAMPLE_MS
 

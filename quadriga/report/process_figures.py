@@ -18,7 +18,7 @@ from quadriga.report.run import Run
 from quadriga.report.trunk_figures import draw_over_run, mark_falls, robot_legend
 from quadriga.shared.config.sections import CENTRAL
 from quadriga.shared.members import PLANNER
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import REFERENCE
 from quadriga.tables import format_number

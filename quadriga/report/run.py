@@ -16,7 +16,7 @@ from quadriga.recordings.truth import Ticks
 from quadriga.report.samples import Samples, read_samples
 from quadriga.report.timeline import TimelineEntry, build_timeline
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, STATE, STATUS, TRUTH
 
 _PACED: Final = tuple(topic.name for topic in (STATE, COMMAND, MEASUREMENT, STATUS, TRUTH))

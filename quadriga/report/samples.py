@@ -15,7 +15,8 @@ from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import Ticks, stack, ticks_of
 from quadriga.shared.errors import MessageError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import FOOT_RADIUS, N_FORCES, N_LEGS, TORQUE_LIMIT, Array, robot_names
+from quadriga.shared.robot.a1 import FOOT_RADIUS, TORQUE_LIMIT
+from quadriga.shared.robot.conventions import N_FORCES, N_LEGS, Array, robot_names
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Measurement, State
 from quadriga.shared.wire.topics import MEASUREMENT, SAMPLE_MS, STATE, topic_of

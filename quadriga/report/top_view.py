@@ -12,7 +12,7 @@ from quadriga.charts.colours import LINES, PALETTE, robot_colour, robot_style
 from quadriga.charts.draw import POINTS_PER_INCH, TEXT, WIDTH, add_legend, tidy_axes
 from quadriga.recordings.traces import Traces
 from quadriga.shared.config.yokes import yoke_pairs
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 _INSTANTS: Final = 6  # at which yokes and times are drawn
 _MARGIN: Final = 0.3  # m

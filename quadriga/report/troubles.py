@@ -21,7 +21,7 @@ from quadriga.report.window import (
     find_lost_stance,
     passive_since,
 )
-from quadriga.shared.robot.a1 import Leg
+from quadriga.shared.robot.conventions import Leg
 from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.topics import SAMPLE_MS
 

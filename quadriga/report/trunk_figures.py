@@ -15,7 +15,7 @@ from quadriga.recordings.traces import demanded_outputs, estimate_errors
 from quadriga.recordings.truth import Ticks
 from quadriga.report.run import Run
 from quadriga.shared.config.yokes import yoke_pairs
-from quadriga.shared.robot.a1 import OUTPUTS, Array
+from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.topics import SAMPLE_MS
 

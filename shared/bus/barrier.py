@@ -8,7 +8,7 @@ from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import SIM, Member, team_members
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 
 
 def processes(config: Config) -> tuple[Member, ...]:

@@ -8,7 +8,7 @@ from typing import Final
 from quadriga.shared.config.payload import carriers
 from quadriga.shared.config.sections import CENTRAL, Config, GaitConfig, PlannerConfig, WorldConfig
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 _TEAM_NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")

@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import TRUNK_LINK, TRUNK_MASS, Array, a1_urdf
+from quadriga.shared.robot.a1 import TRUNK_LINK, TRUNK_MASS, a1_urdf
+from quadriga.shared.robot.conventions import Array
 
 
 def build_pinocchio_model() -> pin.Model:

@@ -12,7 +12,7 @@ import msgpack
 import numpy as np
 
 from quadriga.shared.errors import MessageError
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.flat_layout import FlatLayout
 from quadriga.shared.wire.messages import Flat, Message, cuts_of
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.shared.robot.a1 import JOINT_NAMES, Leg
+from quadriga.shared.robot.conventions import JOINT_NAMES, Leg
 
 XYZ: Final = ("x", "y", "z")
 WXYZ: Final = ("w", "x", "y", "z")

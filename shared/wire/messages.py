@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self, TypeVar, dataclass_transform
 
 import numpy as np
 
-from quadriga.shared.robot.a1 import OUTPUTS, Array
+from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import EVENTS, code_of_schema_1
 from quadriga.shared.wire.entries import FORCES, JOINTS, LEGS, ONE, WXYZ, XYZ

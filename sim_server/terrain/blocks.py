@@ -8,7 +8,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.sim_server.terrain.course import Course
 
 _CELL: Final = 0.35  # m, one block per square of this size

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 _HALF_BODY: Final = (0.25, 0.2)  # m, trunk origin to the farthest foot, along x and y
 _FLAT_MARGIN: Final = 0.4  # m, flat ground around the feet of the spawned team …

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from scipy import ndimage
 
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.sim_server.terrain.course import Course, Rectangle
 
 _SUNK: Final = 0.01  # m, how far below the ground plane the field starts: no double contacts there

@@ -11,7 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.shared.robot.a1 import FOOT_RADIUS, Array
+from quadriga.shared.robot.a1 import FOOT_RADIUS
+from quadriga.shared.robot.conventions import Array
 from quadriga.sim_server.terrain.pebbles import SIZES, Pebbles
 
 PERIOD: Final = 4  # ms between two updates

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.shared.robot.a1 import N_LEGS, Array
+from quadriga.shared.robot.conventions import N_LEGS, Array
 from quadriga.sim_server.terrain.contact import STONE_CONTACT
 from quadriga.sim_server.terrain.course import Course, Rectangle
 

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.sim_server.terrain.blocks import Blocks, build_blocks
 from quadriga.sim_server.terrain.contact import GROUND_OF_STONES, TERRAIN_CONTACT
 from quadriga.sim_server.terrain.course import Course, build_course

@@ -10,7 +10,8 @@ import numpy as np
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import JOINT_NAMES, N_JOINTS, TORQUE_LIMIT, Array, robot_names
+from quadriga.shared.robot.a1 import TORQUE_LIMIT
+from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array, robot_names
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.world.layout import JOINT_POSITIONS, JOINT_RATES

@@ -9,7 +9,7 @@ import numpy as np
 
 from quadriga.shared.config.payload import carriers
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 
 _STREAM: Final = 5  # of the seed
 

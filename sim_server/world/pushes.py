@@ -10,7 +10,7 @@ import numpy as np
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 
 _GRAMMAR: Final = "'robot:force[N]:direction[deg]:start[s]:duration[s]', commas between pushes"
 _FORCE_LIMIT: Final = 5000.0  # N; beyond it the world is no longer stable

@@ -10,14 +10,8 @@ import mujoco
 import numpy as np
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import (
-    FOOT_FRAMES,
-    FOOT_RADIUS,
-    TRUNK_BOX,
-    TRUNK_LINK,
-    TRUNK_MASS,
-    a1_urdf,
-)
+from quadriga.shared.robot.a1 import FOOT_RADIUS, TRUNK_BOX, TRUNK_LINK, TRUNK_MASS, a1_urdf
+from quadriga.shared.robot.conventions import FOOT_FRAMES
 from quadriga.sim_server.terrain.contact import NO_CONTACT, ROBOT_CONTACT
 
 VISUAL_GROUP: Final = 1

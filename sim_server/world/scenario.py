@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import N_JOINTS, Array, robot_names
+from quadriga.shared.robot.conventions import N_JOINTS, Array, robot_names
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Event
 from quadriga.sim_server.world.motors import WeakMotor, weak_motors

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.config.sections import SensorsConfig
-from quadriga.shared.robot.a1 import N_JOINTS, N_LEGS, Array
+from quadriga.shared.robot.conventions import N_JOINTS, N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import State
 from quadriga.sim_server.world.layout import (

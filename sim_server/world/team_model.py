@@ -10,7 +10,8 @@ import numpy as np
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
-from quadriga.shared.robot.a1 import FOOT_FRAMES, GRAVITY, STAND_HEIGHT, Array, q_stand, robot_names
+from quadriga.shared.robot.a1 import STAND_HEIGHT, q_stand
+from quadriga.shared.robot.conventions import FOOT_FRAMES, GRAVITY, Array, robot_names
 from quadriga.sim_server.terrain.contact import NO_CONTACT
 from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
 from quadriga.sim_server.world.layout import JOINT_POSITIONS, NQ

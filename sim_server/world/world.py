@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import FOOT_FRAMES, N_JOINTS, N_LEGS, Array, robot_names
+from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, N_LEGS, Array, robot_names
 from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.messages import Command, Event, State, Truth
 from quadriga.sim_server.terrain.loose import PERIOD, LooseStones

@@ -14,7 +14,7 @@ from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs, PlanResult
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 Team = Callable[..., Any]
 BASE = np.array([0.26, 0.4, 0.0, 0.0, 0.0, 0.1])

@@ -11,7 +11,7 @@ from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
-from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Reference, State
 

@@ -17,7 +17,8 @@ from quadriga.agents.agent import Agent
 from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.agents.planning.interface import Expected
 from quadriga.identification.rollout import Rollout
-from quadriga.shared.robot.a1 import TORQUE_LIMIT, Array
+from quadriga.shared.robot.a1 import TORQUE_LIMIT
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import decode, encode
 from tests.agents.duet import (
     CONFIG,

@@ -12,7 +12,7 @@ from quadriga.agents.controller import acting, controller
 from quadriga.agents.controller.whole_body.problem import WholeBodyProblem
 from quadriga.agents.rehearsal import standing
 from quadriga.agents.telemetry import Telemetry
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import EStop, State, Status
 from tests.agents.duet import CONFIG, FIRST_PLAN, over_the_bus

@@ -17,7 +17,8 @@ from quadriga.agents.gait import (
     stance_progress,
 )
 from quadriga.shared.config.sections import Config, GaitConfig
-from quadriga.shared.robot.a1 import GRAVITY, TOTAL_MASS, Leg
+from quadriga.shared.robot.a1 import TOTAL_MASS
+from quadriga.shared.robot.conventions import GRAVITY, Leg
 
 GAITS = st.builds(
     GaitConfig,

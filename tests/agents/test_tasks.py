@@ -13,7 +13,7 @@ from quadriga.agents.controller.controller import ControllerOutputs, Task
 from quadriga.agents.controller.schedule import Schedule
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config, TeamConfig
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Plan
 from quadriga.shared.wire.topics import SAMPLE_MS
 from tests.agents.duet import every_100_ms, simple_predictor

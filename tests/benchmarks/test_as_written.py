@@ -15,7 +15,7 @@ from quadriga.agents.gait import nominal_forces
 from quadriga.agents.planner.planner_qp import build_problem
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 N = 5
 PLANNER = replace(Config().planner, N=N, force_min=2.0)

@@ -13,7 +13,7 @@ import yaml
 from quadriga.commands.parser import build_parser
 from quadriga.shared.config.load import load
 from quadriga.shared.members import LAST, ROUTER
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.team.launch import ProcessSpec, process_table
 
 TOP = Path(__file__).parents[2]

@@ -31,7 +31,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, QuadrigaError, RecordingError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import PROFILE
-from quadriga.shared.robot.a1 import Array, robot_names
+from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.runtime.arithmetic import arithmetic
 from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.shared.runtime.clock import wall_ns

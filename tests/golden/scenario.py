@@ -13,7 +13,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Message, State
 from quadriga.shared.wire.topics import (

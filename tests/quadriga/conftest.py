@@ -14,7 +14,8 @@ from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.sections import Config, ReferenceConfig, TeamConfig, WorldConfig
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.robot.a1 import q_stand, robot_names
+from quadriga.shared.robot.a1 import q_stand
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire import messages as msg
 from quadriga.shared.wire.codec import encode
 from quadriga.sim_server.world.team_model import formation

@@ -19,7 +19,7 @@ from quadriga.replay.team_replay import replay
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Plan
 
 pytestmark = pytest.mark.usefixtures("_compiled")

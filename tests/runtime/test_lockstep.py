@@ -15,7 +15,7 @@ import pytest
 from quadriga.shared.bus.zenoh_bus import READY, Bus
 from quadriga.shared.errors import MessageError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import M, decode, encode
 from quadriga.shared.wire.messages import Command, Event, Reference, State, Status, Truth

@@ -18,7 +18,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command, Measurement, Plan
 from quadriga.team.endpoint import free_endpoint

@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 
 from quadriga.shared.config.sections import Config, SensorsConfig, TeamConfig, WorldConfig
-from quadriga.shared.robot.a1 import N_JOINTS, q_stand
+from quadriga.shared.robot.a1 import q_stand
+from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.world.world import World
 

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 HIP_X: Final = 0.1805  # m, hip joint from the trunk's origin

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numba
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import cuts_of
 
 

@@ -20,7 +20,8 @@ from quadriga.agents.controller.whole_body.problem import (
     WholeBodyProblem,
     WholeBodySolution,
 )
-from quadriga.shared.robot.a1 import N_JOINTS, TORQUE_LIMIT, Array
+from quadriga.shared.robot.a1 import TORQUE_LIMIT
+from quadriga.shared.robot.conventions import N_JOINTS, Array
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.codes import with_detail
 

@@ -22,7 +22,8 @@ from quadriga.recordings.traces import (
 )
 from quadriga.recordings.truth import distance
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import GRAVITY, N_LEGS, OUTPUTS, TOTAL_MASS, Array
+from quadriga.shared.robot.a1 import TOTAL_MASS
+from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, OUTPUTS, Array
 from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.messages import Measurement
 

@@ -18,7 +18,7 @@ from quadriga.recordings.traces import MeasurementTrace, Traces
 from quadriga.recordings.truth import build_truth_trace, ticks_of
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.members import PLANNER
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic_ns
 from quadriga.shared.wire.messages import Event, Measurement, Status, Truth
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS

@@ -18,7 +18,7 @@ from quadriga.identification.rollout import Tick
 from quadriga.identification.sample_fits import linear_episode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import CENTRAL, Config
-from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 
 # Full speed from 0.2 s on, so that 1.4 s have a steady part of 0.2 s.
 _KEYS: Final = {

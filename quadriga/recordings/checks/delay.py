@@ -14,7 +14,7 @@ from quadriga.agents.time_grid import step_ms
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.shared.config.sections import CENTRAL, Config
 from quadriga.shared.config.yokes import neighbours
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Plan, Status
 
 GIVEN_UP: Final = "waits_given_up"  # the agent's count of messages it no longer waited for

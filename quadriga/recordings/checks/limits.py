@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import JOINT_NAMES, TORQUE_LIMIT, Array, Leg, robot_names
+from quadriga.shared.robot.a1 import TORQUE_LIMIT
+from quadriga.shared.robot.conventions import JOINT_NAMES, Array, Leg, robot_names
 from quadriga.shared.wire.messages import Command, Plan
 
 TOLERANCE: Final = 1e-6  # N and N·m

@@ -8,7 +8,7 @@ from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import max_ages, periods
 from quadriga.shared.recording.sequence import TickTrack
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Plan, Status
 from quadriga.shared.wire.topics import (
     COMMAND,

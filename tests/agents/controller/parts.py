@@ -28,7 +28,7 @@ from quadriga.agents.controller.trunk_feedback import (
     feedforward,
 )
 from quadriga.shared.config.sections import Config, ControllerConfig
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import State
 
 

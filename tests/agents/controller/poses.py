@@ -10,7 +10,8 @@ import pinocchio as pin
 from quadriga.agents.controller.estimator import Estimate
 from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms
 from quadriga.agents.controller.model import RigidBody
-from quadriga.shared.robot.a1 import FOOT_FRAMES, N_JOINTS, STAND_HEIGHT, Array, q_stand
+from quadriga.shared.robot.a1 import STAND_HEIGHT, q_stand
+from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, Array
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 
 MODEL = build_pinocchio_model()

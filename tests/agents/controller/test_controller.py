@@ -19,7 +19,8 @@ from quadriga.agents.controller.whole_body.solution import solve_goal
 from quadriga.agents.gait import nominal_forces
 from quadriga.agents.rehearsal import standing
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import GRAVITY, STAND_HEIGHT, TOTAL_MASS, Array
+from quadriga.shared.robot.a1 import STAND_HEIGHT, TOTAL_MASS
+from quadriga.shared.robot.conventions import GRAVITY, Array
 from tests.agents.controller.parts import (
     estimate_trunk,
     initial_contact,

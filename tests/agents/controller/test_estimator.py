@@ -20,7 +20,8 @@ from quadriga.agents.controller.estimator import (
     trunk_from_truth,
 )
 from quadriga.shared.config.sections import EstimatorConfig
-from quadriga.shared.robot.a1 import FOOT_RADIUS, GRAVITY, N_JOINTS, STAND_HEIGHT, Array, q_stand
+from quadriga.shared.robot.a1 import FOOT_RADIUS, STAND_HEIGHT, q_stand
+from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS, Array
 from quadriga.shared.wire.messages import State, Truth
 from tests.agents.controller.parts import estimate_trunk
 from tests.agents.controller.poses import FEET, MODEL, pose_of

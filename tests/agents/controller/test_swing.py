@@ -16,7 +16,8 @@ from quadriga.agents.controller.swing import (
     limit_foothold,
     swing_reference,
 )
-from quadriga.shared.robot.a1 import FOOT_RADIUS, Array
+from quadriga.shared.robot.a1 import FOOT_RADIUS
+from quadriga.shared.robot.conventions import Array
 
 START, TARGET = np.array([0.1, -0.2, 0.03]), np.array([0.25, -0.15])
 GROUND, APEX, DURATION = 0.01, 0.12, 0.2

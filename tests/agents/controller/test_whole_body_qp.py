@@ -20,7 +20,8 @@ from quadriga.agents.controller.whole_body.problem import (
     WholeBodySolution,
 )
 from quadriga.agents.controller.whole_body.solution import solve, solve_goal
-from quadriga.shared.robot.a1 import GRAVITY, TORQUE_LIMIT, TOTAL_MASS, Array
+from quadriga.shared.robot.a1 import TORQUE_LIMIT, TOTAL_MASS
+from quadriga.shared.robot.conventions import GRAVITY, Array
 from tests.agents.controller.full_qp import desired, dynamics, solve_full
 from tests.agents.controller.poses import Pose, random_pose, standing_pose
 

@@ -23,7 +23,7 @@ from quadriga.agents.predictor.hankel import hankel
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 Team = Callable[..., Any]
 T_INI, N = 2, 3

@@ -15,7 +15,7 @@ from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.planner_qp import build_problem, unpack
 from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS
 from quadriga.shared.config.sections import PlannerConfig
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 T_INI, N = 3, 5
 CONFIG = replace(PlannerConfig(), T_ini=T_INI, N=N)

@@ -16,7 +16,7 @@ from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem, un
 from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS, Solver, judge, residuals
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 N = 8
 PLANNER = replace(Config().planner, N=N)

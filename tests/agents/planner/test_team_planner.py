@@ -19,7 +19,7 @@ from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 BASE = np.array([0.26, 0.4, 0.0, 0.0, 0.0, 0.1])
 STEP = 20

@@ -14,7 +14,7 @@ from quadriga.agents.planning.interface import PlanningInputs
 from quadriga.agents.planning.local import LocalPlanning, LocalState
 from quadriga.agents.predictor.recursive import Correction
 from quadriga.shared.config.sections import Config, TeamConfig
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Measurement
 from tests.agents.duet import asked, simple_predictor
 

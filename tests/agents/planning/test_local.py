@@ -18,7 +18,7 @@ from quadriga.agents.planning.interface import PlanningInputs, PlanningOutputs
 from quadriga.agents.planning.local import LocalPlanning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Measurement, Plan
 from tests.agents.duet import asked, simple_predictor
 

@@ -15,7 +15,7 @@ from quadriga.agents.planning.remote import RemotePlanning, RemoteState
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.config.timing import max_ages
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Measurement, Plan
 from tests.agents.duet import asked
 

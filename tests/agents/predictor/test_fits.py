@@ -26,7 +26,7 @@ from quadriga.agents.predictor.regression import (
 from quadriga.agents.predictor.ridge import solve_ridge
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 
 Team = Callable[..., Any]
 T_INI, N = 3, 4

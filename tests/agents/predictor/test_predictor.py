@@ -15,7 +15,7 @@ from quadriga.agents.predictor.hankel import split
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 Team = Callable[..., Any]
 

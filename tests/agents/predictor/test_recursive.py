@@ -21,7 +21,7 @@ from quadriga.agents.predictor.recursive import (
 )
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 Team = Callable[..., Any]
 

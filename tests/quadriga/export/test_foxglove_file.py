@@ -20,7 +20,7 @@ from quadriga.commands.parser import main
 from quadriga.shared.config.sections import WorldConfig
 from quadriga.shared.errors import MessageError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import FOOT_FRAMES, Array
+from quadriga.shared.robot.conventions import FOOT_FRAMES, Array
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Measurement, Plan, Reference, State, Truth

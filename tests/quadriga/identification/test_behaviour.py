@@ -19,7 +19,7 @@ from quadriga.identification import behaviour as module
 from quadriga.identification import sample_fits
 from quadriga.identification.behaviour import behaviour, digest_of, numbers
 from quadriga.shared.errors import QuadrigaError
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 
 # The first walk cut short: machine code for each copy of the package would take a minute.
 SHORT = """

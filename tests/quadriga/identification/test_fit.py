@@ -21,7 +21,7 @@ from quadriga.identification.fit import report_fit
 from quadriga.identification.fit_report import FitReport, Unfit, horizon_errors
 from quadriga.identification.fit_tables import build_comparison, build_report_tables
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import OUTPUTS
+from quadriga.shared.robot.conventions import OUTPUTS
 from tests.quadriga.linear_data import arguments, config_of, dataset, put_data
 
 Said = pytest.CaptureFixture[str]

@@ -20,7 +20,7 @@ from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import OUTPUTS
+from quadriga.shared.robot.conventions import OUTPUTS
 from quadriga.shared.wire import messages as msg
 from tests.quadriga.conftest import ESTIMATOR_ERROR, SPEED, WriteRun, run_config
 

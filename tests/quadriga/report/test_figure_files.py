@@ -17,7 +17,7 @@ from quadriga.report.process_figures import draw_time_histograms
 from quadriga.report.run import Run, read_run
 from quadriga.report.top_view import draw_top_view
 from quadriga.report.trunk_figures import draw_trajectory
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire import messages as msg
 from tests.quadriga.conftest import WriteRun, outputs, run_config
 

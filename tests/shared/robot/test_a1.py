@@ -12,8 +12,18 @@ import pytest
 from quadriga.agents.controller.maths import leg_kinematics as kinematics
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.a1 import (
-    FOOT_FRAMES,
     FOOT_RADIUS,
+    STAND_HEIGHT,
+    TORQUE_LIMIT,
+    TOTAL_MASS,
+    TRUNK_BOX,
+    TRUNK_LINK,
+    TRUNK_MASS,
+    a1_urdf,
+    q_stand,
+)
+from quadriga.shared.robot.conventions import (
+    FOOT_FRAMES,
     GRAVITY,
     JOINT_NAMES,
     N_FORCES,
@@ -21,15 +31,7 @@ from quadriga.shared.robot.a1 import (
     N_LEGS,
     N_OUTPUTS,
     OUTPUTS,
-    STAND_HEIGHT,
-    TORQUE_LIMIT,
-    TOTAL_MASS,
-    TRUNK_BOX,
-    TRUNK_LINK,
-    TRUNK_MASS,
     Leg,
-    a1_urdf,
-    q_stand,
     robot_names,
 )
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model

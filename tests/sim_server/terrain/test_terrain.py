@@ -8,7 +8,7 @@ import pytest
 
 from quadriga.shared.config.reference_trace import inline_trace, trace_of
 from quadriga.shared.config.sections import Config, ReferenceConfig
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.sim_server.terrain.course import build_course
 from quadriga.sim_server.terrain.height_field import HeightField
 from quadriga.sim_server.terrain.terrain import Terrain, build_terrain

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import JOINT_NAMES
+from quadriga.shared.robot.conventions import JOINT_NAMES
 from quadriga.sim_server.world.motors import WeakMotor, weak_motors
 from tests.sim_server.standing import configured
 

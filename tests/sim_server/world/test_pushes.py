@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import robot_names
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.sim_server.world.pushes import Push, parse_pushes, push_series
 from tests.sim_server.standing import configured
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.shared.config.sections import SensorsConfig
-from quadriga.shared.robot.a1 import Array
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import State
 from quadriga.sim_server.world.sensors import Sensors, turn_matrices
 from tests.sim_server.standing import SILENT

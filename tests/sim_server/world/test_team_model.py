@@ -8,14 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.shared.config.yokes import yoke_pairs
-from quadriga.shared.robot.a1 import (
-    FOOT_FRAMES,
-    JOINT_NAMES,
-    N_JOINTS,
-    TORQUE_LIMIT,
-    TOTAL_MASS,
-    TRUNK_MASS,
-)
+from quadriga.shared.robot.a1 import TORQUE_LIMIT, TOTAL_MASS, TRUNK_MASS
+from quadriga.shared.robot.conventions import FOOT_FRAMES, JOINT_NAMES, N_JOINTS
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 from quadriga.sim_server.world.layout import NQ
 from quadriga.sim_server.world.team_model import build_team_model, formation, spawn_positions

@@ -7,7 +7,8 @@ import pytest
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import GRAVITY, N_JOINTS, TORQUE_LIMIT, TOTAL_MASS, q_stand
+from quadriga.shared.robot.a1 import TORQUE_LIMIT, TOTAL_MASS, q_stand
+from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Event, State, Truth
 from quadriga.sim_server.world.world import MOTOR_DAMPING, World

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from quadriga.agents.controller.maths.leg_kinematics import hip_neutral, leg_kinematics
-from quadriga.shared.robot.a1 import FOOT_RADIUS, N_JOINTS, STAND_HEIGHT, Array, q_stand
+from quadriga.shared.robot.a1 import FOOT_RADIUS, STAND_HEIGHT, q_stand
+from quadriga.shared.robot.conventions import N_JOINTS, Array
 from tests.agents.controller.poses import FEET, MODEL
 
 ANGLES = arrays(np.float64, N_JOINTS, elements=st.floats(-np.pi, np.pi))
