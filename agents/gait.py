@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import TOTAL_MASS
-from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
+from quadriga.shared.robot.conventions import N_LEGS, Array
 
 # Diagonal pairs in the leg order FL FR RL RR: row 0 stands in the first half cycle.
 _BITS = np.array([8, 4, 2, 1])
@@ -41,25 +42,30 @@ def half_cycle_stance(half_cycle: int) -> NDArray[np.bool_]:
     return np.ones(N_LEGS, dtype=np.bool_) if half_cycle < 0 else _PAIRS[half_cycle]
 
 
-def nominal_forces(stance: NDArray[np.bool_]) -> Array:
+def nominal_forces(stance: NDArray[np.bool_], weight: float) -> Array:
     """Forces that carry the robot's weight evenly on its stance feet (the paper's u_des).
 
     Args:
         stance: scheduled stance, shape (..., 4).
+        weight: of the robot, m g, N.
 
     Returns:
         Shape (..., 12): per leg (0, 0, m g / N_c) for stance legs and zero for swing legs, N.
     """
-    forces: Array = NOMINAL_FORCES[stance @ _BITS]
+    forces: Array = nominal_table(weight)[stance @ _BITS]
     return forces
 
 
-def _nominal_table() -> Array:
-    """Nominal forces of all 16 stance patterns. Shape (16, 12), N."""
+@lru_cache
+def nominal_table(weight: float) -> Array:
+    """Nominal forces of all 16 stance patterns, by the bits of the legs. Shape (16, 12), N.
+
+    Args:
+        weight: of the robot, m g, N.
+    """
     stance = np.arange(16)[:, None] & _BITS > 0
     forces = np.zeros((16, N_LEGS, 3))
-    forces[..., 2] = stance * TOTAL_MASS * GRAVITY / np.maximum(stance.sum(axis=1), 1)[:, None]
-    return forces.reshape(16, 3 * N_LEGS)
-
-
-NOMINAL_FORCES = _nominal_table()  # by stance pattern, its bits in the order of the legs
+    forces[..., 2] = stance * weight / np.maximum(stance.sum(axis=1), 1)[:, None]
+    table = forces.reshape(16, 3 * N_LEGS)
+    table.setflags(write=False)
+    return table

@@ -10,14 +10,14 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.shared.config.sections import PlannerConfig, ReferenceConfig
-from quadriga.shared.robot.a1 import TOTAL_MASS
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.config.sections import Config, ReferenceConfig
+from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.wire.messages import Reference
 
-# N, each component of each foot's: ten times the weight on one foot, several times what the motors
-# can press. A planner that is allowed larger deviations may plan them.
-FORCE_MAX: Final = 10.0 * TOTAL_MASS * GRAVITY
+# Times the robot's weight, each component of each foot's force: several times what the motors can
+# press. A planner that is allowed larger deviations may plan them.
+_FORCE_MAX: Final = 10.0
 # m, m/s, rad, rad/s: ten times as fast as the motors turn and swing a leg (21 rad/s, 8 m/s); and
 # many times what a falling robot reaches.
 OUTPUT_MAX: Final = 100.0
@@ -30,9 +30,14 @@ _REFERENCE_LIMITS: Final = {
 }
 
 
-def is_plausible(config: PlannerConfig, u: Array, y: Array) -> bool:
+def force_max(robot: RobotSpec) -> float:
+    """Greatest component of a foot's force that such a robot can mean, N."""
+    return _FORCE_MAX * robot.weight
+
+
+def is_plausible(config: Config, u: Array, y: Array) -> bool:
     """Whether forces u, (…, 12), N, and outputs y, (…, 6), are numbers that a robot can mean."""
-    most = FORCE_MAX + max(config.deviation_max)
+    most = force_max(config.robot) + max(config.planner.deviation_max)
     return bool(np.abs(u).max() <= most) and are_plausible_outputs(y)
 
 

@@ -12,8 +12,8 @@ from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.agents.planning.team import Central, CentralState
 from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import TOTAL_MASS, q_stand
 from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS, N_LEGS, N_OUTPUTS, robot_names
+from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Measurement, Reference, State
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
@@ -31,7 +31,7 @@ def rehearse(config: Config, agent: Agent) -> AgentState:
     memory, lean = agent.initial(), _LEAN * config.controller.fall_tilt
     upright = config.gait.stand_ms + SAMPLE_MS * config.planner.T_ini + 2 * step_ms(config)
     for tick in range(upright + 2 * step_ms(config) + 1):
-        sent = encode(standing(tick, lean if tick > upright else 0.0))
+        sent = encode(standing(config.robot, tick, lean if tick > upright else 0.0))
         inputs = Inputs(decode(sent, State), references=(_stay(config, tick),))
         memory, outputs = agent.step(memory, inputs)
         encode(outputs.command)
@@ -47,7 +47,7 @@ def rehearse_central(config: Config, central: Central) -> None:
         sampled = []
         for index, name in enumerate(robot_names(config.team.robots)):
             stance = scheduled_stance(config, index, np.array([tick - SAMPLE_MS]))[0]
-            u = nominal_forces(stance)
+            u = nominal_forces(stance, config.robot.weight)
             sampled.append((name, Measurement(tick, 0, u, y, stance.astype(float))))
         state, _ = central.step(central.remember(state, sampled, [_stay(config)]))
 
@@ -57,15 +57,15 @@ def _stay(config: Config, tick: int = 0) -> Reference:
     return Reference(epoch, epoch * 1_000_000, 0.0, 0.0, 0.0, config.reference.height)
 
 
-def standing(tick: int, lean: float = 0.0) -> State:
+def standing(robot: RobotSpec, tick: int, lean: float = 0.0) -> State:
     """What a robot that stands still on flat ground measures, or leans to its right, rad."""
     zero = np.zeros(N_JOINTS)
     quat = np.array([np.cos(0.5 * lean), np.sin(0.5 * lean), 0.0, 0.0])
-    weight = np.full(N_LEGS, TOTAL_MASS * GRAVITY / N_LEGS)
+    weight = np.full(N_LEGS, robot.weight / N_LEGS)
     return State(
         tick,
         tick * 1_000_000,
-        q_stand(),
+        robot.q_stand,
         zero,
         zero,
         quat,

@@ -14,8 +14,8 @@ import pinocchio as pin
 import tsid
 
 from quadriga.agents.controller.whole_body.problem import Weights
-from quadriga.shared.robot.a1 import TORQUE_LIMIT
-from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, Array
+from quadriga.shared.robot.a1 import A1
+from quadriga.shared.robot.conventions import FOOT_FRAMES, Array
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class Tsid:
 
     def __init__(self, weights: Weights) -> None:
         self._weights = weights
-        model = build_pinocchio_model()
+        model = build_pinocchio_model(A1)
         self._robot = tsid.RobotWrapper(model, tsid.FLOATING_BASE_SYSTEM, False)
         self._form = tsid.InverseDynamicsFormulationAccForce("tsid", self._robot, False)
         self._v0 = np.zeros(model.nv)
@@ -38,7 +38,7 @@ class Tsid:
         self._form.computeProblemData(0.0, q0, self._v0)
         self._trunk = self._se3("trunk", _TRUNK, np.ones(6))
         self._form.addMotionTask(self._trunk, weights.gamma_defect, 1, 0.0)
-        limit = np.full(N_JOINTS, TORQUE_LIMIT)
+        limit = A1.torque_limit
         self._bounds = tsid.TaskActuationBounds("limits", self._robot)
         self._bounds.setBounds(-limit, limit)
         self._form.addActuationTask(self._bounds, 1.0, 0, 0.0)

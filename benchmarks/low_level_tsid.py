@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from quadriga.agents.controller.whole_body.problem import N_WEIGHTS, SOLUTION_SI
 from quadriga.agents.controller.whole_body.solution import solve_closed_form, solve_goal
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.a1 import A1
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.clock import monotonic_ns
 from quadriga.shared.runtime.collector import collector_off
@@ -94,11 +95,14 @@ def _compare(config: Config, cases: list[TsidCase]) -> dict[str, Any] | None:
     }
 
 
+_TORQUE_LIMIT: Final = A1.torque_limit
+
+
 class _Ours:
     """Terms, assembly and solution as in `Controller.act`."""
 
     def __init__(self, weights: Weights) -> None:
-        self._body, self._weights, self._row = RigidBody(), weights, np.array(weights)
+        self._body, self._weights, self._row = RigidBody(A1), weights, np.array(weights)
         self._x = np.zeros(SOLUTION_SIZE)
 
     def solve(self, case: TsidCase) -> None:
@@ -117,7 +121,7 @@ class _Ours:
         ):
             terms = self._body.terms(case.q, case.v)
             R, p_foot = trunk_of(case.sensed).R, feet_of(case.sensed)
-            self._x = solve_goal(terms, R, p_foot, goal, self._weights).x
+            self._x = solve_goal(terms, R, p_foot, goal, self._weights, A1.torque_limit).x
 
     def torques(self) -> Array:
         """Of the last tick, (12,), N·m."""
@@ -143,6 +147,7 @@ def _whole_body(
         feet_of(sensed),
         Goal(contact, trunk, swing, force),
         Weights(*numbers(weights, N_WEIGHTS)),
+        _TORQUE_LIMIT,
         x,
     )
 

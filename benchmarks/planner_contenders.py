@@ -89,7 +89,9 @@ class Local:
         for i, stance in enumerate(tick.stance):
             key = i, stance.tobytes()
             if key not in self._problems:
-                problem = build_problem(self._config.planner, self._G_u[i], stance)
+                problem = build_problem(
+                    self._config.planner, self._config.robot.weight, self._G_u[i], stance
+                )
                 self._problems[key] = problem
                 for name, solver in SOLVERS.items():
                     self._solvers[name, *key] = solver(problem)
@@ -183,7 +185,7 @@ class Team:
 
     def _build(self, stance: bytes) -> PlannerProblem:
         pattern = np.frombuffer(stance, dtype=np.bool_).reshape(-1, 4)
-        return build_problem(self._config.planner, self._G_u, pattern)
+        return build_problem(self._config.planner, self._config.robot.weight, self._G_u, pattern)
 
 
 class Deepc:
@@ -225,5 +227,5 @@ class Deepc:
     def _build(self, stance: bytes) -> tuple[PlannerProblem, Solver]:
         pattern = np.frombuffer(stance, dtype=np.bool_).reshape(-1, 4)
         condensed = select(self._model, stance_columns(pattern))
-        problem = constrain(self._config.planner, condensed, pattern)
+        problem = constrain(self._config.planner, self._config.robot.weight, condensed, pattern)
         return problem, SOLVERS["daqp"](problem)

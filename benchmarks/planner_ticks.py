@@ -72,7 +72,7 @@ def _tick(
     n, N, now = len(samples), config.planner.N, step * step_ms(config)
     stance = np.stack([horizon_stance(config, i, step) for i in range(n)])
     reference = _in_force(config, now)
-    y_base = np.tile(output_base(config.planner.interface, reference), (N, 1))
+    y_base = np.tile(output_base(config, reference), (N, 1))
     y_des = np.tile(commanded_outputs(reference), (N, 1))
     inputs = tuple(
         replace(_window(config, own, now), step=step, y_base=y_base, y_des=y_des) for own in samples
@@ -80,7 +80,7 @@ def _tick(
     earlier = [_window(config, own, now - step_ms(config)) for own in samples]
     peers = []
     for j, window in enumerate(earlier):
-        nominal = nominal_forces(horizon_stance(config, j, step - 1))
+        nominal = nominal_forces(horizon_stance(config, j, step - 1), config.robot.weight)
         peers.append(
             PeerData(
                 robot=f"r{j + 1}",
@@ -89,7 +89,7 @@ def _tick(
                 step=step - 1,
                 age=0,
                 known=np.ones(config.planner.T_ini, dtype=np.bool_),
-                du_ini=window.u_ini - nominal_forces(window.stance_ini),
+                du_ini=window.u_ini - nominal_forces(window.stance_ini, config.robot.weight),
                 y_ini=window.y_ini,
                 du=plans[j][step - 1].u - nominal,
             )
@@ -100,7 +100,7 @@ def _tick(
     ]
     return PlanningTick(
         stance=stance,
-        nominal=nominal_forces(stance),
+        nominal=nominal_forces(stance, config.robot.weight),
         past=np.stack([robot.past() for robot in inputs]),
         y_des=np.tile((y_des - y_base).ravel(), (n, 1)),
         before=np.stack(before),
@@ -117,7 +117,7 @@ def _window(config: Config, samples: dict[int, Measurement], end: int) -> Planne
     """The T_ini samples that end at tick `end`; the horizon is filled in by the caller."""
     ticks = range(end - SAMPLE_MS * (config.planner.T_ini - 1), end + 1, SAMPLE_MS)
     window = [samples[tick] for tick in ticks]
-    base = [output_base(config.planner.interface, _in_force(config, tick)) for tick in ticks]
+    base = [output_base(config, _in_force(config, tick)) for tick in ticks]
     return PlannerInputs(
         step=0,
         u_ini=np.array([sample.u for sample in window]),
@@ -126,6 +126,7 @@ def _window(config: Config, samples: dict[int, Measurement], end: int) -> Planne
         y_base_ini=np.array(base),
         y_base=np.array(base),
         y_des=np.array(base),
+        weight=config.robot.weight,
     )
 
 

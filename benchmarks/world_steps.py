@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from quadriga.shared.config.load import load
-from quadriga.shared.robot.a1 import q_stand
+from quadriga.shared.robot.a1 import A1
 from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.runtime.clock import monotonic_ns
 from quadriga.shared.wire.messages import Command
@@ -20,7 +20,7 @@ def measure(robots: int, terrain: str, ticks: int = 1000) -> dict[str, Any]:
     """Median and p99 of `World.step`, µs, for robots that stand."""
     world = World(load(None, {"team.robots": robots, "world.terrain": terrain}))
     zero = np.zeros(N_JOINTS)
-    stand = Command(0, 0, zero, q_stand(), zero, np.full(N_JOINTS, 200.0), np.full(N_JOINTS, 4.0))
+    stand = Command(0, 0, zero, A1.q_stand, zero, np.full(N_JOINTS, 200.0), np.full(N_JOINTS, 4.0))
     commands = dict.fromkeys(world.names, stand)
     times = []
     for tick in range(-_SETTLING, ticks):

@@ -40,8 +40,7 @@ from quadriga.agents.controller.trunk_feedback import (
 )
 from quadriga.agents.controller.whole_body.problem import Goal, with_mu
 from quadriga.agents.controller.whole_body.solution import solve_closed_form
-from quadriga.shared.robot.a1 import TOTAL_MASS
-from quadriga.shared.robot.conventions import GRAVITY, N_FORCES, N_LEGS, Array
+from quadriga.shared.robot.conventions import N_FORCES, N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
 
 
@@ -125,7 +124,7 @@ def act(
     body = SingleRigidBody(fixed.body.mass + load, fixed.body.com, fixed.body.inertia_inverse)
 
     deviation = accumulate_forces(
-        memory, task[TASK.deviation], phase.stance, task[TASK.new_sample] > 0.5
+        memory, task[TASK.deviation], phase.stance, task[TASK.new_sample] > 0.5, fixed.weight
     )
     push, v_des = _track_reference(memory, trunk, task, fixed.trunk, dt)
     if task[TASK.feedforward] > 0.5:
@@ -147,11 +146,13 @@ def act(
 
     weights = with_mu(fixed.weights, fixed.weights.mu - memory[MEMORY.mu_reduction])
     x[:] = 0.0
-    return solve_closed_form(terms, trunk.R, p_foot, goal, weights, x)
+    return solve_closed_form(terms, trunk.R, p_foot, goal, weights, fixed.torque_limit, x)
 
 
 @compiled
-def accumulate_forces(memory: Array, planned: Array, stance: Array, new_sample: bool) -> Array:
+def accumulate_forces(
+    memory: Array, planned: Array, stance: Array, new_sample: bool, weight: float
+) -> Array:
     """Add the planned forces to their sum over the present sample.
 
     Args:
@@ -159,6 +160,7 @@ def accumulate_forces(memory: Array, planned: Array, stance: Array, new_sample: 
         planned: deviation from the nominal forces, (12,), N, yaw frame.
         stance: scheduled stance, (4,), 1 or 0.
         new_sample: whether a sample begins with this tick.
+        weight: of the robot alone, N.
 
     Returns:
         The deviation of the legs scheduled to stand, (12,), N, yaw frame.
@@ -168,11 +170,11 @@ def accumulate_forces(memory: Array, planned: Array, stance: Array, new_sample: 
         total[:] = 0.0
         memory[MEMORY.force_count] = 0.0
     memory[MEMORY.force_count] += 1.0
-    weight = TOTAL_MASS * GRAVITY / max(1.0, np.sum(stance))
+    share = weight / max(1.0, np.sum(stance))
     deviation = np.zeros(12)
     for i in range(12):
         deviation[i] = planned[i] * stance[i // 3]
-        nominal = weight * stance[i // 3] if i % 3 == 2 else 0.0
+        nominal = share * stance[i // 3] if i % 3 == 2 else 0.0
         total[i] += nominal + deviation[i]
     return deviation
 

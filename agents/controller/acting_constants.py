@@ -19,7 +19,7 @@ from quadriga.agents.controller.trunk_feedback import (
 )
 from quadriga.agents.controller.whole_body.problem import N_WEIGHTS, Weights
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robot.conventions import N_JOINTS, Array
 from quadriga.shared.runtime.jit import compiled
 
 
@@ -33,6 +33,8 @@ class ActingConstants(NamedTuple):
         feet: what feet are asked for.
         weights: of the whole-body QP.
         friction: how much friction to count on.
+        torque_limit: of each motor, (12,), N·m.
+        weight: of the bare robot, N; nominal forces carry it.
         free_fall: whether a robot without contact is asked to fall freely.
     """
 
@@ -42,6 +44,8 @@ class ActingConstants(NamedTuple):
     feet: FeetGains
     weights: Weights
     friction: FrictionRule
+    torque_limit: Array
+    weight: float
     free_fall: bool
 
 
@@ -56,6 +60,8 @@ class ConstantsLayout(NamedTuple):
     feet: slice
     weights: slice
     friction: slice
+    torque_limit: slice
+    weight: int
     free_fall: int
 
 
@@ -69,6 +75,8 @@ _LAYOUT: Final = ConstantsLayout(
         feet=N_FEET_GAINS,
         weights=N_WEIGHTS,
         friction=N_FRICTION_RULE,
+        torque_limit=N_JOINTS,
+        weight=1,
         free_fall=1,
     )
 )
@@ -76,7 +84,7 @@ _LAYOUT: Final = ConstantsLayout(
 
 def acting_constants(config: Config, body: RigidBody, weights: Weights) -> Array:
     """The row of a configuration and a robot."""
-    controller = config.controller
+    controller, robot = config.controller, config.robot
     return np.concatenate(
         [
             body.links.ravel(),
@@ -87,7 +95,8 @@ def acting_constants(config: Config, body: RigidBody, weights: Weights) -> Array
             feet_gains(config),
             weights,
             friction_rule(controller),
-            [float(controller.flight)],
+            robot.torque_limit,
+            [robot.weight, float(controller.flight)],
         ]
     )
 
@@ -105,5 +114,7 @@ def unpack_constants(row: Array) -> ActingConstants:
         FeetGains(*numbers(row[_LAYOUT.feet], N_FEET_GAINS)),
         Weights(*numbers(row[_LAYOUT.weights], N_WEIGHTS)),
         FrictionRule(*numbers(row[_LAYOUT.friction], N_FRICTION_RULE)),
+        row[_LAYOUT.torque_limit],
+        row[_LAYOUT.weight],
         row[_LAYOUT.free_fall] > 0.5,
     )

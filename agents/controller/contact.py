@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from quadriga.agents.controller.memory import FeetMemory
 from quadriga.agents.controller.schedule import GaitPhase
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import FOOT_RADIUS
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
@@ -42,6 +41,7 @@ class ContactRule(NamedTuple):
         reject_side_contacts: 1 where a foot stopped from the side is no contact, and one that
             landed early and is not loaded any more neither; else 0.
         ground_filter: time constant of the filters of the ground's height, s.
+        foot_radius: m.
     """
 
     detection: float
@@ -51,13 +51,14 @@ class ContactRule(NamedTuple):
     reflex: float
     reject_side_contacts: float
     ground_filter: float
+    foot_radius: float
 
 
 N_CONTACT_RULE: Final = len(ContactRule._fields)
 
 
 def contact_rule(config: Config) -> ContactRule:
-    """The rule that a configuration sets."""
+    """The rule that a configuration sets, for its robot."""
     controller = config.controller
     return ContactRule(
         detection=float(controller.contact_detection),
@@ -67,6 +68,7 @@ def contact_rule(config: Config) -> ContactRule:
         reflex=1e-3 * controller.reflex_ms,
         reject_side_contacts=float(controller.reject_side_contacts),
         ground_filter=1e-3 * controller.ground_filter_ms,
+        foot_radius=config.robot.geometry.foot_radius,
     )
 
 
@@ -95,17 +97,18 @@ def update_contacts(
         The new height of the ground, m, odometry frame.
     """
     rate = dt / (rule.ground_filter + dt)
+    sole_z = foot_z - rule.foot_radius
     if rule.detection < 0.5:
-        return _follow_schedule(feet, ground_height0, phase.stance, foot_z, rate)
+        return _follow_schedule(feet, ground_height0, phase.stance, sole_z, rate)
     loaded = foot_force >= rule.least_force
     carried = _update_stance(feet, phase, loaded, rule, dt)
     _update_swing(feet, phase, loaded, carried, rule, dt)
-    return _update_ground(feet, ground_height0, phase.stance, loaded, foot_z, rate)
+    return _update_ground(feet, ground_height0, phase.stance, loaded, sole_z, rate)
 
 
 @compiled
 def _follow_schedule(
-    feet: FeetMemory, ground_height0: float, stance: Array, foot_z: Array, rate: float
+    feet: FeetMemory, ground_height0: float, stance: Array, sole_z: Array, rate: float
 ) -> float:
     """The paper's plain setting: contacts are the schedule's, the ground is flat and known."""
     contact, early_contact = feet.contact, feet.early_contact
@@ -116,7 +119,7 @@ def _follow_schedule(
         contact[leg] = touchdown_seen[leg] = stance[leg]
         early_contact[leg] = unloaded[leg] = 0.0
         if stance[leg] > 0.5:
-            ground[leg] = foot_z[leg] - FOOT_RADIUS
+            ground[leg] = sole_z[leg]
             total += ground[leg]
             count += 1
     return ground_height0 + rate * (total / count - ground_height0)
@@ -231,7 +234,7 @@ def _update_ground(
     ground_height0: float,
     stance: Array,
     loaded: Flags,
-    foot_z: Array,
+    sole_z: Array,
     rate: float,
 ) -> float:
     """Where the ground is under the feet in contact; its new filtered height."""
@@ -243,10 +246,10 @@ def _update_ground(
         # touchdown would take that of a foot still in the air, and ratchet upward.
         if contact[leg] > 0.5 and loaded[leg] and touchdown_seen[leg] < 0.5:
             touchdown_seen[leg] = 1.0
-            ground[leg] = foot_z[leg] - FOOT_RADIUS
+            ground[leg] = sole_z[leg]
         if contact[leg] > 0.5 and touchdown_seen[leg] > 0.5:
             # The estimator's height drifts; a standing foot carries its ground along with it.
-            ground[leg] += rate * (foot_z[leg] - FOOT_RADIUS - ground[leg])
+            ground[leg] += rate * (sole_z[leg] - ground[leg])
             if stance[leg] > 0.5:
                 total += ground[leg]
                 count += 1

@@ -95,9 +95,11 @@ class Controller:
     """
 
     def __init__(self, config: Config) -> None:
-        self.body = RigidBody()
+        robot = config.robot
+        self.body = RigidBody(robot)
         self.weights = qp_weights(config.controller)
         self._sensing = sensing_constants(config)
+        self._robot = robot
         self._acting = acting_constants(config, self.body, self.weights)
 
     def sense(self, memory: Memory | None, state: State, schedule: Schedule, dt: float) -> Sensed:
@@ -111,7 +113,7 @@ class Controller:
         """
         before = initial_memory() if memory is None else memory.flat
         if memory is None:
-            mean, covariance = standing_filter(state)
+            mean, covariance = standing_filter(state, self._robot)
             before[MEMORY.mean], before[MEMORY.covariance] = mean.ravel(), covariance.ravel()
         new, sensed = np.empty(MEMORY_SIZE), np.empty(SENSED_SIZE)
         sense(before, state.row, schedule.row, dt, self._sensing, new, sensed)
@@ -166,7 +168,7 @@ class Controller:
         """
         terms = self.body.terms(sensed.q, sensed.v, memory.load)
         weights = self.weights._replace(mu=self.weights.mu - memory.mu_reduction)
-        return build(terms, sensed.R, sensed.p_foot, goal, weights)
+        return build(terms, sensed.R, sensed.p_foot, goal, weights, self._robot.torque_limit)
 
 
 def _row_of(task: Task, dt: float, new_sample: bool) -> Array:

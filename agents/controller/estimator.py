@@ -16,8 +16,8 @@ from quadriga.agents.controller.maths.rotation import cross, rotation_matrix
 from quadriga.agents.controller.memory import FilterState
 from quadriga.agents.controller.readings import Readings
 from quadriga.shared.config.sections import EstimatorConfig
-from quadriga.shared.robot.a1 import FOOT_RADIUS, STAND_HEIGHT
 from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robot.spec import Geometry, RobotSpec
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import State, Truth
 
@@ -69,6 +69,18 @@ class FilterNoise(NamedTuple):
     leg_velocity: float
 
 
+class FilterBody(NamedTuple):
+    """What the filter knows of the robot.
+
+    Attributes:
+        geometry: of the legs.
+        imu: where the accelerometer is, (3,), m, trunk frame.
+    """
+
+    geometry: Geometry
+    imu: Array
+
+
 N_NOISE: Final = len(FilterNoise._fields)
 
 
@@ -88,12 +100,12 @@ def known_covariance() -> Array:
     return np.diag(_KNOWN)
 
 
-def standing_filter(state: State) -> FilterState:
+def standing_filter(state: State, robot: RobotSpec) -> FilterState:
     """Of a robot that stands still at the origin, its feet where the joints say."""
     R = rotation_matrix(state.imu_quat_wxyz)
-    p_foot, _, _ = leg_kinematics(state.q_joint, state.v_joint)
+    p_foot, _, _ = leg_kinematics(state.q_joint, state.v_joint, robot.geometry)
     mean = np.zeros((6, 3))
-    mean[0, 2] = STAND_HEIGHT
+    mean[0, 2] = robot.stand_height
     mean[2:] = mean[0] + p_foot @ R.T
     return FilterState(mean, known_covariance())
 
@@ -139,10 +151,10 @@ def _update(
 
 
 @compiled
-def _rolling_velocity(R: Array, omega: Array, omega_leg: Array) -> Array:
+def _rolling_velocity(R: Array, omega: Array, omega_leg: Array, foot_radius: float) -> Array:
     """Velocities of stance feet's centres as their spheres roll, (4, 3), m/s, odometry frame."""
     roll_velocity = np.empty((4, 3))
-    up = np.array([0.0, 0.0, FOOT_RADIUS])
+    up = np.array([0.0, 0.0, foot_radius])
     for leg in range(4):
         roll_velocity[leg] = cross(omega + R @ omega_leg[leg], up)
     return roll_velocity
@@ -175,8 +187,28 @@ def _predict(
 
 
 @compiled
+def specific_force_at_origin(accel: Array, gyro: Array, imu: Array) -> Array:
+    """Specific force at the trunk's origin, a − ω × (ω × r), (3,), m/s², trunk frame.
+
+    The term of the angular acceleration is left out: no sensor measures it, and differences of the
+    gyro's samples are noisier than it is large.
+
+    Args:
+        accel: what the accelerometer measures, (3,), m/s², trunk frame.
+        gyro: angular velocity ω, (3,), rad/s, trunk frame.
+        imu: where it is, r, (3,), m, trunk frame.
+    """
+    return accel - cross(gyro, cross(gyro, imu))
+
+
+@compiled
 def filter_step(
-    before: FilterState, readings: Readings, trust: Array, noise: FilterNoise, dt: float
+    before: FilterState,
+    readings: Readings,
+    trust: Array,
+    noise: FilterNoise,
+    body: FilterBody,
+    dt: float,
 ) -> tuple[FilterState, Estimate]:
     """Predict with the accelerometer over `dt`, correct with the leg kinematics.
 
@@ -185,19 +217,20 @@ def filter_step(
         readings: of the sensors.
         trust: in each foot as an anchor, (4,), 0 (swing, unloaded) to 1.
         noise: the filter's.
+        body: what it knows of the robot.
         dt: time since the last tick, s.
 
     Returns:
         The filter now, and what it estimates.
     """
     R = rotation_matrix(readings.quat_wxyz)
-    p_leg, v_leg, omega_leg = leg_kinematics(readings.q_joint, readings.v_joint)
+    p_leg, v_leg, omega_leg = leg_kinematics(readings.q_joint, readings.v_joint, body.geometry)
     state = FilterState(before.mean.copy(), before.covariance.copy())
     mean, covariance = state
-    acceleration = R @ readings.accel
+    acceleration = R @ specific_force_at_origin(readings.accel, readings.gyro, body.imu)
     acceleration[2] -= GRAVITY
     omega = R @ readings.gyro
-    roll_velocity = _rolling_velocity(R, omega, omega_leg)
+    roll_velocity = _rolling_velocity(R, omega, omega_leg, body.geometry.foot_radius)
     _predict(state, acceleration, roll_velocity, trust, noise, dt)
     for leg in range(4):
         reach, foot = R @ p_leg[leg], 2 + leg
@@ -226,18 +259,19 @@ def filter_step(
     return FilterState(mean, 0.5 * (covariance + covariance.T)), estimate
 
 
-def trunk_from_truth(truth: Truth, robot: str, state: State) -> Estimate:
+def trunk_from_truth(truth: Truth, robot: str, state: State, geometry: Geometry) -> Estimate:
     """The estimate the simulator's truth gives, for comparison with the filter's.
 
     Args:
         truth: of a world in which the robot is.
         robot: its name.
         state: what it measures.
+        geometry: of its legs.
     """
     index = truth.robots.index(robot)
     R = rotation_matrix(truth.base_quat_wxyz[index])
     position, velocity = truth.base_pos[index], truth.base_vel[index]
-    p_leg, _, _ = leg_kinematics(state.q_joint, state.v_joint)
+    p_leg, _, _ = leg_kinematics(state.q_joint, state.v_joint, geometry)
     return Estimate(
         position.copy(),
         velocity.copy(),

@@ -17,10 +17,9 @@ from quadriga.agents.controller.swing import (
     swing_reference,
 )
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robot.conventions import GRAVITY, Array, Leg
 from quadriga.shared.runtime.jit import compiled
 
-_LONGEST = 0.37  # m, how far under the hip a foot is lowered; legs end at 0.4
 _SHORTEST = 0.1  # m, how near to the hip a foot is lifted
 _CLEARANCE = 0.03  # m, how far a foot that was stopped still rises
 _BACK = 0.3  # of the speed at which a foot rises in its reflex: away from what stopped it
@@ -41,6 +40,10 @@ class FeetGains(NamedTuple):
         acceleration: greatest of a swing that began anew, m/s².
         track_sinking_trunk: 1 where feet are lowered as seen from a trunk that sinks, and lifted no
             nearer to the hip than legs reach; else 0.
+        under_hip_x: where a foot stands at rest, from the trunk's origin, forwards, m.
+        under_hip_y: likewise, outwards, m.
+        foot_radius: m.
+        reach: how far under the hip a foot is lowered, m.
     """
 
     stance_time: float
@@ -53,14 +56,19 @@ class FeetGains(NamedTuple):
     reflex_lift: float
     acceleration: float
     track_sinking_trunk: float
+    under_hip_x: float
+    under_hip_y: float
+    foot_radius: float
+    reach: float
 
 
 N_FEET_GAINS: Final = len(FeetGains._fields)
 
 
 def feet_gains(config: Config) -> FeetGains:
-    """The gains that a configuration sets."""
-    controller = config.controller
+    """The gains that a configuration sets, of its robot."""
+    controller, robot = config.controller, config.robot
+    under_hip_x, under_hip_y = robot.feet_under_hips[Leg.FL]
     return FeetGains(
         stance_time=1e-3 * config.gait.stance_ms,
         raibert_gain=controller.raibert_gain,
@@ -72,6 +80,10 @@ def feet_gains(config: Config) -> FeetGains:
         reflex_lift=controller.reflex_lift,
         acceleration=controller.swing_acceleration,
         track_sinking_trunk=float(controller.track_sinking_trunk),
+        under_hip_x=float(under_hip_x),
+        under_hip_y=float(under_hip_y),
+        foot_radius=robot.geometry.foot_radius,
+        reach=robot.reach,
     )
 
 
@@ -134,7 +146,7 @@ def update_anchors(
             if switched and stands:
                 goal[leg] = p_foot[leg]
             goal[leg, 2] -= descent - min(0.0, trunk.velocity[2]) * dt
-            goal[leg, 2] = max(goal[leg, 2], trunk.position[2] - _LONGEST)
+            goal[leg, 2] = max(goal[leg, 2], trunk.position[2] - gains.reach)
         elif tracks:
             goal[leg] = p_foot[leg]
 
@@ -248,7 +260,10 @@ def _swing(
     """
     stance_time, k = gains.stance_time, gains.raibert_gain
     remaining = (1.0 - progress) * stance_time
-    target = foothold(leg, trunk.position, trunk.R, motion, remaining, stance_time, k)
+    forwards = 1.0 if leg < 2 else -1.0
+    outwards = 1.0 if leg % 2 == 0 else -1.0
+    under_hip = forwards * gains.under_hip_x, outwards * gains.under_hip_y
+    target = foothold(under_hip, trunk.position, trunk.R, motion, remaining, stance_time, k)
     expected, highest = ground
     share = 1.0 - lift
     apex = highest + gains.swing_height
@@ -258,7 +273,13 @@ def _swing(
     if gains.track_sinking_trunk > 0.5:
         apex = min(apex, max(trunk.position[2] - _SHORTEST, start[2]))
     return swing_reference(
-        start, target, expected, apex, (progress - lift) / share, share * stance_time, gains.delay
+        start,
+        target,
+        expected + gains.foot_radius,
+        apex,
+        (progress - lift) / share,
+        share * stance_time,
+        gains.delay,
     )
 
 

@@ -8,22 +8,22 @@ import pinocchio as pin
 from quadriga.agents.controller.maths.links import link_table
 from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms, rigid_body_terms
 from quadriga.agents.controller.payload_estimate import add_load
-from quadriga.shared.robot.a1 import q_stand
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
+from quadriga.shared.robot.spec import RobotSpec
 
 
-def _single_rigid_body(model: pin.Model) -> tuple[Array, Array]:
-    """Inverse composite inertia about the centre of mass, and that centre."""
+def _single_rigid_body(model: pin.Model, q_joint: Array) -> tuple[Array, Array]:
+    """Inverse composite inertia about the centre of mass, and that centre, in a pose."""
     q, scratch = pin.neutral(model), model.createData()
-    q[7:] = q_stand()
+    q[7:] = q_joint
     pin.ccrba(model, scratch, q, np.zeros(model.nv))
     com = pin.centerOfMass(model, scratch, q)
     return np.linalg.inv(scratch.Ig.inertia), np.array(com)
 
 
 class RigidBody:
-    """What is constant of one A1, taken from Pinocchio's model of its URDF.
+    """What is constant of one robot, taken from Pinocchio's model of its URDF.
 
     Attributes:
         links: `link_table`.
@@ -32,11 +32,11 @@ class RigidBody:
         inertia_inverse: inverse of the inertia about it, trunk frame, (3, 3), 1/(kg·m²).
     """
 
-    def __init__(self) -> None:
-        model = build_pinocchio_model()
+    def __init__(self, robot: RobotSpec) -> None:
+        model = build_pinocchio_model(robot)
         self.links = link_table(model)
         self.mass: float = float(pin.computeTotalMass(model))
-        self.inertia_inverse, self.com = _single_rigid_body(model)
+        self.inertia_inverse, self.com = _single_rigid_body(model, robot.q_stand)
 
     def terms(self, q: Array, v: Array, load: float = 0.0) -> RigidBodyTerms:
         """Terms at Pinocchio's coordinates, (19,) and (18,), of a robot with a load, kg.

@@ -15,6 +15,7 @@ from quadriga.agents.controller.contact import (
 from quadriga.agents.controller.estimator import (
     N_NOISE,
     Estimate,
+    FilterBody,
     FilterNoise,
     filter_noise,
     filter_step,
@@ -28,8 +29,8 @@ from quadriga.agents.controller.readings import readings_of
 from quadriga.agents.controller.schedule import SCHEDULE, phase_of
 from quadriga.agents.controller.sensed import SENSED, feet_of, trunk_of
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import TOTAL_MASS
 from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robot.spec import N_GEOMETRY, Geometry
 from quadriga.shared.runtime.jit import compiled
 
 
@@ -42,6 +43,8 @@ class SensingLayout(NamedTuple):
         load_time: time constant of the load's filter, s; 0: no load is estimated.
         noise: `FilterNoise`.
         rule: `ContactRule`.
+        geometry: `Geometry`.
+        imu: where the accelerometer is, (3,), m, trunk frame.
     """
 
     trust_ramp: int
@@ -49,18 +52,33 @@ class SensingLayout(NamedTuple):
     load_time: int
     noise: slice
     rule: slice
+    geometry: slice
+    imu: slice
 
 
 _CONSTANTS: Final = SensingLayout(
-    **places(trust_ramp=1, least_force=1, load_time=1, noise=N_NOISE, rule=N_CONTACT_RULE)
+    **places(
+        trust_ramp=1,
+        least_force=1,
+        load_time=1,
+        noise=N_NOISE,
+        rule=N_CONTACT_RULE,
+        geometry=N_GEOMETRY,
+        imu=3,
+    )
 )
 
 
+_MASS: Final = _CONSTANTS.geometry.start + Geometry._fields.index("mass")
+
+
 def sensing_constants(config: Config) -> Array:
-    """What `sense` needs of the configuration, see `SensingLayout`."""
-    estimator = config.estimator
+    """What `sense` needs of the configuration and its robot, see `SensingLayout`."""
+    estimator, robot = config.estimator, config.robot
     ahead = [estimator.trust_ramp, estimator.contact_force, config.controller.load_time]
-    return np.concatenate([ahead, filter_noise(estimator), contact_rule(config)])
+    return np.concatenate(
+        [ahead, filter_noise(estimator), contact_rule(config), robot.geometry, robot.imu]
+    )
 
 
 @compiled
@@ -93,7 +111,9 @@ def sense(
         constants[_CONSTANTS.least_force],
     )
     noise = FilterNoise(*numbers(constants[_CONSTANTS.noise], N_NOISE))
-    filtered, estimate = filter_step(filter_state_of(memory0), readings, trust, noise, dt)
+    geometry = Geometry(*numbers(constants[_CONSTANTS.geometry], N_GEOMETRY))
+    body = FilterBody(geometry, constants[_CONSTANTS.imu])
+    filtered, estimate = filter_step(filter_state_of(memory0), readings, trust, noise, body, dt)
     place(memory0, filtered, estimate, schedule, dt, constants, memory, sensed)
 
 
@@ -130,7 +150,7 @@ def place(
     if load_time > 0.0:
         rate = dt / (load_time + dt)
         memory[MEMORY.load] = estimate_load(
-            memory0[MEMORY.load], estimate.foot_force, TOTAL_MASS, rate
+            memory0[MEMORY.load], estimate.foot_force, constants[_MASS], rate
         )
 
 

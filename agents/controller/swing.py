@@ -6,9 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from quadriga.agents.controller.maths.leg_kinematics import hip_neutral
 from quadriga.agents.controller.maths.rotation import heading
-from quadriga.shared.robot.a1 import FOOT_RADIUS
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
@@ -32,7 +30,7 @@ class MotionReference(NamedTuple):
 
 @compiled
 def foothold(
-    leg: int,
+    under_hip: tuple[float, float],
     position: Array,
     R: Array,
     motion: MotionReference,
@@ -45,7 +43,7 @@ def foothold(
     v is the expected velocity; the hip's own velocity from the yaw rate is added to it.
 
     Args:
-        leg: which.
+        under_hip: point of the trunk under which the foot stands at rest, m, trunk frame.
         position: of the trunk's origin, (3,), m, odometry frame.
         R: trunk to odometry frame, (3, 3).
         motion: of the trunk.
@@ -53,9 +51,9 @@ def foothold(
         stance_time: T_stance, s.
         gain: k, s.
     """
-    hip = hip_neutral()[leg]
+    x, y = under_hip
     c, s = heading(R)
-    rx, ry = c * hip[0] - s * hip[1], s * hip[0] + c * hip[1]
+    rx, ry = c * x - s * y, s * x + c * y
     ahead = remaining + 0.5 * stance_time
     velocity, v_des, wz = motion
     out = np.empty(2)
@@ -99,7 +97,7 @@ def swing_reference(
     Args:
         start: where the foot left the ground, (3,), m.
         target: foothold, (2,), m.
-        ground: expected ground height at the foothold, m.
+        ground: height of a foot's centre that stands on the expected ground, m.
         apex: height of the foot's centre at mid-swing, m.
         progress: progress of swing in [0, 1).
         duration: swing time, s.
@@ -117,7 +115,7 @@ def swing_reference(
         out[1, axis] = step * slope
         out[2, axis] = step * bend
     # Bézier of degree five with doubled end points: zero vertical speed at both ends.
-    end = ground + FOOT_RADIUS - _PENETRATION
+    end = ground - _PENETRATION
     middle = (32.0 * apex - 6.0 * start[2] - 6.0 * end) / 20.0
     points = np.array([start[2], start[2], middle, middle, end, end])
     for order in range(3):

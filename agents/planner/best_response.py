@@ -22,7 +22,10 @@ def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
     n, phase = predictor.meta.robots, phase_of(config, step, predictor.phases)
     problems = [
         build_problem(
-            config.planner, predictor.future_block(i, i, phase), horizon_stance(config, i, step)
+            config.planner,
+            config.robot.weight,
+            predictor.future_block(i, i, phase),
+            horizon_stance(config, i, step),
         )
         for i in range(n)
     ]

@@ -13,7 +13,16 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorFileError
 
 # Fields of the meta that must be as configured, beside the controller's keys.
-_MATCHED: Final = ("robots", "stance_ms", "alternate_phase", "yokes", "interface", "N", "T_ini")
+_MATCHED: Final = (
+    "robots",
+    "robot",
+    "stance_ms",
+    "alternate_phase",
+    "yokes",
+    "interface",
+    "N",
+    "T_ini",
+)
 
 
 def load_checked(path: Path, config: Config) -> tuple[Predictor, Provenance]:

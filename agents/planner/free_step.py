@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.agents.gait import NOMINAL_FORCES
 from quadriga.agents.planner.planner_qp import PlannerProblem
 from quadriga.agents.planner.qp_solver import ClosedForm, minimise_freely
 from quadriga.agents.plausibility import OUTPUT_MAX
@@ -66,13 +65,16 @@ class FreeStep:
         problem: the QP; no bound of it depends on the free response.
         closed: its closed form.
         nominal: nominal forces of the horizon, (N, 12), N.
+        table: `nominal_table` of the robot.
     """
 
-    def __init__(self, problem: PlannerProblem, closed: ClosedForm, nominal: Array) -> None:
+    def __init__(
+        self, problem: PlannerProblem, closed: ClosedForm, nominal: Array, table: Array
+    ) -> None:
         self.residuals = closed.residuals
         condensed = problem.condensed
         self._prediction = _Prediction(
-            condensed.Y_past, condensed.Y_v, problem.columns, nominal, NOMINAL_FORCES
+            condensed.Y_past, condensed.Y_v, problem.columns, nominal, table
         )
         self._minimiser = _Minimiser(
             problem.gradient, closed.minus_inverse, problem.lower, problem.upper, problem.slope

@@ -13,9 +13,8 @@ from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.regression import scaled_blocks
 from quadriga.agents.time_grid import gait_phase, horizon_stance, phase_of, walking_steps
-from quadriga.shared.config.sections import Config, ControllerConfig
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import TOTAL_MASS
 from quadriga.shared.robot.conventions import N_LEGS, N_OUTPUTS, OUTPUTS, Array
 from quadriga.shared.wire.topics import SAMPLE_MS
 
@@ -114,7 +113,7 @@ def height_gains(config: Config, predictor: Predictor) -> Array:
     from 1 counts. Shape (n, 2): robot, time of `_GAIN_TIMES`.
     """
     N, n = predictor.meta.N, predictor.meta.robots
-    physical = physical_height(config.controller, predictor.meta.interface, N)
+    physical = physical_height(config, predictor.meta.interface, N)
     rows = [min(round(1000 * time / SAMPLE_MS), N) - 1 for time in _GAIN_TIMES]
     by_phase: dict[int, list[int]] = {}
     for step in walking_steps(config):
@@ -135,7 +134,7 @@ def height_gains(config: Config, predictor: Predictor) -> Array:
     return greatest
 
 
-def physical_height(controller: ControllerConfig, interface: str, N: int) -> Array:
+def physical_height(config: Config, interface: str, N: int) -> Array:
     """Height response to the test force at the ends of N samples. Shape (N,), m.
 
     The low level closes its loop on the height, a = −kp z − kd z' − ki ∫z. "feedforward" adds
@@ -143,16 +142,17 @@ def physical_height(controller: ControllerConfig, interface: str, N: int) -> Arr
     for against a: on two stance legs γ₂/2·|f − f_des|² + γ₃/2·(z'' − a)² is least at
     z'' = α F/m + (1 − α) a with α = 1/(1 + 2 γ₃/(γ₂ m²)).
     """
+    controller, mass = config.controller, config.robot.mass
     passed = 1.0
     share = 1.0
     if interface == "force":
-        stiffness = 2.0 * controller.gamma_defect / (controller.gamma_force * TOTAL_MASS**2)
+        stiffness = 2.0 * controller.gamma_defect / (controller.gamma_force * mass**2)
         passed = 1.0 / (1.0 + stiffness)
         share = 1.0 - passed
     gains = (controller.ki_z, controller.kp_z, controller.kd_z)
     A = np.zeros((4, 4))  # ∫z, z, z', 1
     A[0, 1] = A[1, 2] = 1.0
-    A[2, 3] = passed * _GAIN_FORCE / TOTAL_MASS
+    A[2, 3] = passed * _GAIN_FORCE / mass
     A[2, :3] = -share * np.array(gains)
     step = linalg.expm(A * SAMPLE_MS / 1000.0)
     state = np.array([0.0, 0.0, 0.0, 1.0])

@@ -189,7 +189,9 @@ class Neighbours:
         du = np.zeros((planner.N, N_FORCES))
         skipped = planner.applied * (end - newest.step) if newest is not None else planner.N
         if newest is not None and skipped < planner.N:
-            nominal = nominal_forces(horizon_stance(config, index, newest.step))
+            nominal = nominal_forces(
+                horizon_stance(config, index, newest.step), config.robot.weight
+            )
             du[: planner.N - skipped] = (newest.u - nominal)[skipped:]
         step = newest.step if newest is not None else None
         return PeerData(robot, index, status, step, max(age, 0), known, du_ini, y_ini, du)
@@ -198,7 +200,7 @@ class Neighbours:
         self, index: int, history: PeerHistory, plans: list[Plan], last: int, end: int
     ) -> tuple[NDArray[np.bool_], Array, Array]:
         """The T_ini samples that end at step `end`: measured, else as the peer planned them."""
-        T_ini = self._config.planner.T_ini
+        T_ini, weight = self._config.planner.T_ini, self._config.robot.weight
         first_tick = end * step_ms(self._config) - SAMPLE_MS * (T_ini - 1)
         known = np.zeros(T_ini, dtype=np.bool_)
         du, y = np.zeros((T_ini, N_FORCES)), np.zeros((T_ini, N_OUTPUTS))
@@ -209,7 +211,7 @@ class Neighbours:
                 measured[place] = sample
         if len(measured) < T_ini:
             ticks = sample_starts(first_tick - SAMPLE_MS, T_ini)
-            nominal = nominal_forces(scheduled_stance(self._config, index, ticks))
+            nominal = nominal_forces(scheduled_stance(self._config, index, ticks), weight)
             for plan in plans:  # ascending, so that a newer plan overwrites older ones
                 ahead = (ticks - plan.tick) // SAMPLE_MS
                 covered = (ahead >= 0) & (ahead < len(plan.u))
@@ -221,7 +223,7 @@ class Neighbours:
             samples = list(measured.values())
             known[places] = True
             stance = np.array([sample.stance for sample in samples]) > 0.5
-            du[places] = np.array([sample.u for sample in samples]) - nominal_forces(stance)
+            du[places] = np.array([sample.u for sample in samples]) - nominal_forces(stance, weight)
             y[places] = [sample.y for sample in samples]
         return known, du, y
 

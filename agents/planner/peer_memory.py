@@ -73,7 +73,7 @@ def remember(
 def _is_usable_measurement(config: Config, measurement: Measurement, now: int) -> bool:
     if not _is_on_grid(config, measurement.tick, SAMPLE_MS, now):
         return False
-    return is_plausible(config.planner, measurement.u, measurement.y)
+    return is_plausible(config, measurement.u, measurement.y)
 
 
 def _is_usable_plan(config: Config, plan: Plan, now: int) -> bool:
@@ -81,7 +81,7 @@ def _is_usable_plan(config: Config, plan: Plan, now: int) -> bool:
         return False
     if plan.step * step_ms(config) != plan.tick or len(plan.u) != config.planner.N:
         return False
-    return is_plausible(config.planner, plan.u, plan.y)
+    return is_plausible(config, plan.u, plan.y)
 
 
 def _is_on_grid(config: Config, tick: int, grid_ms: int, now: int) -> bool:

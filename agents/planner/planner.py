@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.agents.gait import nominal_forces
+from quadriga.agents.gait import nominal_forces, nominal_table
 from quadriga.agents.planner.free_step import FreeStep, OwnWindow
 from quadriga.agents.planner.neighbours import PeerSelection
 from quadriga.agents.planner.peer_terms import Peers, PeerTerms
@@ -46,6 +46,7 @@ class PlannerInputs:
         y_base_ini: base of the outputs (`output_base`) at the ends of these samples, (T_ini, 6).
         y_base: base over the horizon, at the ends of its N samples, (N, 6).
         y_des: desired outputs over the horizon, (N, 6).
+        weight: of the robot, N.
     """
 
     step: int
@@ -55,10 +56,11 @@ class PlannerInputs:
     y_base_ini: Array
     y_base: Array
     y_des: Array
+    weight: float
 
     def past(self) -> Array:
         """Deviations [u_ini; y_ini]. Shape (18 T_ini,)."""
-        du = self.u_ini - nominal_forces(self.stance_ini)
+        du = self.u_ini - nominal_forces(self.stance_ini, self.weight)
         return np.concatenate([du.ravel(), (self.y_ini - self.y_base_ini).ravel()])
 
 
@@ -244,12 +246,15 @@ class Planner:
         return setup
 
     def _build_setup(self, step: int, G_ii: Array) -> _Setup:
-        past = self._predictor.meta.past
+        past, weight = self._predictor.meta.past, self._config.robot.weight
         stance = horizon_stance(self._config, self._index, step)
-        problem = build_problem(self._config.planner, G_ii[:, past:], stance, G_ii[:, :past])
-        solver, nominal = SOLVERS[self._config.planner.solver](problem), nominal_forces(stance)
+        problem = build_problem(
+            self._config.planner, weight, G_ii[:, past:], stance, G_ii[:, :past]
+        )
+        solver = SOLVERS[self._config.planner.solver](problem)
+        nominal = nominal_forces(stance, weight)
         closed = None if self._config.planner.damping else solver.closed_form
-        free = None if closed is None else FreeStep(problem, closed, nominal)
+        free = None if closed is None else FreeStep(problem, closed, nominal, nominal_table(weight))
         return _Setup(problem, solver, nominal, free)
 
 

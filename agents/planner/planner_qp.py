@@ -131,22 +131,27 @@ def condense(
 
 
 def build_problem(
-    config: PlannerConfig, G_u: Array, stance: NDArray[np.bool_], G_past: Array | None = None
+    config: PlannerConfig,
+    weight: float,
+    G_u: Array,
+    stance: NDArray[np.bool_],
+    G_past: Array | None = None,
 ) -> PlannerProblem:
     """The QP of eq. 12 (one agent) or eq. 7 (a team) for one stance pattern of the horizon.
 
     Args:
         config: weights, friction, bounds.
+        weight: of one robot, N.
         G_u: columns that multiply the future forces, shape (6 N n, 12 N n).
         stance: scheduled stance over the horizon, shape (N n, 4).
         G_past: columns that multiply the past, shape (6 N n, P); None: without a past.
     """
     past = np.zeros((len(G_u), 0)) if G_past is None else G_past
-    return constrain(config, condense(config, past, G_u, stance), stance)
+    return constrain(config, weight, condense(config, past, G_u, stance), stance)
 
 
 def constrain(
-    config: PlannerConfig, condensed: Condensed, stance: NDArray[np.bool_]
+    config: PlannerConfig, weight: float, condensed: Condensed, stance: NDArray[np.bool_]
 ) -> PlannerProblem:
     """Add friction cone, force bounds and output bounds to a cost.
 
@@ -158,7 +163,7 @@ def constrain(
     feet = len(columns) // 3
     c = config.mu / np.sqrt(2.0)
     pyramid = np.array([[1.0, 0.0, -c], [-1.0, 0.0, -c], [0.0, 1.0, -c], [0.0, -1.0, -c]])
-    nominal = nominal_forces(stance).reshape(-1)[columns].reshape(feet, 3)
+    nominal = nominal_forces(stance, weight).reshape(-1)[columns].reshape(feet, 3)
     box = np.tile(config.deviation_max, (feet, 1))
     low = -box
     low[:, 2] = np.maximum(low[:, 2], config.force_min - nominal[:, 2])

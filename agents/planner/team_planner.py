@@ -81,7 +81,7 @@ class TeamPlanner:
         du, dy = unpack(problem, solution.x, y_free)
         return TeamResult(
             SOLVED if solution.status == SOLVED else with_detail(NOMINAL, solution.status),
-            (nominal_forces(stance) + du).reshape(n, N, -1),
+            (nominal_forces(stance, self._config.robot.weight) + du).reshape(n, N, -1),
             (base + dy).reshape(n, N, -1),
             solution.residuals,
         )
@@ -95,7 +95,7 @@ class TeamPlanner:
         entry = self._problems.get(key)
         if entry is None:
             condensed = self._formulation(key[0], stance)
-            problem = constrain(self._config.planner, condensed, stance)
+            problem = constrain(self._config.planner, self._config.robot.weight, condensed, stance)
             entry = problem, SOLVERS[self._config.planner.solver](problem)
             self._problems[key] = entry
         return entry

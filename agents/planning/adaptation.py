@@ -80,9 +80,9 @@ class Adapter:
         T_ini, gait = self._config.planner.T_ini, self._config.gait
         stance = np.array([sample.stance for sample in own]) > 0.5
         u, y = np.array([sample.u for sample in own]), np.array([sample.y for sample in own])
-        if not is_plausible(self._config.planner, u, y):
+        if not is_plausible(self._config, u, y):
             return known.refuse()
-        du, dy = u - nominal_forces(stance), y - y_base
+        du, dy = u - nominal_forces(stance, self._config.robot.weight), y - y_base
         z = np.zeros((self._predictor.meta.robots, self._predictor.meta.width))
         z[self._index] = np.concatenate(
             [du[:T_ini].ravel(), dy[:T_ini].ravel(), du[T_ini:].ravel()]

@@ -55,10 +55,10 @@ def base_of_samples(
     config: Config, end: int, count: int, references: tuple[Reference, ...], now: int | None = None
 ) -> Array:
     """The same for the last `count` samples, shape (count, 6)."""
-    interface, height = config.planner.interface, config.reference.height
+    height = config.reference.height
     ticks = range(end - SAMPLE_MS * (count - 1), end + 1, SAMPLE_MS)
     known = [tick if now is None else min(tick, now) for tick in ticks]
     first, last = (reference_at(references, tick, height)[0] for tick in (known[0], known[-1]))
     if first is last:  # as nearly always
-        return np.tile(output_base(interface, last), (len(known), 1))
-    return np.array([output_base(interface, reference_at(references, t, height)[0]) for t in known])
+        return np.tile(output_base(config, last), (len(known), 1))
+    return np.array([output_base(config, reference_at(references, t, height)[0]) for t in known])

@@ -126,7 +126,8 @@ class RemotePlanning:
 
     def _deviation(self, plan: Plan) -> Array:
         """What a plan adds to the nominal forces. Shape (N, 12), N."""
-        du: Array = plan.u - nominal_forces(horizon_stance(self._config, self._index, plan.step))
+        stance = horizon_stance(self._config, self._index, plan.step)
+        du: Array = plan.u - nominal_forces(stance, self._config.robot.weight)
         return du
 
     def _take(

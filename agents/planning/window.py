@@ -41,6 +41,7 @@ def build_planner_inputs(
         y_ini=np.array([sample.y for sample in window]),
         stance_ini=np.array([sample.stance for sample in window]) > 0.5,
         y_base_ini=base_of_window(config, end, references),
-        y_base=np.tile(output_base(planner.interface, now), (planner.N, 1)),
+        y_base=np.tile(output_base(config, now), (planner.N, 1)),
         y_des=np.tile(commanded_outputs(now), (planner.N, 1)),
+        weight=config.robot.weight,
     )

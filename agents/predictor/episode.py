@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import STAND_HEIGHT
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.wire.messages import Reference
 
@@ -90,14 +90,14 @@ class Episode:
         return z, y[:, T_ini:].reshape(n, -1, count)
 
 
-def output_base(interface: str, reference: Reference) -> Array:
+def output_base(config: Config, reference: Reference) -> Array:
     """The outputs that deviations are counted from while `reference` is in force. Shape (6,).
 
     With the interface "feedforward" the low level already follows the reference, so the base is the
     commanded outputs; with "force" the base is standing still at nominal height.
     """
-    if interface == "force":
-        return np.array([STAND_HEIGHT, 0.0, 0.0, 0.0, 0.0, 0.0])
+    if config.planner.interface == "force":
+        return np.array([config.robot.stand_height, 0.0, 0.0, 0.0, 0.0, 0.0])
     return commanded_outputs(reference)
 
 

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from quadriga.shared.config.later import LATER_KEYS
 from quadriga.shared.config.renamed import with_current_names, with_first_names
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
@@ -14,6 +15,9 @@ from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 
 # Keys of the controller that act only in a failure and do not change the plant that is fitted.
 _SAFETY_KEYS: Final = ("damping", "fall_tilt", "max_failures")
+
+
+_FIRST_ROBOT: Final[str] = LATER_KEYS["team.robot"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +45,7 @@ class PredictorMeta:
     phase_ridge: float
     neighbours: str
     stand_ms: int  # where the gait's period, and with it phase 0, begins
+    robot: str = _FIRST_ROBOT
 
     @classmethod
     def of(cls, config: Config) -> PredictorMeta:
@@ -63,14 +68,17 @@ class PredictorMeta:
             phase_ridge=ident.phase_ridge,
             neighbours=ident.neighbours,
             stand_ms=config.gait.stand_ms,
+            robot=config.team.robot,
         )
 
     def to_dict(self) -> dict[str, Any]:
         """A dictionary that can be written as JSON, with the controller's keys as first named.
 
-        So renaming a key changes neither a predictor's file nor its digest.
+        The robot is left out if it is the one that all predictors were of once. So neither a new
+        name nor that key changes a predictor's file or its digest.
         """
-        return asdict(self) | with_first_names({"controller": dict(self.controller)})
+        body = asdict(self) | with_first_names({"controller": dict(self.controller)})
+        return {k: v for k, v in body.items() if (k, v) != ("robot", _FIRST_ROBOT)}
 
     @classmethod
     def from_dict(cls, body: dict[str, Any]) -> PredictorMeta:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from quadriga.identification.behaviour import behaviour
-from quadriga.shared.config.renamed import with_first_names
+from quadriga.shared.config.later import hashed_sections
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.runtime.clock import monotonic, sleep
@@ -32,7 +32,7 @@ def data_key(config: Config) -> str:
     ident = {k: v for k, v in asdict(config.identification).items() if k not in _FITTED}
     horizon = ("T_ini", "N") if config.identification.seconds == 0 else ()
     sections: dict[str, Any] = {
-        "team": {k: team[k] for k in ("robots", "yokes", "spacing", "alternate_phase")},
+        "team": {k: team[k] for k in ("robots", "robot", "yokes", "spacing", "alternate_phase")},
         "sensors": asdict(config.sensors),
         "estimator": asdict(config.estimator),
         "gait": asdict(config.gait),
@@ -43,7 +43,7 @@ def data_key(config: Config) -> str:
     }
     code = behaviour("quadriga.identification.sample_collection")
     libraries = {name: version(name) for name in _LIBRARIES}
-    return _digest([with_first_names(sections), code, libraries])
+    return _digest([hashed_sections(sections), code, libraries])
 
 
 def predictor_key(config: Config) -> str:
@@ -54,7 +54,7 @@ def predictor_key(config: Config) -> str:
         "planner": {k: planner[k] for k in ("N", "T_ini", "applied", "Q", "R", "interface")},
     }
     code = behaviour("quadriga.identification.sample_fits")
-    return _digest([data_key(config), with_first_names(sections), code])
+    return _digest([data_key(config), hashed_sections(sections), code])
 
 
 def predictor_path(config: Config) -> Path:

@@ -118,6 +118,7 @@ def collect_episode(config: Config, number: int, seconds: float) -> Episode | No
     rollout = Rollout(collection_config(config, seed), None, walk.reference, walk.excitation)
     names = robot_names(config.team.robots)
     u, u_nominal, y, y_base = [], [], [], []
+    weight = config.robot.weight
     first = config.gait.stand_ms + SAMPLE_MS
     gave_up = False  # an agent that gave up ends the episode as a fall does
     for tick in rollout.ticks(walk.ticks + 1):
@@ -129,9 +130,9 @@ def collect_episode(config: Config, number: int, seconds: float) -> Episode | No
         measurements = [tick.outputs[name].measurement for name in names]
         samples = [sample for sample in measurements if sample is not None]
         u.append([sample.u for sample in samples])
-        u_nominal.append([nominal_forces(sample.stance > 0.5) for sample in samples])
+        u_nominal.append([nominal_forces(sample.stance > 0.5, weight) for sample in samples])
         y.append([sample.y for sample in samples])
-        base = output_base(config.planner.interface, walk.reference_at(tick.tick))
+        base = output_base(config, walk.reference_at(tick.tick))
         y_base.append([base] * len(names))
     keep = len(u) - _BEFORE_FALL if gave_up or rollout.world.fallen() else len(u)
     if keep * SAMPLE_MS < 1e3 * min(_LEAST_EPISODE_S, seconds):

@@ -63,7 +63,7 @@ def linear_episode(config: Config, samples: int, seed: int) -> Episode:
     stance = np.stack(
         [scheduled_stance(config, i, sample_starts(first, samples)) for i in range(n)], axis=1
     )
-    nominal = nominal_forces(stance)
+    nominal = nominal_forces(stance, config.robot.weight)
     du = du.reshape(samples, n, N_FORCES) * U_SCALE
     base = np.zeros((samples, n, N_OUTPUTS))
     return Episode(

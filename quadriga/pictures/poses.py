@@ -14,7 +14,6 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import q_stand
 from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import State, Truth
@@ -94,7 +93,7 @@ def read_poses(recording: Recording, ticks: Ticks) -> Poses:
     if np.isnan(qpos[..., :7]).any():
         raise RecordingError(str(recording.path), "instants without sim/truth", "truth every 10 ms")
     # A robot whose state was lost at an instant is shown standing.
-    qpos[..., 7:] = np.where(np.isnan(qpos[..., 7:]), q_stand(), qpos[..., 7:])
+    qpos[..., 7:] = np.where(np.isnan(qpos[..., 7:]), config.robot.q_stand, qpos[..., 7:])
     return Poses(config, ticks, qpos.reshape(len(ticks), -1), grf)
 
 
@@ -112,6 +111,7 @@ class PosedTeam:
     """The team's model, to be put into recorded poses."""
 
     def __init__(self, config: Config) -> None:
+        self.config = config
         self.team: TeamModel = build_team_model(config)
         self.model = self.team.model
         self.physics = mujoco.MjData(self.model)

@@ -13,15 +13,10 @@ from PIL import Image
 from quadriga.pictures.frames import FRAME, save_sheet, sheet_ticks
 from quadriga.pictures.poses import PosedTeam, read_poses, truth_ticks
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import TRUNK_BOX
 from quadriga.shared.robot.conventions import Array
 
 _DPI: Final = 100
-_CORNERS: Final = (
-    0.5
-    * np.array(TRUNK_BOX)
-    * np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0], [1, 1, 0]])
-)
+_CORNERS: Final = 0.5 * np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0], [1, 1, 0]])
 
 
 def draw_stick_figures(run_dir: Path) -> None:
@@ -51,7 +46,8 @@ def _picture(team: PosedTeam, centre: Array, radius: float) -> Image.Image:
     trunks = [team.physics.body(f"{name}/trunk") for name in team.names]
     for i, (trunk, legs) in enumerate(zip(trunks, team.legs(), strict=True)):
         colour = team.model.geom(f"{team.names[i]}/trunk").rgba[:3]
-        corners = trunk.xpos + _CORNERS @ trunk.xmat.reshape(3, 3).T
+        box = np.array(team.config.robot.trunk_box)
+        corners = trunk.xpos + (box * _CORNERS) @ trunk.xmat.reshape(3, 3).T
         axes.plot(*corners.T, color=colour, linewidth=3)
         for leg in legs:
             axes.plot(*leg.T, color="0.25", linewidth=1.5, marker=".", markersize=3)

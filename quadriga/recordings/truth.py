@@ -62,9 +62,10 @@ def build_truth_trace(messages: Sequence[Truth], config: Config) -> TruthTrace:
     roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
     cos, sin = np.cos(yaw), np.sin(yaw)
+    feet = config.robot.feet_under_hips
     terrain = build_terrain(config, formation(n, config.team.spacing))
     outputs = [
-        pos[..., 2] - terrain.height_under_hips(pos[..., 0], pos[..., 1], yaw),
+        pos[..., 2] - terrain.height_under_hips(pos[..., 0], pos[..., 1], yaw, feet),
         cos * vel[..., 0] + sin * vel[..., 1],
         cos * vel[..., 1] - sin * vel[..., 0],
         roll, pitch, stack(messages, "base_omega", n, 3)[..., 2],

@@ -25,7 +25,6 @@ import numpy as np
 from quadriga.agents.agent import Agent, AgentState, Inputs, StepProblems
 from quadriga.agents.planner.qp_solver import SolvedQp
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.robot.a1 import TORQUE_LIMIT
 from quadriga.shared.robot.conventions import Array
 
 WHOLE_BODY: Final = "command"  # the topic that is made of it
@@ -102,7 +101,7 @@ def problems_of(agent: Agent, before: AgentState, inputs: Inputs, about: str) ->
 
 def _save_whole_body(problems: StepProblems, about: str) -> SavedQp:
     qp, answer = problems.whole_body, problems.whole_body_solution
-    box = np.full(len(qp.H), TORQUE_LIMIT)
+    box = qp.tau_max
     return SavedQp(
         qp.H,
         qp.g,

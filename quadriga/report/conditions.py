@@ -121,7 +121,9 @@ def share_at_limit(run: Run, index: int, plan: Plan) -> float:
         return 0.0
     starts = plan.tick + SAMPLE_MS * np.arange(applied)
     u = plan.u[:applied]
-    nominal = nominal_forces(scheduled_stance(run.traces.config, index, starts))
+    nominal = nominal_forces(
+        scheduled_stance(run.traces.config, index, starts), run.traces.config.robot.weight
+    )
     limit = _AT_LIMIT * np.tile(planner.deviation_max, N_LEGS)
     forces = u.reshape(-1, N_LEGS, 3)
     sideways = np.abs(forces[..., :2]).max(axis=-1)

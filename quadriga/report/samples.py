@@ -15,8 +15,8 @@ from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import Ticks, stack, ticks_of
 from quadriga.shared.errors import MessageError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import FOOT_RADIUS, TORQUE_LIMIT
 from quadriga.shared.robot.conventions import N_FORCES, N_LEGS, Array, robot_names
+from quadriga.shared.robot.spec import Geometry
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Measurement, State
 from quadriga.shared.wire.topics import MEASUREMENT, SAMPLE_MS, STATE, topic_of
@@ -85,7 +85,7 @@ def _build_samples(
         scheduled_stance(traces.config, index, tick - SAMPLE_MS),
     )
     contact = force > traces.config.controller.contact_force
-    truth = traces.truth
+    truth, robot = traces.truth, traces.config.robot
     if len(truth.tick):
         contact = _look_up(tick, truth.tick, truth.grf[:, index, :, 2] > _LOADED, contact)
     _, x, y, _ = np.moveaxis(quat, -1, 0)
@@ -93,8 +93,10 @@ def _build_samples(
         tick=tick,
         tilt=np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)),
         foot_force=force,
-        foot_speed=_compute_foot_speed(states, _find_velocity(traces, index, tick)),
-        torque=np.abs(stack(states, "tau_joint", N_FORCES)).max(axis=1, initial=0.0) / TORQUE_LIMIT,
+        foot_speed=_compute_foot_speed(states, _find_velocity(traces, index, tick), robot.geometry),
+        torque=(np.abs(stack(states, "tau_joint", N_FORCES)) / robot.torque_limit).max(
+            axis=1, initial=0.0
+        ),
         stance=stance,
         contact=contact,
     )
@@ -111,13 +113,13 @@ def _find_velocity(traces: Traces, index: int, tick: Ticks) -> Array:
     return true
 
 
-def _compute_foot_speed(states: Sequence[State], velocity: Array) -> Array:
+def _compute_foot_speed(states: Sequence[State], velocity: Array, geometry: Geometry) -> Array:
     """Horizontal speed of the lowest point of each foot. Shape (M, 4), m/s."""
     speed = np.zeros((len(states), N_LEGS))
     for k, state in enumerate(states):
-        p_foot, v_foot, omega_calf = leg_kinematics(state.q_joint, state.v_joint)
+        p_foot, v_foot, omega_calf = leg_kinematics(state.q_joint, state.v_joint, geometry)
         tilt = _compute_tilt_rotation(state.imu_quat_wxyz)
-        down = tilt.T @ np.array([0.0, 0.0, -FOOT_RADIUS])
+        down = tilt.T @ np.array([0.0, 0.0, -geometry.foot_radius])
         rolling = np.cross(omega_calf + state.imu_gyro, down)
         relative = (np.cross(state.imu_gyro, p_foot) + v_foot + rolling) @ tilt.T
         speed[k] = np.hypot(*(relative[:, :2] + velocity[k]).T)

@@ -15,6 +15,7 @@ from quadriga.shared.config.reference_trace import ROW_END, inline_trace
 from quadriga.shared.config.renamed import RENAMED
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean, name_file_errors
+from quadriga.shared.robot.robots import ROBOTS
 
 
 def load(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
@@ -72,7 +73,7 @@ def overlay(given: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, An
 
 
 def build(given: Mapping[str, Any]) -> Config:
-    """The configuration with these values; the presets', then the defaults, for the rest.
+    """The configuration with these values; for the rest the presets', the robot's, the defaults.
 
     Raises:
         ConfigError: see `load`.
@@ -81,6 +82,7 @@ def build(given: Mapping[str, Any]) -> Config:
         keys = given.get(section, {})
         if isinstance(keys, dict):
             given = {**given, section: {**presets.get(str(keys.get("preset")), {}), **keys}}
+    given = _with_robots_values(given)
     known = {item.name: item for item in fields(Config)}
     for section in given.keys() - known.keys():
         raise _unknown_name(section, list(known), "a section")
@@ -89,6 +91,21 @@ def build(given: Mapping[str, Any]) -> Config:
     )
     check(config)
     return config
+
+
+def _with_robots_values(given: Mapping[str, Any]) -> Mapping[str, Any]:
+    """`given` with what the robot has beneath; a kind that there is not is refused later."""
+    team = given.get("team", {})
+    kind = team.get("robot") if isinstance(team, dict) else None
+    if not isinstance(kind, str) or kind not in ROBOTS:
+        return given
+    filled = dict(given)
+    for name, value in ROBOTS[kind].defaults.items():
+        section, _, key = name.partition(".")
+        keys = filled.get(section, {})
+        if isinstance(keys, dict):
+            filled[section] = {key: value, **keys}
+    return filled
 
 
 def parse_assignment(text: str, option: str = "--set") -> tuple[str, Any]:

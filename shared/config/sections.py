@@ -10,6 +10,8 @@ from quadriga.shared.config.planner import CENTRAL, PlannerConfig
 from quadriga.shared.config.reference import ReferenceConfig
 from quadriga.shared.config.team import BusConfig, RecorderConfig, RuntimeConfig, TeamConfig
 from quadriga.shared.config.world import SensorsConfig, WorldConfig
+from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robot.spec import RobotSpec
 
 __all__ = [
     "CENTRAL",
@@ -45,3 +47,8 @@ class Config:
     reference: ReferenceConfig = field(default_factory=ReferenceConfig)
     recorder: RecorderConfig = field(default_factory=RecorderConfig)
     runtime: RuntimeConfig = field(default_factory=RuntimeConfig)
+
+    @property
+    def robot(self) -> RobotSpec:
+        """The kind of robot that the team is made of."""
+        return ROBOTS[self.team.robot]

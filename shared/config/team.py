@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from quadriga.shared.config.key import key
+from quadriga.shared.robot.robots import ROBOTS
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,6 +14,7 @@ class TeamConfig:
 
     name: str = key("team", "-", "first part of every key; teams on one network need own names")
     robots: int = key(3, "1", "number of robots r1 … rn", low=1, high=10)
+    robot: str = key("a1", "-", "kind of all robots of the team", choices=tuple(ROBOTS))
     yokes: str = key(
         "complete", "-", "which pairs are yoked", choices=("complete", "chain", "ring")
     )

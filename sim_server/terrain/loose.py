@@ -11,7 +11,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.shared.robot.a1 import FOOT_RADIUS
 from quadriga.shared.robot.conventions import Array
 from quadriga.sim_server.terrain.pebbles import SIZES, Pebbles
 
@@ -33,8 +32,10 @@ class LooseStones:
             the stone, because a stone that appears inside a foot would throw it away.
     """
 
-    def __init__(self, pebbles: Pebbles, model: Any, physics: Any, robots: int) -> None:
-        """Take over the bodies that `Pebbles.add_to` has added last."""
+    def __init__(
+        self, pebbles: Pebbles, model: Any, physics: Any, robots: int, foot_radius: float
+    ) -> None:
+        """Take over the bodies that `Pebbles.add_to` has added last; the feet's radius in m."""
         self._parked = pebbles.parking_poses(robots)
         count = len(self._parked)
         self._q = physics.qpos[-7 * count :].reshape(count, 7)
@@ -42,9 +43,9 @@ class LooseStones:
         self._warm = physics.qacc_warmstart[-6 * count :].reshape(count, 6)
         self._weightless = model.body_gravcomp[-count:]
         self._size, self._of_size = pebbles.size, np.arange(count) * len(SIZES) // count
-        self._touching = FOOT_RADIUS + pebbles.reach
+        self._touching = foot_radius + pebbles.reach
         self._near = self._touching + _MARGIN
-        self._on_top = 2.0 * float(pebbles.half[:, 2].max()) + FOOT_RADIUS
+        self._on_top = 2.0 * float(pebbles.half[:, 2].max()) + foot_radius
         self.pose = pebbles.pose.copy()
         self.stone_of = np.full(count, _NOBODY)
         self.without = 0

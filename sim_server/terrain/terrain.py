@@ -28,10 +28,6 @@ _STREAM: Final = 1  # of the seed: the sensors draw from another one
 _PLANE: Final = "plane"  # materials
 _EARTH: Final = "earth"
 _Colour = tuple[float, float, float]
-# Where the feet stand under the hips, trunk frame, from the URDF: x and y of FL FR RL RR, m.
-_FEET: Final = np.array(
-    [[0.1805, 0.1308], [0.1805, -0.1308], [-0.1805, 0.1308], [-0.1805, -0.1308]]
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,18 +51,19 @@ class Terrain:
         """Height of the ground at world positions x, y of any equal shape, m."""
         return np.zeros(np.shape(x)) if self.relief is None else self.relief.height(x, y)
 
-    def height_under_hips(self, x: Array, y: Array, yaw: Array) -> Array:
+    def height_under_hips(self, x: Array, y: Array, yaw: Array, feet: Array) -> Array:
         """Mean height of the ground where a robot's feet stand under its hips, m.
 
         Args:
             x: world positions of trunks, of any shape, m.
             y: of the same shape, m.
             yaw: of the same shape, rad.
+            feet: `RobotSpec.feet_under_hips`, (4, 2), m.
         """
         cos, sin = np.cos(yaw)[..., None], np.sin(yaw)[..., None]
         mean: Array = self.height(
-            x[..., None] + cos * _FEET[:, 0] - sin * _FEET[:, 1],
-            y[..., None] + sin * _FEET[:, 0] + cos * _FEET[:, 1],
+            x[..., None] + cos * feet[:, 0] - sin * feet[:, 1],
+            y[..., None] + sin * feet[:, 0] + cos * feet[:, 1],
         ).mean(axis=-1)
         return mean
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import TORQUE_LIMIT
 from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array, robot_names
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import Command
@@ -52,7 +51,7 @@ class WeakMotor:
 
 
 @compiled
-def drive(commands: Array, q: Array, v: Array, strength: Array, tau: Array) -> None:
+def drive(commands: Array, q: Array, v: Array, strength: Array, limit: Array, tau: Array) -> None:
     """Fill `tau`, (n, 12), with the motors' torques: tau + kp (q_des − q) + kd (v_des − v).
 
     Args:
@@ -60,6 +59,7 @@ def drive(commands: Array, q: Array, v: Array, strength: Array, tau: Array) -> N
         q: coordinates of each robot, its joints behind the trunk's seven, (n, 19).
         v: velocities, its joints behind the trunk's six, (n, 18).
         strength: the share of its limited torque that each motor gives, (n, 12).
+        limit: of each joint's torque, (12,), N·m.
         tau: N·m.
     """
     for i in range(len(commands)):
@@ -70,7 +70,7 @@ def drive(commands: Array, q: Array, v: Array, strength: Array, tau: Array) -> N
             torque = kp[k] * (q_des[k] - angles[k])
             torque += kd[k] * (v_des[k] - rates[k])
             torque += tau_ff[k]
-            torque = min(max(torque, -TORQUE_LIMIT), TORQUE_LIMIT)
+            torque = min(max(torque, -limit[k]), limit[k])
             tau[i, k] = strength[i, k] * torque
 
 

@@ -1,4 +1,4 @@
-"""One A1 as MuJoCo bodies, built from the same URDF that Pinocchio reads."""
+"""One robot as MuJoCo bodies, built from the same URDF that Pinocchio reads."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ import mujoco
 import numpy as np
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import FOOT_RADIUS, TRUNK_BOX, TRUNK_LINK, TRUNK_MASS, a1_urdf
-from quadriga.shared.robot.conventions import FOOT_FRAMES
+from quadriga.shared.robot.conventions import FOOT_FRAMES, Array
+from quadriga.shared.robot.spec import RobotSpec
 from quadriga.sim_server.terrain.contact import NO_CONTACT, ROBOT_CONTACT
 
+TRUNK: Final = "trunk"  # the trunk's body and box, whatever the URDF calls its link
 VISUAL_GROUP: Final = 1
 FOOT_SOLREF: Final = (0.01, 1.0)  # s, damping ratio
-_FOOT_TOUCH_RADIUS: Final = 1.5 * FOOT_RADIUS  # every contact of the foot lies inside
+_TOUCH: Final = 1.5  # radius of the touch sensor over the foot's: every contact lies inside
 _LIMB_RGBA: Final = (0.25, 0.26, 0.28, 1.0)
 _FOOT_RGBA: Final = (0.1, 0.1, 0.1, 1.0)
 _LIMB_RADIUS: Final = {"hip": 0.03, "thigh": 0.016, "calf": 0.01}
@@ -32,11 +33,12 @@ class RobotBody:
         ConfigError: the URDF is not installed or uses something this parser does not know.
     """
 
-    def __init__(self) -> None:
-        root = ET.parse(a1_urdf()).getroot()
-        self._links = {str(link.get("name")): link for link in root.iter("link")}
+    def __init__(self, robot: RobotSpec) -> None:
+        self._robot = robot
+        root = ET.parse(robot.urdf_path()).getroot()
+        self._links = {str(link.get("name")): link for link in root.findall("link")}
         self._joints: dict[str, list[ET.Element]] = {name: [] for name in self._links}
-        for joint in sorted(root.iter("joint"), key=lambda item: str(item.get("name"))):
+        for joint in sorted(root.findall("joint"), key=lambda item: str(item.get("name"))):
             self._joints[_child(joint, "parent").get("link", "")].append(joint)
 
     def add_to(
@@ -56,26 +58,30 @@ class RobotBody:
             friction: sliding friction of feet and trunk on the terrain.
             rgba: colour of the trunk.
         """
-        trunk = spec.worldbody.add_body(name=prefix + TRUNK_LINK, pos=pos)
+        robot = self._robot
+        trunk = spec.worldbody.add_body(name=prefix + TRUNK, pos=pos)
         trunk.add_freejoint(name=prefix + "free")
-        trunk.add_site(name=prefix + "imu", group=4)
+        trunk.add_site(name=prefix + "imu", pos=robot.imu, group=4)
         trunk.add_geom(
-            name=prefix + TRUNK_LINK,
+            name=prefix + TRUNK,
             type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=[length / 2 for length in TRUNK_BOX],
+            size=[length / 2 for length in robot.trunk_box],
             rgba=rgba,
             mass=0.0,
             priority=1,
             friction=[friction, 0.005, 0.0001],
             **ROBOT_CONTACT,
         )
-        self._fill(trunk, TRUNK_LINK, prefix, friction)
+        self._fill(trunk, robot.trunk_link, prefix, friction)
         return trunk
 
     def _fill(self, body: mujoco.MjsBody, link: str, prefix: str, friction: float) -> None:
-        _set_inertia(body, self._links[link], TRUNK_MASS if link == TRUNK_LINK else None)
+        robot = self._robot
+        _set_inertia(
+            body, self._links[link], robot.trunk_mass if link == robot.trunk_link else None
+        )
         if link in FOOT_FRAMES:
-            _add_foot(body, prefix + link, friction)
+            _add_foot(body, prefix + link, robot.geometry.foot_radius, friction)
         for joint in self._joints[link]:
             name = _child(joint, "child").get("link", "")
             kind = joint.get("type")
@@ -83,10 +89,13 @@ class RobotBody:
                 continue  # only a frame, which neither MuJoCo nor the controller needs
             pos = _origin(joint)
             child = body.add_body(name=prefix + name, pos=pos)
+            child.quat = _rotation(joint)
             if kind == "revolute":
                 _add_joint(child, joint, prefix)
             elif kind != "fixed":
-                raise ConfigError("A1 URDF", f"a joint of type {kind!r}", "fixed or revolute")
+                raise ConfigError(
+                    "the robot's URDF", f"a joint of type {kind!r}", "fixed or revolute"
+                )
             _add_limb(body, link, pos)
             self._fill(child, name, prefix, friction)
 
@@ -102,11 +111,11 @@ def _add_joint(body: mujoco.MjsBody, joint: ET.Element, prefix: str) -> None:
     )
 
 
-def _add_foot(body: mujoco.MjsBody, name: str, friction: float) -> None:
+def _add_foot(body: mujoco.MjsBody, name: str, radius: float, friction: float) -> None:
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        size=[FOOT_RADIUS, 0.0, 0.0],
+        size=[radius, 0.0, 0.0],
         mass=0.0,
         rgba=_FOOT_RGBA,
         solref=FOOT_SOLREF,
@@ -115,7 +124,7 @@ def _add_foot(body: mujoco.MjsBody, name: str, friction: float) -> None:
         **ROBOT_CONTACT,
     )
     body.add_site(
-        name=name, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_FOOT_TOUCH_RADIUS, 0.0, 0.0], group=4
+        name=name, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_TOUCH * radius, 0.0, 0.0], group=4
     )
 
 
@@ -141,7 +150,14 @@ def _set_inertia(body: mujoco.MjsBody, link: ET.Element, mass: float | None) -> 
     body.explicitinertial = True
     body.mass = _mass(link) if mass is None else mass
     body.ipos = _origin(inertial)
-    body.fullinertia = [float(tensor[k]) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")]
+    xx, yy, zz, xy, xz, yz = (float(tensor[k]) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+    body.fullinertia = [xx, yy, zz, xy, xz, yz]
+    R = np.empty(9)
+    mujoco.mju_quat2Mat(R, _rotation(inertial))
+    R = R.reshape(3, 3)
+    if not np.array_equal(R, np.eye(3)):
+        turned = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
+        body.fullinertia = [*np.diag(turned), turned[0, 1], turned[0, 2], turned[1, 2]]
 
 
 def _mass(link: ET.Element) -> float:
@@ -152,11 +168,16 @@ def _mass(link: ET.Element) -> float:
 def _origin(element: ET.Element) -> list[float]:
     """Translation of an element's origin, m."""
     origin = element.find("origin")
-    if origin is None:
-        return [0.0, 0.0, 0.0]
-    if np.any(_numbers(origin.get("rpy", "0 0 0"))):
-        raise ConfigError("A1 URDF", f"rpy={origin.get('rpy')!r} of {element.tag}", "zero rotation")
-    return _numbers(origin.get("xyz", "0 0 0"))
+    return [0.0, 0.0, 0.0] if origin is None else _numbers(origin.get("xyz", "0 0 0"))
+
+
+def _rotation(element: ET.Element) -> Array:
+    """Rotation of an element's origin, quaternion wxyz: about the fixed x, then y, then z."""
+    origin, quat = element.find("origin"), np.array([1.0, 0.0, 0.0, 0.0])
+    rpy = [0.0, 0.0, 0.0] if origin is None else _numbers(origin.get("rpy", "0 0 0"))
+    if any(rpy):
+        mujoco.mju_euler2Quat(quat, rpy, "XYZ")
+    return quat
 
 
 def _numbers(text: str) -> list[float]:
@@ -166,5 +187,5 @@ def _numbers(text: str) -> list[float]:
 def _child(element: ET.Element, tag: str) -> ET.Element:
     child = element.find(tag)
     if child is None:
-        raise ConfigError("A1 URDF", f"<{element.tag}> without <{tag}>", f"a <{tag}>")
+        raise ConfigError("the robot's URDF", f"<{element.tag}> without <{tag}>", f"a <{tag}>")
     return child

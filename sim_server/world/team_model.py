@@ -10,7 +10,6 @@ import numpy as np
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
-from quadriga.shared.robot.a1 import STAND_HEIGHT, q_stand
 from quadriga.shared.robot.conventions import FOOT_FRAMES, GRAVITY, Array, robot_names
 from quadriga.sim_server.terrain.contact import NO_CONTACT
 from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
@@ -21,7 +20,6 @@ from quadriga.sim_server.world.robot_body import VISUAL_GROUP, RobotBody
 TIMESTEP: Final = 1e-3  # s, one tick
 
 _STREAM: Final = 7  # of the seed
-_ANCHOR: Final = (0.0, 0.0, 0.08)  # m, of the yokes' ball joints and of the payload, trunk frame
 _YOKE_SOLREF: Final = (0.02, 1.0)  # s, damping ratio
 _YOKE_SOLIMP: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
 _YOKE_RGBA: Final = (0.85, 0.65, 0.13, 1.0)
@@ -99,15 +97,17 @@ def build_team_model(config: Config) -> TeamModel:
     _set_physics(spec)
     _set_visuals(spec)
     terrain.add_to(spec)
-    a1 = RobotBody()
+    robot = config.robot
+    body = RobotBody(robot)
     for i, (name, (x, y)) in enumerate(zip(names, places.tolist(), strict=True)):
         colour = _TRUNK_RGBA[i % len(_TRUNK_RGBA)]
-        trunk = a1.add_to(spec, f"{name}/", (x, y, STAND_HEIGHT), config.world.friction, colour)
+        place = (x, y, robot.stand_height)
+        trunk = body.add_to(spec, f"{name}/", place, config.world.friction, colour)
         if i == 0:
             _add_sun(trunk)
-        trunk.add_site(name=f"{name}/yoke", pos=_ANCHOR, group=4)
+        trunk.add_site(name=f"{name}/yoke", pos=robot.yoke, group=4)
         if payload[i].mass > 0.0:
-            _add_payload(trunk, f"{name}/payload", payload[i])
+            _add_payload(trunk, f"{name}/payload", payload[i], robot.yoke)
         _add_sensors(spec, f"{name}/")
     pairs = yoke_pairs(len(names), config.team.yokes)
     for i, j in pairs:
@@ -116,7 +116,7 @@ def build_team_model(config: Config) -> TeamModel:
         terrain.pebbles.add_to(spec, len(names), config.world.friction)
     model = spec.compile()
     q_spawn = model.qpos0.copy()
-    q_spawn[: len(names) * NQ].reshape(len(names), NQ)[:, JOINT_POSITIONS] = q_stand()
+    q_spawn[: len(names) * NQ].reshape(len(names), NQ)[:, JOINT_POSITIONS] = robot.q_stand
     return TeamModel(
         model=model,
         terrain=terrain,
@@ -169,10 +169,12 @@ def _add_sun(trunk: mujoco.MjsBody) -> None:
     )
 
 
-def _add_payload(trunk: mujoco.MjsBody, name: str, load: Load) -> None:
-    """A homogeneous box welded on top of the trunk."""
+def _add_payload(
+    trunk: mujoco.MjsBody, name: str, load: Load, mount: tuple[float, float, float]
+) -> None:
+    """A homogeneous box welded on top of the trunk, at `mount` if the load is not offset."""
     x, y = load.offset
-    body = trunk.add_body(name=name, pos=(_ANCHOR[0] + x, _ANCHOR[1] + y, _ANCHOR[2]))
+    body = trunk.add_body(name=name, pos=(mount[0] + x, mount[1] + y, mount[2]))
     body.add_geom(
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=[length / 2 for length in _PAYLOAD_BOX],

@@ -73,10 +73,12 @@ class World:
         self._commanded = np.zeros((n, len(_DAMPED.row)))
         self._tau = np.zeros((n, N_JOINTS))
         self._strength = np.ones((n, N_JOINTS))
+        self._torque_limit = config.robot.torque_limit
+        self._feet_under_hips = config.robot.feet_under_hips
         self._fallen = [False] * n
         self._surely_up = _FALL_HEIGHT + self.team.terrain.top
         # Compiled functions are compiled, or loaded, now and not in the first tick.
-        drive(self._commanded, self._q, self._v, self._strength, np.empty_like(self._tau))
+        self._drive(np.empty_like(self._tau))
         self._sensors = Sensors(config.sensors, config.world.seed, self.names)
 
         self.physics.qpos[:] = self.team.q_spawn
@@ -84,7 +86,11 @@ class World:
         pebbles, model = self.team.terrain.pebbles, self.team.model
         feet = (f"{name}/{foot}" for name in self.names for foot in FOOT_FRAMES)
         self._feet = [model.geom(foot).id for foot in feet]
-        self._stones = None if pebbles is None else LooseStones(pebbles, model, self.physics, n)
+        self._stones = (
+            None
+            if pebbles is None
+            else LooseStones(pebbles, model, self.physics, n, config.robot.geometry.foot_radius)
+        )
         self._settled = True
         self._yoke_force = self._read_yoke_force()
         self._states = self._measure()
@@ -96,8 +102,8 @@ class World:
     def step(self, commands: Mapping[str, Command]) -> tuple[Event, ...]:
         """Advance by one tick under the motors' torques and return what happened.
 
-        Each motor applies tau + kp (q_des − q) + kd (v_des − v), limited to ±`TORQUE_LIMIT`, and a
-        weak motor its share of that. The motors of a robot without a command damp its joints with
+        Each motor applies tau + kp (q_des − q) + kd (v_des − v) within its limit, and a weak motor
+        its share of that. The motors of a robot without a command damp its joints with
         `MOTOR_DAMPING`.
         """
         events = list(self._events.get(self.tick, ()))
@@ -107,7 +113,7 @@ class World:
             self._strength = self._scenario.strength(self.tick)
         rows = [commands.get(name, _DAMPED).row for name in self.names]
         np.concatenate(rows, out=self._commanded.reshape(-1))
-        drive(self._commanded, self._q, self._v, self._strength, self._tau)
+        self._drive(self._tau)
         self._motor[:] = self._tau
         self.settle()
         mujoco.mj_step2(self.team.model, self.physics)
@@ -116,6 +122,10 @@ class World:
         self.tick += 1
         self._states = self._measure()
         return (*events, *self._falls())
+
+    def _drive(self, tau: Array) -> None:
+        """Fill `tau` with the torques for the present commands, N·m."""
+        drive(self._commanded, self._q, self._v, self._strength, self._torque_limit, tau)
 
     def settle(self) -> None:
         """Evaluate what depends on this tick's positions and velocities, once per tick.
@@ -173,7 +183,9 @@ class World:
             yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
             # The mean under the hips, since the trunk may be over a block between the feet.
             above = z - float(
-                self.team.terrain.height_under_hips(np.array(x), np.array(y), np.array(yaw))
+                self.team.terrain.height_under_hips(
+                    np.array(x), np.array(y), np.array(yaw), self._feet_under_hips
+                )
             )
             if not (cosine >= _FALL_COSINE and above >= _FALL_HEIGHT):
                 self._fallen[i] = True

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from quadriga.agents.gait import nominal_forces
 from quadriga.agents.planner.neighbours import PeerData, PeerSelection
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs, PlanResult
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import Array
+from tests.a1 import WEIGHT, nominal_forces
 
 Team = Callable[..., Any]
 BASE = np.array([0.26, 0.4, 0.0, 0.0, 0.0, 0.1])
@@ -50,6 +50,7 @@ def inputs_of(config: Config, step: int = STEP, **changes: Any) -> PlannerInputs
         y_base_ini=np.tile(BASE, (planner.T_ini, 1)),
         y_base=np.tile(BASE, (planner.N, 1)),
         y_des=np.tile(BASE, (planner.N, 1)),
+        weight=WEIGHT,
     )
     return replace(calm, **changes)
 

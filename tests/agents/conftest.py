@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.gait import scheduled_stance
 from quadriga.agents.planner.gates import run_gates
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.fits import fit_ridge
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, save, versions
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import TOTAL_MASS
 from quadriga.shared.robot.conventions import Array
+from tests.a1 import TOTAL_MASS, nominal_forces
 
 FEET = np.array([[0.18, 0.13], [0.18, -0.13], [-0.18, 0.13], [-0.18, -0.13]])
 SMALL = Config()

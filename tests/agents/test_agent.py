@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.gait import scheduled_stance
 from quadriga.agents.planning.interface import Expected
 from quadriga.identification.rollout import Rollout
-from quadriga.shared.robot.a1 import TORQUE_LIMIT
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import decode, encode
+from tests.a1 import TORQUE_LIMIT, nominal_forces
 from tests.agents.duet import (
     CONFIG,
     FIRST_PLAN,

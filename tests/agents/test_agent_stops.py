@@ -10,11 +10,11 @@ import pytest
 
 from quadriga.agents.controller import acting, controller
 from quadriga.agents.controller.whole_body.problem import WholeBodyProblem
-from quadriga.agents.rehearsal import standing
 from quadriga.agents.telemetry import Telemetry
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import EStop, State, Status
+from tests.a1 import standing
 from tests.agents.duet import CONFIG, FIRST_PLAN, over_the_bus
 from tests.agents.lone_robot import ALONE, Robot, is_damping, tilted
 

@@ -11,14 +11,13 @@ from hypothesis import strategies as st
 
 from quadriga.agents.gait import (
     half_cycle_stance,
-    nominal_forces,
     phase_offset_ms,
     scheduled_stance,
     stance_progress,
 )
 from quadriga.shared.config.sections import Config, GaitConfig
-from quadriga.shared.robot.a1 import TOTAL_MASS
 from quadriga.shared.robot.conventions import GRAVITY, Leg
+from tests.a1 import TOTAL_MASS, nominal_forces
 
 GAITS = st.builds(
     GaitConfig,

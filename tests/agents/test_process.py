@@ -10,12 +10,12 @@ import pytest
 from quadriga.agents import process
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
-from quadriga.agents.rehearsal import standing
 from quadriga.shared.bus.zenoh_bus import Bus, Packet
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import BusError
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command
+from tests.a1 import standing
 
 SECOND = 1000  # packets
 

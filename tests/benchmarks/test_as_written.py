@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from benchmarks.as_written import DEFAULT, TIGHT, PaperQp
-from quadriga.agents.gait import nominal_forces
-from quadriga.agents.planner.planner_qp import build_problem
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.robot.conventions import Array
+from tests.a1 import build_problem, nominal_forces
 
 N = 5
 PLANNER = replace(Config().planner, N=N, force_min=2.0)

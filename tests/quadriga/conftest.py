@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.gait import scheduled_stance
 from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.sections import Config, ReferenceConfig, TeamConfig, WorldConfig
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.robot.a1 import q_stand
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire import messages as msg
 from quadriga.shared.wire.codec import encode
 from quadriga.sim_server.world.team_model import formation
+from tests.a1 import nominal_forces, q_stand
 
 SECONDS = 6.0
 SPEED = 0.51  # m/s along the yaw axis, 0.01 more than asked for

@@ -13,11 +13,11 @@ from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.robot.a1 import q_stand
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Command, Event
 from quadriga.sim_server.world.world import World
+from tests.a1 import q_stand
 
 Packet = tuple[str, bytes]
 Change = Callable[[int, str, bytes], bytes | None]

@@ -16,13 +16,13 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import SIM
-from quadriga.shared.robot.a1 import q_stand
 from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import die_with_parent, stop_on_signals
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command, Event, State
 from quadriga.shared.wire.topics import COMMAND, EVENT, STATE
+from tests.a1 import q_stand
 
 
 def run(config: Config, robot: str) -> None:

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from quadriga.agents.gait import nominal_forces
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.replay.team_replay import replay
@@ -21,6 +20,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Plan
+from tests.a1 import nominal_forces
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 

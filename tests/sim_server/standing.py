@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 
 from quadriga.shared.config.sections import Config, SensorsConfig, TeamConfig, WorldConfig
-from quadriga.shared.robot.a1 import q_stand
 from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.world.world import World
+from tests.a1 import q_stand
 
 SILENT = SensorsConfig(**{item.name: 0.0 for item in fields(SensorsConfig)})
 

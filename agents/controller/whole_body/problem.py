@@ -98,6 +98,7 @@ class WholeBodyProblem(NamedTuple):
         a0: forces of none, (3 n_c,), N.
         B: accelerations of the outputs of each torque, (18 − 3 n_c, 12).
         defect0: defect of none, b₀ − a_des, (18 − 3 n_c,), m/s², rad/s².
+        tau_max: (12,), N·m.
     """
 
     H: Array
@@ -108,6 +109,7 @@ class WholeBodyProblem(NamedTuple):
     a0: Array
     B: Array
     defect0: Array
+    tau_max: Array
 
 
 SOLUTION_SIZE: Final = 12 + 12 + 18  # torques, forces, defect

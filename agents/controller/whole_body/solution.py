@@ -20,7 +20,6 @@ from quadriga.agents.controller.whole_body.problem import (
     WholeBodyProblem,
     WholeBodySolution,
 )
-from quadriga.shared.robot.a1 import TORQUE_LIMIT
 from quadriga.shared.robot.conventions import N_JOINTS, Array
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.codes import with_detail
@@ -31,10 +30,15 @@ _OPTIMAL: Final = 1  # DAQP's flag
 
 
 def solve_goal(
-    terms: RigidBodyTerms, R: Array, p_foot: Array, goal: Goal, weights: Weights
+    terms: RigidBodyTerms,
+    R: Array,
+    p_foot: Array,
+    goal: Goal,
+    weights: Weights,
+    torque_limit: Array,
 ) -> WholeBodySolution:
     """Build, solve, unpack; numbers beyond all bounds or a singular problem are no solution."""
-    problem = build(terms, R, p_foot, goal, weights)
+    problem = build(terms, R, p_foot, goal, weights, torque_limit)
     return unpack(problem, goal.contact, *solve(problem))
 
 
@@ -48,15 +52,15 @@ def solve(problem: WholeBodyProblem) -> tuple[Array, str]:
     rows = N_JOINTS + len(problem.c)
     upper = np.full(rows, _UNBOUNDED)
     lower = np.empty(rows)
-    upper[:N_JOINTS] = TORQUE_LIMIT
-    lower[:N_JOINTS] = -TORQUE_LIMIT
+    upper[:N_JOINTS] = problem.tau_max
+    lower[:N_JOINTS] = -problem.tau_max
     lower[N_JOINTS:] = problem.c
     tau, _, flag, _ = daqp.solve(
         problem.H, problem.g, problem.C, upper, lower, np.zeros(rows, dtype=np.intc)
     )
     if flag != _OPTIMAL or not np.isfinite(tau).all():
         return np.zeros(N_JOINTS), with_detail(INFEASIBLE, str(flag))
-    return np.clip(tau, -TORQUE_LIMIT, TORQUE_LIMIT), CONSTRAINED
+    return np.clip(tau, -problem.tau_max, problem.tau_max), CONSTRAINED
 
 
 def unpack(problem: WholeBodyProblem, contact: Array, tau: Array, status: str) -> WholeBodySolution:
@@ -68,7 +72,13 @@ def unpack(problem: WholeBodyProblem, contact: Array, tau: Array, status: str) -
 
 @compiled
 def solve_closed_form(
-    terms: RigidBodyTerms, R: Array, p_foot: Array, goal: Goal, weights: Weights, x: Array
+    terms: RigidBodyTerms,
+    R: Array,
+    p_foot: Array,
+    goal: Goal,
+    weights: Weights,
+    torque_limit: Array,
+    x: Array,
 ) -> int:
     """Fill `x`, see `WholeBodySolution`, with the optimum without limits.
 
@@ -78,12 +88,13 @@ def solve_closed_form(
         p_foot: foot centres, (4, 3), m, odometry frame.
         goal: what is asked for.
         weights: of the QP.
+        torque_limit: τ_max of each motor, (12,), N·m.
         x: (42,), zero.
 
     Returns:
         The length of the defect; 0 if the optimum breaks a limit.
     """
-    problem = build(terms, R, p_foot, goal, weights)
+    problem = build(terms, R, p_foot, goal, weights, torque_limit)
     tau, feasible = _unconstrained(problem)
     _imply(problem, goal.contact, tau, x)
     return len(problem.defect0) if feasible else 0
@@ -97,8 +108,8 @@ def _unconstrained(problem: WholeBodyProblem) -> tuple[Array, bool]:
     tau = step[:, 0].copy()
     C, c = problem.C, problem.c
     feasible = True
-    for torque in tau:
-        if not abs(torque) <= TORQUE_LIMIT:
+    for k in range(12):
+        if not abs(tau[k]) <= problem.tau_max[k]:
             feasible = False
     for row in range(len(c)):
         if not dot(C[row], tau) >= c[row] - _TOLERANCE:

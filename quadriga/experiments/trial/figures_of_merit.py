@@ -22,7 +22,6 @@ from quadriga.recordings.traces import (
 )
 from quadriga.recordings.truth import distance
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import TOTAL_MASS
 from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, OUTPUTS, Array
 from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.messages import Measurement
@@ -126,7 +125,7 @@ def compute_figures(walk: Walk) -> Figures:
 def _cost_of_transport(config: Config, work: float | None, way: float | None) -> float | None:
     if work is None or way is None or way < _SHORTEST:
         return None
-    mass = config.team.robots * TOTAL_MASS + config.world.payload
+    mass = config.team.robots * config.robot.mass + config.world.payload
     return work / (mass * GRAVITY * way)
 
 
@@ -155,11 +154,11 @@ def _output_cost(Q: Sequence[float], squares: Mapping[str, float | None]) -> flo
 
 def _force_cost(walk: Walk, begin: int, end: int, R: Array) -> Array:
     """‖u − u_nominal‖²_R of every sample of every robot within the steady part."""
-    parts = [np.zeros(0)]
+    parts, weight = [np.zeros(0)], walk.traces.config.robot.weight
     for samples in walk.samples.values():
         kept = [sample for sample in samples if begin <= sample.tick <= end]
         if kept:
             u = np.array([sample.u for sample in kept])
             stance = np.array([sample.stance for sample in kept]) > 0.5
-            parts.append((u - nominal_forces(stance)) ** 2 @ R)
+            parts.append((u - nominal_forces(stance, weight)) ** 2 @ R)
     return np.concatenate(parts)

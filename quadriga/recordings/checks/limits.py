@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import TORQUE_LIMIT
 from quadriga.shared.robot.conventions import JOINT_NAMES, Array, Leg, robot_names
 from quadriga.shared.wire.messages import Command, Plan
 
@@ -74,6 +73,7 @@ class Torques:
     def __init__(self, config: Config) -> None:
         self.finding = Finding("torques", "commands")
         self._damping = config.controller.damping
+        self._limit = config.robot.torque_limit
         self._largest = 0.0
 
     def look(self, item: CheckedMessage) -> None:
@@ -81,12 +81,15 @@ class Torques:
         if not isinstance(command, Command):
             return
         self.finding.looked += 1
-        largest = float(np.abs(command.tau).max())
-        self._largest = max(self._largest, largest)
-        if largest > TORQUE_LIMIT + TOLERANCE:
-            joint = JOINT_NAMES[int(np.abs(command.tau).argmax())]
+        torque = np.abs(command.tau)
+        self._largest = max(self._largest, float(torque.max()))
+        k = int((torque - self._limit).argmax())
+        if torque[k] > self._limit[k] + TOLERANCE:
             self.finding.add_objection(
-                command.tick, item.key, f"{largest:.6g} N·m of {joint}", f"{TORQUE_LIMIT:g} N·m"
+                command.tick,
+                item.key,
+                f"{torque[k]:.6g} N·m of {JOINT_NAMES[k]}",
+                f"{self._limit[k]:g} N·m",
             )
         kp, kd = float(np.abs(command.kp).max()), float(command.kd.max())
         if kp > 0.0 or kd > self._damping or float(command.kd.min()) < 0.0:

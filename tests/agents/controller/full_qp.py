@@ -10,8 +10,8 @@ import pinocchio as pin
 from scipy import sparse
 
 from quadriga.agents.controller.whole_body.problem import Goal, Weights
-from quadriga.shared.robot.a1 import TORQUE_LIMIT
 from quadriga.shared.robot.conventions import Array
+from tests.a1 import TORQUE_LIMIT
 from tests.agents.controller.poses import FEET, MODEL, Pose
 
 _FRAME = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED

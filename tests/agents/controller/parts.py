@@ -30,13 +30,14 @@ from quadriga.agents.controller.trunk_feedback import (
 from quadriga.shared.config.sections import Config, ControllerConfig
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import State
+from tests.a1 import BODY
 
 
 def estimate_trunk(
     previous: FilterState, state: State, trust: Array, noise: FilterNoise, dt: float
 ) -> tuple[FilterState, Estimate]:
     """One step of the estimator."""
-    return filter_step(previous, readings_of(state.row), trust, noise, dt)
+    return filter_step(previous, readings_of(state.row), trust, noise, BODY, dt)
 
 
 @dataclass(frozen=True)

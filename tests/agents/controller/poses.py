@@ -10,13 +10,13 @@ import pinocchio as pin
 from quadriga.agents.controller.estimator import Estimate
 from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms
 from quadriga.agents.controller.model import RigidBody
-from quadriga.shared.robot.a1 import STAND_HEIGHT, q_stand
+from quadriga.shared.robot.a1 import A1
 from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, Array
-from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
+from tests.a1 import STAND_HEIGHT, build_pinocchio_model, q_stand
 
 MODEL = build_pinocchio_model()
 FEET = tuple(MODEL.getFrameId(name) for name in FOOT_FRAMES)
-BODY = RigidBody()
+BODY = RigidBody(A1)
 
 
 @dataclass(frozen=True)

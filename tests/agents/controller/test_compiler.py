@@ -9,9 +9,9 @@ import sys
 import numpy as np
 
 from quadriga.agents.agent import Agent, Inputs
-from quadriga.agents.rehearsal import standing
 from quadriga.shared.config.sections import Config, GaitConfig, PlannerConfig, TeamConfig
 from quadriga.shared.wire.messages import Reference
+from tests.a1 import standing
 
 TICKS = 30
 CONFIG = Config(

@@ -10,17 +10,16 @@ import pinocchio as pin
 import pytest
 
 from quadriga.agents.controller.controller import Controller, ControllerOutputs, Task
-from quadriga.agents.controller.estimator import filter_noise, foot_trust, standing_filter
+from quadriga.agents.controller.estimator import filter_noise, foot_trust
 from quadriga.agents.controller.memory import Memory
 from quadriga.agents.controller.schedule import Schedule
 from quadriga.agents.controller.swing import MotionReference, foothold, swing_reference
 from quadriga.agents.controller.trunk_feedback import trunk_gains
 from quadriga.agents.controller.whole_body.solution import solve_goal
-from quadriga.agents.gait import nominal_forces
-from quadriga.agents.rehearsal import standing
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import STAND_HEIGHT, TOTAL_MASS
+from quadriga.shared.robot.a1 import A1
 from quadriga.shared.robot.conventions import GRAVITY, Array
+from tests.a1 import STAND_HEIGHT, TOTAL_MASS, nominal_forces, standing, standing_filter
 from tests.agents.controller.parts import (
     estimate_trunk,
     initial_contact,
@@ -114,8 +113,9 @@ def test_swing_feet_follow_their_reference(seed: int, ahead: np.ndarray | None) 
     data = MODEL.createData()
     pin.forwardKinematics(MODEL, data, pose.q, pose.v)
     for leg in (1, 2):
+        x, y = A1.feet_under_hips[leg]
         target = foothold(
-            leg,
+            (float(x), float(y)),
             estimate.position,
             estimate.R,
             MotionReference(velocity, v_des, 0.3),
@@ -126,7 +126,7 @@ def test_swing_feet_follow_their_reference(seed: int, ahead: np.ndarray | None) 
         x, v, a = swing_reference(
             before.estimate.p_foot[leg],
             target,
-            ground[[0, 3]].mean(),
+            ground[[0, 3]].mean() + A1.geometry.foot_radius,
             ground.max() + config.swing_height,
             0.4,
             0.2,
@@ -283,6 +283,7 @@ def test_the_tick_in_one_piece_is_its_parts_one_by_one() -> None:
             estimate.p_foot,
             outputs.goal,
             controller.weights,
+            A1.torque_limit,
         )
     np.testing.assert_allclose(outputs.memory.mean, filtered.mean, atol=1e-12)
     np.testing.assert_allclose(outputs.memory.contact, contacts.feet.contact)

@@ -10,7 +10,7 @@ import pytest
 
 from quadriga.agents.controller.maths.links import link_table
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import TOTAL_MASS, q_stand
+from tests.a1 import TOTAL_MASS, q_stand
 from tests.agents.controller.poses import BODY, FEET, MODEL, random_pose
 
 

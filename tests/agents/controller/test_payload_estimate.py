@@ -15,9 +15,9 @@ from quadriga.shared.config.sections import (
     TeamConfig,
     WorldConfig,
 )
-from quadriga.shared.robot.a1 import TOTAL_MASS
 from quadriga.shared.robot.conventions import GRAVITY
 from quadriga.shared.wire.messages import Reference
+from tests.a1 import TOTAL_MASS
 from tests.agents.controller.poses import BODY, MODEL, random_pose
 
 

@@ -9,22 +9,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from quadriga.agents.controller.maths.leg_kinematics import hip_neutral
 from quadriga.agents.controller.swing import (
     MotionReference,
     foothold,
     limit_foothold,
     swing_reference,
 )
-from quadriga.shared.robot.a1 import FOOT_RADIUS
+from quadriga.shared.robot.a1 import A1
 from quadriga.shared.robot.conventions import Array
+from tests.a1 import FOOT_RADIUS
 
 START, TARGET = np.array([0.1, -0.2, 0.03]), np.array([0.25, -0.15])
 GROUND, APEX, DURATION = 0.01, 0.12, 0.2
 
 
 def reference(progress: float, delay: float = 0.0) -> Array:
-    return swing_reference(START, TARGET, GROUND, APEX, progress, DURATION, delay)
+    return swing_reference(START, TARGET, GROUND + FOOT_RADIUS, APEX, progress, DURATION, delay)
 
 
 def test_a_swing_starts_where_the_foot_is_and_at_rest() -> None:
@@ -126,13 +126,14 @@ def test_the_foothold_is_raiberts(leg: int, seed: int) -> None:
     """p_hip + v t_remaining + v T/2 + k (v − v_des), v the hip's: the yaw rate moves it too."""
     random = np.random.default_rng(seed)
     roll, pitch, yaw = random.uniform([-0.4, -0.4, -3.0], [0.4, 0.4, 3.0])
-    R = pin.rpy.rpyToMatrix(roll, pitch, yaw)
+    R, (x, y) = pin.rpy.rpyToMatrix(roll, pitch, yaw), A1.feet_under_hips[leg]
+    under_hip = float(x), float(y)
     position, velocity, v_des = random.uniform(-1.0, 1.0, (3, 3))
     wz, remaining, stance_time, gain = random.uniform(0.0, [0.5, 0.2, 0.3, 0.1])
-    arm = pin.utils.rotate("z", yaw) @ np.array([*hip_neutral()[leg], 0.0])
+    arm = pin.utils.rotate("z", yaw) @ np.array([*under_hip, 0.0])
     hip_velocity = velocity + np.cross([0.0, 0.0, wz], arm)
     expected = position + arm + hip_velocity * (remaining + stance_time / 2)
     expected += gain * (velocity - v_des)
     motion = MotionReference(velocity, v_des, wz)
-    found = foothold(leg, position, R, motion, remaining, stance_time, gain)
+    found = foothold(under_hip, position, R, motion, remaining, stance_time, gain)
     np.testing.assert_allclose(found, expected[:2], atol=1e-12)

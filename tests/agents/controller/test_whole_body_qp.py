@@ -20,8 +20,9 @@ from quadriga.agents.controller.whole_body.problem import (
     WholeBodySolution,
 )
 from quadriga.agents.controller.whole_body.solution import solve, solve_goal
-from quadriga.shared.robot.a1 import TORQUE_LIMIT, TOTAL_MASS
+from quadriga.shared.robot.a1 import A1
 from quadriga.shared.robot.conventions import GRAVITY, Array
+from tests.a1 import TORQUE_LIMIT, TOTAL_MASS
 from tests.agents.controller.full_qp import desired, dynamics, solve_full
 from tests.agents.controller.poses import Pose, random_pose, standing_pose
 
@@ -45,11 +46,15 @@ def random_goal(random: np.random.Generator, contact: Array, size: float) -> Goa
 
 
 def problem_of(pose: Pose, goal: Goal, weights: Weights = WEIGHTS) -> WholeBodyProblem:
-    return build(pose.terms(), pose.estimate.R, pose.estimate.p_foot, goal, weights)
+    return build(
+        pose.terms(), pose.estimate.R, pose.estimate.p_foot, goal, weights, A1.torque_limit
+    )
 
 
 def solution_of(pose: Pose, goal: Goal, weights: Weights = WEIGHTS) -> WholeBodySolution:
-    return solve_goal(pose.terms(), pose.estimate.R, pose.estimate.p_foot, goal, weights)
+    return solve_goal(
+        pose.terms(), pose.estimate.R, pose.estimate.p_foot, goal, weights, A1.torque_limit
+    )
 
 
 def check_limits(solution: WholeBodySolution, goal: Goal, weights: Weights = WEIGHTS) -> None:

@@ -11,12 +11,12 @@ import pytest
 
 from quadriga.agents.inbox.inbox import Inbox
 from quadriga.agents.planning.interface import Expected
-from quadriga.agents.rehearsal import standing
 from quadriga.shared.config.load import load
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import EStop, Event, Measurement, Message, Plan, Reference, Truth
 from quadriga.shared.wire.topics import ESTOP, TABLE, Topic
+from tests.a1 import standing
 
 NOTHING = Expected()
 

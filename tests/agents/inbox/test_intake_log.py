@@ -15,10 +15,10 @@ from quadriga.agents.inbox.intake_log import (
     parse_message_id,
 )
 from quadriga.agents.planning.interface import NOTHING, Expected
-from quadriga.agents.rehearsal import standing
 from quadriga.shared.config.load import load
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Consumed, EStop, Measurement, Plan, Reference
+from tests.a1 import standing
 
 PLAN = Plan(480, 0, 12, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 1)
 SAMPLE = Measurement(480, 0, np.zeros(12), np.zeros(6), np.ones(4))

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from benchmarks.as_written import TIGHT, DeepcQp
-from quadriga.agents.gait import nominal_forces
 from quadriga.agents.planner.deepc_qp import build_model, select
 from quadriga.agents.planner.planner_qp import Condensed, PlannerProblem, constrain
 from quadriga.agents.predictor.deepc import Reduction, reduce
@@ -24,6 +23,7 @@ from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import Array
+from tests.a1 import WEIGHT, nominal_forces
 
 Team = Callable[..., Any]
 T_INI, N = 2, 3
@@ -172,7 +172,7 @@ def bounded(
     f = condensed.F_past @ case.past + condensed.F_des @ case.y_des
     free = np.abs(np.linalg.solve(condensed.H, f)).reshape(-1, 3)
     planner = replace(PLANNER, mu=0.3, deviation_max=tuple(tightness * free.max(axis=0)))
-    problem = constrain(planner, condensed, case.stance.reshape(-1, 4))
+    problem = constrain(planner, WEIGHT, condensed, case.stance.reshape(-1, 4))
     v, active = exact(condensed.H, f, problem.A, problem.lower, problem.upper)
     assert active
     return condensed, problem, planner, v

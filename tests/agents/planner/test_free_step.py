@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.agents.gait import nominal_forces
+from quadriga.agents.gait import nominal_table
 from quadriga.agents.planner.free_step import FreeStep, OwnWindow
 from quadriga.agents.planner.planner import PlannerInputs
-from quadriga.agents.planner.planner_qp import build_problem, unpack
+from quadriga.agents.planner.planner_qp import unpack
 from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS
 from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.robot.conventions import Array
+from tests.a1 import WEIGHT, build_problem, nominal_forces
 
 T_INI, N = 3, 5
 CONFIG = replace(PlannerConfig(), T_ini=T_INI, N=N)
@@ -32,7 +33,7 @@ SOLVER = SOLVERS["daqp"](PROBLEM)
 def free() -> FreeStep:
     closed = SOLVER.closed_form
     assert closed is not None
-    return FreeStep(PROBLEM, closed, NOMINAL)
+    return FreeStep(PROBLEM, closed, NOMINAL, nominal_table(WEIGHT))
 
 
 def inputs_of(seed: int, size: float) -> PlannerInputs:
@@ -46,6 +47,7 @@ def inputs_of(seed: int, size: float) -> PlannerInputs:
         y_base_ini=1e-2 * size * rng.normal(size=(T_INI, 6)),
         y_base=rng.normal(size=(N, 6)),
         y_des=rng.normal(size=(1, 6)) + 1e-3 * size * rng.normal(size=(N, 6)),
+        weight=WEIGHT,
     )
 
 

@@ -14,7 +14,6 @@ from scipy import integrate, optimize
 
 from quadriga.agents.planner.best_response import best_response_map, best_response_radius
 from quadriga.agents.planner.gates import height_gains, held_out_error, physical_height, run_gates
-from quadriga.agents.planner.planner_qp import build_problem
 from quadriga.agents.predictor.episode import Y_SCALE
 from quadriga.agents.predictor.fits import fit_ridge
 from quadriga.agents.predictor.gate_report import GateReport
@@ -22,8 +21,8 @@ from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.a1 import TOTAL_MASS
 from quadriga.shared.robot.conventions import Array
+from tests.a1 import TOTAL_MASS, build_problem
 
 Team = Callable[..., Any]
 
@@ -112,7 +111,9 @@ def test_the_physical_response_is_the_integrated_equation(plant: Config, ki: flo
     times = 0.01 * np.arange(1, 26)
     found = integrate.solve_ivp(rate, (0, 0.25), [0.0] * 3, t_eval=times, rtol=1e-10, atol=1e-14)
     np.testing.assert_allclose(
-        physical_height(controller, "feedforward", 25), found.y[1], rtol=1e-6
+        physical_height(replace(plant, controller=controller), "feedforward", 25),
+        found.y[1],
+        rtol=1e-6,
     )
 
 
@@ -120,7 +121,9 @@ def test_a_free_trunk_rises_with_half_a_t_squared(plant: Config) -> None:
     times = 0.01 * np.arange(1, 26)
     expected = 0.5 * 10.0 / TOTAL_MASS * times**2
     soft = replace(plant.controller, gamma_defect=1e-9)
-    np.testing.assert_allclose(physical_height(soft, "force", 25), expected, rtol=1e-9)
+    np.testing.assert_allclose(
+        physical_height(replace(plant, controller=soft), "force", 25), expected, rtol=1e-9
+    )
 
 
 def test_the_qp_lets_the_share_of_a_force_through_that_minimises_its_cost(plant: Config) -> None:
@@ -136,7 +139,7 @@ def test_the_qp_lets_the_share_of_a_force_through_that_minimises_its_cost(plant:
     realised = optimize.minimize_scalar(
         cost, bounds=(0.0, half), method="bounded", options={"xatol": 1e-10}
     ).x
-    z = physical_height(controller, "force", 25)
+    z = physical_height(replace(plant, controller=controller), "force", 25)
     assert z[-1] == pytest.approx(0.5 * 2 * realised / TOTAL_MASS * 0.25**2, rel=1e-6)
 
 

@@ -10,13 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.gait import scheduled_stance
 from quadriga.agents.planner.neighbours import FRESH, HELD, LOST, SHIFTED, Neighbours, PeerData
 from quadriga.agents.planner.peer_memory import PeerMemory
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Measurement, Plan
+from tests.a1 import nominal_forces
 
 CONFIG = Config()
 CONFIG = replace(

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.agents.gait import nominal_forces
 from quadriga.agents.planner.neighbours import HELD, LOST, PeerData, PeerSelection
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner
@@ -16,6 +15,7 @@ from quadriga.agents.predictor.fits import fit_ridge
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance, walking_steps
 from quadriga.shared.config.sections import Config
+from tests.a1 import nominal_forces
 from tests.agents.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, plan, terms_of
 
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.agents.gait import nominal_forces
 from quadriga.agents.planner.planner import Planner, PlannerState
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
+from tests.a1 import nominal_forces
 from tests.agents.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, plan, terms_of
 
 

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import optimize
 
-from quadriga.agents.gait import nominal_forces
-from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem, unpack
+from quadriga.agents.planner.planner_qp import PlannerProblem, unpack
 from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS, Solver, judge, residuals
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.robot.conventions import Array
+from tests.a1 import build_problem, nominal_forces
 
 N = 8
 PLANNER = replace(Config().planner, N=N)

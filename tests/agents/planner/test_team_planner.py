@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from quadriga.agents.gait import nominal_forces
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs
 from quadriga.agents.planner.team_planner import build_centralised
@@ -20,6 +19,7 @@ from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
+from tests.a1 import WEIGHT, nominal_forces
 
 BASE = np.array([0.26, 0.4, 0.0, 0.0, 0.0, 0.1])
 STEP = 20
@@ -45,6 +45,7 @@ def disturbed(config: Config, seed: int, size: float = 1.0) -> list[PlannerInput
             y_base_ini=np.tile(BASE, (planner.T_ini, 1)),
             y_base=np.tile(BASE, (planner.N, 1)),
             y_des=np.tile(BASE + 0.2 * scale * rng.normal(size=6), (planner.N, 1)),
+            weight=WEIGHT,
         )
         for _ in range(config.team.robots)
     ]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.gait import scheduled_stance
 from quadriga.agents.modes import WALK, Mode
 from quadriga.agents.planning.adaptation import Adapter
 from quadriga.agents.planning.interface import PlanningInputs
@@ -16,6 +16,7 @@ from quadriga.agents.predictor.recursive import Correction
 from quadriga.shared.config.sections import Config, TeamConfig
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Measurement
+from tests.a1 import nominal_forces
 from tests.agents.duet import asked, simple_predictor
 
 ALONE = Config(team=TeamConfig(robots=1))

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.gait import scheduled_stance
 from quadriga.agents.modes import STAND, STOPPING, WALK, Mode
 from quadriga.agents.planner.planner import PlanResult
 from quadriga.agents.planner.qp_solver import Residuals
@@ -20,6 +20,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Measurement, Plan
+from tests.a1 import nominal_forces
 from tests.agents.duet import asked, simple_predictor
 
 ALONE = Config(team=TeamConfig(robots=1), planner=PlannerConfig(latency_ms=0))

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.agents.gait import nominal_forces
 from quadriga.agents.modes import STAND, WALK, Mode
 from quadriga.agents.planning.interface import Expected, PlanningInputs, PlanningOutputs
 from quadriga.agents.planning.remote import RemotePlanning, RemoteState
@@ -17,6 +16,7 @@ from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.config.timing import max_ages
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Measurement, Plan
+from tests.a1 import nominal_forces
 from tests.agents.duet import asked
 
 CONFIG = Config(team=TeamConfig(robots=2), planner=PlannerConfig(kind="centralised", latency_ms=0))

@@ -8,7 +8,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.gait import scheduled_stance
 from quadriga.agents.modes import DAMPING, STOPPING, Mode
 from quadriga.agents.planner.team_planner import build_centralised
 from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
@@ -16,6 +16,7 @@ from quadriga.agents.rehearsal import rehearse_central
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.wire.messages import Measurement
+from tests.a1 import nominal_forces
 from tests.agents.duet import asked, every_100_ms, fingerprint, simple_predictor
 
 CONFIG = Config(team=TeamConfig(robots=2), planner=PlannerConfig(kind="centralised"))

@@ -21,10 +21,10 @@ from quadriga.shared.config.sections import WorldConfig
 from quadriga.shared.errors import MessageError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import FOOT_FRAMES, Array
-from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Measurement, Plan, Reference, State, Truth
 from quadriga.sim_server.world.team_model import build_team_model
+from tests.a1 import build_pinocchio_model
 from tests.quadriga.conftest import ESTIMATOR_ERROR, WriteRun, outputs, run_config
 from tests.quadriga.conftest import truth as truth_message
 from tests.quadriga.export.conftest import PLAN

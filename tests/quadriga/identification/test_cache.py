@@ -106,7 +106,7 @@ def test_the_same_configuration_has_the_same_key() -> None:
 def test_new_names_of_keys_change_no_key(monkeypatch: pytest.MonkeyPatch) -> None:
     before = data_key(Config()), predictor_key(Config())
     assert RENAMED
-    monkeypatch.setattr(cache, "with_first_names", lambda sections: sections)
+    monkeypatch.setattr(cache, "hashed_sections", lambda sections: sections)
     assert data_key(Config()) != before[0], "with today's names it would"
     monkeypatch.undo()
     assert (data_key(Config()), predictor_key(Config())) == before

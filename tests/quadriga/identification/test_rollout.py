@@ -11,10 +11,10 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config, SensorsConfig
-from quadriga.shared.robot.a1 import STAND_HEIGHT
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Message, Reference
+from tests.a1 import STAND_HEIGHT
 from tests.agents.duet import simple_predictor
 
 SPEED = 0.5

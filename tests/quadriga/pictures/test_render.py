@@ -13,9 +13,9 @@ from quadriga.pictures.poses import PosedTeam, read_poses, truth_ticks
 from quadriga.pictures.render import render
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import FOOT_RADIUS, q_stand
 from quadriga.shared.wire import messages as msg
 from quadriga.sim_server.world.layout import NQ
+from tests.a1 import FOOT_RADIUS, q_stand
 from tests.quadriga.conftest import SPEED, WriteRun, run_config
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.load import load
-from quadriga.shared.robot.a1 import FOOT_RADIUS
 from quadriga.team.operator import reference_at
+from tests.a1 import FOOT_RADIUS
 
 CONFIG = load(
     None,

@@ -15,7 +15,6 @@ from quadriga.agents.inbox.intake_log import Intake
 from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, predictor_sha256, save
-from quadriga.agents.rehearsal import standing
 from quadriga.commands.parser import main
 from quadriga.recordings.metadata import build_metadata
 from quadriga.replay.recorded_predictor import PREDICTOR, copy_predictor, find_predictor
@@ -30,6 +29,7 @@ from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Command, Reference
+from tests.a1 import standing
 from tests.quadriga.replay.rewritten import rewritten
 
 REPORT = GateReport(1, {}, {}, 0.5, (0.1,), ((1.0,),), (0.3, 2.0), 0.1, 0.5, (), ())

@@ -11,6 +11,7 @@ from typing import cast
 import pytest
 
 from quadriga.commands.parser import main
+from quadriga.shared.config.later import hashed_sections
 from quadriga.shared.config.load import build, load
 from quadriga.shared.config.renamed import (
     RENAMED,
@@ -102,7 +103,7 @@ def test_a_recorded_key_that_no_version_had_is_refused() -> None:
 
 def test_a_new_name_changes_no_hash() -> None:
     config = Config()
-    body = {name: keys for name, keys in with_first_names(asdict(config)).items() if name != "bus"}
+    body = {name: keys for name, keys in hashed_sections(asdict(config)).items() if name != "bus"}
     text = json.dumps(body, sort_keys=True, separators=(",", ":"))
     assert config_sha256(config) == hashlib.sha256(text.encode()).hexdigest() == FIRST_NAMES_SHA256
     assert config_sha256(build(asdict(config))) == FIRST_NAMES_SHA256

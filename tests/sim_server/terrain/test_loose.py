@@ -6,12 +6,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from quadriga.shared.robot.a1 import TOTAL_MASS
 from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
 from quadriga.shared.wire.codec import encode
 from quadriga.sim_server.terrain.loose import LooseStones
 from quadriga.sim_server.terrain.pebbles import Pebbles
 from quadriga.sim_server.world.world import World
+from tests.a1 import TOTAL_MASS
 from tests.sim_server.standing import configured, shift, stand
 
 

@@ -7,11 +7,12 @@ import pytest
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import TORQUE_LIMIT, TOTAL_MASS, q_stand
+from quadriga.shared.robot.a1 import A1
 from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Event, State, Truth
 from quadriga.sim_server.world.world import MOTOR_DAMPING, World
+from tests.a1 import TORQUE_LIMIT, TOTAL_MASS, q_stand
 from tests.sim_server.standing import STAND, command, configured, momentum, shift, stand
 
 TERRAINS = ("flat", "boxes", "gravel", "heightfield", "slope")
@@ -217,7 +218,9 @@ def test_a_robot_on_its_side_has_fallen_at_any_height() -> None:
 def test_trunk_height_counts_from_the_terrain_under_the_hips() -> None:
     world = World(configured(1, terrain="heightfield", terrain_height=0.3, seconds=8.0))
     x = np.linspace(2.0, 5.0, 3000)
-    under = world.team.terrain.height_under_hips(x, np.zeros_like(x), np.zeros_like(x))
+    under = world.team.terrain.height_under_hips(
+        x, np.zeros_like(x), np.zeros_like(x), A1.feet_under_hips
+    )
     world.physics.qpos[0] = x[under.argmax()]
     for above, fallen in ((0.125, ()), (0.115, ("r1",))):
         world.physics.qpos[2] = under.max() + above
@@ -233,7 +236,9 @@ def test_who_stands_astride_of_a_block_has_not_fallen() -> None:
     world = World(configured(1, terrain="boxes", terrain_height=0.15, seconds=8.0))
     terrain = world.team.terrain
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(1.5, 5, 0.02), np.arange(-1, 1, 0.02)))
-    astride = terrain.height(x, y) - terrain.height_under_hips(x, y, np.zeros_like(x))
+    astride = terrain.height(x, y) - terrain.height_under_hips(
+        x, y, np.zeros_like(x), A1.feet_under_hips
+    )
     place = astride.argmax()
     assert astride[place] > 0.145, "no such place"
     world.physics.qpos[:3] = x[place], y[place], 0.26

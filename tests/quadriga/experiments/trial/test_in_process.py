@@ -17,9 +17,9 @@ from quadriga.identification.predictors import fit
 from quadriga.identification.rollout import Tick
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import TOTAL_MASS
 from quadriga.shared.robot.conventions import GRAVITY
 from quadriga.shared.wire.codec import encode
+from tests.a1 import TOTAL_MASS
 from tests.quadriga.linear_data import config_of, dataset
 
 

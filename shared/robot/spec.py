@@ -1,0 +1,133 @@
+"""A kind of quadruped as data: what controller, world, pictures and checks know of it."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
+
+_PACKAGE: Final = "cmeel.prefix/share/example-robot-data/robots"
+
+
+class Geometry(NamedTuple):
+    """Lengths of a robot's legs, as compiled code takes them; left and right, front and rear alike.
+
+    Attributes:
+        hip_x: hip joint from the trunk's origin, forwards, m.
+        hip_y: likewise, outwards, m.
+        thigh_y: thigh joint from the hip joint, outwards, m.
+        link: length of the thigh, and of the calf, m.
+        foot_radius: m.
+        mass: of the whole robot, kg.
+    """
+
+    hip_x: float
+    hip_y: float
+    thigh_y: float
+    link: float
+    foot_radius: float
+    mass: float
+
+
+N_GEOMETRY: Final = len(Geometry._fields)
+
+
+@dataclass(frozen=True)
+class RobotSpec:
+    """A kind of robot: four legs with a hip that turns about x, a thigh and a calf about y.
+
+    Attributes:
+        kind: its name in the configuration, `team.robot`.
+        title: its name for people.
+        urdf: of example-robot-data, below the folder of its robots.
+        trunk_link: the URDF's link that is free in the world.
+        trunk_mass: kg; what the trunk link weighs, where that is not the URDF's mass.
+        geometry: of the legs, and the mass.
+        trunk_box: full lengths of the trunk's collision box, (3,), m, about its origin.
+        imu: where gyro and accelerometer are, (3,), m, trunk frame; their axes are the trunk's.
+        yoke: where the ball joint of the yokes and the payload sit, (3,), m, trunk frame.
+        torque: limits of the motors of hip, thigh and calf, (3,), N·m.
+        speed: likewise, (3,), rad/s.
+        lower, upper: limits of the joint angles, in the order of `JOINT_NAMES`, (12,), rad.
+        stand_height: of the trunk's origin above the ground when it stands, m.
+        reach: how far under the hip a foot may be lowered, m.
+        defaults: values by `section.key` that this robot has where the configuration says nothing.
+    """
+
+    kind: str
+    title: str
+    urdf: str
+    trunk_link: str
+    geometry: Geometry
+    trunk_box: tuple[float, float, float]
+    imu: tuple[float, float, float]
+    yoke: tuple[float, float, float]
+    torque: tuple[float, float, float]
+    speed: tuple[float, float, float]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    stand_height: float
+    reach: float
+    trunk_mass: float | None = None
+    defaults: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def mass(self) -> float:
+        """Of the whole robot, kg."""
+        return self.geometry.mass
+
+    @property
+    def weight(self) -> float:
+        """Of the whole robot, N."""
+        return self.mass * GRAVITY
+
+    @cached_property
+    def torque_limit(self) -> Array:
+        """Of every joint, in the order of `JOINT_NAMES`. Shape (12,), N·m."""
+        return _read_only(np.tile(self.torque, N_LEGS))
+
+    @cached_property
+    def q_stand(self) -> Array:
+        """Joint angles that put every foot under its hip at `stand_height`. Shape (12,), rad."""
+        leg = self.geometry
+        half_knee = float(np.arccos((self.stand_height - leg.foot_radius) / (2 * leg.link)))
+        return _read_only(np.tile([0.0, half_knee, -2.0 * half_knee], N_LEGS))
+
+    @cached_property
+    def feet_under_hips(self) -> Array:
+        """Where the feet stand under their hips, trunk frame. Shape (4, 2), m."""
+        leg = self.geometry
+        x, y = leg.hip_x, leg.hip_y + leg.thigh_y
+        return _read_only(np.array([[x, y], [x, -y], [-x, y], [-x, -y]]))
+
+    def urdf_path(self) -> Path:
+        """Path of the URDF that the package example-robot-data installs.
+
+        Raises:
+            ConfigError: the package is not installed in this environment.
+        """
+        found = importlib.util.find_spec("cmeel")
+        roots = [] if found is None or found.origin is None else [Path(found.origin).parent.parent]
+        for root in roots:
+            path = root / _PACKAGE / self.urdf
+            if path.is_file():
+                return path
+        raise ConfigError(
+            f"description of the robot {self.title}",
+            f"no {Path(self.urdf).name}",
+            "the file of the package example-robot-data",
+            "install the project's dependencies with `make install`",
+        )
+
+
+def _read_only(array: Array) -> Array:
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,66 @@
+"""The A1's numbers, and functions that ask for a robot with the A1 filled in, for tests of it."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from quadriga.agents import gait, rehearsal
+from quadriga.agents.controller import estimator
+from quadriga.agents.controller.maths import leg_kinematics as kinematics
+from quadriga.agents.controller.memory import FilterState
+from quadriga.agents.planner import planner_qp
+from quadriga.agents.planner.planner_qp import PlannerProblem
+from quadriga.shared.config.sections import PlannerConfig
+from quadriga.shared.robot import pinocchio_model
+from quadriga.shared.robot.a1 import A1
+from quadriga.shared.robot.conventions import Array
+from quadriga.shared.wire.messages import State
+
+GEOMETRY: Final = A1.geometry
+WEIGHT: Final = A1.weight
+TOTAL_MASS: Final = A1.mass
+TORQUE_LIMIT: Final = A1.torque[0]  # the same for all joints
+STAND_HEIGHT: Final = A1.stand_height
+FOOT_RADIUS: Final = GEOMETRY.foot_radius
+BODY: Final = estimator.FilterBody(GEOMETRY, np.array(A1.imu))
+
+
+def q_stand() -> Array:
+    """Joint angles of the standing robot, (12,), rad."""
+    return A1.q_stand.copy()
+
+
+def nominal_forces(stance: NDArray[np.bool_]) -> Array:
+    """See `gait.nominal_forces`."""
+    return gait.nominal_forces(stance, WEIGHT)
+
+
+def standing(tick: int, lean: float = 0.0) -> State:
+    """See `rehearsal.standing`."""
+    return rehearsal.standing(A1, tick, lean)
+
+
+def standing_filter(state: State) -> FilterState:
+    """See `estimator.standing_filter`."""
+    return estimator.standing_filter(state, A1)
+
+
+def leg_kinematics(q_joint: Array, v_joint: Array) -> tuple[Array, Array, Array]:
+    """See `maths.leg_kinematics`."""
+    return kinematics.leg_kinematics(q_joint, v_joint, GEOMETRY)
+
+
+def build_pinocchio_model() -> pin.Model:
+    """See `pinocchio_model.build_pinocchio_model`."""
+    return pinocchio_model.build_pinocchio_model(A1)
+
+
+def build_problem(
+    config: PlannerConfig, G_u: Array, stance: NDArray[np.bool_], G_past: Array | None = None
+) -> PlannerProblem:
+    """See `planner_qp.build_problem`."""
+    return planner_qp.build_problem(config, WEIGHT, G_u, stance, G_past)

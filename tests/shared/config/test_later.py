@@ -1,0 +1,42 @@
+"""A key that came later changes no hash while it has the value that all before was made with."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, fields
+
+import pytest
+
+from quadriga.shared.config import later
+from quadriga.shared.config.later import LATER_KEYS, hashed_sections
+from quadriga.shared.config.load import load
+from quadriga.shared.config.renamed import with_first_names
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import config_sha256
+
+
+def test_every_later_key_is_a_key() -> None:
+    keys = {
+        f"{section.name}.{key.name}"
+        for section in fields(Config)
+        for key in fields(getattr(Config(), section.name))
+    }
+    assert LATER_KEYS.keys() <= keys
+
+
+def test_a_later_key_is_left_out_while_it_has_its_first_value(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As if `world.friction` had come later; all before was walked on 0.7."""
+    monkeypatch.setattr(later, "LATER_KEYS", {"world.friction": 0.7})
+    before, other = (asdict(load(None, {"world.friction": value})) for value in (0.7, 0.3))
+    assert "friction" not in hashed_sections(before)["world"]
+    assert hashed_sections(other) == with_first_names(other)
+    assert hashed_sections({"world": 5}) == {"world": 5}, "no section, left to the check"
+
+
+def test_so_it_changes_the_hash_only_with_another_value(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(later, "LATER_KEYS", {**LATER_KEYS, "world.friction": 0.7})
+    hashes = [config_sha256(load(None, {"world.friction": value})) for value in (0.7, 0.3, 0.4)]
+    monkeypatch.undo()
+    assert len(set(hashes)) == 3
+    assert hashes[1:] == [config_sha256(load(None, {"world.friction": v})) for v in (0.3, 0.4)]

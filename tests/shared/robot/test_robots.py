@@ -1,0 +1,175 @@
+"""What the records of the robots say, against the robots' URDFs."""
+
+from __future__ import annotations
+
+import importlib.util
+import xml.etree.ElementTree as ET
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.robot.a1 import A1
+from quadriga.shared.robot.conventions import (
+    FOOT_FRAMES,
+    GRAVITY,
+    JOINT_NAMES,
+    N_FORCES,
+    N_JOINTS,
+    N_LEGS,
+    N_OUTPUTS,
+    OUTPUTS,
+    Leg,
+    robot_names,
+)
+from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
+from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robot.spec import RobotSpec
+
+every_robot = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS.keys())
+
+
+@lru_cache
+def urdf_of(kind: str) -> ET.Element:
+    return ET.parse(ROBOTS[kind].urdf_path()).getroot()
+
+
+@lru_cache
+def model_of(kind: str) -> pin.Model:
+    return build_pinocchio_model(ROBOTS[kind])
+
+
+def link(robot: RobotSpec, name: str) -> ET.Element:
+    found = urdf_of(robot.kind).find(f"link[@name='{name}']")
+    assert found is not None
+    return found
+
+
+def numbers(element: ET.Element | None, attribute: str) -> list[float]:
+    assert element is not None
+    return [float(word) for word in element.get(attribute, "").split()]
+
+
+@every_robot
+def test_joints_are_in_pinocchios_order(robot: RobotSpec) -> None:
+    model = model_of(robot.kind)
+    assert tuple(model.names)[2:] == JOINT_NAMES
+    assert (model.nq, model.nv) == (7 + N_JOINTS, 6 + N_JOINTS)
+    assert [leg.name for leg in Leg] == [frame.removesuffix("_foot") for frame in FOOT_FRAMES]
+    for leg, frame in zip(Leg, FOOT_FRAMES, strict=True):
+        calf = model.frames[model.getFrameId(frame)].parentJoint
+        assert model.names[calf] == JOINT_NAMES[3 * leg + 2]
+
+
+@every_robot
+def test_the_mass_is_that_of_the_model(robot: RobotSpec) -> None:
+    assert pin.computeTotalMass(model_of(robot.kind)) == pytest.approx(robot.mass, abs=5e-4)
+
+
+def test_only_the_mass_of_the_a1s_trunk_differs_from_the_urdf() -> None:
+    model = model_of("a1")
+    whole = pin.buildModelFromUrdf(str(A1.urdf_path()), pin.JointModelFreeFlyer())
+    urdfs_trunk = numbers(link(A1, A1.trunk_link).find("inertial/mass"), "value")[0]
+    difference = pin.computeTotalMass(whole) - pin.computeTotalMass(model)
+    assert A1.trunk_mass is not None
+    assert difference == pytest.approx(urdfs_trunk - A1.trunk_mass)
+    for i in range(2, model.njoints):
+        assert model.inertias[i].isApprox(whole.inertias[i])
+
+
+def test_the_trunk_keeps_its_centre_and_its_own_inertia() -> None:
+    """All that is fixed to the trunk, with the trunk link's mass replaced: Steiner by hand."""
+    whole = pin.buildModelFromUrdf(str(A1.urdf_path()), pin.JointModelFreeFlyer()).inertias[1]
+    inertial = link(A1, A1.trunk_link).find("inertial")
+    assert inertial is not None
+    assert A1.trunk_mass is not None
+    mass = numbers(inertial.find("mass"), "value")[0]
+    centre = np.array(numbers(inertial.find("origin"), "xyz"))
+    taken = mass - A1.trunk_mass
+    com = (whole.mass * whole.lever - taken * centre) / (whole.mass - taken)
+
+    def about(point: np.ndarray, weight: float, lever: np.ndarray) -> np.ndarray:
+        d = lever - point
+        shifted: np.ndarray = weight * (d @ d * np.eye(3) - np.outer(d, d))
+        return shifted
+
+    inertia = whole.inertia + about(com, whole.mass, whole.lever) - about(com, taken, centre)
+    changed = model_of("a1").inertias[1]
+    np.testing.assert_allclose(changed.lever, com, atol=1e-12)
+    np.testing.assert_allclose(changed.inertia, inertia, atol=1e-12)
+
+
+@every_robot
+def test_limits_of_torque_speed_and_position_are_the_urdfs(robot: RobotSpec) -> None:
+    model = model_of(robot.kind)
+    np.testing.assert_allclose(model.effortLimit[6:], robot.torque_limit)
+    np.testing.assert_allclose(model.velocityLimit[6:], np.tile(robot.speed, N_LEGS))
+    np.testing.assert_allclose(model.lowerPositionLimit[7:], robot.lower, atol=1e-9)
+    np.testing.assert_allclose(model.upperPositionLimit[7:], robot.upper, atol=1e-9)
+
+
+@every_robot
+def test_feet_and_trunk_have_their_collision_shapes_sizes(robot: RobotSpec) -> None:
+    """Where the URDF has a mesh instead of a sphere or box, Unitree's MJCF gives the size."""
+    for frame in FOOT_FRAMES:
+        sphere = link(robot, frame).find("collision/geometry/sphere")
+        if sphere is not None:
+            assert numbers(sphere, "radius") == [robot.geometry.foot_radius]
+    box = link(robot, robot.trunk_link).find("collision/geometry/box")
+    if box is not None:
+        np.testing.assert_allclose(numbers(box, "size"), robot.trunk_box)
+
+
+@every_robot
+@pytest.mark.parametrize("leg", Leg)
+def test_the_legs_dimensions_are_those_of_the_kinematics(robot: RobotSpec, leg: Leg) -> None:
+    front, left = leg in (Leg.FL, Leg.FR), leg in (Leg.FL, Leg.RL)
+    x, y, geometry = (1.0 if front else -1.0), (1.0 if left else -1.0), robot.geometry
+    model = model_of(robot.kind)
+    expected = {
+        f"{leg.name}_hip_joint": [x * geometry.hip_x, y * geometry.hip_y, 0.0],
+        f"{leg.name}_thigh_joint": [0.0, y * geometry.thigh_y, 0.0],
+        f"{leg.name}_calf_joint": [0.0, 0.0, -geometry.link],
+    }
+    for name, offset in expected.items():
+        place = model.jointPlacements[model.getJointId(name)]
+        np.testing.assert_allclose(place.translation, offset, atol=1e-9)
+    foot = model.frames[model.getFrameId(f"{leg.name}_foot")].placement
+    np.testing.assert_allclose(foot.translation, [0.0, 0.0, -geometry.link], atol=1e-9)
+
+
+@every_robot
+def test_the_imu_is_where_the_urdf_has_it(robot: RobotSpec) -> None:
+    model = model_of(robot.kind)
+    frame = model.frames[model.getFrameId("imu_joint")]
+    np.testing.assert_allclose(frame.placement.translation, robot.imu, atol=1e-9)
+    np.testing.assert_allclose(frame.placement.rotation, np.eye(3), atol=1e-12)
+
+
+@every_robot
+def test_the_nominal_pose_stands_at_its_height_within_the_joints_limits(robot: RobotSpec) -> None:
+    model = model_of(robot.kind)
+    data, q = model.createData(), pin.neutral(model)
+    q[7:] = robot.q_stand
+    pin.framesForwardKinematics(model, data, q)
+    for frame in FOOT_FRAMES:
+        height = data.oMf[model.getFrameId(frame)].translation[2]
+        assert height == pytest.approx(robot.geometry.foot_radius - robot.stand_height, abs=1e-12)
+    assert (q[7:] > robot.lower).all()
+    assert (q[7:] < robot.upper).all()
+    assert not robot.q_stand.flags.writeable
+
+
+def test_sizes_belong_together() -> None:
+    assert (len(Leg), len(JOINT_NAMES), 3 * len(Leg)) == (N_LEGS, N_JOINTS, N_FORCES)
+    assert len(OUTPUTS) == N_OUTPUTS
+    assert pytest.approx(-model_of("a1").gravity.linear[2]) == GRAVITY
+    assert robot_names(3) == ("r1", "r2", "r3")
+
+
+def test_a_missing_robot_description_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    with pytest.raises(ConfigError, match="make install"):
+        A1.urdf_path()
