@@ -54,7 +54,7 @@ def _about(s: Survey) -> Iterator[tuple[str, str]]:
             yield f"--{name}", " ".join(recorded_patterns(s.metadata, name)) or NOTHING
     if s.config is not None:
         c = s.config
-        robots = "1 robot" if c.team.robots == 1 else f"{c.team.robots} robots"
+        robots = f"{c.team.robots} × {c.robot.title}"
         yield (
             "team",
             f"{c.team.name}, {robots}, {c.world.mode}, "

@@ -50,7 +50,11 @@ def list_facts(run: Run) -> Iterator[tuple[str, str]]:
     else:
         yield "recorded", run.path.name
     yield "world time", f"{run.begin / 1000:.2f} … {run.end / 1000:.2f} s, {config.world.mode}"
-    yield "team", f"{config.team.name}: {', '.join(traces.robots)}; yokes {config.team.yokes}"
+    yield (
+        "team",
+        f"{config.team.name}: {', '.join(traces.robots)}, {config.robot.title}; "
+        f"yokes {config.team.yokes}",
+    )
     world = config.world
     if world.scenario:
         yield "scenario", world.scenario

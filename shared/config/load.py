@@ -171,13 +171,14 @@ def _check_value(name: str, key: Field[Any], value: Any) -> Any:
             raise ConfigError(name, repr(value), "true or false")
         return value
     if isinstance(default, str):
-        return _check_text(name, meta["choices"], value)
+        return _check_text(name, meta, value)
     return _check_number(name, meta, type(default), value)
 
 
-def _check_text(name: str, choices: tuple[str, ...], value: Any) -> str:
+def _check_text(name: str, meta: Mapping[str, Any], value: Any) -> str:
+    choices: tuple[str, ...] = meta["choices"]
     if choices and value not in choices:
-        hint = did_you_mean(value, choices)
+        hint = "; ".join(filter(None, (meta["hint"], did_you_mean(value, choices))))
         raise ConfigError(name, repr(value), f"one of {', '.join(choices)}", hint)
     if not isinstance(value, str) or not value.isprintable():
         raise ConfigError(name, repr(value), "text without control characters")

@@ -14,7 +14,13 @@ class TeamConfig:
 
     name: str = key("team", "-", "first part of every key; teams on one network need own names")
     robots: int = key(3, "1", "number of robots r1 … rn", low=1, high=10)
-    robot: str = key("a1", "-", "kind of all robots of the team", choices=tuple(ROBOTS))
+    robot: str = key(
+        "a1",
+        "-",
+        "kind of all robots of the team",
+        choices=tuple(ROBOTS),
+        hint="all robots of a team are of one kind",
+    )
     yokes: str = key(
         "complete", "-", "which pairs are yoked", choices=("complete", "chain", "ring")
     )

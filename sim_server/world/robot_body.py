@@ -152,9 +152,9 @@ def _set_inertia(body: mujoco.MjsBody, link: ET.Element, mass: float | None) -> 
     body.ipos = _origin(inertial)
     xx, yy, zz, xy, xz, yz = (float(tensor[k]) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
     body.fullinertia = [xx, yy, zz, xy, xz, yz]
-    R = np.empty(9)
-    mujoco.mju_quat2Mat(R, _rotation(inertial))
-    R = R.reshape(3, 3)
+    flat = np.empty(9)
+    mujoco.mju_quat2Mat(flat, _rotation(inertial))
+    R = flat.reshape(3, 3)
     if not np.array_equal(R, np.eye(3)):
         turned = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
         body.fullinertia = [*np.diag(turned), turned[0, 1], turned[0, 2], turned[1, 2]]

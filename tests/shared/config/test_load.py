@@ -186,3 +186,14 @@ def test_assignments_on_the_command_line() -> None:
 def test_the_committed_page_is_in_step_with_the_code() -> None:
     page = SOURCE / "docs" / "configuration.md"
     assert page.read_text(encoding="utf-8") == to_markdown(Config())
+
+
+def test_a_robots_own_values_stand_beneath_what_is_given() -> None:
+    assert load(None, {"team.robot": "go2"}).reference.height == 0.28
+    assert load(None, {"team.robot": "go2", "reference.height": 0.25}).reference.height == 0.25
+    assert load().reference.height == 0.26
+
+
+def test_a_team_of_different_robots_is_refused_with_the_reason() -> None:
+    with pytest.raises(ConfigError, match=r"'a1,go2'.*one of a1, go1, go2.*of one kind"):
+        load(None, {"team.robot": "a1,go2"})
