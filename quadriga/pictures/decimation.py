@@ -1,0 +1,131 @@
+"""From a robot's mesh files to few triangles for each link.
+
+Importing this takes most of a second: whoever finds the result in the cache need not.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import fast_simplification
+import numpy as np
+import trimesh
+from collada.common import DaeError
+
+from quadriga.pictures.link_mesh import LinkMesh, LinkMeshes, Rgba
+from quadriga.pictures.urdf_visuals import MeshVisual
+from quadriga.shared.errors import MeshError
+from quadriga.shared.robot.conventions import Array
+
+_FEWEST: Final = 60  # triangles of a surface, however small: fewer show no shape
+_UNPAINTED: Final = (0.5, 0.5, 0.5, 1.0)
+
+Surface = tuple[trimesh.Trimesh, Rgba | None]
+
+
+def decimate(visuals: Mapping[str, tuple[MeshVisual, ...]], triangles: int) -> LinkMeshes:
+    """Meshes of all links with about `triangles` triangles together, shared out by area.
+
+    A surface has the colour of its file; where that gives none, the URDF's.
+
+    Raises:
+        MeshError: a mesh file cannot be read.
+    """
+    read = cache(read_surfaces)  # several links show one file
+    placed = {
+        link: [
+            (surface.copy().apply_transform(visual.transform), rgba or visual.rgba or _UNPAINTED)
+            for visual in several
+            for surface, rgba in read(visual.path)
+        ]
+        for link, several in visuals.items()
+    }
+    whole = sum(surface.area for surfaces in placed.values() for surface, _ in surfaces)
+    return {
+        link: _join(
+            (_simplify(surface, max(round(triangles * surface.area / whole), _FEWEST)), rgba)
+            for surface, rgba in surfaces
+        )
+        for link, surfaces in placed.items()
+    }
+
+
+def read_surfaces(path: Path) -> tuple[Surface, ...]:
+    """The surfaces of a mesh file, one for each colour, each shared vertex stored once.
+
+    The file's up axis is not heeded, as in RViz: URDFs are written for that, and a file that says
+    `Y_UP` may well have z upwards.
+
+    Raises:
+        MeshError: the file cannot be read, or holds no triangles.
+    """
+    try:
+        scene = trimesh.load_scene(path)
+        surfaces = tuple(_surface(scene, node) for node in scene.graph.nodes_geometry)
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, DaeError) as error:
+        raise _unreadable(path, str(error) or type(error).__name__) from None
+    if not sum(len(surface.faces) for surface, _ in surfaces):
+        raise _unreadable(path, "no triangles")
+    return surfaces
+
+
+def _surface(scene: trimesh.Scene, node: str) -> Surface:
+    """One geometry of a file, where the file's tree of nodes has it."""
+    transform, name = scene.graph[node]
+    geometry = scene.geometry[name]
+    # Without normals and texture coordinates, by which exporters keep vertices apart.
+    bare = trimesh.Trimesh(geometry.vertices, geometry.faces, process=False)
+    bare.merge_vertices()
+    bare.update_faces(bare.nondegenerate_faces())
+    bare.remove_unreferenced_vertices()
+    material = getattr(geometry.visual, "material", None)
+    rgba = None if material is None else _display_colour(np.array(material.main_color) / 255.0)
+    return bare.apply_transform(transform), rgba
+
+
+def _display_colour(linear: Array) -> Rgba:
+    """Collada files hold linear light, screens and URDFs mean sRGB; shape (4,), 0 … 1."""
+    rgb, alpha = linear[:3], linear[3]
+    bright = 1.055 * rgb ** (1 / 2.4) - 0.055
+    red, green, blue = np.where(rgb <= 0.0031308, 12.92 * rgb, bright).tolist()
+    return red, green, blue, float(alpha)
+
+
+def _simplify(surface: trimesh.Trimesh, triangles: int) -> trimesh.Trimesh:
+    """The surface with about `triangles` triangles, or as it is if it has no more than that."""
+    if len(surface.faces) <= triangles:
+        return surface
+    vertices, faces = fast_simplification.simplify(
+        surface.vertices, surface.faces.astype(np.int32), target_count=triangles
+    )
+    return trimesh.Trimesh(vertices, faces, process=False)
+
+
+def _join(surfaces: Iterable[tuple[trimesh.Trimesh, Rgba]]) -> tuple[LinkMesh, ...]:
+    """One mesh for each colour, the largest first."""
+    by_colour: defaultdict[Rgba, list[trimesh.Trimesh]] = defaultdict(list)
+    for surface, rgba in surfaces:
+        by_colour[rgba].append(surface)
+    largest_first = sorted(
+        by_colour.items(), key=lambda item: sum(part.area for part in item[1]), reverse=True
+    )
+    return tuple(_link_mesh(several, rgba) for rgba, several in largest_first)
+
+
+def _link_mesh(surfaces: list[trimesh.Trimesh], rgba: Rgba) -> LinkMesh:
+    """One mesh of several surfaces."""
+    starts = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])
+    faces = [surface.faces + start for surface, start in zip(surfaces, starts, strict=False)]
+    return LinkMesh(
+        np.concatenate([surface.vertices for surface in surfaces]).astype(np.float32),
+        np.concatenate(faces).astype(np.int32),
+        rgba,
+    )
+
+
+def _unreadable(path: Path, reason: str) -> MeshError:
+    return MeshError(f"mesh {path}", reason, "a file of triangles", "a damaged file?")
