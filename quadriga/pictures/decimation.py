@@ -16,19 +16,18 @@ import numpy as np
 import trimesh
 from collada.common import DaeError
 
-from quadriga.pictures.link_mesh import LinkMesh, LinkMeshes, Rgba
+from quadriga.pictures.link_mesh import Decimation, LinkMesh, LinkMeshes, Rgba
 from quadriga.pictures.urdf_visuals import MeshVisual
 from quadriga.shared.errors import MeshError
 from quadriga.shared.robot.conventions import Array
 
-_FEWEST: Final = 60  # triangles of a surface, however small: fewer show no shape
 _UNPAINTED: Final = (0.5, 0.5, 0.5, 1.0)
 
 Surface = tuple[trimesh.Trimesh, Rgba | None]
 
 
-def decimate(visuals: Mapping[str, tuple[MeshVisual, ...]], triangles: int) -> LinkMeshes:
-    """Meshes of all links with about `triangles` triangles together, shared out by area.
+def decimate(visuals: Mapping[str, tuple[MeshVisual, ...]], settings: Decimation) -> LinkMeshes:
+    """Meshes of all links, their triangles shared out by area.
 
     A surface has the colour of its file; where that gives none, the URDF's.
 
@@ -47,15 +46,14 @@ def decimate(visuals: Mapping[str, tuple[MeshVisual, ...]], triangles: int) -> L
     whole = sum(surface.area for surfaces in placed.values() for surface, _ in surfaces)
     return {
         link: _join(
-            (_simplify(surface, max(round(triangles * surface.area / whole), _FEWEST)), rgba)
-            for surface, rgba in surfaces
+            (_simplify(surface, surface.area / whole, settings), rgba) for surface, rgba in surfaces
         )
         for link, surfaces in placed.items()
     }
 
 
 def read_surfaces(path: Path) -> tuple[Surface, ...]:
-    """The surfaces of a mesh file, one for each colour, each shared vertex stored once.
+    """The surfaces of a mesh file, one for each colour.
 
     The file's up axis is not heeded, as in RViz: URDFs are written for that, and a file that says
     `Y_UP` may well have z upwards.
@@ -77,11 +75,7 @@ def _surface(scene: trimesh.Scene, node: str) -> Surface:
     """One geometry of a file, where the file's tree of nodes has it."""
     transform, name = scene.graph[node]
     geometry = scene.geometry[name]
-    # Without normals and texture coordinates, by which exporters keep vertices apart.
     bare = trimesh.Trimesh(geometry.vertices, geometry.faces, process=False)
-    bare.merge_vertices()
-    bare.update_faces(bare.nondegenerate_faces())
-    bare.remove_unreferenced_vertices()
     material = getattr(geometry.visual, "material", None)
     rgba = None if material is None else _display_colour(np.array(material.main_color) / 255.0)
     return bare.apply_transform(transform), rgba
@@ -95,14 +89,36 @@ def _display_colour(linear: Array) -> Rgba:
     return red, green, blue, float(alpha)
 
 
-def _simplify(surface: trimesh.Trimesh, triangles: int) -> trimesh.Trimesh:
-    """The surface with about `triangles` triangles, or as it is if it has no more than that."""
+def _simplify(surface: trimesh.Trimesh, share: float, settings: Decimation) -> trimesh.Trimesh:
+    """The surface with about its share of triangles, or as it is if it has no more than that."""
+    triangles = max(round(settings.triangles * share), settings.fewest)
     if len(surface.faces) <= triangles:
         return surface
+    merged = _merge_close_vertices(surface, settings.cell)
     vertices, faces = fast_simplification.simplify(
-        surface.vertices, surface.faces.astype(np.int32), target_count=triangles
+        merged.vertices,
+        merged.faces.astype(np.int32),
+        target_count=min(triangles, len(merged.faces)),
+        agg=settings.haste,
     )
     return trimesh.Trimesh(vertices, faces, process=False)
+
+
+def _merge_close_vertices(surface: trimesh.Trimesh, edge: float) -> trimesh.Trimesh:
+    """The surface with one vertex, the mean, for all vertices in a cube with this edge, m.
+
+    Meshes from construction drawings have slivers, doubled walls and edges of three triangles, at
+    which the decimation by quadrics stops or goes astray. This leaves none of them.
+    """
+    cells = np.floor((surface.vertices - surface.bounds[0]) / edge).astype(np.int64)
+    row = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
+    _, cell, count = np.unique(row, return_inverse=True, return_counts=True)
+    sums = [np.bincount(cell, coordinate) for coordinate in surface.vertices.T]
+    merged = trimesh.Trimesh((np.array(sums) / count).T, cell[surface.faces], process=False)
+    corners = np.sort(merged.faces, axis=1)
+    merged.update_faces((np.diff(corners, axis=1) > 0).all(axis=1) & merged.unique_faces())
+    merged.remove_unreferenced_vertices()
+    return merged
 
 
 def _join(surfaces: Iterable[tuple[trimesh.Trimesh, Rgba]]) -> tuple[LinkMesh, ...]:

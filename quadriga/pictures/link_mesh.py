@@ -32,6 +32,24 @@ class LinkMesh:
     rgba: Rgba
 
 
+@dataclass(frozen=True, slots=True)
+class Decimation:
+    """How coarse meshes are made.
+
+    Attributes:
+        triangles: of one robot, about; surfaces that cannot be made as coarse may add half of that.
+        fewest: triangles of a surface, however small: fewer show no shape.
+        cell: vertices in a cube with this edge become one before quadrics decide, m.
+        haste: how fast the threshold of the quadrics grows. The 7 of the package's default is meant
+            for coordinates in the hundreds and makes a lump of a leg in metres.
+    """
+
+    triangles: int = 6000  # so that ten robots are drawn fast
+    fewest: int = 60
+    cell: float = 0.002  # smaller than a pixel of a picture
+    haste: float = 3.0
+
+
 LinkMeshes = Mapping[str, tuple[LinkMesh, ...]]  # by link
 
 

@@ -6,16 +6,17 @@ import hashlib
 import json
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
-from quadriga.pictures.link_mesh import LinkMeshes, read_meshes, write_meshes
+from quadriga.pictures.link_mesh import Decimation, LinkMeshes, read_meshes, write_meshes
 from quadriga.pictures.urdf_visuals import MeshVisual, mesh_visuals
 from quadriga.shared.errors import MeshError
 from quadriga.shared.runtime.places import cache_file
 
-TRIANGLES: Final = 6000  # of one robot, so that ten are drawn fast
+SETTINGS: Final = Decimation()
 _LIBRARIES: Final = ("trimesh", "pycollada", "fast-simplification")
 _MAKING: Final = 1  # how meshes are made and written; another number forgets those in the cache
 
@@ -23,9 +24,9 @@ _MAKING: Final = 1  # how meshes are made and written; another number forgets th
 def link_meshes(urdf: Path) -> LinkMeshes:
     """Meshes of the links that move or carry one that moves, the largest of a link first.
 
-    Feet, cameras and whatever else is fixed to such a link are part of it. All together have about
-    `TRIANGLES` triangles, shared out by area. They are made once for each state of the URDF and of
-    its mesh files, which takes seconds, and come out of the cache after that.
+    Feet, cameras and whatever else is fixed to such a link are part of it. Meshes are made once for
+    each state of the URDF and of its mesh files, which takes seconds, and come out of the cache
+    after that.
 
     Raises:
         MeshError: the URDF or one of its mesh files is missing or cannot be read.
@@ -37,7 +38,7 @@ def link_meshes(urdf: Path) -> LinkMeshes:
     # Imported here, for it takes most of a second that all pictures but the first can do without.
     from quadriga.pictures.decimation import decimate
 
-    meshes = decimate(visuals, TRIANGLES)
+    meshes = decimate(visuals, SETTINGS)
     with suppress(OSError):  # without a cache they are made each time
         write_meshes(path, meshes)
     return meshes
@@ -51,5 +52,5 @@ def _key(urdf: Path, visuals: Mapping[str, tuple[MeshVisual, ...]]) -> str:
     except OSError as error:
         raise MeshError(f"meshes of {urdf.name}", str(error), "files that can be read") from None
     libraries = {name: version(name) for name in _LIBRARIES}
-    parts = json.dumps([_MAKING, TRIANGLES, libraries, digests], sort_keys=True)
+    parts = json.dumps([_MAKING, asdict(SETTINGS), libraries, digests], sort_keys=True)
     return hashlib.sha256(parts.encode()).hexdigest()[:16]

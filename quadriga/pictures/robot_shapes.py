@@ -23,13 +23,15 @@ def dress(spec: mujoco.MjSpec, robots: Sequence[str], meshes: LinkMeshes) -> Non
     Args:
         spec: the world of a team, not yet compiled.
         robots: names of the robots.
-        meshes: of each link, in the link's frame.
+        meshes: of each link, in the link's frame; without any, the world stays as it is.
     """
+    if not meshes:
+        return
     for link, several in meshes.items():
         for k, mesh in enumerate(several):
             _add_mesh(spec, f"{link}.{k}", mesh)
     for robot in robots:
-        trunk, hull = spec.body(f"{robot}/trunk"), list(spec.geom(f"{robot}/trunk").rgba)
+        hull = list(spec.geom(f"{robot}/trunk").rgba)
         for name in (*meshes, *FOOT_FRAMES):
             for geom in _body(spec, robot, name).geoms:
                 geom.group = _HIDDEN_GROUP
@@ -39,7 +41,7 @@ def dress(spec: mujoco.MjSpec, robots: Sequence[str], meshes: LinkMeshes) -> Non
                 body.add_geom(
                     type=mujoco.mjtGeom.mjGEOM_MESH,
                     meshname=f"{link}.{k}",
-                    rgba=hull if body == trunk and k == 0 else mesh.rgba,
+                    rgba=hull if body.name == f"{robot}/trunk" and k == 0 else mesh.rgba,
                     mass=0.0,
                     group=VISUAL_GROUP,
                     **NO_CONTACT,
