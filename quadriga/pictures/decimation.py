@@ -29,15 +29,13 @@ Surface = tuple[trimesh.Trimesh, Rgba | None]
 def decimate(visuals: Mapping[str, tuple[MeshVisual, ...]], settings: Decimation) -> LinkMeshes:
     """Meshes of all links, their triangles shared out by area.
 
-    A surface has the colour of its file; where that gives none, the URDF's.
-
     Raises:
         MeshError: a mesh file cannot be read.
     """
     read = cache(read_surfaces)  # several links show one file
     placed = {
         link: [
-            (surface.copy().apply_transform(visual.transform), rgba or visual.rgba or _UNPAINTED)
+            (surface.copy().apply_transform(visual.transform), _colour(visual, rgba))
             for visual in several
             for surface, rgba in read(visual.path)
         ]
@@ -81,6 +79,17 @@ def _surface(scene: trimesh.Scene, node: str) -> Surface:
     return bare.apply_transform(transform), rgba
 
 
+def _colour(visual: MeshVisual, rgba: Rgba | None) -> Rgba:
+    """Of a surface that its file gives the colour `rgba`, if any.
+
+    The URDF decides if it names the material. One without a name, often white, comes from exporters
+    and knows less than the file.
+    """
+    if visual.rgba is not None and (visual.named or rgba is None):
+        return visual.rgba
+    return rgba or _UNPAINTED
+
+
 def _display_colour(linear: Array) -> Rgba:
     """Collada files hold linear light, screens and URDFs mean sRGB; shape (4,), 0 … 1."""
     rgb, alpha = linear[:3], linear[3]
@@ -100,6 +109,7 @@ def _simplify(surface: trimesh.Trimesh, share: float, settings: Decimation) -> t
         merged.faces.astype(np.int32),
         target_count=min(triangles, len(merged.faces)),
         agg=settings.haste,
+        preserve_border=True,
     )
     return trimesh.Trimesh(vertices, faces, process=False)
 

@@ -37,7 +37,8 @@ class Decimation:
     """How coarse meshes are made.
 
     Attributes:
-        triangles: of one robot, about; surfaces that cannot be made as coarse may add half of that.
+        triangles: of one robot, shared out by area. Small surfaces and borders of surfaces, which
+            stay so that no gaps open between colours, add up to as many.
         fewest: triangles of a surface, however small: fewer show no shape.
         cell: vertices in a cube with this edge become one before quadrics decide, m.
         haste: how fast the threshold of the quadrics grows. The 7 of the package's default is meant
@@ -45,7 +46,7 @@ class Decimation:
     """
 
     triangles: int = 6000  # so that ten robots are drawn fast
-    fewest: int = 60
+    fewest: int = 150
     cell: float = 0.002  # smaller than a pixel of a picture
     haste: float = 3.0
 

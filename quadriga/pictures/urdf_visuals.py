@@ -26,11 +26,13 @@ class MeshVisual:
         path: the file.
         transform: from the file's coordinates to the link's frame, m, scale included, shape (4, 4).
         rgba: the URDF's colour, 0 … 1; None if it gives none.
+        named: whether this colour is that of a material with a name.
     """
 
     path: Path
     transform: Array
     rgba: Rgba | None
+    named: bool
 
 
 def mesh_visuals(urdf: Path) -> Mapping[str, tuple[MeshVisual, ...]]:
@@ -70,9 +72,8 @@ def mesh_visuals(urdf: Path) -> Mapping[str, tuple[MeshVisual, ...]]:
             if mesh is not None and carrier in found:
                 scale = np.diag([*_numbers(mesh, "scale", "1 1 1"), 1.0])
                 transform = offset @ _origin(visual) @ scale
-                found[carrier].append(
-                    MeshVisual(_mesh_path(urdf, mesh), transform, _colour(visual, palette))
-                )
+                colour = _colour(visual, palette)
+                found[carrier].append(MeshVisual(_mesh_path(urdf, mesh), transform, *colour))
     return {name: tuple(visuals) for name, visuals in found.items() if visuals}
 
 
@@ -116,12 +117,13 @@ def _mesh_path(urdf: Path, mesh: ET.Element) -> Path:
     )
 
 
-def _colour(visual: ET.Element, palette: Mapping[str, Rgba | None]) -> Rgba | None:
-    """The colour of a visual's material: its own, or that of the robot's material of this name."""
+def _colour(visual: ET.Element, palette: Mapping[str, Rgba | None]) -> tuple[Rgba | None, bool]:
+    """The colour of a visual's material and whether that has a name, by which it may be shared."""
     material = visual.find("material")
     if material is None:
-        return None
-    return _rgba(material) or palette.get(str(material.get("name")))
+        return None, False
+    name = material.get("name", "")
+    return _rgba(material) or palette.get(name), bool(name)
 
 
 def _rgba(material: ET.Element) -> Rgba | None:

@@ -16,7 +16,7 @@ import pytest
 
 from quadriga.pictures.decimation import read_surfaces
 from quadriga.pictures.link_mesh import LinkMesh, LinkMeshes
-from quadriga.pictures.meshes import SETTINGS, link_meshes
+from quadriga.pictures.meshes import link_meshes
 from quadriga.pictures.urdf_visuals import mesh_visuals
 from quadriga.shared.errors import MeshError
 from quadriga.shared.robot.a1 import a1_urdf
@@ -111,14 +111,14 @@ def test_left_legs_mirror_right_ones_and_rear_hips_front_ones(robot: str) -> Non
         turned = np.sort(box(meshes[other]) * mirror, axis=0)
         np.testing.assert_allclose(box(meshes[one]), turned, atol=0.006, err_msg=one)
         middle = centroid(meshes[other]) * mirror
-        np.testing.assert_allclose(centroid(meshes[one]), middle, atol=0.004, err_msg=one)
+        np.testing.assert_allclose(centroid(meshes[one]), middle, atol=0.01, err_msg=one)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_meshes_have_few_triangles_and_the_extent_of_their_sources(robot: str) -> None:
     meshes = meshes_of(robot)
     triangles = sum(len(mesh.faces) for several in meshes.values() for mesh in several)
-    assert triangles < 1.5 * SETTINGS.triangles
+    assert 4000 < triangles < 11_000
     if robot == "go1":
         return  # 28 MB of text
     for link, several in mesh_visuals(urdf_of(robot)).items():

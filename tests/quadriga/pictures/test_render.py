@@ -85,7 +85,7 @@ def test_without_meshes_boxes_and_capsules_and_one_line(
     shutil.copy(a1_urdf(), tmp_path / robot)
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
     messages: list[str] = []
-    run = write_run(run_config(1, 0.1))
+    run = write_run(run_config(1, 0.5))
     paths = render(run, messages.append)
     if "OpenGL" in messages[-1]:
         pytest.skip(messages[-1])

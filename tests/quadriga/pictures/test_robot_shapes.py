@@ -45,7 +45,7 @@ def test_only_meshes_of_the_robots_are_seen_and_trunks_have_their_colours() -> N
             for geom in range(model.ngeom)
             if model.geom_bodyid[geom] in bodies and DRAWN[model.geom_group[geom]]
         ]
-        assert {model.geom_type[geom] for geom in seen} == {mujoco.mjtGeom.mjGEOM_MESH}
+        assert {int(model.geom_type[geom]) for geom in seen} == {int(mujoco.mjtGeom.mjGEOM_MESH)}
         assert len({int(model.geom_bodyid[geom]) for geom in seen}) == 13
         colours = [model.geom_rgba[geom].tolist() for geom in seen]
         assert bare.geom(f"{robot}/trunk").rgba.tolist() in colours
