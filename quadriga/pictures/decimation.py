@@ -19,7 +19,6 @@ from collada.common import DaeError
 from quadriga.pictures.link_mesh import Decimation, LinkMesh, LinkMeshes, Rgba
 from quadriga.pictures.urdf_visuals import MeshVisual
 from quadriga.shared.errors import MeshError
-from quadriga.shared.robot.conventions import Array
 
 _UNPAINTED: Final = (0.5, 0.5, 0.5, 1.0)
 
@@ -61,7 +60,8 @@ def read_surfaces(path: Path) -> tuple[Surface, ...]:
     """
     try:
         scene = trimesh.load_scene(path)
-        surfaces = tuple(_surface(scene, node) for node in scene.graph.nodes_geometry)
+        linear = path.suffix.lower() == ".dae"
+        surfaces = tuple(_surface(scene, node, linear) for node in scene.graph.nodes_geometry)
     except (OSError, ValueError, LookupError, TypeError, AttributeError, DaeError) as error:
         raise _unreadable(path, str(error) or type(error).__name__) from None
     if not sum(len(surface.faces) for surface, _ in surfaces):
@@ -69,14 +69,24 @@ def read_surfaces(path: Path) -> tuple[Surface, ...]:
     return surfaces
 
 
-def _surface(scene: trimesh.Scene, node: str) -> Surface:
-    """One geometry of a file, where the file's tree of nodes has it."""
+def _surface(scene: trimesh.Scene, node: str, linear: bool) -> Surface:
+    """One geometry of a file, where the file's tree of nodes has it.
+
+    Args:
+        scene: the file.
+        node: of the geometry.
+        linear: whether the file's colours are linear light, as Blender writes them into Collada.
+    """
     transform, name = scene.graph[node]
     geometry = scene.geometry[name]
     bare = trimesh.Trimesh(geometry.vertices, geometry.faces, process=False)
     material = getattr(geometry.visual, "material", None)
-    rgba = None if material is None else _display_colour(np.array(material.main_color) / 255.0)
-    return bare.apply_transform(transform), rgba
+    if material is None:
+        return bare.apply_transform(transform), None
+    red, green, blue, alpha = (np.array(material.main_color) / 255.0).tolist()
+    if linear:
+        red, green, blue = map(_to_srgb, (red, green, blue))
+    return bare.apply_transform(transform), (red, green, blue, alpha)
 
 
 def _colour(visual: MeshVisual, rgba: Rgba | None) -> Rgba:
@@ -90,12 +100,9 @@ def _colour(visual: MeshVisual, rgba: Rgba | None) -> Rgba:
     return rgba or _UNPAINTED
 
 
-def _display_colour(linear: Array) -> Rgba:
-    """Collada files hold linear light, screens and URDFs mean sRGB; shape (4,), 0 … 1."""
-    rgb, alpha = linear[:3], linear[3]
-    bright = 1.055 * rgb ** (1 / 2.4) - 0.055
-    red, green, blue = np.where(rgb <= 0.0031308, 12.92 * rgb, bright).tolist()
-    return red, green, blue, float(alpha)
+def _to_srgb(light: float) -> float:
+    """Linear light, 0 … 1, as screens and URDFs count it."""
+    return 12.92 * light if light <= 0.0031308 else 1.055 * light ** (1 / 2.4) - 0.055
 
 
 def _simplify(surface: trimesh.Trimesh, share: float, settings: Decimation) -> trimesh.Trimesh:
@@ -104,10 +111,12 @@ def _simplify(surface: trimesh.Trimesh, share: float, settings: Decimation) -> t
     if len(surface.faces) <= triangles:
         return surface
     merged = _merge_close_vertices(surface, settings.cell)
+    if len(merged.faces) <= triangles:
+        return merged
     vertices, faces = fast_simplification.simplify(
         merged.vertices,
         merged.faces.astype(np.int32),
-        target_count=min(triangles, len(merged.faces)),
+        target_count=triangles,
         agg=settings.haste,
         preserve_border=True,
     )
@@ -132,10 +141,11 @@ def _merge_close_vertices(surface: trimesh.Trimesh, edge: float) -> trimesh.Trim
 
 
 def _join(surfaces: Iterable[tuple[trimesh.Trimesh, Rgba]]) -> tuple[LinkMesh, ...]:
-    """One mesh for each colour, the largest first."""
+    """One mesh for each colour, the largest first; what is smaller than a cell has vanished."""
     by_colour: defaultdict[Rgba, list[trimesh.Trimesh]] = defaultdict(list)
     for surface, rgba in surfaces:
-        by_colour[rgba].append(surface)
+        if len(surface.faces):
+            by_colour[rgba].append(surface)
     largest_first = sorted(
         by_colour.items(), key=lambda item: sum(part.area for part in item[1]), reverse=True
     )

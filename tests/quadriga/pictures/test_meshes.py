@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 
 from quadriga.pictures.decimation import read_surfaces
 from quadriga.pictures.link_mesh import LinkMesh, LinkMeshes
@@ -246,6 +247,17 @@ def test_scale_mirror_rotation_and_fixed_links_are_as_the_urdf_says(tmp_path: Pa
     np.testing.assert_allclose(found, wanted, atol=1e-6)
     volume = np.linalg.det(mesh.vertices[mesh.faces].astype(float) - [1, -0.5, 0]).sum() / 6
     assert volume == pytest.approx(0.1 * 0.2 * 0.3 / 6), "triangles face outwards, though mirrored"
+
+
+@pytest.mark.usefixtures("own_cache")
+def test_what_is_smaller_than_the_finest_detail_vanishes(tmp_path: Path) -> None:
+    (tmp_path / "part.obj").write_text(TETRAHEDRON)
+    trimesh.creation.icosphere(subdivisions=2, radius=4e-4).export(tmp_path / "bolt.stl")
+    bolt = '<visual><geometry><mesh filename="bolt.stl"/></geometry></visual>'
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(ARM.replace("</visual>", "</visual>" + bolt))
+    (mesh,) = link_meshes(urdf)["arm"]
+    assert len(mesh.faces) == 4
 
 
 @pytest.mark.parametrize(
