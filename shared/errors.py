@@ -55,6 +55,10 @@ class NewerRecordingError(RecordingError):
     """A recording that only a later version of this project can read."""
 
 
+class MeshError(QuadrigaError):
+    """The URDF of a robot, or a mesh file that it names, is missing or cannot be read."""
+
+
 class ProcessError(QuadrigaError):
     """A process of the team failed or did not start."""
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,10 +17,14 @@ import numpy as np
 from PIL import Image
 
 from quadriga.pictures.frames import FRAME, clip_ticks, save_clip, save_sheet, sheet_ticks
+from quadriga.pictures.link_mesh import LinkMeshes
+from quadriga.pictures.meshes import link_meshes
 from quadriga.pictures.poses import PosedTeam, Poses, read_poses, truth_ticks
-from quadriga.shared.errors import QuadrigaError
+from quadriga.pictures.robot_shapes import dress
+from quadriga.shared.errors import MeshError, QuadrigaError
+from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robot.conventions import Array, robot_names
 
 _AZIMUTH: Final = 145.0  # deg, seen from ahead and the left of a team that walks along x
 _ELEVATION: Final = -24.0  # deg
@@ -36,22 +41,37 @@ _CLIP_QUALITY: Final = (512, 0)
 def draw(run_dir: Path) -> None:
     """Write contact sheet and clip of the run in `run_dir`.
 
+    One line is printed if the robots' meshes are missing, so that they are boxes and capsules.
+
     Raises:
         RecordingError: the recording is missing or holds no truth.
     """
     recording = Recording(run_dir / "run.mcap")
     ticks = truth_ticks(recording)
+    meshes: LinkMeshes = {}
+    try:
+        meshes = link_meshes(recorded_config(recording).robot.urdf_path())
+    except MeshError as error:
+        print(f"robots are drawn as boxes and capsules: {error}", flush=True)
     for wanted, quality, save in (
         (sheet_ticks(ticks), _SHEET_QUALITY, save_sheet),
         (clip_ticks(ticks), _CLIP_QUALITY, save_clip),
     ):
         poses = read_poses(recording, wanted)
-        save(run_dir, wanted, list(frames(poses, quality)))
+        save(run_dir, wanted, list(frames(poses, quality, meshes)))
 
 
-def frames(poses: Poses, quality: tuple[int, int]) -> Iterator[Image.Image]:
-    """One picture of the team for each pose, the camera moving along."""
-    team = PosedTeam(poses.config)
+def frames(poses: Poses, quality: tuple[int, int], meshes: LinkMeshes) -> Iterator[Image.Image]:
+    """One picture of the team for each pose, the camera moving along.
+
+    Args:
+        poses: of all bodies.
+        quality: size of the shadow map, texels, and samples of a pixel.
+        meshes: what the robots look like; where empty, boxes and capsules.
+    """
+    team = PosedTeam(
+        poses.config, partial(dress, robots=robot_names(poses.config.team.robots), meshes=meshes)
+    )
     team.model.vis.quality.shadowsize, team.model.vis.quality.offsamples = quality
     pebbles = team.team.terrain.pebbles
     if pebbles is not None:  # thousands of them

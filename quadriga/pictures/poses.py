@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -108,11 +108,18 @@ def _truths(recording: Recording) -> Iterator[Truth]:
 
 
 class PosedTeam:
-    """The team's model, to be put into recorded poses."""
+    """The team's model, to be put into recorded poses.
 
-    def __init__(self, config: Config) -> None:
+    Args:
+        config: of the run.
+        dress: gets the world before it is compiled, to change what pictures of it show.
+    """
+
+    def __init__(
+        self, config: Config, dress: Callable[[mujoco.MjSpec], None] | None = None
+    ) -> None:
         self.config = config
-        self.team: TeamModel = build_team_model(config)
+        self.team: TeamModel = build_team_model(config, dress)
         self.model = self.team.model
         self.physics = mujoco.MjData(self.model)
         self.names = robot_names(config.team.robots)

@@ -20,12 +20,12 @@ def render(run_dir: Path, say: Callable[[str], None] = print) -> tuple[Path, ...
 
     MuJoCo draws `walk.png` and `walk.webp` off-screen, in a process of its own that chooses EGL
     unless MUJOCO_GL says otherwise. Where that fails, `walk.png` shows stick figures and `say`
-    gets one line about it.
+    gets one line about it; likewise where it must do without the robots' meshes.
 
     Raises:
         RecordingError: the recording is missing, empty or holds no truth.
     """
-    problem = _draw_offscreen(run_dir)
+    problem = _draw_offscreen(run_dir, say)
     if not problem:
         return run_dir / SHEET, run_dir / CLIP
     draw_stick_figures(run_dir)
@@ -33,15 +33,14 @@ def render(run_dir: Path, say: Callable[[str], None] = print) -> tuple[Path, ...
     return (run_dir / SHEET,)
 
 
-def _draw_offscreen(run_dir: Path) -> str:
+def _draw_offscreen(run_dir: Path, say: Callable[[str], None]) -> str:
     """Draw with MuJoCo; the reason why it did not work, or an empty text."""
     command = [sys.executable, "-m", "quadriga.pictures.mujoco_frames", str(run_dir)]
     try:
         done = subprocess.run(
             command,
             env={"MUJOCO_GL": "egl"} | os.environ,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
+            capture_output=True,
             text=True,
             errors="replace",
             timeout=_TIMEOUT,
@@ -50,6 +49,8 @@ def _draw_offscreen(run_dir: Path) -> str:
     except subprocess.TimeoutExpired:
         return f"nothing drawn after {_TIMEOUT:g} s"
     if done.returncode == 0:
+        for line in done.stdout.splitlines():
+            say(line)
         return ""
     lines = done.stderr.strip().splitlines()
     return lines[-1] if lines else f"exit status {done.returncode}"

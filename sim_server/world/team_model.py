@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -82,8 +83,14 @@ def spawn_positions(config: Config) -> Array:
     return places + random.uniform(-reach, reach, places.shape)
 
 
-def build_team_model(config: Config) -> TeamModel:
+def build_team_model(
+    config: Config, dress: Callable[[mujoco.MjSpec], None] | None = None
+) -> TeamModel:
     """Build and compile the world of a configuration; equal configurations give equal models.
+
+    Args:
+        config: of the run.
+        dress: gets the world before it is compiled, to change what pictures of it show.
 
     Raises:
         ConfigError: the payload names no robot, the reference's trace is no trace, or the robot's
@@ -114,6 +121,8 @@ def build_team_model(config: Config) -> TeamModel:
         _add_yoke(spec, names[i], names[j])
     if terrain.pebbles is not None:
         terrain.pebbles.add_to(spec, len(names), config.world.friction)
+    if dress is not None:
+        dress(spec)
     model = spec.compile()
     q_spawn = model.qpos0.copy()
     q_spawn[: len(names) * NQ].reshape(len(names), NQ)[:, JOINT_POSITIONS] = robot.q_stand

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from quadriga.pictures.poses import PosedTeam, read_poses, truth_ticks
 from quadriga.pictures.render import render
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import A1
 from quadriga.shared.wire import messages as msg
 from quadriga.sim_server.world.layout import NQ
 from tests.a1 import FOOT_RADIUS, q_stand
@@ -70,6 +73,27 @@ def test_renders_sheet_and_clip(write_run: WriteRun) -> None:
     with Image.open(paths[1]) as clip:
         assert clip.size == (640, 360)
         assert getattr(clip, "n_frames", 1) == 7
+
+
+def test_without_meshes_boxes_and_capsules_and_one_line(
+    write_run: WriteRun, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The process that draws finds an installation whose mesh files are missing."""
+    robot = "cmeel.prefix/share/example-robot-data/robots/a1_description/urdf"
+    (tmp_path / "cmeel").mkdir()
+    (tmp_path / "cmeel" / "__init__.py").touch()
+    (tmp_path / robot).mkdir(parents=True)
+    shutil.copy(A1.urdf_path(), tmp_path / robot)
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
+    messages: list[str] = []
+    run = write_run(run_config(1, 0.5))
+    paths = render(run, messages.append)
+    if "OpenGL" in messages[-1]:
+        pytest.skip(messages[-1])
+    assert [path.name for path in paths] == ["walk.png", "walk.webp"]
+    assert len(messages) == 1
+    assert "boxes and capsules" in messages[0]
+    assert "trunk.dae" in messages[0]
 
 
 def test_without_opengl_stick_figures_and_one_line(
