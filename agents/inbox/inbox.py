@@ -11,9 +11,10 @@ from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.planning.operator_references import AHEAD_MS
 from quadriga.agents.plausibility import is_orientation, is_within_limits
 from quadriga.agents.time_grid import step_ms
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import OPERATOR, PLANNER, SIM
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import EStop, Event, Message, Plan, Reference, State, Truth
 from quadriga.shared.wire.topics import (
@@ -60,7 +61,7 @@ class Inbox:
     """
 
     def __init__(self, config: Config, robot: str, peers: Sequence[str]) -> None:
-        team, central = config.team.name, config.planner.kind in CENTRAL
+        team, central = config.team.name, find_kind(config.planner.kind).central
         self._robot = robot
         self._lockstep = config.world.mode == "lockstep"
         self._peers, self._planners = tuple(peers), (PLANNER,) if central else tuple(peers)

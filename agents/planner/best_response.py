@@ -2,42 +2,52 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final, NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy import linalg
 
 from quadriga.agents.planner.planner_qp import build_problem
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
-from quadriga.shared.config.sections import Config
+from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.robot.conventions import Array
+
+_SAME: Final = 1e-6  # relative: other machines have other last digits, other costs differ by more
+# What a problem's size and predictor depend on, and no cost.
+_SIZES: Final = ("N", "T_ini", "applied", "interface")
+
+
+class _LocalCost(NamedTuple):
+    """Of one agent's QP: Hessian (nv, nv), G_iiᵀ Q̄ (nv, 6 N) and the places of its forces (nv,)."""
+
+    H: Array
+    gradient: Array
+    columns: NDArray[np.int64]
 
 
 def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
     """The linear map from all agents' present plans to their next, without inequality constraints.
 
     U_i ← −H_ii⁻¹ G_iiᵀ Q̄ Σ_{j≠i} G_ij U_j over the stance legs of planning step `step`, with
-    the G of its phase.
+    the G of its phase. H_ii is that of the QP that is solved; slacks of soft bounds are left out,
+    since they are zero where no bound is active.
     Shape (s, s), s being the number of stance forces of the team (150 per robot at N = 25).
     """
     n, phase = predictor.meta.robots, phase_of(config, step, predictor.phases)
-    problems = [
-        build_problem(
-            config.planner,
-            config.robot.weight,
-            predictor.future_block(i, i, phase),
-            horizon_stance(config, i, step),
-        )
-        for i in range(n)
-    ]
+    costs = _local_costs(config, predictor, step)
     rows = []
-    for i, problem in enumerate(problems):
+    for i, cost in enumerate(costs):
         coupling = [
-            np.zeros_like(problem.H)
+            np.zeros_like(cost.H)
             if i == j
-            else problem.gradient @ predictor.future_block(i, j, phase)[:, problems[j].columns]
+            else cost.gradient @ predictor.future_block(i, j, phase)[:, costs[j].columns]
             for j in range(n)
         ]
-        factor = linalg.cho_factor(problem.H)
+        factor = linalg.cho_factor(cost.H)
         rows.append(-linalg.cho_solve(factor, np.concatenate(coupling, axis=1)))
     return np.concatenate(rows)
 
@@ -47,14 +57,68 @@ def best_response_radius(config: Config, predictor: Predictor) -> float:
 
     Below 1 the one-step-delay iteration of the agents' plans converges; 0 for a single robot.
     """
-    n = predictor.meta.robots
-    if n == 1:
+    if predictor.meta.robots == 1:
         return 0.0
-    distinct: dict[tuple[int, bytes], int] = {}
-    for step in walking_steps(config):
-        patterns = b"".join(horizon_stance(config, i, step).tobytes() for i in range(n))
-        distinct.setdefault((phase_of(config, step, predictor.phases), patterns), step)
     return max(
         float(np.abs(linalg.eigvals(best_response_map(config, predictor, step))).max())
-        for step in distinct.values()
+        for step in _distinct_steps(config, predictor)
     )
+
+
+def probe_costs(config: Config, predictor: Predictor) -> tuple[float, ...]:
+    """Numbers that tell the QPs that a radius belongs to: Σ pᵀ H p and Σ pᵀ G_uᵀ Q̄ q of each step.
+
+    p and q are fixed, so that any key that changes a cost changes them, whatever it is called.
+    Two numbers for each distinct planning step; () for a single robot.
+    """
+    if predictor.meta.robots == 1:
+        return ()
+    probes: list[float] = []
+    for step in _distinct_steps(config, predictor):
+        random = np.random.default_rng(0)
+        hessian = gradient = 0.0
+        for cost in _local_costs(config, predictor, step):
+            p, q = (random.uniform(0.5, 1.5, size) for size in cost.gradient.shape)
+            hessian += float(p @ cost.H @ p)
+            gradient += float(p @ cost.gradient @ q)
+        probes += [hessian, gradient]
+    return tuple(probes)
+
+
+def are_same_costs(probes: tuple[float, ...], others: tuple[float, ...]) -> bool:
+    """Whether two results of `probe_costs` are of the same QPs."""
+    return len(probes) == len(others) and np.allclose(probes, others, rtol=_SAME, atol=0.0)
+
+
+def with_usual_costs(config: Config, Q: tuple[float, ...], R: tuple[float, ...]) -> Config:
+    """The configuration with a cost of these weights and nothing else in it.
+
+    Args:
+        config: gives all that is no cost.
+        Q: weights of the outputs.
+        R: weights of the forces.
+    """
+    sizes = {name: getattr(config.planner, name) for name in _SIZES}
+    return replace(config, planner=replace(PlannerConfig(), **sizes, Q=Q, R=R))
+
+
+def _local_costs(config: Config, predictor: Predictor, step: int) -> list[_LocalCost]:
+    """The cost of each agent's QP at a planning step, as the planner builds it."""
+    phase, costs = phase_of(config, step, predictor.phases), []
+    for i in range(predictor.meta.robots):
+        G_u = predictor.future_block(i, i, phase)
+        stance = horizon_stance(config, i, step)
+        problem = build_problem(config.planner, config.robot.weight, G_u, stance)
+        nv = len(problem.columns)
+        costs.append(_LocalCost(problem.H[:nv, :nv], problem.gradient, problem.columns))
+    return costs
+
+
+def _distinct_steps(config: Config, predictor: Predictor) -> Iterable[int]:
+    """One planning step for each pair of a phase and the stance patterns of all robots."""
+    distinct: dict[tuple[int, bytes], int] = {}
+    for step in walking_steps(config):
+        robots = range(predictor.meta.robots)
+        patterns = b"".join(horizon_stance(config, i, step).tobytes() for i in robots)
+        distinct.setdefault((phase_of(config, step, predictor.phases), patterns), step)
+    return distinct.values()

@@ -6,11 +6,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from quadriga.agents.planner.best_response import best_response_radius
+from quadriga.agents.planner.best_response import (
+    are_same_costs,
+    best_response_radius,
+    probe_costs,
+    with_usual_costs,
+)
+from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import REMEDY, Provenance, read
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorFileError
+from quadriga.shared.planner_kinds import find_kind
 
 # Fields of the meta that must be as configured, beside the controller's keys.
 _MATCHED: Final = (
@@ -28,8 +35,9 @@ _MATCHED: Final = (
 def load_checked(path: Path, config: Config) -> tuple[Predictor, Provenance]:
     """Read a predictor and refuse any that is not for this team or has not passed its gates.
 
-    The figures are compared with the limits of `config`. If the weights Q, R are not those that the
-    best-response radius was computed for, the radius is computed again.
+    The figures are compared with the limits of `config`. If the agents respond to each other's
+    plans, and their QPs are not those that the best-response radius was computed for, the radius is
+    computed again.
 
     Raises:
         PredictorFileError: no such file, not a predictor, corrupt, fitted for another team, gait,
@@ -38,16 +46,31 @@ def load_checked(path: Path, config: Config) -> tuple[Predictor, Provenance]:
     """
     predictor, provenance = read(path)
     _check_meta(path, predictor.meta, PredictorMeta.of(config))
-    gates, planner = provenance.gates, config.planner
-    weights = (tuple(planner.Q), tuple(planner.R))
-    if weights != (gates.Q, gates.R):
-        gates = replace(
-            gates, radius=best_response_radius(config, predictor), Q=planner.Q, R=planner.R
-        )
+    gates = gates_in_force(provenance.gates, config, predictor)
+    gates.check(config.planner.kind)
+    return predictor, replace(provenance, gates=gates)
+
+
+def gates_in_force(gates: GateReport, config: Config, predictor: Predictor) -> GateReport:
+    """The figures of a predictor with the limits of `config` and the radius of its QPs.
+
+    Args:
+        gates: as they are stored with the predictor.
+        config: the team's configuration.
+        predictor: whose figures these are.
+    """
     limits = config.identification
     gates = replace(gates, gain_limits=tuple(limits.gain_range), radius_limit=limits.max_radius)
-    gates.check(planner.kind)
-    return predictor, replace(provenance, gates=gates)
+    if not find_kind(config.planner.kind).needs_peers:
+        return gates
+    planner, probes = config.planner, probe_costs(config, predictor)
+    known = gates.cost_probes
+    if not known:
+        known = probe_costs(with_usual_costs(config, gates.Q, gates.R), predictor)
+    if are_same_costs(probes, known):
+        return gates
+    radius = best_response_radius(config, predictor)
+    return replace(gates, radius=radius, Q=planner.Q, R=planner.R, cost_probes=probes)
 
 
 def _check_meta(path: Path, got: PredictorMeta, expected: PredictorMeta) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import linalg
 
-from quadriga.agents.planner.best_response import best_response_radius
+from quadriga.agents.planner.best_response import best_response_radius, probe_costs
 from quadriga.agents.predictor.episode import Y_SCALE, Episode
 from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor
@@ -49,6 +49,7 @@ def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode])
         condition=predictor.condition,
         coupling=tuple(tuple(row) for row in coupling_table(predictor).tolist()),
         size=predictor.G.nbytes,
+        cost_probes=probe_costs(config, predictor),
     )
 
 

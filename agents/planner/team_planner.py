@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces
-from quadriga.agents.planner.deepc_qp import select
+from quadriga.agents.planner.deepc_qp import build_model, select
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.planner_qp import (
     NO_BOUNDS,
@@ -21,6 +21,8 @@ from quadriga.agents.planner.planner_qp import (
     unpack,
 )
 from quadriga.agents.planner.qp_solver import NOMINAL, SOLVED, SOLVERS, Residuals, Solver
+from quadriga.agents.predictor.deepc import reduce
+from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
 from quadriga.shared.config.sections import Config
@@ -28,6 +30,7 @@ from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codes import with_detail
 
+Collected = Callable[[], Sequence[Episode]]
 Formulation = Callable[[int, NDArray[np.bool_]], Condensed]  # of contact phase and stance
 
 
@@ -136,6 +139,24 @@ def build_deepc(config: Config, model: Condensed) -> TeamPlanner:
             'with planner.kind = "deepc" the outputs are eliminated together with g',
         )
     return TeamPlanner(config, lambda _, stance: select(model, stance_columns(stance)))
+
+
+def build_centralised_team(
+    config: Config, predictor: Predictor, _collected: Collected
+) -> TeamPlanner:
+    """The planner of the kind `centralised`; see `build_centralised`."""
+    return build_centralised(config, predictor)
+
+
+def build_deepc_team(
+    config: Config, _predictor: Predictor | None, collected: Collected
+) -> TeamPlanner:
+    """The planner of the kind `deepc`, from the collected episodes; see `build_deepc`."""
+    planner = config.planner
+    reduction = reduce(collected(), planner.T_ini, planner.N)
+    return build_deepc(
+        config, build_model(reduction, planner, planner.lambda_g, planner.lambda_sigma)
+    )
 
 
 def _stack_columns(G: Array, past: int) -> tuple[list[Array], list[Array]]:

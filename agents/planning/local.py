@@ -30,6 +30,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.recursive import Correction
 from quadriga.agents.time_grid import exchange_ms, first_step, patience, step_ms
 from quadriga.shared.config.sections import Config
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import with_detail
@@ -38,7 +39,6 @@ from quadriga.shared.wire.messages import Measurement, Reference
 WINDOW_LOST: Final = "window-lost"  # stop: no plan of its own for as long as a peer may be silent
 WINDOW_GAP: Final = "window_gap"  # counter: no plan, a sample of the robot's own is missing
 UNLEARNT: Final = "window_not_learnt"  # counter: an agent that adapts refused a window
-ALONE: Final = "decentralised"
 
 
 @record
@@ -283,7 +283,7 @@ def _peer_lost(names: tuple[str, ...]) -> str:
 
 def _coupled_peers(config: Config, index: int, predictor: Predictor) -> frozenset[int]:
     """Places of the robots whose plans matter to this agent."""
-    if config.planner.kind == ALONE:
+    if not find_kind(config.planner.kind).needs_peers:
         return frozenset()
     others = frozenset(range(config.team.robots)) - {index}
     if predictor.meta.neighbours == "all":

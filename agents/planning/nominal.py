@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 from quadriga.agents.planning.interface import NOTHING, Expected, PlanningInputs, PlanningOutputs
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.shared.config.sections import Config
 
 _NO_OUTPUTS: Final = PlanningOutputs()
 
@@ -32,3 +35,10 @@ class NominalPlanning:
     def problem_of(self, state: None, inputs: PlanningInputs) -> None:
         """No QP."""
         return
+
+
+def build_nominal(
+    _config: Config, _index: int, _predictor: Predictor | None, _clock_ns: Callable[[], int]
+) -> NominalPlanning:
+    """The planning part of the kind `none`."""
+    return NominalPlanning()

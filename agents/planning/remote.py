@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
@@ -20,6 +21,7 @@ from quadriga.agents.planning.interface import (
 )
 from quadriga.agents.planning.operator_references import reference_at
 from quadriga.agents.predictor.episode import commanded_outputs
+from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import first_step, horizon_stance, patience, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import N_LEGS, Array
@@ -150,3 +152,10 @@ class RemotePlanning:
 def central_latency(config: Config) -> int:
     """Ticks from the data of a central plan to its start; at least one for the way there."""
     return max(1, config.planner.latency_ms)
+
+
+def build_remote(
+    config: Config, index: int, _predictor: Predictor | None, _clock_ns: Callable[[], int]
+) -> RemotePlanning:
+    """The planning part of an agent of every kind that is one process for the team."""
+    return RemotePlanning(config, index)

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from quadriga.shared.errors import PredictorError
+from quadriga.shared.planner_kinds import find_kind
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,8 @@ class GateReport:
             and phases.
         radius_limit: must be below this.
         Q, R: planner weights that the radius was computed for.
+        cost_probes: tell the QPs that the radius was computed for, whatever their cost is made of;
+            () in a file of an earlier version, whose cost had no other weights than Q and R.
         condition: number of the regression, penalty included; None if it is not known.
         coupling: norm of the scaled G_ij, the largest of all phases, per robot i and j.
         size: of G, bytes.
@@ -43,6 +46,7 @@ class GateReport:
     condition: float | None = None
     coupling: tuple[tuple[float, ...], ...] = ()
     size: int = 0
+    cost_probes: tuple[float, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """A dictionary that can be written as JSON."""
@@ -66,8 +70,8 @@ class GateReport:
         """Refuse the predictor if a figure is beyond its limit.
 
         Args:
-            kind: of planner that will use it; the radius matters only if agents respond to each
-                other's plans.
+            kind: of planner that will use it; the radius matters only if its agents respond to
+                each other's plans.
 
         Raises:
             PredictorError: a figure is beyond its limit; the message names both.
@@ -90,7 +94,7 @@ class GateReport:
                         "forces in the data that follow the outputs (feedback bias), "
                         "or a controller stiffer than the interface assumes",
                     )
-        if kind == "distributed" and not self.radius < self.radius_limit:
+        if find_kind(kind).needs_peers and not self.radius < self.radius_limit:
             raise PredictorError(
                 "predictor: radius of the best-response map",
                 f"{self.radius:.3f}",

@@ -7,8 +7,9 @@ import argparse
 from quadriga.commands.command import AddCommand, Given
 from quadriga.commands.fitted_predictor import load_predictor
 from quadriga.commands.options import add_predictor, add_wait
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.planner_kinds import find_kind
 
 
 def add(add_command: AddCommand) -> None:
@@ -27,7 +28,7 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     if arguments.robot not in names:
         raise ConfigError("--robot", repr(arguments.robot), f"one of {', '.join(names)}")
     predictor = None
-    if config.planner.kind not in ("none", *CENTRAL):
+    if find_kind(config.planner.kind).agents_predict:
         predictor = load_predictor(config, arguments)
     process.run(config, arguments.robot, predictor)
     return 0

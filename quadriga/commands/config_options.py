@@ -65,7 +65,7 @@ def build_config_options() -> argparse.ArgumentParser:
             f"--{option}",
             type=type(default),
             dest=name,
-            metavar="|".join(meta["choices"]) or "X",
+            metavar="|".join([*meta["choices"], *(["…"] if meta["more"] else [])]) or "X",
             help=f"{meta['doc']}{unit} ({default})".replace("%", "%%"),
         )
     return options

@@ -6,6 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from quadriga.shared.config.sections import Config
+from quadriga.shared.planner_kinds import find_kind
 
 if TYPE_CHECKING:
     from quadriga.agents.predictor.predictor import Predictor
@@ -32,7 +33,7 @@ def fitted_sha256(config: Config, wait: float) -> str:
     Raises:
         PredictorError: there is none after `wait` seconds, or it is not of this team.
     """
-    if config.planner.kind == "none":
+    if not find_kind(config.planner.kind).needs_predictor:
         return ""
     from quadriga.agents.planner.checked_predictor import load_checked
     from quadriga.agents.predictor.store import predictor_sha256

@@ -7,8 +7,9 @@ import argparse
 from quadriga.commands.command import AddCommand, Given
 from quadriga.commands.fitted_predictor import load_predictor
 from quadriga.commands.options import add_predictor, add_wait
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.planner_kinds import find_kind
 
 
 def add(add_command: AddCommand) -> None:
@@ -24,12 +25,14 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     from quadriga.agents import central_process
     from quadriga.identification.central_planner import build_central_planner
 
-    if config.planner.kind not in CENTRAL:
+    kind = find_kind(config.planner.kind)
+    if not kind.central:
         raise ConfigError(
             "planner.kind",
-            repr(config.planner.kind),
-            f"one of {', '.join(CENTRAL)}",
+            repr(kind.name),
+            "a kind that is one process for the team, such as centralised",
             "in all other kinds each agent plans for itself",
         )
-    central_process.run(config, build_central_planner(config, load_predictor(config, arguments)))
+    predictor = load_predictor(config, arguments) if kind.needs_predictor else None
+    central_process.run(config, build_central_planner(config, predictor))
     return 0

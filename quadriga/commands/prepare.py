@@ -6,6 +6,7 @@ import argparse
 
 from quadriga.commands.command import AddCommand, Given
 from quadriga.shared.config.sections import Config
+from quadriga.shared.planner_kinds import find_kind
 
 
 def add(add_command: AddCommand) -> None:
@@ -21,6 +22,6 @@ def run(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 
     console = Console(stderr=True)
     warm_up(config, console)
-    if config.planner.kind != "none":
+    if find_kind(config.planner.kind).needs_predictor:
         print(ensure_predictor(config, console))
     return 0

@@ -16,6 +16,7 @@ from quadriga.identification.fit_report import reason
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
+from quadriga.shared.planner_kinds import find_kind
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +50,12 @@ def prepare_predictors(configs: Iterable[Config], console: Console) -> dict[Conf
     fitted: dict[Config, Fitted] = {}
     made: dict[tuple[Path, str], Fitted] = {}
     for config in configs:
-        if config.planner.kind == "none":
+        if not find_kind(config.planner.kind).needs_predictor:
             fitted[config] = Fitted()
             continue
-        # Gates are those of the kind of planner, and their limits and Q, R of the configuration.
-        limits = (config.planner.Q, config.planner.R, config.identification, config.planner.kind)
-        key = (predictor_path(config), repr(limits))
+        # Gates are those of the planner, whose QP any of its keys may change, with the limits of
+        # the configuration.
+        key = (predictor_path(config), repr((config.planner, config.identification)))
         if key not in made:
             made[key] = _prepare(config, console)
         fitted[config] = made[key]
@@ -74,4 +75,5 @@ def _prepare(config: Config, console: Console) -> Fitted:
         raise  # of which no other predictor is to blame
     except PredictorError as error:
         return Fitted(refused=reason(error))
-    return Fitted(path, sha256, data_path(config) if config.planner.kind == "deepc" else None)
+    needs_data = find_kind(config.planner.kind).needs_data
+    return Fitted(path, sha256, data_path(config) if needs_data else None)

@@ -11,6 +11,7 @@ from typing import Any, Final
 from quadriga.agents.predictor.fits import FITS
 from quadriga.shared.config.load import flatten, parse_assignment, read_toml
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.planner_kinds import BUILT_IN, find_kind, installed_kinds
 
 Keys = Mapping[str, Any]  # values by section.key
 
@@ -73,7 +74,8 @@ def parse_variants(options: Sequence[str], file: Path | None) -> tuple[Variant, 
         ConfigError: a name that nothing explains or that is given twice, or none at all.
     """
     from_file = {} if file is None else read_keys(read_toml(file), str(file))
-    known: dict[str, Keys] = {**PLANNERS, **from_file}
+    plugins = {kind: _planner(kind) for kind in installed_kinds() if kind not in BUILT_IN}
+    known: dict[str, Keys] = {**plugins, **PLANNERS, **from_file}
     named: dict[str, Keys] = {}
     for text in [part for o in options for part in split_outside_brackets(o, ",")] or from_file:
         name, colon, keys = text.partition(":")
@@ -100,7 +102,8 @@ def combine_with_predictors(
     """Each variant with each predictor, as `planner+predictor`; one without a planner as it is.
 
     Raises:
-        ConfigError: a name is none of `PREDICTORS`, or stands there twice.
+        ConfigError: a name is none of `PREDICTORS`, or stands there twice; or a variant's kind of
+            planner is not installed.
     """
     for name in predictors:
         if name not in PREDICTORS:
@@ -109,7 +112,8 @@ def combine_with_predictors(
         raise ConfigError("--predictors", ", ".join(predictors), "each once")
     combined: list[Variant] = []
     for variant in variants:
-        if not predictors or variant.keys.get("planner.kind") == "none":
+        kind = variant.keys.get("planner.kind")
+        if not predictors or (kind is not None and not find_kind(kind).needs_predictor):
             combined.append(variant)
             continue
         for name in predictors:

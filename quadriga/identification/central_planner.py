@@ -5,26 +5,29 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from quadriga.agents.planner.deepc_qp import build_model
-from quadriga.agents.planner.team_planner import TeamPlanner, build_centralised, build_deepc
-from quadriga.agents.predictor.deepc import reduce
+from quadriga.agents.planner.team_planner import TeamPlanner
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.cache import data_path
 from quadriga.identification.dataset import read_data
 from quadriga.shared.config.sections import Config
+from quadriga.shared.planner_kinds import find_kind, load_builder
 from quadriga.shared.runtime.blas import use_one_blas_thread
 
 
 def build_central_planner(
-    config: Config, predictor: Predictor, data: Path | None = None
+    config: Config, predictor: Predictor | None, data: Path | None = None
 ) -> TeamPlanner:
     """The planner of the whole team for a `planner.kind` that is one process for all.
 
-    `data` is the file of what was collected, which DeePC plans with; None takes the cache's.
+    Args:
+        config: the team's configuration.
+        predictor: the fitted predictor; None for a kind that needs none.
+        data: the file of what was collected, for a kind that needs it; None takes the cache's.
 
     Raises:
-        PredictorError: the predictor is of another team; there are no collected data for DeePC.
+        PredictorError: the predictor is of another team; there are no collected data.
+        ConfigError: the kind is not installed, or cannot be imported.
     """
     use_one_blas_thread()
     return choose_central_planner(
@@ -33,13 +36,9 @@ def build_central_planner(
 
 
 def choose_central_planner(
-    config: Config, predictor: Predictor, collected: Callable[[], Sequence[Episode]]
+    config: Config, predictor: Predictor | None, collected: Callable[[], Sequence[Episode]]
 ) -> TeamPlanner:
-    """The same with the episodes that DeePC plans with, which no other planner asks for."""
-    if config.planner.kind == "centralised":
-        return build_centralised(config, predictor)
-    planner = config.planner
-    reduction = reduce(collected(), planner.T_ini, planner.N)
-    return build_deepc(
-        config, build_model(reduction, planner, planner.lambda_g, planner.lambda_sigma)
-    )
+    """The same with the collected episodes, which only a kind that needs them asks for."""
+    kind = find_kind(config.planner.kind)
+    planner: TeamPlanner = load_builder(kind, kind.build_team)(config, predictor, collected)
+    return planner

@@ -10,6 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
+from quadriga.agents.planner.checked_predictor import gates_in_force
 from quadriga.agents.planner.gates import run_gates
 from quadriga.agents.predictor.fits import FITS
 from quadriga.agents.predictor.fits import fit as fit_predictor
@@ -75,7 +76,8 @@ def report_fit(config: Config, dataset: Dataset, name: str) -> FitReport | Unfit
     """
     path, kind = predictor_path(config), config.planner.kind
     if path.is_file():
-        predictor, origin = read(path)  # whose limits are those of `config`: they name the file
+        predictor, origin = read(path)
+        origin = replace(origin, gates=gates_in_force(origin.gates, config, predictor))
         seconds = _read_fit_seconds(path, predictor_sha256(predictor))
     else:
         use_one_blas_thread()

@@ -42,6 +42,7 @@ class Rollout:
         references: the reference that starts at a tick, or None.
         excitation: force deviation (12,) of a robot at a tick, or None; data collection only.
         planner: the planner of the whole team, if `planner.kind` is one process for all.
+        clock_ns: read around the agents' own planners, for `Outputs.planner_ns` alone.
     """
 
     def __init__(
@@ -51,10 +52,12 @@ class Rollout:
         references: Callable[[int], Reference | None],
         excitation: Callable[[str, int], Array] | None = None,
         planner: TeamPlanner | None = None,
+        clock_ns: Callable[[], int] = lambda: 0,
     ) -> None:
         use_one_blas_thread()
         self.world = World(config)
-        self.agents = {name: Agent(config, name, predictor) for name in self.world.names}
+        names = self.world.names
+        self.agents = {name: Agent(config, name, predictor, clock_ns) for name in names}
         self.states: dict[str, AgentState] = {n: a.initial() for n, a in self.agents.items()}
         self._references = references
         self._excitation = excitation

@@ -13,6 +13,7 @@ import numpy as np
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, STATE, TRUTH, Topic
 
@@ -47,7 +48,7 @@ def missing_ticks(config: Config, ticks: Mapping[str, Ticks]) -> dict[str, int]:
             missing[key] = count(key, topic, 0, end)
         key = MEASUREMENT.key(team, name)
         missing[key] = count(key, MEASUREMENT, _first_tick(config, ticks, key), end)
-        if config.planner.kind != "none":
+        if find_kind(config.planner.kind).publishes:
             key = PLAN.key(team, name)
             plans = _recorded_ticks(ticks, key)
             last = min(int(plans.max()), end) if len(plans) else end

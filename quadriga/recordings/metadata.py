@@ -15,6 +15,7 @@ from typing import Any, Final
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
+from quadriga.shared.planner_kinds import installed_kinds, plugin_origin
 
 # What a run's figures depend on.
 _PACKAGES: Final = (
@@ -38,17 +39,25 @@ def build_metadata(config: Config, predictor_sha256: str) -> dict[str, str]:
         "config_json": json.dumps(asdict(config), sort_keys=True),
         "config_sha256": config_sha256(config),
         "predictor_sha256": predictor_sha256,
-        "versions": json.dumps(installed_versions()),
+        "versions": json.dumps(installed_versions(config.planner.kind)),
     }
 
 
-def installed_versions() -> dict[str, str]:
-    """Versions of what a run's figures depend on, by the name of the package."""
+def installed_versions(planner: str = "none") -> dict[str, str]:
+    """Versions of what a run's figures depend on, by the name of the package.
+
+    Args:
+        planner: kind of planner; the package of a plug-in is named with the digest of its files.
+
+    Raises:
+        ConfigError: no installed package has this kind.
+    """
     versions = {"python": platform.python_version(), "machine": platform.machine()}
     for package in _PACKAGES:
         with suppress(importlib.metadata.PackageNotFoundError):
             versions[package] = importlib.metadata.version(package)
-    return versions
+    package, _, version = plugin_origin(planner).partition(" ")
+    return versions | ({package: version} if package else {})
 
 
 def recorded_versions(metadata: Mapping[str, str]) -> dict[str, str]:
@@ -59,7 +68,7 @@ def recorded_versions(metadata: Mapping[str, str]) -> dict[str, str]:
 
 def differing_versions(metadata: Mapping[str, str]) -> str:
     """Packages that had another version when recorded, as text; "" if there are none."""
-    here = installed_versions()
+    here = installed_versions(_recorded_kind(metadata))
     return ", ".join(
         f"{name} {version} (here {here.get(name, 'absent')})"
         for name, version in recorded_versions(metadata).items()
@@ -71,6 +80,14 @@ def recorded_patterns(metadata: Mapping[str, str], name: str) -> list[str]:
     """Key patterns that a recorder was given as `--topics` or `--exclude`."""
     patterns = _parse_json(metadata, name)
     return [str(pattern) for pattern in patterns] if isinstance(patterns, list) else []
+
+
+def _recorded_kind(metadata: Mapping[str, str]) -> str:
+    """The kind of planner, or "none" where it is not recorded or no longer installed."""
+    config = _parse_json(metadata, "config_json")
+    planner = config.get("planner") if isinstance(config, dict) else None
+    kind = planner.get("kind") if isinstance(planner, dict) else None
+    return kind if kind in installed_kinds() else "none"
 
 
 def _parse_json(metadata: Mapping[str, str], name: str) -> Any:

@@ -10,8 +10,9 @@ from typing import Final
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox, Order, Source, decode_packet, order_of
 from quadriga.agents.inbox.intake_log import ANYONE
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.wire.messages import Consumed
@@ -115,7 +116,7 @@ def _build_handlers(
     handlers[COMMAND.key(team, robot)] = keep_command
     handlers[INPUTS.key(team, robot)] = keep_record
     handlers[MEASUREMENT.key(team, robot)] = _keep_sent(log, MEASUREMENT)
-    if config.planner.kind not in CENTRAL:
+    if not find_kind(config.planner.kind).central:
         handlers[PLAN.key(team, robot)] = _keep_sent(log, PLAN)
     for peer in agent.peers:
         handlers[COMMAND.key(team, peer)] = _keep_ticks(log.peers_awake[peer])

@@ -8,9 +8,10 @@ from typing import Any
 
 from quadriga.agents.agent import Agent
 from quadriga.shared.config.load import build, overlay
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import departures
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.planner_kinds import find_kind
 
 
 def change_config(config: Config, given: Mapping[str, Any]) -> Config:
@@ -44,7 +45,7 @@ def check_agents(old: Agent, new: Agent) -> None:
         if one != other:
             raise ConfigError(key, repr(other), f"{one!r} as recorded", "a replay keeps the team")
     new_peers = sorted(set(new.peers) - set(old.peers))
-    was_central, is_central = (config.planner.kind in CENTRAL for config in (was, now))
+    was_central, is_central = (find_kind(config.planner.kind).central for config in (was, now))
     if was_central != is_central or new_peers:
         raise ConfigError(
             "planner.kind",

@@ -12,8 +12,9 @@ import numpy as np
 
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256, read
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, RecordingError, name_file_errors
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.places import cache_dir, cache_files
 
@@ -45,7 +46,7 @@ def find_predictor(
     Raises:
         PredictorError: the agents had one, and it is nowhere; or `given` is none.
     """
-    if config.planner.kind in ("none", *CENTRAL):
+    if not find_kind(config.planner.kind).agents_predict:
         if given is not None:
             raise PredictorError(
                 f"--predictor {given}",

@@ -13,6 +13,7 @@ from quadriga.report.run import Run
 from quadriga.shared.config.reference_trace import ROW_END
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import departures
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, STATE, STATUS, TRUTH
 
@@ -113,7 +114,7 @@ def describe_missing(run: Run) -> list[str]:
     ):
         if topic.name not in names and topic.name not in keys:
             missing.append(f"No {topic.name}: {without}.")
-    if PLAN.name not in names and traces.config.planner.kind != "none":
+    if PLAN.name not in names and find_kind(traces.config.planner.kind).publishes:
         missing.append("No plan: planned curves are left out.")
     silent = [
         robot

@@ -22,7 +22,7 @@ from quadriga.report.window import (
     find_lost_stance,
     passive_since,
 )
-from quadriga.shared.config.sections import CENTRAL
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import N_LEGS, Leg
 from quadriga.shared.wire.messages import Plan
 from quadriga.shared.wire.topics import REFERENCE, SAMPLE_MS
@@ -97,7 +97,7 @@ def _assess_planning(run: Run, index: int, tick: int) -> Iterator[tuple[str, boo
     ]
     if not plans:
         yield "no plans", False
-        yield "none", config.planner.kind != "none"
+        yield "none", find_kind(config.planner.kind).publishes
         return
     share = float(np.mean([share_at_limit(run, index, plan) for plan in plans]))
     yield f"{100 * share:.0f} % of samples", share > 0.0
@@ -135,7 +135,7 @@ def share_at_limit(run: Run, index: int, plan: Plan) -> float:
 def _find_oldest_input(run: Run, robot: str, tick: int) -> tuple[str, bool]:
     """The oldest of what the agent planned with, by its plans and statuses."""
     traces, step = run.traces, step_ms(run.traces.config)
-    usual = 0 if run.traces.config.planner.kind in CENTRAL else 1
+    usual = 0 if find_kind(run.traces.config.planner.kind).central else 1
     ages: dict[str, tuple[float, bool]] = {}
     for plan in traces.plans[robot]:
         if tick - BEFORE_MS < plan.tick <= tick:

@@ -27,8 +27,8 @@ from quadriga.report.timeline import TimelineEntry
 from quadriga.report.top_view import draw_top_view
 from quadriga.report.trouble_figure import draw_trouble
 from quadriga.report.troubles import Trouble, find_troubles
-from quadriga.shared.config.sections import CENTRAL
 from quadriga.shared.errors import RecordingError, name_file_errors
+from quadriga.shared.planner_kinds import find_kind
 
 PAGE: Final = "report.html"
 _TROUBLES: Final = 6  # shown in full
@@ -208,7 +208,7 @@ def _build_processes(run: Run) -> Iterator[Section]:
     times = PageTable(_TIMES, process_figures.list_times(run), numbers=True)
     drawing = Drawing(process_figures.draw_times(run), "solve and tick times")
     yield Section("times", "Solve and tick times", [drawing, times])
-    central = run.traces.config.planner.kind in CENTRAL
+    central = find_kind(run.traces.config.planner.kind).central
     what = "the plan in force was" if central else "each peer's plan was when it was planned with"
     drawing = Drawing(process_figures.draw_ages(run), "ages of inputs")
     text = f"How old, by world time, {what}."

@@ -16,8 +16,8 @@ from quadriga.charts.panels import Bars, Curve, Mark, Panel, PanelGrid
 from quadriga.recordings.traces import quantile_of, times_of
 from quadriga.report.run import Run
 from quadriga.report.trunk_figures import draw_over_run, mark_falls, robot_legend
-from quadriga.shared.config.sections import CENTRAL
 from quadriga.shared.members import PLANNER
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import REFERENCE
@@ -91,7 +91,7 @@ def draw_times(run: Run) -> Figure:
         Panel("longest control tick in 100 ms [µs]", tick, log=True, span=1.0, levels=kilohertz),
     ]
     legend = robot_legend(run)
-    if run.traces.config.planner.kind in CENTRAL:
+    if find_kind(run.traces.config.planner.kind).central:
         legend.append(("asked", PLANNER))
     return draw_over_run(run, panels, legend, height=130.0)
 
@@ -140,7 +140,7 @@ def draw_ages(run: Run) -> Figure:
                 curves.append(Curve(time / 1000, age, style, "step", gap=_SENT_S))
         levels = [(float(REFERENCE.max_age_ms), "reference: stops")]
         panels.append(Panel(f"{robot}: age [ms]", curves, span=100.0, floor=0.0, levels=levels))
-    central = traces.config.planner.kind in CENTRAL
+    central = find_kind(traces.config.planner.kind).central
     legend = [("planned", "central plan")] if central else robot_legend(run)
     return draw_over_run(run, panels, [*legend, ("asked", "reference")], height=70.0)
 

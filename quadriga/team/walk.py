@@ -15,6 +15,7 @@ from quadriga.replay.recorded_predictor import copy_predictor
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.runtime.signals import stop_flag
 from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
@@ -47,7 +48,7 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
     run_dir = make_run_dir(out)
     warm_up(config, console)
     predictor, sha256 = None, ""
-    if config.planner.kind != "none":
+    if find_kind(config.planner.kind).needs_predictor:
         predictor = ensure_predictor(config, console)
         sha256 = predictor_sha256(load_checked(predictor, config)[0])
         copy_predictor(predictor, run_dir)

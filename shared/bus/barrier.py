@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import SIM, Member, team_members
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import robot_names
 
 
@@ -15,7 +16,7 @@ def processes(config: Config) -> tuple[Member, ...]:
     """All processes of a team, in the order of the table of processes."""
     return team_members(
         robot_names(config.team.robots),
-        central=config.planner.kind in CENTRAL,
+        central=find_kind(config.planner.kind).central,
         recorded=config.recorder.enabled,
     )
 

@@ -6,8 +6,9 @@ import re
 from typing import Final
 
 from quadriga.shared.config.payload import carriers
-from quadriga.shared.config.sections import CENTRAL, Config, GaitConfig, PlannerConfig, WorldConfig
+from quadriga.shared.config.sections import Config, GaitConfig, PlannerConfig, WorldConfig
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.planner_kinds import find_kind, read_options
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.topics import SAMPLE_MS
 
@@ -78,14 +79,16 @@ def _check_world(world: WorldConfig, names: tuple[str, ...]) -> None:
 
 
 def _check_planner(planner: PlannerConfig, world: WorldConfig) -> None:
-    """Plans reach from one to the next, and who waits for a peer's is waited for."""
+    """The kind is installed; plans reach from one to the next; a peer is waited for."""
+    kind = find_kind(planner.kind)
+    read_options(kind, planner.options)
     if planner.applied > planner.N:
         raise ConfigError(
             "planner.applied", str(planner.applied), f"at most planner.N = {planner.N}"
         )
-    if planner.kind == "none":
+    if not kind.publishes:
         return
-    latency = max(1, planner.latency_ms) if planner.kind in CENTRAL else planner.latency_ms
+    latency = max(1, planner.latency_ms) if kind.central else planner.latency_ms
     longest = SAMPLE_MS * (planner.N - planner.applied)
     if latency > longest:
         raise ConfigError(

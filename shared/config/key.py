@@ -15,12 +15,23 @@ def key(
     high: float | None = None,
     choices: tuple[str, ...] = (),
     hint: str = "",
+    more: str = "",
 ) -> Any:
     """Declare a configuration key: its default, unit, meaning and permitted range.
 
-    `hint` is the likely cause of another choice than the permitted ones.
+    Args:
+        default: its value where nothing else is said.
+        unit: of the value; "-" or "1" without one.
+        doc: what it means.
+        low: least value.
+        high: greatest value.
+        choices: all values of a text, or those that are known here if there may be `more`.
+        hint: the likely cause of another choice than the permitted ones.
+        more: what else is permitted beside the choices, in words; the check of the whole
+            configuration then decides.
     """
-    meta = {"unit": unit, "doc": doc, "low": low, "high": high, "choices": choices, "hint": hint}
+    limits = {"low": low, "high": high, "choices": choices, "hint": hint, "more": more}
+    meta = {"unit": unit, "doc": doc, **limits}
     if isinstance(default, (list, dict)):
         raise TypeError("a default must be immutable")
     return field(default=default, metadata=meta)

@@ -177,7 +177,7 @@ def _check_value(name: str, key: Field[Any], value: Any) -> Any:
 
 def _check_text(name: str, meta: Mapping[str, Any], value: Any) -> str:
     choices: tuple[str, ...] = meta["choices"]
-    if choices and value not in choices:
+    if choices and value not in choices and not meta["more"]:
         hint = "; ".join(filter(None, (meta["hint"], did_you_mean(value, choices))))
         raise ConfigError(name, repr(value), f"one of {', '.join(choices)}", hint)
     if not isinstance(value, str) or not value.isprintable():

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 from quadriga.shared.config.key import key
-
-CENTRAL: Final = ("centralised", "deepc")  # kinds of planner that are one process for the team
+from quadriga.shared.planner_kinds import BUILT_IN
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,10 +22,14 @@ class PlannerConfig:
     kind: str = key(
         "distributed",
         "-",
-        "distributed: each agent plans with its peers' last plans (eq. 12); decentralised: "
-        "without its peers; centralised: one process plans for all (eq. 7); deepc: one process "
-        "plans for all (eq. 5); none: nominal forces",
-        choices=("distributed", "decentralised", "centralised", "deepc", "none"),
+        "; ".join(f"{kind.name}: {kind.title}" for kind in BUILT_IN.values()),
+        choices=tuple(BUILT_IN),
+        more="the name of a plug-in's",
+    )
+    options: str = key(
+        "",
+        "-",
+        "numbers that a plug-in's planner lets be set: name=number pairs, separated by spaces",
     )
     compensation: bool = key(
         False, "-", "distributed: bring peers' windows and plans forward by their age"

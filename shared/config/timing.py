@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.sections import Config
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.wire.topics import CONFIGURED, PLAN, SAMPLE_MS, STATUS, STATUS_MS, TABLE, TRUTH
 
 
@@ -29,7 +30,7 @@ def max_ages(config: Config) -> dict[str, int]:
     a central planner come its latency after their data.
     """
     planner = config.planner
-    late = max(1, planner.latency_ms) if planner.kind in CENTRAL else 0
+    late = max(1, planner.latency_ms) if find_kind(planner.kind).central else 0
     steps = 1 + planner.max_peer_age + planner.hold_steps
     configured = {PLAN: steps * SAMPLE_MS * planner.applied + late}
     return {

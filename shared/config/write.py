@@ -85,7 +85,8 @@ def _unit(meta: Any) -> str:
 
 def _limits(meta: Any) -> str:
     if meta["choices"]:
-        return f"one of {', '.join(meta['choices'])}"
+        more = f", or {meta['more']}" if meta["more"] else ""
+        return f"one of {', '.join(meta['choices'])}{more}"
     low, high = meta["low"], meta["high"]
     if low is None:
         return "" if high is None else f"≤ {high:g}"

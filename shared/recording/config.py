@@ -34,7 +34,9 @@ def recorded_config(recording: Recording | Salvage) -> Config:
             f"configuration of {recording.path}",
             f"{error.name} = {error.got}",
             error.expected,
-            "recorded by another version of quadriga: use that one",
+            error.cause
+            if error.name == "planner.kind"
+            else "recorded by another version of quadriga: use that one",
         ) from None
     except RecursionError:  # in the words about a value that nests as deeply as JSON permits
         raise RecordingError(

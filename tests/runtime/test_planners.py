@@ -15,8 +15,9 @@ from quadriga.identification.central_planner import build_central_planner
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.load import load
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.codec import decode, encode
@@ -49,7 +50,7 @@ def config_of(kind: str) -> Config:
 
 def in_one_process(config: Config, predictor: Path) -> dict[str, list[bytes]]:
     """Commands, measurements and (of agents that make them) plans, by key."""
-    fitted, central = load_predictor(predictor, config)[0], config.planner.kind in CENTRAL
+    fitted, central = load_predictor(predictor, config)[0], find_kind(config.planner.kind).central
     rollout = Rollout(
         config,
         None if central else fitted,

@@ -25,7 +25,6 @@ from quadriga.replay.saved_qp import load as load_qp
 from quadriga.replay.team_replay import replay
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.load import load
-from quadriga.shared.config.sections import CENTRAL
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.wire.codes import BACK
@@ -297,7 +296,7 @@ def test_waits_that_were_given_up_are_replayed_to_the_byte(tmp_path: Path) -> No
     check_exact(run, replayed(run))
 
 
-@pytest.mark.parametrize("kind", CENTRAL[:1])
+@pytest.mark.parametrize("kind", ["centralised"])
 def test_the_plans_of_a_central_planner_are_inputs(tmp_path: Path, kind: str) -> None:
     run = walked(tmp_path / "run", world__seconds=0.7, planner__kind=kind)
     outcomes = replayed(run)

@@ -16,12 +16,16 @@ from quadriga.shared.config.reference_trace import trace_sha256
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import PredictorError, PredictorFileError, ProcessError
+from quadriga.shared.planner_kinds import plugin_origin
 from quadriga.shared.runtime.clock import monotonic
 
 
 @dataclass(frozen=True, slots=True)
 class TrialJob:
-    """A trial: its group's configuration, predictor and trace, and the code it is meant for."""
+    """A trial: its group's configuration, predictor and trace, and the code it is meant for.
+
+    `plugin` is the package that its planner comes with, "" for a built-in one.
+    """
 
     group: Group
     seed: int
@@ -29,6 +33,7 @@ class TrialJob:
     fitted: Fitted
     versions: str
     trace_sha256: str = ""
+    plugin: str = ""
 
     @property
     def name(self) -> str:
@@ -42,7 +47,7 @@ def walk_trial(
     """Walk a trial to its end or to the first fall, in this process unless `walk` does it.
 
     Raises:
-        ProcessError: this process has other code, libraries or trace than the campaign.
+        ProcessError: this process has other code, libraries, planner or trace than the campaign.
         ConfigError: the configuration cannot be walked.
         PredictorFileError: the predictor's file, or that of its data, is gone or damaged.
     """
@@ -50,6 +55,11 @@ def walk_trial(
     if not is_same_code(mine, job.versions):
         raise ProcessError(
             "a worker's code and libraries", mine, job.versions, "install the same version there"
+        )
+    plugin = plugin_origin(job.config.planner.kind)
+    if plugin != job.plugin:
+        raise ProcessError(
+            "a worker's planner", plugin, job.plugin, "install the same version there"
         )
     if trace_sha256(job.config) != job.trace_sha256:
         raise ProcessError(

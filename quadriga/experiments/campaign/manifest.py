@@ -25,7 +25,9 @@ _UNKNOWN: Final = (
 class GroupEntry:
     """A group: its names, seeds, and digests.
 
-    `config_sha256` is that of its configuration with seed 0, and of the trace that this names.
+    `config_sha256` is that of its configuration with seed 0, and of the trace that this names;
+    `plugin` names the package that its planner comes with, its version and the digest of its files
+    (`plugin_origin`), and is empty for a built-in planner.
     """
 
     scenario: str
@@ -34,6 +36,7 @@ class GroupEntry:
     config_sha256: str
     predictor_sha256: str
     seeds: tuple[int, ...]
+    plugin: str = ""
 
     @property
     def group(self) -> Group:
@@ -129,14 +132,15 @@ class Manifest:
         for entry in more.groups:
             known = groups.setdefault(entry.group, entry)
             for what, old, new in (
-                ("configuration", known.config_sha256, entry.config_sha256),
-                ("predictor", known.predictor_sha256, entry.predictor_sha256),
+                ("configuration", known.config_sha256[:12], entry.config_sha256[:12]),
+                ("predictor", known.predictor_sha256[:12], entry.predictor_sha256[:12]),
+                ("planner", known.plugin, entry.plugin),
             ):
                 if old != new:
                     raise ConfigError(
                         f"{name}: {entry.group.name}",
-                        f"trials of {what} {old[:12]}",
-                        f"of {new[:12]}",
+                        f"trials of {what} {old}",
+                        f"of {new}",
                         _REMEDY,
                     )
             groups[entry.group] = replace(known, seeds=tuple(sorted({*known.seeds, *entry.seeds})))

@@ -152,7 +152,8 @@ def _build_facts(report: CampaignReport) -> PageTable:
     ]
     for entry in manifest.groups:
         digest = entry.predictor_sha256[:12] or "none"
-        text = f"seeds {format_seeds(entry.seeds)}; predictor {digest}; "
+        plugin = f"planner of {entry.plugin}; " if entry.plugin else ""
+        text = f"seeds {format_seeds(entry.seeds)}; predictor {digest}; {plugin}"
         facts.append((_name_group(entry.group), f"{text}{config_file(Path(), entry.group)}"))
     facts.append(("code and libraries", manifest.versions))
     facts.append(("commands", "\n".join(manifest.typed)))

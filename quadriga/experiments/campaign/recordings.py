@@ -23,6 +23,7 @@ from quadriga.report.page import PAGE
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, ProcessError
+from quadriga.shared.planner_kinds import plugin_origin
 from quadriga.team.run_report import report_folder
 
 RECORDINGS: Final = "recordings"
@@ -61,11 +62,20 @@ def record_trials(
     """
     manifest.check_versions(code_and_libraries(), folder)
     digests = {entry.group: entry.predictor_sha256 for entry in manifest.groups}
+    plugins = {entry.group: entry.plugin for entry in manifest.groups}
     for number, row in enumerate(rows, 1):
         run_dir = run_dir_of(folder, row.group, row.seed)
         if (run_dir / PAGE).is_file():
             continue
         config = with_seed(load(config_file(folder, row.group)), row.seed)
+        plugin = plugin_origin(config.planner.kind)
+        if plugin != plugins[row.group]:
+            raise ConfigError(
+                f"planner of {row.group.name}",
+                plugin,
+                plugins[row.group],
+                "install the version that the trials were walked with",
+            )
         (fitted,) = prepare_predictors([config], console).values()
         if fitted.sha256 != digests[row.group]:
             raise ConfigError(

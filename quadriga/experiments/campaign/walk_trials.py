@@ -27,6 +27,7 @@ from quadriga.shared.config.reference_trace import trace_sha256
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.planner_kinds import plugin_origin
 from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.warm_up import warm_up
 from quadriga.workers import run_each
@@ -87,6 +88,7 @@ def walk_campaign(
                 fitted[plan.configs[group]],
                 ledger.manifest.versions,
                 traces[group],
+                plugin_origin(plan.configs[group].planner.kind),
             )
             for group, seed in plan.trials()
             if (group, seed) not in done
@@ -130,6 +132,7 @@ def build_manifest(plan: CampaignPlan, fitted: Mapping[Config, Fitted], typed: s
                 _digest(config),
                 fitted[config].sha256,
                 tuple(sorted(plan.seeds)),
+                plugin_origin(config.planner.kind),
             )
             for group, config in plan.configs.items()
         ),

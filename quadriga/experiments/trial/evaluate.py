@@ -12,7 +12,8 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.experiments.trial.figures_of_merit import Figures, compute_figures
 from quadriga.experiments.trial.in_process import roll_out
 from quadriga.identification.central_planner import build_central_planner
-from quadriga.shared.config.sections import CENTRAL, Config, WorldConfig
+from quadriga.shared.config.sections import Config, WorldConfig
+from quadriga.shared.planner_kinds import find_kind
 
 
 def evaluate(config: Config, predictor: Path | None, data: Path | None = None) -> Figures:
@@ -20,25 +21,25 @@ def evaluate(config: Config, predictor: Path | None, data: Path | None = None) -
 
     Args:
         config: the team's configuration.
-        predictor: its file; None without a planner.
-        data: what the predictor was fitted to, which DeePC plans with; None takes the cache's.
+        predictor: its file; None for a kind of planner that needs none.
+        data: what the predictor was fitted to, for a kind that plans with that; None takes the
+            cache's.
 
     Raises:
         QuadrigaError: the predictor is refused, or the data are missing.
     """
     # Planners are kept by what they are made of, and the world is not part of that.
     fixed = replace(config, world=WorldConfig())
-    if predictor is None:
-        return compute_figures(roll_out(config, None, None))
-    team = _team_planner(fixed, predictor, data) if config.planner.kind in CENTRAL else None
+    central = find_kind(config.planner.kind).central
+    team = _team_planner(fixed, predictor, data) if central else None
     return compute_figures(roll_out(config, _predictor(fixed, predictor), team))
 
 
 @lru_cache(maxsize=4)
-def _predictor(config: Config, path: Path) -> Predictor:
-    return load_checked(path, config)[0]
+def _predictor(config: Config, path: Path | None) -> Predictor | None:
+    return None if path is None else load_checked(path, config)[0]
 
 
 @lru_cache(maxsize=2)
-def _team_planner(config: Config, path: Path, data: Path | None) -> TeamPlanner:
+def _team_planner(config: Config, path: Path | None, data: Path | None) -> TeamPlanner:
     return build_central_planner(config, _predictor(config, path), data)

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from quadriga.agents.agent import Agent
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.team_planner import TeamPlanner, TeamResult
 from quadriga.agents.predictor.predictor import Predictor
@@ -16,8 +15,9 @@ from quadriga.experiments.trial.figures_of_merit import Walk
 from quadriga.identification.rollout import Rollout, Tick
 from quadriga.recordings.traces import MeasurementTrace, Traces
 from quadriga.recordings.truth import build_truth_trace, ticks_of
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.members import PLANNER
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic_ns
 from quadriga.shared.wire.messages import Event, Measurement, Status, Truth
@@ -42,10 +42,10 @@ def roll_out(
         watch: shown every tick.
     """
     timed = None if planner is None else _TimedPlanner(planner)
-    rollout = Rollout(config, None, references_of(config), planner=timed)
-    if config.planner.kind not in (*CENTRAL, "none"):
-        rollout.agents = {n: Agent(config, n, predictor, monotonic_ns) for n in rollout.agents}
-        rollout.states = {name: agent.initial() for name, agent in rollout.agents.items()}
+    of_agents = predictor if find_kind(config.planner.kind).agents_predict else None
+    rollout = Rollout(
+        config, of_agents, references_of(config), planner=timed, clock_ns=monotonic_ns
+    )
     log, meter = _WalkLog(config), _WorkMeter(rollout.world)
     last = round(1000 * config.world.seconds)
     while rollout.world.tick < last and not rollout.world.fallen():

@@ -17,7 +17,8 @@ from quadriga.identification.central_planner import choose_central_planner
 from quadriga.identification.rollout import Tick
 from quadriga.identification.sample_fits import linear_episode
 from quadriga.shared.config.load import load
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.sections import Config
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 
 # Full speed from 0.2 s on, so that 1.4 s have a steady part of 0.2 s.
@@ -75,7 +76,8 @@ def samples() -> Iterator[Array]:
         def watch(tick: Tick, seen: list[Array] = seen) -> None:
             seen.extend(numbers_sent(tick))
 
-        predictor = None if config.planner.kind == "none" else sample_predictor(config)
+        needs_one = find_kind(config.planner.kind).needs_predictor
+        predictor = sample_predictor(config) if needs_one else None
         walk = roll_out(config, predictor, _team_planner(config, predictor), watch)
         yield from seen
         truth = walk.traces.truth
@@ -124,7 +126,7 @@ def sample_predictor(config: Config) -> Predictor:
 
 
 def _team_planner(config: Config, predictor: Predictor | None) -> TeamPlanner | None:
-    if predictor is None or config.planner.kind not in CENTRAL:
+    if not find_kind(config.planner.kind).central:
         return None
     return choose_central_planner(
         config, predictor, lambda: [linear_episode(config, 300, seed) for seed in range(2)]

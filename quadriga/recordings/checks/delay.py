@@ -12,8 +12,9 @@ import numpy as np
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.time_grid import step_ms
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
-from quadriga.shared.config.sections import CENTRAL, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import neighbours
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Plan, Status
 
@@ -79,7 +80,7 @@ class Delay:
             yield f"step {plan.step}", f"step {plan.tick / self._step_ms:g} at this tick"
         if plan.exchange > config.planner.exchanges:
             yield f"exchange {plan.exchange}", f"at most {config.planner.exchanges}"
-        if config.planner.kind in CENTRAL:
+        if find_kind(config.planner.kind).central:
             expected = dict.fromkeys(self._peers, plan.step)
             if plan.used != expected:
                 yield f"used {plan.used}", f"{expected}"
@@ -123,7 +124,7 @@ class Delay:
 
 def _peers(config: Config, index: int, names: tuple[str, ...]) -> tuple[str, ...]:
     """Robots whose plans matter to one that plans for itself."""
-    if config.planner.kind != "distributed":
+    if not find_kind(config.planner.kind).needs_peers:
         return ()
     if config.identification.neighbours == "yoked":
         return tuple(names[j] for j in neighbours(len(names), config.team.yokes, index))
