@@ -80,13 +80,15 @@ NOTHING: Final = Expected()
 class PlanningInterface(Protocol[S]):
     """The planning part of an agent, with a state of type S that only it looks into.
 
-    Its functions depend on their arguments alone.
+    Its functions depend on their arguments alone, and change none of them. A class that names this
+    one as its base needs no more than `initial` and `step`: it then takes in nothing of its peers,
+    waits for nobody and solves no QP.
     """
 
     @property
     def peers(self) -> tuple[str, ...]:
         """Robots whose plans and measurements it takes in."""
-        ...
+        return ()
 
     def initial(self) -> S:
         """Its state before the first tick."""
@@ -94,7 +96,7 @@ class PlanningInterface(Protocol[S]):
 
     def expected(self, tick: int) -> Expected:
         """What lock-step waits for before the step of `tick`."""
-        ...
+        return NOTHING
 
     def step(self, state: S, inputs: PlanningInputs) -> tuple[S, PlanningOutputs]:
         """Take in what arrived, plan if it is time to, say what to apply now."""
@@ -102,4 +104,4 @@ class PlanningInterface(Protocol[S]):
 
     def problem_of(self, state: S, inputs: PlanningInputs) -> SolvedQp | None:
         """The QP that `step` solves for these arguments; None if it solves none."""
-        ...
+        return None

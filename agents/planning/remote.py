@@ -17,6 +17,7 @@ from quadriga.agents.planning.interface import (
     REFUSED,
     Expected,
     PlanningInputs,
+    PlanningInterface,
     PlanningOutputs,
 )
 from quadriga.agents.planning.operator_references import reference_at
@@ -52,7 +53,7 @@ class RemoteState:
     newest: tuple[int, int] = (-1, 0)
 
 
-class RemotePlanning:
+class RemotePlanning(PlanningInterface[RemoteState]):
     """Fixed data of an agent that follows a central planner.
 
     Args:
@@ -65,11 +66,6 @@ class RemotePlanning:
         self._step_ms, self._latency = step_ms(config), central_latency(config)
         self._first_step = first_step(config)
         self._most = _SHARE * np.tile(config.planner.deviation_max, N_LEGS) + _MARGIN  # (12,), N
-
-    @property
-    def peers(self) -> tuple[str, ...]:
-        """None: the central planner knows them."""
-        return ()
 
     def initial(self) -> RemoteState:
         """No plan yet."""
@@ -107,10 +103,6 @@ class RemotePlanning:
             ages_ms={"plan": float(tick - plan_tick)} if newest_step >= 0 else {},
             unusual=tuple(unusual),
         )
-
-    def problem_of(self, state: RemoteState, inputs: PlanningInputs) -> None:
-        """None: the QP is the central planner's."""
-        return
 
     def _is_usable(self, plan: Plan, tick: int) -> bool:
         """Whether a plan is one of this team's at this time: else it is foreign, or forged."""

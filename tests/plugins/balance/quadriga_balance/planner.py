@@ -1,0 +1,48 @@
+"""Forces in proportion to filtered errors of speed, height and tilt, held over the horizon."""
+
+import numpy as np
+
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.modes import WALK
+from quadriga.agents.planning.active_plan import ActivePlan, add_plan, setpoint_at
+from quadriga.agents.planning.interface import PlanningInputs, PlanningInterface, PlanningOutputs
+from quadriga.agents.planning.operator_references import reference_at
+from quadriga.agents.predictor.episode import commanded_outputs
+from quadriga.agents.time_grid import first_step, horizon_stance, step_ms
+from quadriga.shared.planner_kinds import find_kind, read_options
+from quadriga.shared.robot.conventions import Array
+from quadriga.shared.wire.messages import Plan
+
+FRONT, LEFT = np.array([1, 1, -1, -1]), np.array([1, -1, 1, -1])  # of FL FR RL RR
+State = tuple[Array, tuple[ActivePlan, ...]]  # filtered errors, (6,); plans
+
+
+class Balance(PlanningInterface[State]):
+    def __init__(self, config, index, predictor, clock_ns) -> None:  # type: ignore[no-untyped-def]
+        self.config, self.index, self.step_ms = config, index, step_ms(config)
+        options = read_options(find_kind(config.planner.kind), config.planner.options)
+        self.speed, self.height, self.tilt = options.values()
+
+    def initial(self) -> State:
+        return np.zeros(6), ()
+
+    def step(self, state: State, inputs: PlanningInputs) -> tuple[State, PlanningOutputs]:
+        (errors, plans), sample, tick = state, inputs.measurement, inputs.tick
+        if sample is None or inputs.mode.name != WALK:
+            return state, PlanningOutputs(setpoint=setpoint_at(plans, tick))
+        now, _ = reference_at(inputs.references, tick, self.config.reference.height)
+        wanted, plan = commanded_outputs(now), None
+        errors = 0.8 * errors + 0.2 * (sample.y - wanted)
+        step, rest = divmod(tick, self.step_ms)
+        if rest == 0 and step >= first_step(self.config):
+            stance = horizon_stance(self.config, self.index, step)
+            du, y = self.forces(errors, stance.astype(float)), np.tile(wanted, (len(stance), 1))
+            plan = Plan(tick, tick * 10**6, step, nominal_forces(stance) + du, y, "solved", {}, 0)
+            plans = add_plan(plans, ActivePlan(tick, tick, du, y))
+        return (errors, plans), PlanningOutputs(plan, setpoint_at(plans, tick))
+
+    def forces(self, errors: Array, stance: Array) -> Array:
+        z, vx, vy, roll, pitch, _ = errors
+        each: Array = np.outer(np.ones(4), [-self.speed * vx, -self.speed * vy, -self.height * z])
+        each[:, 2] += self.tilt * (pitch * FRONT - roll * LEFT)
+        return (stance[..., None] * np.clip(each, -8.0, 8.0)).reshape(len(stance), 12)
