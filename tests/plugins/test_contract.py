@@ -1,0 +1,216 @@
+"""What every planner must keep to, whoever wrote it: held against a walk of two robots."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from quadriga.agents.modes import STAND, WALK, Mode
+from quadriga.agents.planning.interface import (
+    Expected,
+    PlanningInputs,
+    PlanningInterface,
+    PlanningOutputs,
+)
+from quadriga.agents.planning.registry import build_planning
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.time_grid import step_ms
+from quadriga.experiments.trial.sample_trials import sample_predictor
+from quadriga.identification.central_planner import choose_central_planner
+from quadriga.identification.rollout import Rollout
+from quadriga.identification.sample_fits import linear_episode
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.members import PLANNER
+from quadriga.shared.planner_kinds import find_kind, installed_kinds
+from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.wire.messages import Plan
+from quadriga.team.operator import references_of
+
+TICKS = 600
+KEYS = {
+    "team.robots": 2, "gait.stand_ms": 100, "reference.vx": 0.3, "reference.ramp": 0.1,
+    "planner.N": 10, "planner.T_ini": 4, "world.seed": 5, "world.scatter": 0.02,
+}  # fmt: skip
+
+every_kind = pytest.mark.parametrize("name", installed_kinds())
+
+
+@dataclass(frozen=True)
+class Call:
+    """A step of a planning part: copies of its arguments, and what it gave."""
+
+    before: Any
+    inputs: PlanningInputs
+    after: Any
+    outputs: PlanningOutputs
+
+
+class Watched(PlanningInterface[Any]):
+    """A planning part whose steps are kept."""
+
+    def __init__(self, planning: PlanningInterface[Any]) -> None:
+        self.planning = planning
+        self.calls: list[Call] = []
+
+    @property
+    def peers(self) -> tuple[str, ...]:
+        return self.planning.peers
+
+    def initial(self) -> Any:
+        return self.planning.initial()
+
+    def expected(self, tick: int) -> Expected:
+        return self.planning.expected(tick)
+
+    def step(self, state: Any, inputs: PlanningInputs) -> tuple[Any, PlanningOutputs]:
+        before, arrived = deepcopy(state), deepcopy(inputs)
+        after, outputs = self.planning.step(state, inputs)
+        assert are_equal(before, state), "a step changed the state it was given"
+        assert are_equal(arrived, inputs), "a step changed its inputs"
+        self.calls.append(Call(before, arrived, deepcopy(after), deepcopy(outputs)))
+        return after, outputs
+
+
+def are_equal(one: Any, other: Any) -> bool:
+    """Whether two values are equal to the last bit."""
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray):
+        return bool(one.shape == other.shape) and one.tobytes() == other.tobytes()
+    if is_dataclass(one):
+        names = [item.name for item in fields(one)]
+        return all(are_equal(getattr(one, name), getattr(other, name)) for name in names)
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(are_equal(one[k], other[k]) for k in one)
+    if isinstance(one, tuple | list):
+        return len(one) == len(other) and all(map(are_equal, one, other))
+    return bool(one == other)
+
+
+def config_of(name: str) -> Config:
+    return load(None, {**KEYS, "planner.kind": name})
+
+
+def predictor_of(config: Config) -> Predictor | None:
+    kind = find_kind(config.planner.kind)
+    return sample_predictor(config) if kind.needs_predictor else None
+
+
+def build(config: Config, index: int) -> PlanningInterface[Any]:
+    predictor = predictor_of(config) if find_kind(config.planner.kind).agents_predict else None
+    return build_planning(config, index, predictor, lambda: 0)
+
+
+@cache
+def walk(name: str) -> tuple[list[Call], ...]:
+    """The steps of both robots' planning parts in a walk."""
+    config, kind = config_of(name), find_kind(name)
+    predictor = predictor_of(config)
+    team = None
+    if kind.central:
+        episodes = [linear_episode(config, 300, seed) for seed in range(2)]
+        team = choose_central_planner(config, predictor, lambda: episodes)
+    of_agents = predictor if kind.agents_predict else None
+    rollout = Rollout(config, of_agents, references_of(config), planner=team)
+    watched = [Watched(build(config, index)) for index in range(2)]
+    for agent, planning in zip(rollout.agents.values(), watched, strict=True):
+        agent._planning = planning
+    for _ in rollout.ticks(TICKS):
+        pass
+    assert not rollout.world.fallen()
+    return tuple(planning.calls for planning in watched)
+
+
+def plans_of(name: str, robot: int) -> list[Plan]:
+    """The plans that a robot made, or was sent by the planner of the whole team."""
+    calls = walk(name)[robot]
+    if find_kind(name).central:
+        return [plan for call in calls for sender, plan in call.inputs.plans if sender == PLANNER]
+    return [call.outputs.plan for call in calls if call.outputs.plan is not None]
+
+
+@every_kind
+@pytest.mark.parametrize("robot", [0, 1])
+def test_plans_and_setpoints_are_finite(name: str, robot: int) -> None:
+    config, plans = config_of(name), plans_of(name, robot)
+    assert bool(plans) is find_kind(name).publishes
+    for plan in plans:
+        assert plan.u.shape == (config.planner.N, 12)
+        assert plan.y.shape == (config.planner.N, 6)
+        assert np.isfinite(plan.u).all()
+        assert np.isfinite(plan.y).all()
+        assert plan.tick == plan.step * step_ms(config)
+    assert [plan.serial for plan in plans] == sorted({plan.serial for plan in plans})
+    for call in walk(name)[robot]:
+        setpoint = call.outputs.setpoint
+        assert setpoint.deviation.shape == (12,)
+        assert np.isfinite(setpoint.deviation).all()
+        assert setpoint.v_ref is None or np.isfinite(setpoint.v_ref).all()
+
+
+@every_kind
+def test_the_robot_walks_with_the_planner(name: str) -> None:
+    for calls in walk(name):
+        assert len(calls) == TICKS
+        assert calls[-1].inputs.mode.name == WALK
+        assert {call.outputs.stop_reason for call in calls} == {""}
+
+
+@every_kind
+def test_the_same_arguments_give_the_same_results(name: str) -> None:
+    """Asked in any order: nothing is kept but in the state."""
+    planning = build(config_of(name), 0)
+    for call in reversed(walk(name)[0]):
+        after, outputs = planning.step(deepcopy(call.before), deepcopy(call.inputs))
+        assert are_equal(after, call.after)
+        assert are_equal(outputs, call.outputs)
+
+
+@every_kind
+def test_a_replay_is_exact(name: str) -> None:
+    planning = build(config_of(name), 1)
+    state = planning.initial()
+    for call in walk(name)[1]:
+        state, outputs = planning.step(state, deepcopy(call.inputs))
+        assert are_equal(outputs, call.outputs)
+
+
+@every_kind
+def test_there_is_no_state_without_input(name: str) -> None:
+    planning = build(config_of(name), 0)
+    begin = planning.initial()
+    assert are_equal(begin, planning.initial())
+    for tick in range(50):
+        state, outputs = planning.step(begin, PlanningInputs(tick, Mode(STAND, 0), ()))
+        assert are_equal(state, begin)
+        assert outputs.plan is None
+        assert outputs.stop_reason == ""
+        assert not outputs.setpoint.deviation.any()
+
+
+@every_kind
+@pytest.mark.parametrize("robot", [0, 1])
+def test_what_is_expected_can_have_been_sent(name: str, robot: int) -> None:
+    config, kind = config_of(name), find_kind(name)
+    planning, names = build(config, robot), robot_names(2)
+    assert {*planning.peers} <= {*names} - {names[robot]}
+    assert kind.needs_peers or not planning.peers
+    for tick in range(TICKS):
+        expected = planning.expected(tick)
+        assert expected == planning.expected(tick)
+        assert expected.reference_tick is None
+        assert not expected.truth
+        if expected.plan is not None:
+            assert kind.central or planning.peers
+            assert expected.plan[0] * step_ms(config) < tick
+        if expected.measurement_tick is not None:
+            assert planning.peers
+            assert expected.measurement_tick < tick
+    for plan in plans_of(name, robot):
+        assert kind.central or {*plan.used} <= {*planning.peers}
