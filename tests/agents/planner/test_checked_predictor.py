@@ -6,13 +6,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from quadriga.agents.planner import planner_qp
 from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.planner.planner_qp import Condensed
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.predictor.store import Provenance
-from quadriga.shared.config.sections import Config
+from quadriga.agents.predictor.store import Provenance, save
+from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.conventions import Array
 
 
 def test_what_is_saved_is_loaded(
@@ -66,7 +71,7 @@ def test_gates_hold_against_the_limits_in_force(stored: Path, plant: Config) -> 
 
 
 def test_other_weights_are_gated_anew(stored: Path, plant: Config) -> None:
-    """The radius belongs to Q and R; with forces made cheap the plans fight harder."""
+    """The radius belongs to the QP; with forces made cheap the plans fight harder."""
     before = load_checked(stored, plant)[1].gates.radius
     cheap = replace(plant, planner=replace(plant.planner, R=(1e-7, 1e-7, 1e-7)))
     loose = replace(plant.identification, max_radius=10.0)
@@ -77,3 +82,40 @@ def test_other_weights_are_gated_anew(stored: Path, plant: Config) -> None:
     load_checked(stored, replace(plant, identification=between))
     with pytest.raises(PredictorError, match="radius of the best-response map"):
         load_checked(stored, replace(cheap, identification=between))
+
+
+def test_a_new_key_of_the_cost_is_gated_anew(
+    stored: Path, plant: Config, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As if `force_min` weighed the differences between successive forces: no list names it."""
+    condense = planner_qp.condense
+
+    def smoothing(
+        config: PlannerConfig, G_past: Array, G_u: Array, stance: NDArray[np.bool_]
+    ) -> Condensed:
+        usual = condense(config, G_past, G_u, stance)
+        steps = np.diff(np.eye(len(usual.H)), axis=0)
+        return replace(usual, H=usual.H + config.force_min * steps.T @ steps)
+
+    before = load_checked(stored, plant)[1].gates
+    monkeypatch.setattr(planner_qp, "condense", smoothing)
+    assert load_checked(stored, plant)[1].gates == before, "its default changes no QP"
+    smooth = replace(plant, planner=replace(plant.planner, force_min=5.0))
+    after = load_checked(stored, smooth)[1].gates
+    assert after.radius < 0.9 * before.radius
+    assert (after.Q, after.R) == (before.Q, before.R)
+    alone = replace(smooth, planner=replace(smooth.planner, kind="decentralised"))
+    assert load_checked(stored, alone)[1].gates == before, "nobody answers anybody's plans"
+
+
+def test_a_file_without_probes_was_made_of_q_and_r_alone(
+    tmp_path: Path, plant: Config, fitted: tuple[Predictor, Provenance]
+) -> None:
+    """As earlier versions wrote it; that its radius is not computed again shows in its value."""
+    predictor, provenance = fitted
+    path = tmp_path / "old.npz"
+    old = replace(provenance.gates, cost_probes=(), radius=0.125)
+    save(path, predictor, replace(provenance, gates=old))
+    assert load_checked(path, plant)[1].gates == old
+    dear = replace(plant, planner=replace(plant.planner, R=(2.0, 2.0, 2.0)))
+    assert load_checked(path, dear)[1].gates.radius != 0.125

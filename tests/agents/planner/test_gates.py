@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
 from tests.a1 import TOTAL_MASS, build_problem
+from tests.plugins.kinds import install_kind
 
 Team = Callable[..., Any]
 
@@ -232,6 +234,28 @@ def test_block_weight_reduces_the_radius(plant: Config, linear_team: Team) -> No
         report.check()
     for kind in ("centralised", "decentralised"):
         report.check(kind)  # nobody answers anybody's plans
+
+
+@pytest.mark.parametrize("responds", [True, False])
+def test_a_plugin_that_responds_to_plans_is_held_against_the_radius(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, responds: bool
+) -> None:
+    kind = "answering" if responds else "deaf"
+    install_kind(tmp_path, monkeypatch, kind, f"'nowhere:P', needs_peers={responds}")
+    report = GateReport(1, {}, {}, 0.5, (0.1,), ((1.0,),), (0.3, 2.0), 0.9, 0.5, (), ())
+    if not responds:
+        report.check(kind)
+        return
+    with pytest.raises(PredictorError, match=r"radius of the best-response map: got 0\.900"):
+        report.check(kind)
+
+
+def test_soft_bounds_leave_the_best_response_as_it_is(plant: Config) -> None:
+    """Their slacks are zero where no bound is active: the map has none."""
+    predictor = coupled(plant, seed=2, strength=1.0)
+    soft = replace(plant, planner=replace(plant.planner, output_bounds="soft"))
+    found, usual = (best_response_map(config, predictor, 20) for config in (soft, plant))
+    np.testing.assert_array_equal(found, usual)
 
 
 def phased(predictor: Predictor, *others: Array) -> Predictor:

@@ -23,6 +23,7 @@ from quadriga.shared.config.sections import (
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.wire import messages as msg
 from quadriga.shared.wire.codec import encode
+from tests.plugins.kinds import install_kind
 from tests.quadriga.conftest import WriteRun, run_config, write
 
 SHORT = run_config(seconds=1.3)
@@ -212,6 +213,26 @@ def bare(step: int, exchange: int, used: dict[str, int], status: str = "solved")
         used,
         exchange,
     )
+
+
+@pytest.mark.parametrize("responds", [True, False])
+def test_plans_of_a_plugin_are_held_against_the_delay_by_its_facts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, responds: bool
+) -> None:
+    kind = "responsive" if responds else "aloof"
+    install_kind(tmp_path, monkeypatch, kind, f"'nowhere:P', needs_peers={responds}")
+    config = Config(team=TeamConfig(robots=2), planner=PlannerConfig(kind=kind))
+    plans = [(f"r{i}", bare(step, 0, {})) for step in (20, 21) for i in (1, 2)]
+    finding = plans_only(tmp_path, config, plans)
+    assert finding.passed is not responds
+    assert [first.got for first in finding.first] == (
+        ["used none of r2", "used none of r1"] if responds else []
+    )
+    (tmp_path / "plans.mcap").unlink()
+    plans[-1] = ("r2", bare(21, 0, {"r1": 20}))
+    finding = plans_only(tmp_path, config, plans)
+    expected = "used none of r2" if responds else "used a plan of r1"
+    assert [first.got for first in finding.first] == [expected]
 
 
 def test_answers_within_a_step_use_the_plans_of_that_step(tmp_path: Path) -> None:

@@ -1,0 +1,135 @@
+"""A planner that another package brings: every command takes it, and no file here knows it.
+
+The commands are those of docs/extending.md.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from quadriga.shared.wire.messages import Plan
+
+TOP = Path(__file__).parents[2]
+PACKAGE = "tests/plugins/balance"
+PIP = (
+    sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index",
+    "--no-build-isolation", "--disable-pip-version-check",
+)  # fmt: skip
+
+
+def documented_commands() -> list[list[str]]:
+    """The lines of the shell blocks of the section on planners."""
+    page = (TOP / "docs" / "extending.md").read_text(encoding="utf-8")
+    section = re.split(r"^## ", page.partition("\n## A planner\n")[2], flags=re.MULTILINE)[0]
+    blocks = re.findall(r"^```sh\n(.*?)^```", section, flags=re.MULTILINE | re.DOTALL)
+    return [shlex.split(line, comments=True) for block in blocks for line in block.splitlines()]
+
+
+class Place:
+    """A folder in which the documented commands are typed, with the package installed beside it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.target = folder, folder / "installed"
+        source = folder / "source"
+        shutil.copytree(TOP / PACKAGE, source, ignore=shutil.ignore_patterns("__pycache__"))
+        done = self.run(*PIP, "--target", str(self.target), str(source))
+        assert done.returncode == 0, done.stderr
+
+    def run(self, *words: str) -> subprocess.CompletedProcess[str]:
+        path = os.pathsep.join(filter(None, (str(self.target), os.environ.get("PYTHONPATH"))))
+        return subprocess.run(
+            words, cwd=self.folder, env={**os.environ, "PYTHONPATH": path}, check=False,
+            capture_output=True, text=True, timeout=500,
+        )  # fmt: skip
+
+    def quadriga(self, *words: str) -> subprocess.CompletedProcess[str]:
+        return self.run(sys.executable, "-m", "quadriga", *words)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Place:
+    return Place(tmp_path_factory.mktemp("plugin"))
+
+
+@pytest.fixture(scope="module")
+def said(place: Place) -> dict[str, str]:
+    """What each documented command says, by its name; each of them succeeds."""
+    first, *commands = documented_commands()
+    assert first == ["pip", "install", f"./{PACKAGE}"]
+    found = {}
+    for program, command, *options in commands:
+        assert program == "quadriga"
+        done = place.quadriga(command, *options)
+        assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
+        found[command] = done.stdout
+    return found
+
+
+def test_the_package_is_small() -> None:
+    files = [*(TOP / PACKAGE).rglob("*.py")]
+    assert 0 < sum(len(file.read_text(encoding="utf-8").splitlines()) for file in files) < 60
+
+
+def test_the_documented_commands_succeed(said: dict[str, str]) -> None:
+    assert {*said} == {"walk", "info", "check", "replay", "campaign"}
+
+
+def test_its_plans_are_recorded_and_the_recording_names_it(
+    place: Place, said: dict[str, str]
+) -> None:
+    from quadriga.shared.recording.reader import Recording
+
+    recording = Recording(place.folder / "runs" / "balance" / "run.mcap")
+    plans = [*recording.messages(Plan, "r2")]
+    assert len(plans) > 20
+    assert any((abs(plan.u) > 0).any() for plan in plans)
+    assert re.search(r"quadriga-balance 0\.1\.0 [0-9a-f]{16}", said["info"])
+
+
+def test_its_recording_is_checked_and_replayed_to_the_byte(said: dict[str, str]) -> None:
+    assert "FAIL" not in said["check"]
+    assert re.search(r"ok +delay +.*plans", said["check"])
+    for robot in ("r1", "r2"):
+        assert re.search(rf"{robot}: .*plan.* equal to the byte", said["replay"])
+
+
+def test_what_it_does_differs_from_no_planner(place: Place, said: dict[str, str]) -> None:
+    rows = (place.folder / "runs" / "compared" / "trials.csv").read_text(encoding="utf-8")
+    assert rows.count(",balance,") == rows.count(",none,") == 1
+    assert "balance" in said["campaign"]
+
+
+def test_its_options_are_checked(place: Place) -> None:
+    done = place.quadriga("config", "--planner", "balance", "--set", "planner.options=sped=3")
+    assert done.returncode != 0
+    assert "options of balance: speed, height, tilt (did you mean 'speed'?)" in done.stderr
+
+
+def test_it_keeps_the_contract_of_all_planners(place: Place) -> None:
+    test = str(TOP / "tests" / "plugins" / "test_contract.py")
+    options = ("-vv", "-p", "no:cacheprovider", "-p", "no:xdist", "-k", "balance", "--rootdir")
+    done = place.run(sys.executable, "-m", "pytest", *options, str(TOP), test)
+    assert done.returncode == 0, done.stdout
+    assert re.search(r"test_a_replay_is_exact\[balance\] PASSED", done.stdout)
+    assert len(re.findall(r"balance\] PASSED", done.stdout)) >= 8
+
+
+def test_a_campaign_does_not_go_on_with_other_code_of_it(
+    place: Place, said: dict[str, str]
+) -> None:
+    """Last of all: the installed package is edited."""
+    assert said
+    with (place.target / "quadriga_balance" / "planner.py").open("a", encoding="utf-8") as file:
+        file.write("# edited\n")
+    _, command, *options = documented_commands()[-1]
+    done = place.quadriga(command, *options)
+    assert done.returncode != 0
+    assert "trials of planner quadriga-balance 0.1.0 " in done.stderr
