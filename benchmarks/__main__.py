@@ -24,6 +24,7 @@ from typing import Any
 from benchmarks import blas_threads
 from benchmarks.options import Options
 from quadriga.shared.errors import QuadrigaError
+from quadriga.shared.planner_kinds import BUILT_IN
 from quadriga.shared.runtime.clock import monotonic, wall_ns
 from quadriga.shared.runtime.signals import interrupt_on_sigterm
 
@@ -115,7 +116,7 @@ def parse_options(words: Sequence[str] | None = None) -> Options:
         "--planner",
         default="distributed",
         help="of the walks (%(default)s)",
-        choices=("distributed", "decentralised", "none"),
+        choices=[name for name, kind in BUILT_IN.items() if not kind.central],
     )
     parser.add_argument("--quick", action="store_true", help="all parts, too short to mean much")
     parser.add_argument("--out", type=Path, default=Path("runs/bench.json"), metavar="FILE")

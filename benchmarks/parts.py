@@ -142,11 +142,12 @@ def team(
     from quadriga.agents.planner.checked_predictor import load_checked
     from quadriga.identification.predictors import ensure_predictor
     from quadriga.shared.config.load import load
+    from quadriga.shared.planner_kinds import find_kind
 
     config = load(
         None, {"team.robots": robots, "world.seconds": seconds, "planner.kind": options.planner}
     )
-    if options.planner == "none":
+    if not find_kind(options.planner).needs_predictor:
         return config, None, None
     path = ensure_predictor(config, console)
     return config, path, load_checked(path, config)[0]

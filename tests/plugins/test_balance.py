@@ -20,9 +20,16 @@ from quadriga.shared.wire.messages import Plan
 TOP = Path(__file__).parents[2]
 PACKAGE = "tests/plugins/balance"
 PIP = (
-    sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index",
-    "--no-build-isolation", "--disable-pip-version-check",
-)  # fmt: skip
+    sys.executable,
+    "-m",
+    "pip",
+    "install",
+    "--quiet",
+    "--no-deps",
+    "--no-index",
+    "--no-build-isolation",
+    "--disable-pip-version-check",
+)
 
 
 def documented_commands() -> list[list[str]]:
@@ -46,9 +53,14 @@ class Place:
     def run(self, *words: str) -> subprocess.CompletedProcess[str]:
         path = os.pathsep.join(filter(None, (str(self.target), os.environ.get("PYTHONPATH"))))
         return subprocess.run(
-            words, cwd=self.folder, env={**os.environ, "PYTHONPATH": path}, check=False,
-            capture_output=True, text=True, timeout=500,
-        )  # fmt: skip
+            words,
+            cwd=self.folder,
+            env={**os.environ, "PYTHONPATH": path},
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=500,
+        )
 
     def quadriga(self, *words: str) -> subprocess.CompletedProcess[str]:
         return self.run(sys.executable, "-m", "quadriga", *words)
@@ -105,6 +117,23 @@ def test_what_it_does_differs_from_no_planner(place: Place, said: dict[str, str]
     rows = (place.folder / "runs" / "compared" / "trials.csv").read_text(encoding="utf-8")
     assert rows.count(",balance,") == rows.count(",none,") == 1
     assert "balance" in said["campaign"]
+
+
+def test_without_the_package_a_recording_says_what_is_missing(
+    place: Place, said: dict[str, str]
+) -> None:
+    assert said
+    recording = str(place.folder / "runs" / "balance" / "run.mcap")
+    done = subprocess.run(
+        [sys.executable, "-m", "quadriga", "check", recording],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+    assert done.returncode != 0
+    assert "planner.kind = 'balance', expected one of distributed" in done.stderr
+    assert "install the package that has it: an entry point 'balance'" in done.stderr
 
 
 def test_its_options_are_checked(place: Place) -> None:

@@ -34,9 +34,15 @@ from quadriga.team.operator import references_of
 
 TICKS = 600
 KEYS = {
-    "team.robots": 2, "gait.stand_ms": 100, "reference.vx": 0.3, "reference.ramp": 0.1,
-    "planner.N": 10, "planner.T_ini": 4, "world.seed": 5, "world.scatter": 0.02,
-}  # fmt: skip
+    "team.robots": 2,
+    "gait.stand_ms": 100,
+    "reference.vx": 0.3,
+    "reference.ramp": 0.1,
+    "planner.N": 10,
+    "planner.T_ini": 4,
+    "world.seed": 5,
+    "world.scatter": 0.02,
+}
 
 every_kind = pytest.mark.parametrize("name", installed_kinds())
 
