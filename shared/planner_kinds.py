@@ -42,6 +42,9 @@ class PlannerKind:
         needs_data: whether it plans with the collected data themselves.
         publishes: whether plans are published; if so they are missed where there are none.
         options: numbers that `planner.options` may set, with their defaults.
+
+    Raises:
+        ValueError: facts that contradict each other.
     """
 
     name: str
@@ -53,6 +56,10 @@ class PlannerKind:
     needs_data: bool = False
     publishes: bool = True
     options: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.central and self.needs_peers:
+            raise ValueError(f"{self.name}: one process plans for all, so no agent needs its peers")
 
     @property
     def central(self) -> bool:

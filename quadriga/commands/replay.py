@@ -49,6 +49,7 @@ def run(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
     """Replay with the recording's configuration and what is `given`; 1 if something differs."""
     from rich.console import Console
 
+    from quadriga.recordings.metadata import differing_versions
     from quadriga.replay.outcome import format_outcome
     from quadriga.replay.team_replay import replay, replay_to_breakpoint
     from quadriga.shared.recording.reader import Recording
@@ -64,5 +65,9 @@ def run(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
         outcomes = [replay_to_breakpoint(path, robot, *options, arguments.stop_at)]
     for outcome in outcomes:
         print(format_outcome(outcome))
-    Recording(path).require_whole()
-    return int(any(outcome.failed for outcome in outcomes))
+    recording, failed = Recording(path), any(outcome.failed for outcome in outcomes)
+    others = differing_versions(recording.metadata) if failed else ""
+    if others:
+        print(f"recorded with other versions, which may be why: {others}")
+    recording.require_whole()
+    return int(failed)

@@ -72,6 +72,11 @@ def test_it_is_not_imported_by_who_only_lists_the_kinds(
             r"quadriga_lame_module:KIND of quadriga-lame 1\.2 raises ModuleNotFoundError: "
             r"No module named 'no_such_library', expected a planner that can be imported",
         ),
+        (
+            "from quadriga.shared.planner_kinds import PlannerKind\n"
+            "KIND = PlannerKind('lame', 't', 'a:b', build_team='a:c', needs_peers=True)",
+            r"of quadriga-lame 1\.2 raises ValueError: lame: one process plans for all",
+        ),
         ("KIND = 3", r"of quadriga-lame 1\.2: 3, expected a PlannerKind named 'lame'"),
         (
             "from quadriga.shared.planner_kinds import BUILT_IN\nKIND = BUILT_IN['none']",

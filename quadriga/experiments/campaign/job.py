@@ -59,7 +59,10 @@ def walk_trial(
     plugin = plugin_origin(job.config.planner.kind)
     if plugin != job.plugin:
         raise ProcessError(
-            "a worker's planner", plugin, job.plugin, "install the same version there"
+            "a worker's planner",
+            plugin or "a built-in one",
+            job.plugin or "a built-in one",
+            "install the same version there",
         )
     if trace_sha256(job.config) != job.trace_sha256:
         raise ProcessError(

@@ -98,6 +98,7 @@ def test_what_would_not_belong_together_is_refused(tmp_path: Path) -> None:
         ({"versions": "code 2"}, "trials with code and versions code 1, expected code 2"),
         ({"groups": (replace(entry, config_sha256="cd" * 32),)}, "trials of configuration abab"),
         ({"groups": (replace(entry, predictor_sha256="ef"),)}, "trials of predictor"),
+        ({"groups": (replace(entry, plugin="mine 0.1 ab"),)}, "expected of mine 0.1 ab"),
         ({"sweeps": manifest("none", sweeps=("world.payload",)).sweeps}, "swept keys"),
     ]
     for change, message in changes:
