@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from quadriga.shared.config.key import key
-from quadriga.shared.planner_kinds import BUILT_IN
+from quadriga.shared.planner_kinds import BUILT_IN, find_kind, read_options
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,3 +121,8 @@ class PlannerConfig:
     peer_timeout: float = key(
         5.0, "s wall", "lockstep: longest wait for a peer's plan", low=0.01, high=10.0
     )
+
+    @property
+    def option_values(self) -> Mapping[str, float]:
+        """What `options` sets, and the defaults of its kind for the rest, in the kind's order."""
+        return read_options(find_kind(self.kind), self.options)

@@ -119,6 +119,7 @@ def test_options_are_numbers_that_the_kind_has(
     kind = find_kind("tuned")
     config = load(None, {"planner.kind": "tuned", "planner.options": "lead=1e-1"})
     assert read_options(kind, config.planner.options) == {"gain": 2.0, "lead": 0.1}
+    assert [*config.planner.option_values] == ["gain", "lead"]
     for text, words in (
         ("gian=1", r"options of tuned: gain, lead \(did you mean 'gain'\?\)"),
         ("gain", r"got 'gain', expected gain=NUMBER"),

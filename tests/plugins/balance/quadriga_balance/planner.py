@@ -9,7 +9,6 @@ from quadriga.agents.planning.interface import PlanningInputs, PlanningInterface
 from quadriga.agents.planning.operator_references import reference_at
 from quadriga.agents.predictor.episode import commanded_outputs
 from quadriga.agents.time_grid import first_step, horizon_stance, step_ms
-from quadriga.shared.planner_kinds import find_kind, read_options
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Plan
 
@@ -20,8 +19,7 @@ State = tuple[Array, tuple[ActivePlan, ...]]  # filtered errors, (6,); plans
 class Balance(PlanningInterface[State]):
     def __init__(self, config, index, predictor, clock_ns) -> None:  # type: ignore[no-untyped-def]
         self.config, self.index, self.step_ms = config, index, step_ms(config)
-        options = read_options(find_kind(config.planner.kind), config.planner.options)
-        self.speed, self.height, self.tilt = options.values()
+        self.speed, self.height, self.tilt = config.planner.option_values.values()
 
     def initial(self) -> State:
         return np.zeros(6), ()
@@ -37,7 +35,8 @@ class Balance(PlanningInterface[State]):
         if rest == 0 and step >= first_step(self.config):
             stance = horizon_stance(self.config, self.index, step)
             du, y = self.forces(errors, stance.astype(float)), np.tile(wanted, (len(stance), 1))
-            plan = Plan(tick, tick * 10**6, step, nominal_forces(stance) + du, y, "solved", {}, 0)
+            u = nominal_forces(stance, self.config.robot.weight) + du
+            plan = Plan(tick, tick * 10**6, step, u, y, "solved", {}, 0)
             plans = add_plan(plans, ActivePlan(tick, tick, du, y))
         return (errors, plans), PlanningOutputs(plan, setpoint_at(plans, tick))
 
