@@ -26,7 +26,7 @@ ALL = [
 # What a collected walk depends on: by section all keys but those named, or only those named.
 WALKED = {
     *(name for name in ALL if name.split(".")[0] in ("sensors", "estimator", "gait", "controller")),
-    "team.robots", "team.yokes", "team.spacing", "team.alternate_phase",
+    "team.robots", "team.robot", "team.yokes", "team.spacing", "team.alternate_phase",
     "reference.height", "planner.interface",
     # As long as the length of the collection follows from the rule:
     "planner.N", "planner.T_ini",
