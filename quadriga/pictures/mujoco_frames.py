@@ -73,8 +73,8 @@ def frames(poses: Poses, quality: tuple[int, int], meshes: LinkMeshes) -> Iterat
         poses.config, partial(dress, robots=robot_names(poses.config.team.robots), meshes=meshes)
     )
     team.model.vis.quality.shadowsize, team.model.vis.quality.offsamples = quality
-    pebbles = team.team.terrain.pebbles
-    if pebbles is not None:  # thousands of them
+    relief = team.team.terrain.relief
+    if relief.loose:  # thousands of stones
         team.model.vis.quality.numslices, team.model.vis.quality.numstacks = _COARSE
     _light(team.model, 3.0 + 2.0 * poses.radius())
     camera = mujoco.MjvCamera()
@@ -87,8 +87,7 @@ def frames(poses: Poses, quality: tuple[int, int], meshes: LinkMeshes) -> Iterat
             team.physics.light_xpos[0, :2] = centre[:2]
             camera.lookat[:] = [*centre[:2], 0.15]
             renderer.update_scene(team.physics, camera)
-            if pebbles is not None:
-                pebbles.draw(renderer.scene, centre, poses.radius() + _STREWN)
+            relief.draw(renderer.scene, centre, poses.radius() + _STREWN)
             _add_forces(renderer.scene, team.feet(), grf)
             yield Image.fromarray(renderer.render())
     finally:
