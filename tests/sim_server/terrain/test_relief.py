@@ -9,6 +9,7 @@ import pytest
 from quadriga.shared.config.terrains import TERRAINS
 from quadriga.sim_server.terrain.relief import Relief
 from quadriga.sim_server.terrain.terrain import build_terrain
+from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.sim_server.world.team_model import formation
 from quadriga.sim_server.world.world import World
@@ -31,8 +32,8 @@ def test_a_terrain_is_built_by_its_row_and_a_plane_without_height(kind: str) -> 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_terrain_is_announced_with_the_keys_that_shape_it(kind: str) -> None:
-    config = configured(terrain=kind, terrain_height=0.07, stairs_rise=0.08, slope=9.0, seed=4)
-    detail = build_scenario(config, ()).events[1].detail
+    config = configured(terrain=kind, terrain_height=0.07, stairs_rise=0.05, slope=9.0, seed=4)
+    detail = build_scenario(config, build_loads(config)).events[1].detail
     assert detail.startswith(kind)
     assert "{" not in detail
     assert (", seed 4" in detail) == (kind != "flat")
