@@ -28,6 +28,7 @@ from quadriga.shared.robot.conventions import Array, robot_names
 
 _AZIMUTH: Final = 145.0  # deg, seen from ahead and the left of a team that walks along x
 _ELEVATION: Final = -24.0  # deg
+_BELOW: Final = 0.11  # m under the middle of the trunks: there the camera looks
 _FORCE_SCALE: Final = 0.005  # m per N
 _FORCE_RADIUS: Final = 0.008  # m
 _FORCE_RGBA: Final = np.array([0.95, 0.75, 0.1, 0.9], dtype=np.float32)
@@ -85,7 +86,7 @@ def frames(poses: Poses, quality: tuple[int, int], meshes: LinkMeshes) -> Iterat
         for qpos, grf, centre in zip(poses.qpos, poses.grf, poses.centre(), strict=True):
             team.set(qpos)
             team.physics.light_xpos[0, :2] = centre[:2]
-            camera.lookat[:] = [*centre[:2], 0.15]
+            camera.lookat[:] = [*centre[:2], centre[2] - _BELOW]
             renderer.update_scene(team.physics, camera)
             relief.draw(renderer.scene, centre, poses.radius() + _STREWN)
             _add_forces(renderer.scene, team.feet(), grf)
