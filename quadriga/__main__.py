@@ -9,7 +9,13 @@ import sys
 def main() -> int:
     """Run the command line; a signal that comes while it is being imported waits until then."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-    from quadriga.commands.parser import main as command_line
+    from quadriga.shared.errors import QuadrigaError
+
+    try:
+        from quadriga.commands.parser import main as command_line
+    except QuadrigaError as error:  # of a package that adds to this one
+        print(f"quadriga: {error}", file=sys.stderr)
+        return 2
 
     return command_line()
 

@@ -85,7 +85,7 @@ class Scene:
     def terrain(self, tick: int, path: Array) -> fox.SceneUpdate:
         """The ground around a path (F, 3), if it is not flat."""
         terrain: Terrain = self._posed.team.terrain
-        if terrain.relief is None:
+        if not terrain.top:
             return fox.SceneUpdate(entities=[])
         low = np.floor((path[:, :2].min(axis=0) - _MARGIN) / _CELL) * _CELL
         high = path[:, :2].max(axis=0) + _MARGIN

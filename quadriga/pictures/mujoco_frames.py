@@ -28,6 +28,7 @@ from quadriga.shared.robot.conventions import Array, robot_names
 
 _AZIMUTH: Final = 145.0  # deg, seen from ahead and the left of a team that walks along x
 _ELEVATION: Final = -24.0  # deg
+_BELOW: Final = 0.11  # m under the middle of the trunks: there the camera looks
 _FORCE_SCALE: Final = 0.005  # m per N
 _FORCE_RADIUS: Final = 0.008  # m
 _FORCE_RGBA: Final = np.array([0.95, 0.75, 0.1, 0.9], dtype=np.float32)
@@ -73,8 +74,8 @@ def frames(poses: Poses, quality: tuple[int, int], meshes: LinkMeshes) -> Iterat
         poses.config, partial(dress, robots=robot_names(poses.config.team.robots), meshes=meshes)
     )
     team.model.vis.quality.shadowsize, team.model.vis.quality.offsamples = quality
-    pebbles = team.team.terrain.pebbles
-    if pebbles is not None:  # thousands of them
+    relief = team.team.terrain.relief
+    if relief.loose:  # thousands of stones
         team.model.vis.quality.numslices, team.model.vis.quality.numstacks = _COARSE
     _light(team.model, 3.0 + 2.0 * poses.radius())
     camera = mujoco.MjvCamera()
@@ -85,10 +86,9 @@ def frames(poses: Poses, quality: tuple[int, int], meshes: LinkMeshes) -> Iterat
         for qpos, grf, centre in zip(poses.qpos, poses.grf, poses.centre(), strict=True):
             team.set(qpos)
             team.physics.light_xpos[0, :2] = centre[:2]
-            camera.lookat[:] = [*centre[:2], 0.15]
+            camera.lookat[:] = [*centre[:2], centre[2] - _BELOW]
             renderer.update_scene(team.physics, camera)
-            if pebbles is not None:
-                pebbles.draw(renderer.scene, centre, poses.radius() + _STREWN)
+            relief.draw(renderer.scene, centre, poses.radius() + _STREWN)
             _add_forces(renderer.scene, team.feet(), grf)
             yield Image.fromarray(renderer.render())
     finally:

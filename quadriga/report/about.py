@@ -12,6 +12,7 @@ from quadriga.recordings.metadata import recorded_versions
 from quadriga.report.run import Run
 from quadriga.shared.config.reference_trace import ROW_END
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.terrains import TERRAINS
 from quadriga.shared.config.write import departures
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.wire.codes import FALL
@@ -149,11 +150,7 @@ def list_traffic(run: Run) -> list[tuple[str, ...]]:
 
 def _describe_ground(config: Config) -> str:
     world = config.world
-    if world.terrain == "flat":
-        return "flat ground"
-    if world.terrain == "slope":
-        return f"ramps of {world.slope:g}° up to {1000 * world.terrain_height:.0f} mm"
-    return f"{world.terrain} up to {1000 * world.terrain_height:.0f} mm"
+    return world.ground if TERRAINS[world.terrain].builder else f"{world.ground} ground"
 
 
 def _format(value: Any) -> str:

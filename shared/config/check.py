@@ -7,6 +7,7 @@ from typing import Final
 
 from quadriga.shared.config.payload import carriers
 from quadriga.shared.config.sections import Config, GaitConfig, PlannerConfig, WorldConfig
+from quadriga.shared.config.terrains import TERRAINS
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.planner_kinds import find_kind, read_options
 from quadriga.shared.robot.conventions import robot_names
@@ -20,7 +21,6 @@ _PAIRS: Final = (
     "identification.gain_range",
 )
 _ANSWER: Final = 1.0  # s wall, for a robot's step once it has waited for a peer in vain
-_LEAST_PEBBLE: Final = 0.005  # m; the ground holds millions of smaller stones
 
 
 def check(config: Config) -> None:
@@ -69,12 +69,14 @@ def _check_world(world: WorldConfig, names: tuple[str, ...]) -> None:
             f"at least world.command_hold_ms = {world.command_hold_ms}",
             "a late command is held first, then damped",
         )
-    if world.terrain == "pebbles" and world.terrain_height < _LEAST_PEBBLE:
+    terrain = TERRAINS[world.terrain]
+    height = getattr(world, terrain.height_key)
+    if height < terrain.least_height:
         raise ConfigError(
-            "world.terrain_height",
-            f"{world.terrain_height:g}",
-            f"at least {_LEAST_PEBBLE:g} m for terrain 'pebbles'",
-            "the height of the largest stones; terrain 'flat' has none",
+            f"world.{terrain.height_key}",
+            f"{height:g}",
+            f"at least {terrain.least_height:g} m for terrain {terrain.name!r}",
+            "terrain 'flat' has no height",
         )
 
 

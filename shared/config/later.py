@@ -10,7 +10,15 @@ from quadriga.shared.config.renamed import with_first_names
 
 # By today's name, `section.key`: the value that all that is older was made with. While a key has
 # it, nothing that is hashed tells that there is such a key.
-LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType({"team.robot": "a1", "planner.options": ""})
+LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
+    {
+        "team.robot": "a1",
+        "planner.options": "",
+        "world.stairs_rise": 0.06,
+        "world.stairs_run": 0.3,
+        "world.stairs_count": 8,
+    }
+)
 
 
 def hashed_sections(sections: Mapping[str, Any]) -> dict[str, Any]:

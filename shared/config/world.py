@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from quadriga.shared.config.key import key
+from quadriga.shared.config.terrains import TERRAINS, terrain_meanings
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,11 +29,7 @@ class WorldConfig:
         high=0.1,
     )
     terrain: str = key(
-        "flat",
-        "-",
-        "kind of ground; gravel: fixed stones; pebbles: a layer of loose stones; slope: ramps up "
-        "and down",
-        choices=("flat", "boxes", "gravel", "heightfield", "pebbles", "slope"),
+        "flat", "-", f"kind of ground; {terrain_meanings()}", choices=tuple(TERRAINS)
     )
     terrain_height: float = key(
         0.05,
@@ -42,6 +39,9 @@ class WorldConfig:
         high=0.3,
     )
     slope: float = key(8.0, "deg", "terrain slope: grade of the ramps", low=0.5, high=25.0)
+    stairs_rise: float = key(0.06, "m", "terrain stairs: height of a step", low=0.0, high=0.2)
+    stairs_run: float = key(0.3, "m", "terrain stairs: depth of a tread", low=0.1, high=2.0)
+    stairs_count: int = key(8, "1", "terrain stairs: steps up, and down again", low=1, high=50)
     friction: float = key(0.8, "1", "friction coefficient of feet on ground", low=0.05, high=2.0)
     payload: float = key(0.0, "kg", "load unknown to the agents", low=0.0, high=60.0)
     payload_on: str = key(
@@ -109,7 +109,13 @@ class WorldConfig:
     @property
     def uneven(self) -> bool:
         """Whether the ground is anything but a plane."""
-        return self.terrain != "flat" and self.terrain_height > 0.0
+        kind = TERRAINS[self.terrain]
+        return bool(kind.builder) and getattr(self, kind.height_key) > 0.0
+
+    @property
+    def ground(self) -> str:
+        """What the ground is, in words."""
+        return TERRAINS[self.terrain].text.format_map(asdict(self))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,13 +12,15 @@ from typing import Final
 from quadriga.shared.errors import QuadrigaError
 
 _FIRST_LINE: Final = re.compile(r"\s*(import\s+\w|from\s+[\w.]+\s+(import\b|\\$))")
+_CHOICE: Final = re.compile(r"""\bimport_module\(f["']([\w.]+)\.\{""")
 
 
 def followed_files(root: Path, modules: Iterable[str]) -> Sequence[Path]:
     """Files of modules and of all that they import below `root`, sorted.
 
     Imports anywhere in a file count, also those within functions, and the packages that modules
-    lie in. What is imported from elsewhere is left out, and so is what `import_module` names.
+    lie in. What is imported from elsewhere is left out. Of `import_module(f"package.{name}")` every
+    module of the package counts; whatever else `import_module` is given does not.
 
     Args:
         root: the folder that the packages lie in.
@@ -41,7 +43,8 @@ def followed_files(root: Path, modules: Iterable[str]) -> Sequence[Path]:
     while todo:
         name, file = todo.pop()
         package = name if file.name == "__init__.py" else name.rpartition(".")[0]
-        for imported in {*_parents(name), *_imports(package, file.read_text(encoding="utf-8"))}:
+        text = file.read_text(encoding="utf-8")
+        for imported in {*_parents(name), *_imports(package, text), *_chosen(root, text)}:
             path = _file(root, imported)
             if path is not None and path not in files:
                 files.add(path)
@@ -75,6 +78,13 @@ def _imports(package: str, text: str) -> Iterator[str]:
             names = [".".join([*base, alias.name]) for alias in statement.names]
         for name in names:
             yield from _parents(name)
+
+
+def _chosen(root: Path, text: str) -> Iterator[str]:
+    """Names of the modules that a file chooses one of when it runs."""
+    for package in _CHOICE.findall(text):
+        folder = root.joinpath(*package.split("."))
+        yield from (f"{package}.{file.stem}" for file in sorted(folder.glob("[!_]*.py")))
 
 
 def _statements(text: str) -> Iterator[ast.Import | ast.ImportFrom]:

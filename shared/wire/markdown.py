@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import fields
 
 from quadriga.shared.wire.messages import Message
-from quadriga.shared.wire.topics import CONFIGURED, TABLE, Topic
+from quadriga.shared.wire.topic import CONFIGURED, Topic
+from quadriga.shared.wire.topics import TABLE
 
 _HEAD = """\
 # Topics and messages

@@ -1,51 +1,20 @@
 """The table of topics: key, message type, period, maximum age, who sends it and who takes it.
 
-What the entries of a message's arrays are called stands with its fields, in `wire.messages`.
+What the entries of a message's arrays are called stands with its fields, in `wire.messages`. Other
+packages add rows of their own, see `wire.plugin_topics`.
 """
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
 from typing import Final
 
 from quadriga.shared import members
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, SIM
 from quadriga.shared.wire import messages as msg
-
-CONFIGURED: Final = -1  # a time that the configuration says: see `quadriga.shared.config.timing`
-
-
-@dataclass(frozen=True, slots=True)
-class Topic:
-    """One row of the table.
-
-    Attributes:
-        name: last part of the key; `per_robot` tells whether a robot's name stands before it.
-        type: the message's dataclass.
-        senders: roles whose processes publish it.
-        receivers: roles whose processes act on it, the recorder aside.
-        per_robot: whether every robot has one of its own.
-        period_ms: world time between two of them; 0: sent on event; or `CONFIGURED`.
-        max_age_ms: longest gap between two of them, in world time, that is nothing unusual; of a
-            reference also how long it is obeyed. 0: none; or `CONFIGURED`.
-        recorded: whether it is part of a recording of everything.
-    """
-
-    name: str
-    type: type[msg.Message]
-    senders: tuple[str, ...]
-    receivers: tuple[str, ...]
-    _: KW_ONLY
-    per_robot: bool = False
-    period_ms: int
-    max_age_ms: int = 0
-    recorded: bool = True
-
-    def key(self, team: str, robot: str = "") -> str:
-        """The Zenoh key of this topic; `robot` may be `*`."""
-        return f"{team}/{robot}/{self.name}" if self.per_robot else f"{team}/{self.name}"
-
+from quadriga.shared.wire.plugin_topics import plugin_topics
+from quadriga.shared.wire.topic import CONFIGURED as CONFIGURED
+from quadriga.shared.wire.topic import Topic as Topic
 
 SAMPLE_MS: Final = 10  # one sample of u and y: forces are means over it, outputs taken at its end
 REFERENCE_EPOCH_MS: Final = 100  # the operator speaks at multiples of this
@@ -69,22 +38,26 @@ PLAN: Final = Topic(
 )  # fmt: skip
 STATUS: Final = Topic(
     "status", msg.Status, (*_PLANS, SIM), (),
-    per_robot=True, period_ms=CONFIGURED, max_age_ms=1000,
+    per_robot=True, period_ms=CONFIGURED, max_age_ms=1000, repeats=True,
 )  # fmt: skip
 INPUTS: Final = Topic("inputs", msg.Consumed, (AGENT,), (), per_robot=True, period_ms=0)
 REFERENCE: Final = Topic(
-    "reference", msg.Reference, (OPERATOR,), _PLANS, period_ms=REFERENCE_EPOCH_MS, max_age_ms=500
-)
+    "reference", msg.Reference, (OPERATOR,), _PLANS,
+    period_ms=REFERENCE_EPOCH_MS, max_age_ms=500, repeats=True,
+)  # fmt: skip
 ESTOP: Final = Topic("estop", msg.EStop, (members.ESTOP,), (AGENT,), period_ms=0)
 TRUTH: Final = Topic(
     "sim/truth", msg.Truth, (SIM,), (AGENT, OPERATOR, LAUNCHER, members.ESTOP),
     period_ms=CONFIGURED,
 )  # fmt: skip
-EVENT: Final = Topic("sim/event", msg.Event, (SIM,), (*_PLANS, OPERATOR, LAUNCHER), period_ms=0)
+EVENT: Final = Topic(
+    "sim/event", msg.Event, (SIM,), (*_PLANS, OPERATOR, LAUNCHER), period_ms=0, repeats=True
+)
 
-TABLE: Final = (
+_OWN: Final = (
     STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, ESTOP, TRUTH, EVENT,
 )  # fmt: skip
+TABLE: Final = (*_OWN, *plugin_topics(_OWN))
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}
 
 

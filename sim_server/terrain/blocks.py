@@ -8,8 +8,11 @@ from typing import Final
 import mujoco
 import numpy as np
 
+from quadriga.shared.config.world import WorldConfig
 from quadriga.shared.robot.conventions import Array
+from quadriga.sim_server.terrain.contact import TERRAIN_CONTACT
 from quadriga.sim_server.terrain.course import Course
+from quadriga.sim_server.terrain.relief import Relief
 
 _CELL: Final = 0.35  # m, one block per square of this size
 _SIZE: Final = (0.1, 0.4)  # m, range of the horizontal edges
@@ -18,7 +21,7 @@ _RGBA: Final = ((0.72, 0.53, 0.30, 1.0), (0.80, 0.62, 0.38, 1.0), (0.62, 0.44, 0
 
 
 @dataclass(frozen=True, slots=True)
-class Blocks:
+class Blocks(Relief):
     """Blocks on the ground; where two overlap the higher one counts.
 
     Attributes:
@@ -48,7 +51,7 @@ class Blocks:
         height: Array = np.where(inside, self.tall, 0.0).max(axis=-1, initial=0.0)
         return height
 
-    def add_to(self, spec: mujoco.MjSpec, contact: dict[str, int]) -> None:
+    def add_to(self, spec: mujoco.MjSpec) -> None:
         """Add one box geom per block to the world body."""
         for i in range(len(self.tall)):
             h = float(self.tall[i]) / 2.0
@@ -58,16 +61,16 @@ class Blocks:
                 size=[*self.half[i], h],
                 quat=[np.cos(self.yaw[i] / 2.0), 0.0, 0.0, np.sin(self.yaw[i] / 2.0)],
                 rgba=_RGBA[i % len(_RGBA)],
-                **contact,
+                **TERRAIN_CONTACT,
             )
 
 
-def build_blocks(course: Course, height: float, random: np.random.Generator) -> Blocks:
+def build_blocks(course: Course, world: WorldConfig, random: np.random.Generator) -> Blocks:
     """One block per cell of the course that the team's way needs, none on the flat place.
 
     Args:
         course: where the team starts and walks.
-        height: greatest height of a block, m; heights are uniform in 0.2 … 1 of it.
+        world: how high the highest block may be; heights are uniform in 0.2 … 1 of that.
         random: the terrain's random stream.
     """
     extent = course.extent
@@ -78,7 +81,7 @@ def build_blocks(course: Course, height: float, random: np.random.Generator) -> 
     centre += random.uniform(0.0, _CELL, centre.shape)
     half = random.uniform(_SIZE[0] / 2.0, _SIZE[1] / 2.0, centre.shape)
     yaw = random.uniform(0.0, np.pi, len(centre))
-    tall = height * random.uniform(_LEAST_HEIGHT, 1.0, len(centre))
+    tall = world.terrain_height * random.uniform(_LEAST_HEIGHT, 1.0, len(centre))
     clear = -course.flat.depth(centre[:, 0], centre[:, 1]) > np.hypot(half[:, 0], half[:, 1])
     keep = clear & course.needs(centre[:, 0], centre[:, 1])
     return Blocks(centre=centre[keep], half=half[keep], yaw=yaw[keep], tall=tall[keep])

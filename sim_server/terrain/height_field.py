@@ -11,8 +11,12 @@ import mujoco
 import numpy as np
 from scipy import ndimage
 
+from quadriga.shared.config.world import WorldConfig
 from quadriga.shared.robot.conventions import Array
+from quadriga.sim_server.terrain.contact import TERRAIN_CONTACT
 from quadriga.sim_server.terrain.course import Course, Rectangle
+from quadriga.sim_server.terrain.materials import EARTH, add_checker
+from quadriga.sim_server.terrain.relief import Relief
 
 _SUNK: Final = 0.01  # m, how far below the ground plane the field starts: no double contacts there
 _BASE: Final = 0.05  # m, thickness below the lowest point
@@ -34,7 +38,7 @@ _BED_LENGTH: Final = 0.15  # m, correlation length of the bed that the stones li
 
 
 @dataclass(frozen=True, slots=True)
-class HeightField:
+class HeightField(Relief):
     """Heights over a regular grid, two triangles per cell; the plane z = 0 covers what is lower.
 
     Attributes:
@@ -68,8 +72,9 @@ class HeightField:
         surface = np.where(u >= v, below, above)
         return np.where(inside, np.maximum(surface, 0.0), 0.0)
 
-    def add_to(self, spec: mujoco.MjSpec, contact: dict[str, int], material: str) -> None:
+    def add_to(self, spec: mujoco.MjSpec) -> None:
         """Add the field as one geom of the world body."""
+        add_checker(spec, EARTH)
         rows, columns = self.z.shape
         box = self.extent
         half_x, half_y = (box.x_high - box.x_low) / 2.0, (box.y_high - box.y_low) / 2.0
@@ -86,51 +91,52 @@ class HeightField:
             type=mujoco.mjtGeom.mjGEOM_HFIELD,
             hfieldname="terrain",
             pos=[box.x_low + half_x, box.y_low + half_y, low],
-            material=material,
-            **contact,
+            material=EARTH,
+            **TERRAIN_CONTACT,
         )
 
 
-def build_smooth_field(course: Course, height: float, random: np.random.Generator) -> HeightField:
-    """Gaussian hills between 0 and `height`, m."""
+def build_smooth_field(
+    course: Course, world: WorldConfig, random: np.random.Generator
+) -> HeightField:
+    """Gaussian hills between 0 and `world.terrain_height`."""
     x, y = _grid(course.extent, _SMOOTH_CELL)
     hills = _hills(x.shape, _SMOOTH_LENGTH / _SMOOTH_CELL, random)
-    return _field(course, x, y, hills, height)
+    return _field(course, x, y, hills, world.terrain_height)
 
 
-def build_gravel(course: Course, height: float, random: np.random.Generator) -> HeightField:
-    """Stones of 3 to 6 cm on an uneven bed, between 0 and `height`, m.
+def build_gravel(course: Course, world: WorldConfig, random: np.random.Generator) -> HeightField:
+    """Stones of 3 to 6 cm on an uneven bed, between 0 and `world.terrain_height`.
 
     The stones are part of the ground: they do not move, roll or sink.
     """
     x, y = _grid(course.extent, _GRAVEL_CELL)
+    height = world.terrain_height
     stand_out = min(_STONE_HEIGHT, height)
     bed = _hills(x.shape, _BED_LENGTH / _GRAVEL_CELL, random)
     z = (height - stand_out) * bed + stand_out * _stones(course.extent, x, y, random)
     return _field(course, x, y, z, height)
 
 
-def build_ramps(
-    course: Course, height: float, random: np.random.Generator, *, slope: float
-) -> HeightField:
+def build_ramps(course: Course, world: WorldConfig, random: np.random.Generator) -> HeightField:
     """Ramps that lead up and down again, one after the other, as wide as the ground.
 
     Args:
         course: where the team starts and walks.
-        height: of the highest crest, m; the others are drawn, down to half of it.
+        world: how steep every ramp and how high the highest crest is; the others are drawn, down to
+            half of that.
         random: the terrain's random stream.
-        slope: grade of every ramp, rad.
     """
     x, y = _grid(course.extent, _RAMP_CELL)
     heading = random.uniform(-_RAMP_TURN, _RAMP_TURN)
     way = np.array([np.cos(heading), np.sin(heading)])
     corners = np.array(list(product(*course.flat.sides)))
-    along, grade = way[0] * x + way[1] * y, np.tan(slope)
+    along, grade = way[0] * x + way[1] * y, np.tan(math.radians(world.slope))
     profile = np.zeros_like(along)
     for side in (1.0, -1.0):  # ramps at both ends: a team may walk backwards
         foot = float((side * corners @ way).max()) + _FILTER * _ROUNDED
         while foot < float((side * along).max()):
-            crest = _SUNK + height * random.uniform(_LEAST_CREST, 1.0)
+            crest = _SUNK + world.terrain_height * random.uniform(_LEAST_CREST, 1.0)
             half = crest / grade
             profile = np.maximum(profile, crest - grade * np.abs(side * along - foot - half))
             foot += 2.0 * half

@@ -7,19 +7,34 @@ lends one to every stone near a low foot, until the stone lies still and no foot
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quadriga.shared.robot.conventions import Array
-from quadriga.sim_server.terrain.pebbles import SIZES, Pebbles
 
-PERIOD: Final = 4  # ms between two updates
 _MARGIN: Final = 0.01  # m around foot and stone; a foot moves less until the next update
 _LOW: Final = 0.03  # m from the top of the largest stone to a foot that counts as near
 _LEAVE: Final = 0.02  # m beyond the distance at which it got its body, a stone may lose it
 _STILL: Final = (0.02, 1.0)  # m/s, rad/s
 _NOBODY: Final = -1
+
+
+class LyingStones(Protocol):
+    """Stones as they lie at first."""
+
+    @property
+    def pose(self) -> Array:
+        """Centre and attitude wxyz of each stone, shape (s, 7), m, world."""
+
+    @property
+    def size(self) -> NDArray[np.int64]:
+        """Index of each stone's size, shape (s,)."""
+
+    @property
+    def half(self) -> Array:
+        """Half axes of the stones of each size, shape (sizes, 3), m."""
 
 
 class LooseStones:
@@ -33,20 +48,28 @@ class LooseStones:
     """
 
     def __init__(
-        self, pebbles: Pebbles, model: Any, physics: Any, robots: int, foot_radius: float
+        self, stones: LyingStones, parked: Array, model: Any, physics: Any, foot_radius: float
     ) -> None:
-        """Take over the bodies that `Pebbles.add_to` has added last; the feet's radius in m."""
-        self._parked = pebbles.parking_poses(robots)
-        count = len(self._parked)
+        """Take over the last bodies of a world.
+
+        Args:
+            stones: as they lie at first.
+            parked: poses of the bodies while they are not in use, shape (p, 7), m, world; as many
+                of each size, ordered by size.
+            model: the compiled world.
+            physics: its state.
+            foot_radius: radius of the robots' feet, m.
+        """
+        self._parked, count = parked, len(parked)
         self._q = physics.qpos[-7 * count :].reshape(count, 7)
         self._v = physics.qvel[-6 * count :].reshape(count, 6)
         self._warm = physics.qacc_warmstart[-6 * count :].reshape(count, 6)
         self._weightless = model.body_gravcomp[-count:]
-        self._size, self._of_size = pebbles.size, np.arange(count) * len(SIZES) // count
-        self._touching = foot_radius + pebbles.reach
+        self._size, self._of_size = stones.size, np.arange(count) * len(stones.half) // count
+        self._touching = foot_radius + float(stones.half.max())
         self._near = self._touching + _MARGIN
-        self._on_top = 2.0 * float(pebbles.half[:, 2].max()) + foot_radius
-        self.pose = pebbles.pose.copy()
+        self._on_top = 2.0 * float(stones.half[:, 2].max()) + foot_radius
+        self.pose = stones.pose.copy()
         self.stone_of = np.full(count, _NOBODY)
         self.without = 0
         self._cells: defaultdict[tuple[int, int], set[int]] = defaultdict(set)

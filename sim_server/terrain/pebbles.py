@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, ClassVar, Final
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from quadriga.shared.config.world import WorldConfig
 from quadriga.shared.robot.conventions import N_LEGS, Array
 from quadriga.sim_server.terrain.contact import STONE_CONTACT
 from quadriga.sim_server.terrain.course import Course, Rectangle
+from quadriga.sim_server.terrain.loose import LooseStones
+from quadriga.sim_server.terrain.relief import Relief
 
-SIZES: Final = (0.5, 0.67, 0.83, 1.0)  # of the largest
+_SIZES: Final = (0.5, 0.67, 0.83, 1.0)  # of the largest
 _AXES: Final = (1.3, 1.1, 1.0)  # half axes of a stone over half its height
 _CELL: Final = 2.1  # half lengths of the largest stone; one stone per square of this size
 _DENSITY: Final = 2600.0  # kg/m³
@@ -30,15 +33,16 @@ _RGBA: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Pebbles:
+class Pebbles(Relief):
     """Stones as they lie before the walk.
 
     Attributes:
         pose: centre and attitude wxyz of each stone, shape (s, 7), m, world.
-        size: index of each stone's size in `SIZES`, shape (s,).
+        size: index of each stone's size in `_SIZES`, shape (s,).
         half: half axes of the stones of each size, shape (4, 3), m.
     """
 
+    loose: ClassVar[bool] = True
     pose: Array
     size: NDArray[np.int64]
     half: Array
@@ -50,17 +54,17 @@ class Pebbles:
 
     def parking_poses(self, robots: int) -> Array:
         """Poses of the unused bodies of stones, ordered by size, m, world. Shape (p, 7)."""
-        count = len(SIZES) * -(-_PER_LEG * N_LEGS * robots // len(SIZES))
+        count = len(_SIZES) * -(-_PER_LEG * N_LEGS * robots // len(_SIZES))
         parked = np.zeros((count, 7))
         parked[:, 0] = 4.0 * self.reach * np.arange(count)
         parked[:, 2], parked[:, 3] = _PARKED, 1.0
         return parked
 
-    def add_to(self, spec: mujoco.MjSpec, robots: int, friction: float) -> None:
+    def add_bodies(self, spec: mujoco.MjSpec, robots: int, friction: float) -> None:
         """Add the bodies of stones that can move, parked and weightless, after everything else."""
         parked = self.parking_poses(robots)
         for k, pose in enumerate(parked.tolist()):
-            i = k * len(SIZES) // len(parked)
+            i = k * len(_SIZES) // len(parked)
             body = spec.worldbody.add_body(name=f"pebble{k}", pos=pose[:3], gravcomp=1.0)
             body.add_freejoint()
             body.add_geom(
@@ -75,6 +79,10 @@ class Pebbles:
                 rgba=_RGBA[i],
                 **STONE_CONTACT,
             )
+
+    def start(self, model: Any, physics: Any, robots: int, foot_radius: float) -> LooseStones:
+        """Lend the bodies of a compiled world to stones near feet."""
+        return LooseStones(self, self.parking_poses(robots), model, physics, foot_radius)
 
     def draw(self, scene: mujoco.MjvScene, centre: Array, reach: float) -> None:
         """Add the stones around a place to a picture, as they lay at the start."""
@@ -94,19 +102,19 @@ class Pebbles:
             scene.ngeom += 1
 
 
-def build_pebbles(course: Course, height: float, random: np.random.Generator) -> Pebbles:
+def build_pebbles(course: Course, world: WorldConfig, random: np.random.Generator) -> Pebbles:
     """Stones side by side wherever the team's way needs them, none on the flat place.
 
     Args:
         course: where the team starts and walks.
-        height: of the largest stones, m.
+        world: how high the largest stones are.
         random: the terrain's random stream.
     """
-    half = 0.5 * height * np.outer(SIZES, _AXES)
+    half = 0.5 * world.terrain_height * np.outer(_SIZES, _AXES)
     longest = float(half.max())
     centre = _lattice(course.extent, _CELL * longest, random)
     free = (0.5 * _CELL - 1.0) * longest
-    size = random.integers(len(SIZES), size=len(centre))
+    size = random.integers(len(_SIZES), size=len(centre))
     # Each stone lies in its square; a smaller stone may lie farther off its middle.
     turn, away = random.uniform(0.0, 2.0 * np.pi, len(centre)), random.uniform(size=len(centre))
     away *= free + longest - half[size, 0]

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.terrains import TERRAINS
 from quadriga.shared.robot.conventions import N_JOINTS, Array, robot_names
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Event
@@ -89,7 +90,4 @@ def build_scenario(config: Config, loads: Sequence[Load]) -> Scenario:
 
 def _ground(config: Config) -> str:
     world = config.world
-    if world.terrain == "flat":
-        return "flat"
-    grade = f" of {world.slope:g} deg" if world.terrain == "slope" else ""
-    return f"{world.terrain}{grade} up to {world.terrain_height:g} m, seed {world.seed}"
+    return f"{world.ground}, seed {world.seed}" if TERRAINS[world.terrain].builder else world.ground

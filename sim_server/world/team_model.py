@@ -48,7 +48,7 @@ class TeamModel:
         yokes: the pairs of robot indices that are yoked.
         rest_length: length of each yoke at the spawn, shape (k,), m.
         payload: load on each robot.
-        q_spawn: positions at the spawn, shape (19 n,); loose stones follow after the robots.
+        q_spawn: positions at the spawn, shape (19 n,); the terrain's bodies follow.
     """
 
     model: mujoco.MjModel
@@ -119,8 +119,7 @@ def build_team_model(
     pairs = yoke_pairs(len(names), config.team.yokes)
     for i, j in pairs:
         _add_yoke(spec, names[i], names[j])
-    if terrain.pebbles is not None:
-        terrain.pebbles.add_to(spec, len(names), config.world.friction)
+    terrain.relief.add_bodies(spec, len(names), config.world.friction)
     if dress is not None:
         dress(spec)
     model = spec.compile()

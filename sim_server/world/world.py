@@ -13,7 +13,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, N_LEGS, Array, robot_names
 from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.messages import Command, Event, State, Truth
-from quadriga.sim_server.terrain.loose import PERIOD, LooseStones
+from quadriga.sim_server.terrain.relief import FOLLOW_MS
 from quadriga.sim_server.world import layout
 from quadriga.sim_server.world.motors import drive
 from quadriga.sim_server.world.scenario import build_scenario
@@ -64,7 +64,7 @@ class World:
             for tick in {event.tick for event in self._scenario.events}
         }
         n = len(self.names)
-        # Views of MuJoCo's own memory; behind the robots come the loose stones.
+        # Views of MuJoCo's own memory; behind the robots come the terrain's bodies.
         self._q = self.physics.qpos[: n * layout.NQ].reshape(n, layout.NQ)
         self._v = self.physics.qvel[: n * layout.NV].reshape(n, layout.NV)
         applied = self.physics.qfrc_applied[: n * layout.NV].reshape(n, layout.NV)
@@ -83,13 +83,11 @@ class World:
 
         self.physics.qpos[:] = self.team.q_spawn
         mujoco.mj_forward(self.team.model, self.physics)
-        pebbles, model = self.team.terrain.pebbles, self.team.model
+        model = self.team.model
         feet = (f"{name}/{foot}" for name in self.names for foot in FOOT_FRAMES)
         self._feet = [model.geom(foot).id for foot in feet]
-        self._stones = (
-            None
-            if pebbles is None
-            else LooseStones(pebbles, model, self.physics, n, config.robot.geometry.foot_radius)
+        self._moving = self.team.terrain.relief.start(
+            model, self.physics, n, config.robot.geometry.foot_radius
         )
         self._settled = True
         self._yoke_force = self._read_yoke_force()
@@ -134,8 +132,8 @@ class World:
         """
         if self._settled:
             return
-        if self._stones is not None and (self.tick - 1) % PERIOD == 0:
-            self._stones.follow(self.physics.geom_xpos[self._feet])
+        if self._moving is not None and (self.tick - 1) % FOLLOW_MS == 0:
+            self._moving.follow(self.physics.geom_xpos[self._feet])
         mujoco.mj_step1(self.team.model, self.physics)
         self._settled = True
 

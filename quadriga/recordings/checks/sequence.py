@@ -7,22 +7,15 @@ from typing import Final
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import max_ages, periods
+from quadriga.shared.members import AGENT, PLANNER
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Plan, Status
-from quadriga.shared.wire.topics import (
-    COMMAND,
-    ESTOP,
-    EVENT,
-    MEASUREMENT,
-    REFERENCE,
-    STATE,
-    STATUS,
-    TRUTH,
-)
+from quadriga.shared.wire.topics import COMMAND, ESTOP, MEASUREMENT, STATE, TABLE
 
-_MAY_REPEAT: Final = frozenset((STATUS.name, REFERENCE.name, EVENT.name))
-_WORLD: Final = frozenset((STATE.name, TRUTH.name, REFERENCE.name))
+_MAY_REPEAT: Final = frozenset(topic.name for topic in TABLE if topic.repeats)
+# What is never passed over, not even in real time: agents and planners skip steps, others do not.
+_WHOLE: Final = frozenset(t.name for t in TABLE if not {AGENT, PLANNER} & {*t.senders})
 _EVERYONE_S: Final = (STATE, COMMAND, MEASUREMENT)
 _TAIL_MS: Final = 20  # a world that was stopped may end in the middle of a sample
 
@@ -55,8 +48,8 @@ class Order:
 class Gaps:
     """No message is missing between the first and the last tick, and no robot's keys are.
 
-    In real time an agent answers the newest state and passes over older ones, so there only the
-    world's own messages must be without gaps.
+    In real time an agent answers the newest state and passes over older ones, so there only what
+    others send must be without gaps.
     """
 
     def __init__(self, config: Config, *, filtered: bool) -> None:
@@ -78,7 +71,7 @@ class Gaps:
         passed_over = 0
         for key, (topic, track) in sorted(self._tracks.items()):
             self.finding.looked += track.count + track.lost
-            if lockstep or topic in _WORLD:
+            if lockstep or topic in _WHOLE:
                 for before, after in track.gaps:
                     count = (after - before - 1) // self._periods[topic]
                     self.finding.add_objection(

@@ -48,6 +48,11 @@ def test_every_form_of_an_import_is_followed(root: Path, text: str) -> None:
     assert names(root, "pack.a") - {"pack/b"} == {"pack/a", "pack/room/__init__", "pack/room/c"}
 
 
+def test_every_module_that_may_be_chosen_is_followed(root: Path) -> None:
+    put(root, "pack/a", 'def f(name):\n    return import_module(f"pack.room.{name}")\n')
+    assert names(root, "pack.a") == {"pack/a", "pack/room/__init__", "pack/room/c"}
+
+
 def test_imports_of_imports_count_and_circles_end(root: Path) -> None:
     put(root, "pack/a", "from pack import b\n")
     put(root, "pack/b", "from pack import a\nfrom pack.room.c import X\n")

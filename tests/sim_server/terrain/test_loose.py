@@ -24,9 +24,9 @@ def strewn(robots: int = 1, **world: object) -> World:
 
 
 def parts(world: World) -> tuple[Pebbles, LooseStones]:
-    pebbles, stones = world.team.terrain.pebbles, world._stones
-    assert pebbles is not None
-    assert stones is not None
+    pebbles, stones = world.team.terrain.relief, world._moving
+    assert isinstance(pebbles, Pebbles)
+    assert isinstance(stones, LooseStones)
     return pebbles, stones
 
 

@@ -1,0 +1,71 @@
+"""The table of terrains: what they are called, which keys shape them and who builds them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass
+from types import MappingProxyType
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True)
+class TerrainKind:
+    """One row of the table.
+
+    Attributes:
+        name: what `world.terrain` calls it.
+        builder: `module:function` of the package `quadriga.sim_server.terrain`; "" of a plane.
+        text: how events and reports describe it, keys of `[world]` in braces.
+        meaning: what neither its name nor its keys say.
+        height_key: the key of `[world]` that is its height; at 0 the ground is a plane.
+        least_height: the least that it may be, m.
+    """
+
+    name: str
+    builder: str
+    text: str
+    _: KW_ONLY
+    meaning: str = ""
+    height_key: str = "terrain_height"
+    least_height: float = 0.0
+
+
+_ROWS: Final = (
+    TerrainKind("flat", "", "flat"),
+    TerrainKind("boxes", "blocks:build_blocks", "boxes up to {terrain_height:g} m"),
+    TerrainKind(
+        "gravel",
+        "height_field:build_gravel",
+        "gravel up to {terrain_height:g} m",
+        meaning="fixed stones",
+    ),
+    TerrainKind(
+        "heightfield", "height_field:build_smooth_field", "heightfield up to {terrain_height:g} m"
+    ),
+    TerrainKind(
+        "pebbles",
+        "pebbles:build_pebbles",
+        "pebbles up to {terrain_height:g} m",
+        meaning="a layer of loose stones",
+        least_height=0.005,  # the ground holds millions of smaller stones
+    ),
+    TerrainKind(
+        "slope",
+        "height_field:build_ramps",
+        "slope of {slope:g} deg up to {terrain_height:g} m",
+        meaning="ramps up and down",
+    ),
+    TerrainKind(
+        "stairs",
+        "stairs:build_stairs",
+        "stairs, {stairs_count} steps of {stairs_rise:g} m up and down, {stairs_run:g} m deep",
+        meaning="up, a landing, and down again",
+        height_key="stairs_rise",
+    ),
+)
+TERRAINS: Final[Mapping[str, TerrainKind]] = MappingProxyType({row.name: row for row in _ROWS})
+
+
+def terrain_meanings() -> str:
+    """What the names of terrains do not say, as the key's documentation has it."""
+    return "; ".join(f"{row.name}: {row.meaning}" for row in _ROWS if row.meaning)
