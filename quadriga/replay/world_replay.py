@@ -57,6 +57,14 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
             "one in lock-step",
             "which command moved the motors in which tick is not recorded in real time",
         )
+    if not config.team.one_world:
+        plant = f"team.plant {config.team.plant!r} and team.plants {config.team.plants!r}"
+        raise RecordingError(
+            str(recording.path),
+            f"a walk with {plant}",
+            "one of a single simulated world",
+            "no other plant can be computed again",
+        )
     world, silent = World(config), set[str]()
     keys = {
         name: (STATE.key(config.team.name, name), COMMAND.key(config.team.name, name))

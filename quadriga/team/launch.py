@@ -14,7 +14,7 @@ from typing import Final, Self
 from quadriga.shared.bus.barrier import processes
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.members import LAST, RECORDER, SIM, Member
+from quadriga.shared.members import LAST, LEADS, RECORDER, Member, has_lead
 from quadriga.shared.runtime.clock import monotonic, sleep
 
 _ONE_THREAD: Final = (
@@ -58,8 +58,8 @@ def process_table(
 
     def build_row(member: Member) -> ProcessSpec:
         role, options = member.role, list[str]()
-        if role.per_robot:
-            options += ["--robot", member.name]
+        if member.robot:
+            options += ["--robot", member.robot]
         if role.predicts and predictor is not None:
             options += ["--predictor", str(predictor)]
         if role.name == RECORDER:
@@ -107,9 +107,9 @@ class Launch:
                 names the process, how it ended and its last words.
         """
         first_to_leave, left_at = "", 0.0
-        while SIM in self._running:
+        while has_lead(self._running):
             for name in list(self._running):
-                if self._reap(name) and name != SIM and not first_to_leave:
+                if self._reap(name) and name not in LEADS and not first_to_leave:
                     first_to_leave, left_at = name, monotonic()
             if first_to_leave and monotonic() - left_at > _EARLY:
                 got, expected = "an end while the team walked", "to walk until the end"

@@ -71,7 +71,7 @@ class Bus:
     ) -> Self:
         """Join the network as process `name` of `team`.
 
-        In peer mode the process named `sim` listens on `bus.endpoint`; all others connect to it,
+        In peer mode the process that drives time listens on `bus.endpoint`; all others connect,
         now or when it appears, and learn of each other through it, so that links are direct.
         In client mode the router must be there, or appear within `bus.barrier_timeout` if
         `stopped` is given.

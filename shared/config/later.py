@@ -10,7 +10,9 @@ from quadriga.shared.config.renamed import with_first_names
 
 # By today's name, `section.key`: the value that all that is older was made with. While a key has
 # it, nothing that is hashed tells that there is such a key.
-LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType({"team.robot": "a1"})
+LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
+    {"team.robot": "a1", "team.plant": "mujoco", "team.plants": "one"}
+)
 
 
 def hashed_sections(sections: Mapping[str, Any]) -> dict[str, Any]:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from quadriga.shared.config.key import key
 from quadriga.shared.robot.robots import ROBOTS
+
+SIMULATED: Final = "mujoco"  # the kind of plant that is a simulated world
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,10 +25,24 @@ class TeamConfig:
         hint="all robots of a team are of one kind",
     )
     yokes: str = key(
-        "complete", "-", "which pairs are yoked", choices=("complete", "chain", "ring")
+        "complete", "-", "which pairs are yoked", choices=("complete", "chain", "ring", "none")
     )
     spacing: float = key(0.9, "m", "distance between neighbours at the start", low=0.6, high=3.0)
     alternate_phase: bool = key(True, "-", "every second robot trots half a gait period later")
+    plant: str = key(
+        SIMULATED, "-", "what the robots are: mujoco, or a kind that an installed package adds"
+    )
+    plants: str = key(
+        "one",
+        "-",
+        "one: a single process is the plant of all robots; each: every robot has one of its own",
+        choices=("one", "each"),
+    )
+
+    @property
+    def one_world(self) -> bool:
+        """Whether the plant is one simulated world of all robots: it knows the truth of all."""
+        return self.plant == SIMULATED and self.plants == "one"
 
 
 @dataclass(frozen=True, slots=True)

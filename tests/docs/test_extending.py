@@ -1,0 +1,44 @@
+"""The commands of docs/extending.md do what the page says, section by section."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from quadriga.shared.runtime.places import SOURCE
+
+_PAGE: Final = (SOURCE / "docs" / "extending.md").read_text(encoding="utf-8")
+_SHELL: Final = re.compile(r"^```sh\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_LIMIT: Final = 300.0  # s, far more than any section takes on a busy machine
+SECTIONS: Final = {
+    part.partition("\n")[0]: "".join(_SHELL.findall(part)) for part in _PAGE.split("\n## ")[1:]
+}
+
+
+def test_every_section_has_commands() -> None:
+    assert {"A terrain", "A topic"} <= SECTIONS.keys()
+    assert all(SECTIONS.values())
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_the_commands_of_a_section_run(section: str, tmp_path: Path) -> None:
+    """In a folder with what they name of the checkout, so that nothing is left in that."""
+    shutil.copytree(SOURCE / "tests" / "plugins", tmp_path / "tests" / "plugins")
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    done = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", SECTIONS[section]],
+        cwd=tmp_path,
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+        timeout=_LIMIT,
+        check=False,
+    )
+    assert done.returncode == 0, f"{done.stdout[-2000:]}\n{done.stderr[-4000:]}"
