@@ -64,7 +64,7 @@ def _await_plants(server: PlantServer, stopped: Callable[[], bool]) -> End | Non
         if packet is not None:
             server.take(*packet, oldest=tick)
         elif monotonic() > deadline:
-            return plant_gone(sorted(waiting), f"silent for {patience:g} s")
+            time.end = plant_gone(sorted(waiting), f"silent for {patience:g} s")
         else:
             time.look(bus.members_at(HERE))
     return time.end

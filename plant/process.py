@@ -58,7 +58,10 @@ def run(
         end = loop(server, stopped)
         if time.drives:
             server.announce(end.code, "", end.detail)
-    if end.code == codes.PLANT_GONE:
+    if time.end is not None and time.end.code == codes.PLANT_GONE:
         raise BusError(
-            f"team {team!r}", end.detail, "every robot's plant until the end", "see its own words"
+            f"team {team!r}",
+            time.end.detail,
+            "the plants of all robots until the end",
+            "it failed, was stopped, or lost its link: see what it says itself",
         )
