@@ -70,6 +70,7 @@ def summary_of(traces: Traces) -> dict[str, Any]:
         **_traffic(traces),
         "team": config.team.name,
         "robots": config.team.robots,
+        "yokes": config.team.yokes,
         "seed": config.world.seed,
         "mode": config.world.mode,
         "scenario": config.world.scenario,
