@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -49,7 +50,8 @@ def never() -> bool:
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the package of `tests/plugins/puppet`, installed."""
     folder = tmp_path_factory.mktemp("site")
-    package = SOURCE / "tests" / "plugins" / "puppet"
+    package = folder / "source"  # a copy: pip builds where the source is
+    shutil.copytree(SOURCE / "tests" / "plugins" / "puppet", package)
     pip = (sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check")
     flags = ("--no-deps", "--no-build-isolation", "--no-index", "--target", str(folder))
     subprocess.run([*pip, *flags, str(package)], check=True, timeout=WAIT)

@@ -6,7 +6,6 @@ import numpy as np
 
 from quadriga.plant.protocol import Plant
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import q_stand
 from quadriga.shared.wire.messages import Command, Event, State
 
 LAG = 20.0  # ticks, in which a joint has gone two thirds of its way
@@ -19,7 +18,7 @@ class Puppets(Plant):
 
     def __init__(self, config: Config, names: tuple[str, ...]) -> None:
         self.names, self.tick = names, 0
-        self.q = {name: q_stand() for name in names}
+        self.q = dict.fromkeys(names, config.robot.q_stand)
         self.v = {name: np.zeros(12) for name in names}
 
     def states(self) -> dict[str, State]:
