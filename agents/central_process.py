@@ -36,7 +36,7 @@ _WORKING: Final = "plan"
 
 
 def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None = None) -> None:
-    """Plan for the whole team until the world ends, the sim server leaves, or it is stopped.
+    """Plan for the whole team until the walk ends, who drives time leaves, or it is stopped.
 
     Args:
         config: the team's configuration.

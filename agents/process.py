@@ -35,7 +35,7 @@ def run(
     predictor: Predictor | None,
     stopped: Callable[[], bool] | None = None,
 ) -> None:
-    """Walk one robot until the world ends, the sim server leaves, or it is stopped.
+    """Walk one robot until the walk ends, who drives time leaves, or it is stopped.
 
     Args:
         config: the team's configuration.

@@ -43,7 +43,7 @@ def run(
     selection: Selection | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> RecordedFiles:
-    """Record until SIGINT, SIGTERM or the sim server's leaving; then drain and finish the file.
+    """Record until SIGINT, SIGTERM or the plant's leaving; then drain and finish the file.
 
     The recorder is a member that the team waits for, unless the team walks already or has one:
     then it records beside it from now on, nobody waits for it, and it reports what it missed.

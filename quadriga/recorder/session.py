@@ -54,7 +54,7 @@ class Session:
 
         Args:
             late: nobody has waited for this recorder.
-            seen: the sim server has been there; its leaving is the end.
+            seen: the plant has been there; its leaving is the end.
         """
         self._seen = seen
         self._flushed = self._begun = monotonic()

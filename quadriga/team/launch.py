@@ -26,7 +26,7 @@ _ONE_THREAD: Final = (
 QUADRIGA: Final = (sys.executable, "-m", "quadriga")
 _LAST_WORDS: Final = 12  # lines of a failed process's log that are shown
 _LOOK: Final = 0.05  # s
-_EARLY: Final = 4.0  # s, by which others may leave before the sim server: it closes politely
+_EARLY: Final = 4.0  # s, by which others may leave before who drives time: it closes politely
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ class Launch:
         return {name: process.pid for name, process in self._running.items()}
 
     def watch(self, look: Callable[[], bool]) -> None:
-        """Wait until the sim server has ended the walk, then until the others have left.
+        """Wait until the plant has ended the walk, then until the others have left.
 
         Args:
             look: called all the time; returns whether to stop the walk now.
@@ -152,7 +152,7 @@ class Launch:
     def stop(self) -> None:
         """Stop what still runs: SIGTERM, the recorder last, and SIGKILL after a grace period.
 
-        The sim server then tells the others that the walk is over, and the recorder hears it.
+        The plant then tells the others that the walk is over, and the recorder hears it.
         """
         self._terminate([name for name in self._running if name != LAST])
         self._terminate([name for name in self._running if name == LAST])

@@ -97,7 +97,7 @@ class Bus:
     def join(cls, bus: BusConfig, team: str, name: str) -> Self:
         """Join the network at `bus.endpoint`; in peer mode be who listens there if nobody does.
 
-        For a process that must be found although no sim server runs. If somebody listens there,
+        For a process that must be found although no plant runs. If somebody listens there,
         this waits for the link to them.
 
         Raises:

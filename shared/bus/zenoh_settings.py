@@ -38,7 +38,7 @@ def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str
         "mode": bus.mode,
         "connect/endpoints": [] if hub else [bus.endpoint],
         "listen/endpoints": listen,
-        # The others may start before the sim server or the router: keep trying in the background.
+        # The others may start before the plant or the router: keep trying in the background.
         "connect/exit_on_failure": False,
         "connect/timeout_ms": -1 if peer else 0,
         "connect/retry": {

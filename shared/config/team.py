@@ -56,7 +56,9 @@ class BusConfig:
         choices=("peer", "client"),
     )
     endpoint: str = key(
-        "tcp/127.0.0.1:7447", "-", "where the sim server listens (peer) or the router is (client)"
+        "tcp/127.0.0.1:7447",
+        "-",
+        "where the sim server, or plant_r1, listens (peer) or the router is (client)",
     )
     listen: str = key(
         "tcp/127.0.0.1:0", "-", "peer mode: where every other process listens; port 0: any free one"
@@ -83,7 +85,7 @@ class RuntimeConfig:
     priority: str = key(
         "realtime",
         "-",
-        "realtime: agents, planner and sim server take precedence over ordinary processes "
+        "realtime: agents, planner and plants take precedence over ordinary processes "
         "(SCHED_RR) if the user may do so; ordinary: they do not",
         choices=("realtime", "ordinary"),
     )
