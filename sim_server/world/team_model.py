@@ -86,16 +86,14 @@ def spawn_positions(config: Config) -> Array:
 
 
 def build_team_model(
-    config: Config,
-    names: Sequence[str] = (),
-    dress: Callable[[mujoco.MjSpec], None] | None = None,
+    config: Config, dress: Callable[[mujoco.MjSpec], None] | None = None, names: Sequence[str] = ()
 ) -> TeamModel:
     """Build and compile the world of a configuration; equal configurations give equal models.
 
     Args:
         config: the team's configuration.
-        names: the robots that are in this world, at their places in the team; by default all.
         dress: gets the world before it is compiled, to change what pictures of it show.
+        names: the robots that are in this world, at their places in the team; by default all.
 
     Raises:
         ConfigError: the payload names no robot, the reference's trace is no trace, or the robot's

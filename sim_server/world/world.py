@@ -58,7 +58,7 @@ class World:
 
     def __init__(self, config: Config, names: Sequence[str] = ()) -> None:
         self.tick = 0
-        self.team = build_team_model(config, names)
+        self.team = build_team_model(config, names=names)
         self.names = tuple(self.team.robots)
         self._indices = list(self.team.robots.values())
         self.physics = mujoco.MjData(self.team.model)
