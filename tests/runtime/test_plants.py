@@ -74,7 +74,7 @@ def check_walked_to_the_end(recording: Recording, *, lockstep: bool) -> None:
         if lockstep:
             assert states == commands == list(range(1000))
         else:  # a busy machine may lose some
-            assert states[-1] >= 980
+            assert states[-1] >= 500
             assert len(commands) > 100
     assert {m.tick for m in recording.messages(Reference)} >= set(range(0, 1000, 100))
     events = list(recording.messages(Event))
