@@ -19,7 +19,7 @@ from quadriga.shared.bus.barrier import meet
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
-from quadriga.shared.members import PLANNER, SIM
+from quadriga.shared.members import PLANNER, has_lead
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
@@ -36,7 +36,7 @@ _WORKING: Final = "plan"
 
 
 def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None = None) -> None:
-    """Plan for the whole team until the world ends, the sim server leaves, or it is stopped.
+    """Plan for the whole team until the walk ends, who drives time leaves, or it is stopped.
 
     Args:
         config: the team's configuration.
@@ -87,7 +87,7 @@ class _CentralShell:
         state, since = CentralState(), monotonic()
         while not (stopped() or self._ended):
             packet = self._bus.get(POLL)
-            if packet is None and SIM not in self._bus.members_at(HERE):
+            if packet is None and not has_lead(self._bus.members_at(HERE)):
                 return
             for key, payload in (packet, *self._bus.drain()) if packet else ():
                 self._take(key, payload)

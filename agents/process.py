@@ -16,7 +16,7 @@ from quadriga.shared.bus.barrier import meet
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
-from quadriga.shared.members import SIM
+from quadriga.shared.members import has_lead
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.collector import end_collection
@@ -35,7 +35,7 @@ def run(
     predictor: Predictor | None,
     stopped: Callable[[], bool] | None = None,
 ) -> None:
-    """Walk one robot until the world ends, the sim server leaves, or it is stopped.
+    """Walk one robot until the walk ends, who drives time leaves, or it is stopped.
 
     Args:
         config: the team's configuration.
@@ -90,7 +90,7 @@ class _Shell:
             if state is not None:
                 memory = self._answer(memory, state)
                 self._misfits = None
-            elif SIM not in self._bus.members_at(HERE):
+            elif not has_lead(self._bus.members_at(HERE)):
                 return
             else:
                 self._check_clock(memory.tick)

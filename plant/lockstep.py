@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from quadriga.plant.server import TOLD_TO_STOP, End, PlantServer
+from quadriga.plant.end import TOLD_TO_STOP, End
+from quadriga.plant.server import PlantServer
+from quadriga.plant.team_time import plant_gone
 from quadriga.shared.bus.zenoh_bus import HERE, POLL
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire import codes
@@ -18,7 +20,9 @@ def run_lockstep(server: PlantServer, stopped: Callable[[], bool]) -> End:
     """Step until the walk is over; why it is."""
     while not stopped():
         server.publish()
-        if (end := server.step(_commands(server, stopped))) is not None:
+        commands = _commands(server, stopped)
+        end = _await_plants(server, stopped) or server.step(commands)
+        if end is not None:
             return end
     return TOLD_TO_STOP
 
@@ -29,7 +33,7 @@ def _commands(server: PlantServer, stopped: Callable[[], bool]) -> dict[str, Com
     waiting = set(server.plant.names) - server.silent
     alone = not waiting
     deadline = monotonic() + (_ALONE if alone else server.config.world.command_timeout)
-    while (waiting or alone) and not stopped():
+    while (waiting or alone) and not stopped() and server.time.end is None:
         left = deadline - monotonic()
         if left <= 0.0:
             silence = f"silent for {server.config.world.command_timeout:g} s"
@@ -37,15 +41,33 @@ def _commands(server: PlantServer, stopped: Callable[[], bool]) -> dict[str, Com
             break
         packet = bus.get(min(left, POLL))
         if packet is None:
+            server.time.look(bus.members_at(HERE))
             gone = waiting - bus.members_at(HERE)
             _give_up(server, gone, codes.GONE, "gone")
             waiting -= gone
-        elif robot := box.take(*packet, tick=tick, oldest=tick):
+        elif robot := server.take(*packet, oldest=tick):
             waiting.discard(robot)
             if robot in server.silent:
                 server.silent.discard(robot)
                 server.announce(codes.BACK, robot, "answers again")
     return {name: box.latest[name] for name in server.plant.names if box.tick_of(name) == tick}
+
+
+def _await_plants(server: PlantServer, stopped: Callable[[], bool]) -> End | None:
+    """Wait until the other plants let this tick be taken; why the walk ends, if it does."""
+    tick, time, bus = server.plant.tick, server.time, server.bus
+    # Longer than a plant waits for its own robot, for which this one then waits too.
+    patience = 2.0 * server.config.world.command_timeout
+    deadline = monotonic() + patience
+    while time.end is None and (waiting := time.awaited(tick)) and not stopped():
+        packet = bus.get(POLL)
+        if packet is not None:
+            server.take(*packet, oldest=tick)
+        elif monotonic() > deadline:
+            time.end = plant_gone(sorted(waiting), f"silent for {patience:g} s")
+        else:
+            time.look(bus.members_at(HERE))
+    return time.end
 
 
 def _give_up(server: PlantServer, robots: set[str], code: str, why: str) -> None:

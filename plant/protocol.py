@@ -9,17 +9,17 @@ from quadriga.shared.wire.messages import Command, Event, State, Truth
 
 
 class Plant(Protocol):
-    """Robots that are measured and commanded once a tick of 1 ms."""
+    """Robots that are measured and commanded once a tick of 1 ms.
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the robots, in the order of every stacked array."""
-        ...
+    A class that has it as its base need not define `truth` and `settle`.
 
-    @property
-    def tick(self) -> int:
-        """World time that has passed, ms."""
-        ...
+    Attributes:
+        names: of the robots, in the order of every stacked array.
+        tick: world time that has passed, ms.
+    """
+
+    names: tuple[str, ...]
+    tick: int
 
     def states(self) -> Mapping[str, State]:
         """What each robot measures at this tick, by name."""
@@ -34,8 +34,7 @@ class Plant(Protocol):
 
     def truth(self) -> Truth | None:
         """The true state at this tick; None of a plant that does not know it."""
-        ...
+        return None
 
     def settle(self) -> None:
         """Work that needs no command, while those of this tick are awaited."""
-        ...

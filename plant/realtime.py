@@ -6,10 +6,13 @@ from collections.abc import Callable
 from typing import Final
 
 from quadriga.plant.deadlines import DAMPED, HELD, PERIOD_MS, Deadlines
+from quadriga.plant.end import TOLD_TO_STOP, End
 from quadriga.plant.late import FRESH, HOLD, grade, hold_joints
-from quadriga.plant.server import TOLD_TO_STOP, End, PlantServer
+from quadriga.plant.server import PlantServer
+from quadriga.shared.bus.zenoh_bus import HERE
 from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.wire.messages import Command
+from quadriga.shared.wire.topics import SAMPLE_MS
 
 TICK: Final = 1e-3  # s
 _SLACK: Final = 3.0  # ticks that are made up for
@@ -24,13 +27,23 @@ def run_realtime(server: PlantServer, stopped: Callable[[], bool]) -> End:
         server.publish()
         motors.deadlines.note_lateness(rate.wait())  # meanwhile the agents answer
         for packet in server.bus.drain():
-            server.commands.take(*packet, tick=server.plant.tick, oldest=0)
+            server.take(*packet, oldest=0)
+        if not server.time.alone:
+            _keep_time(server, rate)
         end = server.step(motors.commands())
         if server.plant.tick % PERIOD_MS == 0 or end is not None:
             server.publish_status(motors.deadlines.status(server.plant.tick, rate.overruns))
     code, detail = end or TOLD_TO_STOP
     late = motors.deadlines.describe_late()
     return End(code, f"{detail}; late ticks: {late}; overruns of the world: {rate.overruns}")
+
+
+def _keep_time(server: PlantServer, rate: Rate) -> None:
+    """Follow the team's clock, and see whether the other plants are still there."""
+    tick, time = server.plant.tick, server.time
+    if tick % SAMPLE_MS == 0:
+        time.look(server.bus.members_at(HERE))
+    rate.delay(TICK * max(time.ahead(tick), 1.0 - _SLACK))
 
 
 class _Motors:

@@ -4,43 +4,46 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import Final
 
 from quadriga.plant.commands import CommandBox
+from quadriga.plant.end import End
 from quadriga.plant.protocol import Plant
+from quadriga.plant.team_time import TeamTime
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.members import SIM
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import encode, truncate_text
-from quadriga.shared.wire.messages import Command, Event, Status
-from quadriga.shared.wire.topics import EVENT, STATE, STATUS, TRUTH
+from quadriga.shared.wire.messages import Clock, Command, Event, Status
+from quadriga.shared.wire.topics import CLOCK, EVENT, STATE, STATUS, TRUTH
 
 FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first fall
-
-
-class End(NamedTuple):
-    """Why a walk is over: a code of `quadriga.shared.wire.codes.EVENTS`, and prose."""
-
-    code: str
-    detail: str
-
-
-TOLD_TO_STOP: Final = End(codes.SIGNAL, "signal")
 
 
 class PlantServer:
     """The plant, its publishers, the commands that arrive, and when the walk is over.
 
+    Args:
+        config: the team's configuration.
+        plant: its robots, or one of them.
+        bus: where the agents are.
+        time: this plant's part in the team's time; by default it is the plant of all robots.
+        name: of this process.
+
     Attributes:
-        commands: the newest command of every robot.
+        commands: the newest command of every robot of the plant.
         silent: robots that are not waited for.
     """
 
-    def __init__(self, config: Config, plant: Plant, bus: Bus) -> None:
+    def __init__(
+        self, config: Config, plant: Plant, bus: Bus, time: TeamTime | None = None, name: str = SIM
+    ) -> None:
         team, realtime = config.team.name, config.world.mode == "realtime"
         self.config, self.plant, self.bus = config, plant, bus
+        self.time = time or TeamTime()
         self.commands = CommandBox(team, plant.names)
         self.silent: set[str] = set()
         self._put_state = {
@@ -51,23 +54,42 @@ class PlantServer:
             name: bus.publisher(STATE.key(team, name), droppable=True) for name in plant.names
         }
         self._put_truth = bus.publisher(TRUTH.key(team), droppable=realtime)
-        self._put_status = bus.publisher(STATUS.key(team, SIM), droppable=True)
+        self._put_clock = bus.publisher(CLOCK.key(team), droppable=realtime)
+        self._put_status = bus.publisher(STATUS.key(team, name), droppable=True)
         self._put_event = bus.publisher(EVENT.key(team), droppable=realtime)
         self._put_stop = bus.publisher(EVENT.key(team))  # all leave by it, no tick waits for it
-        self._truth_period = periods(config)[TRUTH.name]
+        self._periods = periods(config)
         self._last_tick = round(config.world.seconds * 1000)
         self._fallen: set[str] = set()
         self._malformed = 0
 
     def publish(self) -> None:
-        """Send the present tick's truth, when due, and every robot's state."""
+        """Send the present tick's clock and truth, when due, and every robot's state.
+
+        The truth is the whole team's: a plant of one robot among several does not know it.
+        """
         plant = self.plant
-        if plant.tick % self._truth_period == 0 and (truth := plant.truth()) is not None:
-            self._put_truth(encode(truth))
+        if self.time.drives and plant.tick % self._periods[CLOCK.name] == 0:
+            self._put_clock(encode(Clock(plant.tick, plant.tick * 1_000_000)))
+        if self.time.alone and plant.tick % self._periods[TRUTH.name] == 0:
+            truth = plant.truth()
+            if truth is not None:
+                self._put_truth(encode(truth))
         for name, state in plant.states().items():
             put = self._put_silent if name in self.silent else self._put_state
             put[name](encode(state))
         plant.settle()
+
+    def take(self, key: str, payload: bytes, oldest: int) -> str:
+        """Take in a packet; the robot's name if its command is now newer.
+
+        A command of the future, or of before tick `oldest`, is refused.
+        """
+        tick = self.plant.tick
+        if key not in self.time.keys:
+            return self.commands.take(key, payload, tick=tick, oldest=oldest)
+        self.time.take(key, payload, tick)
+        return ""
 
     def announce(self, code: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""
@@ -81,17 +103,25 @@ class PlantServer:
         """Advance the plant by one tick; why the walk ends, if it does."""
         self._report_malformed()
         for event in self.plant.step(commands):
-            self._send(event)
-            if event.code == codes.FALL:
-                self._fallen.add(event.robot)
-                self._last_tick = min(self._last_tick, event.tick + FALL_LINGER_MS)
+            if event.robot or self.time.drives:  # what concerns all is announced once
+                self._send(event)
+            self._note_fall(event)
+        while self.time.falls:
+            self._note_fall(self.time.falls.pop())
+        if self.time.end is not None or not self.time.drives:
+            return self.time.end
         if self.plant.tick < self._last_tick:
             return None
         self._report_malformed(at_once=True)
-        fallen = [name for name in self.plant.names if name in self._fallen]
+        fallen = [name for name in robot_names(self.config.team.robots) if name in self._fallen]
         if fallen:
             return End(codes.FALLEN, f"fall of {', '.join(fallen)}")
         return End(codes.TIME_OVER, "end of world.seconds")
+
+    def _note_fall(self, event: Event) -> None:
+        if event.code == codes.FALL:
+            self._fallen.add(event.robot)
+            self._last_tick = min(self._last_tick, event.tick + FALL_LINGER_MS)
 
     def _report_malformed(self, *, at_once: bool = False) -> None:
         """Announce malformed commands, once in a second of world time at most unless `at_once`."""

@@ -5,11 +5,11 @@ It imports nothing of the project, so that every module may ask it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-SIM: Final = "sim"  # steps the world; the others leave when it does
+SIM: Final = "sim"  # steps the plant, which is a simulated world or a real robot
 OPERATOR: Final = "operator"  # says how fast to walk where
 RECORDER: Final = "recorder"
 PLANNER: Final = "planner"  # plans for all robots, if one process does
@@ -19,6 +19,9 @@ AGENT: Final = "agent"  # one for each robot, whose name it has: r1 … rn
 ROUTER: Final = "router"
 LAUNCHER: Final = "launcher"  # shows how far the walk has come
 ESTOP: Final = "estop"  # stops the team once
+
+# Who drives time, by name: the only plant, or that of the first robot. The others leave with it.
+LEADS: Final = frozenset((SIM, "plant_r1"))
 
 ALWAYS: Final = "always"
 CENTRAL: Final = "central"  # one process plans for all
@@ -30,7 +33,8 @@ class Role:
     """One row of the table.
 
     Attributes:
-        name: of the role, and of its only process; an agent's process has its robot's name.
+        name: of the role, and of its only process; an agent's process has its robot's name, and
+            the plant of a single robot that of `plant_name`.
         command: the subcommand of `quadriga` that is this process.
         needed: when a team has such a process: `ALWAYS`, `CENTRAL` or `RECORDED`.
         per_robot: whether there is one for each robot.
@@ -60,24 +64,46 @@ LAST: Final = ROLES[-1].name
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One process of a team, which all others wait for before they walk."""
+    """One process of a team, which all others wait for before they walk.
+
+    `robot` is the one it is for, "" of a process that is for all.
+    """
 
     name: str
     role: Role
+    robot: str = ""
 
 
-def team_members(robots: Sequence[str], *, central: bool, recorded: bool) -> tuple[Member, ...]:
+def plant_name(robot: str) -> str:
+    """The process that is the plant of one robot; with "" that of all robots."""
+    return f"plant_{robot}" if robot else SIM
+
+
+def has_lead(names: Collection[str]) -> bool:
+    """Whether one of these processes drives the team's time."""
+    return not LEADS.isdisjoint(names)
+
+
+def team_members(
+    robots: Sequence[str], *, central: bool, recorded: bool, plant_each: bool = False
+) -> tuple[Member, ...]:
     """The processes of a team, in the order of the table.
 
     Args:
         robots: their names.
         central: whether one process plans for all.
         recorded: whether the team waits for a recorder.
+        plant_each: whether each robot has a plant of its own.
     """
     needed = {ALWAYS: True, CENTRAL: central, RECORDED: recorded}
-    return tuple(
-        Member(name, role)
-        for role in ROLES
-        if needed[role.needed]
-        for name in (robots if role.per_robot else (role.name,))
-    )
+    members = list[Member]()
+    for role in ROLES:
+        if not needed[role.needed]:
+            continue
+        if role.per_robot:
+            members += [Member(robot, role, robot) for robot in robots]
+        elif role.name == SIM and plant_each:
+            members += [Member(plant_name(robot), role, robot) for robot in robots]
+        else:
+            members.append(Member(role.name, role))
+    return tuple(members)

@@ -1,4 +1,4 @@
-"""`quadriga sim`: the sim server's process."""
+"""`quadriga sim`: the process of the team's plant, or of one robot's."""
 
 from __future__ import annotations
 
@@ -6,15 +6,29 @@ import argparse
 
 from quadriga.commands.command import AddCommand, Given
 from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError
 
 
 def add(add_command: AddCommand) -> None:
-    add_command("sim", run, "the sim server alone")
+    command = add_command("sim", run, "the sim server alone, or another plant")
+    command.add_argument(
+        "--robot",
+        default="",
+        metavar="NAME",
+        help="the plant of this robot alone, where team.plants is 'each'",
+    )
 
 
-def run(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
-    """Run the sim server until the walk is over."""
-    from quadriga.sim_server import process
+def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """Run the plant until the walk is over."""
+    from quadriga.plant import process
+    from quadriga.shared.robot.conventions import robot_names
+    from quadriga.team.plants import plant_factory
 
-    process.run(config)
+    robot, plants = arguments.robot, config.team.plants
+    permitted = robot_names(config.team.robots) if plants == "each" else ("",)
+    if robot not in permitted:
+        expected = f"one of {', '.join(permitted)}" if plants == "each" else "nothing"
+        raise ConfigError("--robot", repr(robot), expected, f"team.plants is {plants!r}")
+    process.run(config, plant_factory(config), robot)
     return 0

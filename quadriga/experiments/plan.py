@@ -112,14 +112,27 @@ def build_plan(
         config = build(_over(_over(given[name], variant.keys), changes))
         configs[Group(name, variant.name, tuple(label for label, _ in points))] = config
     _check_names(configs)
-    for config in {(c.team, c.world): c for c in configs.values()}.values():
-        World(config)  # its errors are better known before anything is collected and fitted
+    _check_worlds(configs)
     return CampaignPlan(files, variants, sweeps, seeds, baseline, configs)
 
 
 def with_seed(config: Config, seed: int) -> Config:
     """The configuration of one trial of a group."""
     return replace(config, world=replace(config.world, seed=seed))
+
+
+def _check_worlds(configs: Mapping[Group, Config]) -> None:
+    """Errors that are better known before anything is collected and fitted."""
+    for group, config in configs.items():
+        if not config.team.one_world:
+            raise ConfigError(
+                f"{group.scenario}: team.plant, team.plants",
+                f"{config.team.plant!r}, {config.team.plants!r}",
+                "'mujoco', 'one'",
+                "trials are walked in one simulated world",
+            )
+    for config in {(c.team, c.world): c for c in configs.values()}.values():
+        World(config)
 
 
 def _check_sweeps(sweeps: Sequence[Sweep]) -> None:

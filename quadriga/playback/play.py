@@ -24,7 +24,7 @@ PLAYER: Final = "player"
 _SETTLE: Final = 0.6  # s, for listeners that try again to connect, and to see who is there
 _LOOK: Final = 0.1  # s, between looks at keys, status line and presence while messages flow
 _SLACK: Final = 0.2  # s of delay that is made up for; a longer one is left behind
-_MEMBER: Final = re.compile(rf"r\d+|{SIM}|{OPERATOR}|{PLANNER}|{PLAYER}")
+_MEMBER: Final = re.compile(rf"(plant_)?r\d+|{SIM}|{OPERATOR}|{PLANNER}|{PLAYER}")
 
 
 def play(

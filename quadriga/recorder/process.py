@@ -16,7 +16,7 @@ from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import RecordingError, system_reason
-from quadriga.shared.members import RECORDER, SIM
+from quadriga.shared.members import RECORDER, has_lead
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.signals import stop_on_signals
 
@@ -43,7 +43,7 @@ def run(
     selection: Selection | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> RecordedFiles:
-    """Record until SIGINT, SIGTERM or the sim server's leaving; then drain and finish the file.
+    """Record until SIGINT, SIGTERM or the plant's leaving; then drain and finish the file.
 
     The recorder is a member that the team waits for, unless the team walks already or has one:
     then it records beside it from now on, nobody waits for it, and it reports what it missed.
@@ -102,12 +102,12 @@ def _join(bus: Bus, config: Config, stopped: Callable[[], bool], *, at_once: boo
         HERE,
         members(config),
         config.bus.barrier_timeout,
-        lambda: stopped() or SIM in bus.members_at(HERE),
+        lambda: stopped() or has_lead(bus.members_at(HERE)),
     )
     if stopped():
         return ""
     sleep(_SETTLE)
-    walking, doubled = SIM in bus.members_at(READY), RECORDER in bus.members_at(HERE)
+    walking, doubled = has_lead(bus.members_at(READY)), RECORDER in bus.members_at(HERE)
     if walking or doubled or not config.recorder.enabled:
         return LATE
     return MEMBER if meet(bus, config, stopped) else ""

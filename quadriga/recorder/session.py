@@ -8,7 +8,7 @@ from typing import Final
 from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
-from quadriga.shared.members import PLANNER, SIM
+from quadriga.shared.members import PLANNER, has_lead, plant_name
 from quadriga.shared.recording.mcap_chunk import name_of
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
@@ -54,7 +54,7 @@ class Session:
 
         Args:
             late: nobody has waited for this recorder.
-            seen: the sim server has been there; its leaving is the end.
+            seen: the plant has been there; its leaving is the end.
         """
         self._seen = seen
         self._flushed = self._begun = monotonic()
@@ -73,11 +73,12 @@ class Session:
         if missed:
             self._say(missed)
         robots = {find_topic(key)[1] for key in first_ticks} - {""}
-        strangers = robots - {*robot_names(self._robots), PLANNER}
+        known = robot_names(self._robots)
+        strangers = robots - {*known, *map(plant_name, ("", *known)), PLANNER}
         if strangers:
             self._say(
                 f"{', '.join(sorted(strangers))} walk too, but the configuration that is stored is "
-                f"of {', '.join(robot_names(self._robots))}: give the team's with --config"
+                f"of {', '.join(known)}: give the team's with --config"
             )
 
     def drain(self) -> None:
@@ -106,7 +107,7 @@ class Session:
             return
         self._parts.flush()
         self._flushed = monotonic()
-        there = SIM in self._bus.members_at(HERE)
+        there = has_lead(self._bus.members_at(HERE))
         self._ended = self._seen and not there
         self._seen = self._seen or there
 

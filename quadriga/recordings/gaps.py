@@ -21,7 +21,8 @@ from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, STATE, TRUTH
 def missing_ticks(config: Config, ticks: Mapping[str, Ticks]) -> dict[str, int]:
     """Number of missing ticks by key.
 
-    Each topic is expected once a period. A state, a command and truth are expected from tick 0 on,
+    Each topic is expected once a period. A state, a command and truth, of a plant that knows it,
+    are expected from tick 0 on,
     measurements from their first on, up to the team's last state; of a topic's last period nothing
     is expected, since the world may have stopped within it. Plans are expected from their first to
     their last: a robot that has stopped plans no more. A robot without measurements or plans lacks
@@ -41,7 +42,9 @@ def missing_ticks(config: Config, ticks: Mapping[str, Ticks]) -> dict[str, int]:
     def count(key: str, topic: Topic, first: int, last: int) -> int:
         return _count_missing(_recorded_ticks(ticks, key), first, period[topic.name], last)
 
-    missing = {TRUTH.key(team): count(TRUTH.key(team), TRUTH, 0, end)}
+    missing = dict[str, int]()
+    if config.team.one_world:
+        missing[TRUTH.key(team)] = count(TRUTH.key(team), TRUTH, 0, end)
     for name in names:
         for topic in (STATE, COMMAND):
             key = topic.key(team, name)

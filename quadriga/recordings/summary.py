@@ -70,6 +70,7 @@ def summary_of(traces: Traces) -> dict[str, Any]:
         **_traffic(traces),
         "team": config.team.name,
         "robots": config.team.robots,
+        "yokes": config.team.yokes,
         "seed": config.world.seed,
         "mode": config.world.mode,
         "scenario": config.world.scenario,
@@ -164,18 +165,15 @@ def _agents(traces: Traces) -> dict[str, Any]:
 
 def _deadlines(traces: Traces) -> dict[str, Any]:
     """In real time what came late, by robot and of the world; else None."""
-    if not traces.world:
+    plants = {robot: statuses[-1] for robot, statuses in traces.plants.items() if statuses}
+    if not plants:
         return {"realtime": None}
-    sim_status = traces.world[-1]
-    ticks = sim_status.counters.get("ticks", 0)
+    lead = next(iter(plants.values()))
     by_member: dict[str, Any] = {
-        "world": {
-            "jitter_ms": _spread(sim_status, "jitter"),
-            "overruns": sim_status.counters.get("overruns"),
-        }
+        "world": {"jitter_ms": _spread(lead, "jitter"), "overruns": lead.counters.get("overruns")}
     }
-    for robot in traces.robots:
-        own = traces.statuses[robot]
+    for robot, sim_status in plants.items():
+        own, ticks = traces.statuses[robot], sim_status.counters.get("ticks", 0)
         late = sim_status.counters.get(f"{robot}.late", 0)
         by_member[robot] = {
             "late": late,

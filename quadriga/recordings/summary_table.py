@@ -33,7 +33,8 @@ def print_summary(summary: dict[str, Any], console: Console) -> None:
 
 def _build_title(summary: dict[str, Any]) -> str:
     robots = summary["robots"]
-    team = f"{robots} yoked robots" if robots > 1 else "1 robot"
+    yoked = "unyoked" if summary["yokes"] == "none" else "yoked"
+    team = f"{robots} {yoked} robots" if robots > 1 else "1 robot"
     where = summary["scenario"] or summary["terrain"]
     return f"{team}, {where}, seed {summary['seed']}, {summary['mode']}"
 

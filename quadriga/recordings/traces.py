@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +13,7 @@ from quadriga.recordings.truth import Ticks, TruthTrace, build_truth_trace, stac
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.errors import MessageError, RecordingError
-from quadriga.shared.members import PLANNER, SIM
+from quadriga.shared.members import PLANNER, SIM, plant_name
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import OUTPUTS, Array, robot_names
@@ -61,7 +61,8 @@ class Traces:
         ticks: ticks by key, in the order of the recording.
         log_times: log times of the first and the last state, ns, and None without states.
         references: ticks (R,) and values vx, vy, wz, height (R, 4), sorted.
-        world: what the world of a walk in real time says of itself (`quadriga.plant.deadlines`).
+        plants: what each robot's plant, in real time, says of itself (`quadriga.plant.deadlines`);
+            one world says the same of all its robots.
     """
 
     config: Config
@@ -78,7 +79,7 @@ class Traces:
     plans: Mapping[str, tuple[Plan, ...]]
     statuses: Mapping[str, tuple[Status, ...]]
     events: tuple[Event, ...]
-    world: tuple[Status, ...] = ()
+    plants: Mapping[str, tuple[Status, ...]] = field(default_factory=dict)
 
 
 def read_traces(recording: Recording, names: Container[str] | None = None) -> Traces:
@@ -136,7 +137,10 @@ def read_traces(recording: Recording, names: Container[str] | None = None) -> Tr
         plans={robot: tuple(decoded[Plan, robot]) for robot in robots},
         statuses={name: tuple(decoded[Status, name]) for name in (*robots, PLANNER)},
         events=tuple(decoded[Event, ""]),
-        world=tuple(decoded[Status, SIM]),
+        plants={
+            robot: tuple(decoded[Status, SIM] or decoded[Status, plant_name(robot)])
+            for robot in robots
+        },
     )
 
 

@@ -49,14 +49,7 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
     Raises:
         RecordingError: not of a lock-step world, or with commands missing from the file.
     """
-    config = recorded_config(recording)
-    if config.world.mode != "lockstep":
-        raise RecordingError(
-            str(recording.path),
-            "a walk in real time",
-            "one in lock-step",
-            "which command moved the motors in which tick is not recorded in real time",
-        )
+    config = _computable_config(recording)
     world, silent = World(config), set[str]()
     keys = {
         name: (STATE.key(config.team.name, name), COMMAND.key(config.team.name, name))
@@ -97,6 +90,30 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
             "nothing that a world published from tick 0 on",
             "states or sim/truth of a whole walk",
         )
+
+
+def _computable_config(recording: Recording) -> Config:
+    """The configuration of a walk that can be computed again.
+
+    Raises:
+        RecordingError: it was not in lock-step, or not in one simulated world.
+    """
+    config = recorded_config(recording)
+    if config.world.mode != "lockstep":
+        raise RecordingError(
+            str(recording.path),
+            "a walk in real time",
+            "one in lock-step",
+            "which command moved the motors in which tick is not recorded in real time",
+        )
+    if not config.team.one_world:
+        raise RecordingError(
+            str(recording.path),
+            f"team.plant {config.team.plant!r} and team.plants {config.team.plants!r}",
+            "a walk in one simulated world",
+            "no other plant can be computed again",
+        )
+    return config
 
 
 def _update_silent(silent: set[str], team: str, entries: Iterable[ChunkEntry]) -> None:

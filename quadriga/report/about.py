@@ -25,7 +25,8 @@ def build_title(run: Run) -> str:
     """The run in one line."""
     config = run.traces.config
     n = config.team.robots
-    who = f"{n} yoked robots" if n > 1 else "1 robot"
+    yoked = "unyoked" if config.team.yokes == "none" else "yoked"
+    who = f"{n} {yoked} robots" if n > 1 else "1 robot"
     return f"{who} on {_describe_ground(config)}, seed {config.world.seed}"
 
 

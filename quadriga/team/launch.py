@@ -14,7 +14,7 @@ from typing import Final, Self
 from quadriga.shared.bus.barrier import processes
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.members import LAST, RECORDER, SIM, Member
+from quadriga.shared.members import LAST, LEADS, RECORDER, Member, has_lead
 from quadriga.shared.runtime.clock import monotonic, sleep
 
 _ONE_THREAD: Final = (
@@ -26,7 +26,7 @@ _ONE_THREAD: Final = (
 QUADRIGA: Final = (sys.executable, "-m", "quadriga")
 _LAST_WORDS: Final = 12  # lines of a failed process's log that are shown
 _LOOK: Final = 0.05  # s
-_EARLY: Final = 4.0  # s, by which others may leave before the sim server: it closes politely
+_EARLY: Final = 4.0  # s, by which others may leave before who drives time: it closes politely
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +58,8 @@ def process_table(
 
     def build_row(member: Member) -> ProcessSpec:
         role, options = member.role, list[str]()
-        if role.per_robot:
-            options += ["--robot", member.name]
+        if member.robot:
+            options += ["--robot", member.robot]
         if role.predicts and predictor is not None:
             options += ["--predictor", str(predictor)]
         if role.name == RECORDER:
@@ -97,7 +97,7 @@ class Launch:
         return {name: process.pid for name, process in self._running.items()}
 
     def watch(self, look: Callable[[], bool]) -> None:
-        """Wait until the sim server has ended the walk, then until the others have left.
+        """Wait until the plant has ended the walk, then until the others have left.
 
         Args:
             look: called all the time; returns whether to stop the walk now.
@@ -107,9 +107,9 @@ class Launch:
                 names the process, how it ended and its last words.
         """
         first_to_leave, left_at = "", 0.0
-        while SIM in self._running:
+        while has_lead(self._running):
             for name in list(self._running):
-                if self._reap(name) and name != SIM and not first_to_leave:
+                if self._reap(name) and name not in LEADS and not first_to_leave:
                     first_to_leave, left_at = name, monotonic()
             if first_to_leave and monotonic() - left_at > _EARLY:
                 got, expected = "an end while the team walked", "to walk until the end"
@@ -152,7 +152,7 @@ class Launch:
     def stop(self) -> None:
         """Stop what still runs: SIGTERM, the recorder last, and SIGKILL after a grace period.
 
-        The sim server then tells the others that the walk is over, and the recorder hears it.
+        The plant then tells the others that the walk is over, and the recorder hears it.
         """
         self._terminate([name for name in self._running if name != LAST])
         self._terminate([name for name in self._running if name == LAST])

@@ -16,8 +16,8 @@ from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import decode, encode, truncate_text
 from quadriga.shared.wire.envelope import envelope
-from quadriga.shared.wire.messages import EStop, Event, Reference, Truth
-from quadriga.shared.wire.topics import ESTOP, REFERENCE, TRUTH, topics_for
+from quadriga.shared.wire.messages import Clock, EStop, Event, Reference
+from quadriga.shared.wire.topics import CLOCK, ESTOP, REFERENCE, topics_for
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 
 _AHEAD: Final = 4  # epochs; agents in lock-step wait for the one in force
@@ -53,7 +53,7 @@ def references_of(config: Config) -> Callable[[int], Reference | None]:
 
 
 def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
-    """Publish the reference, following the world's time, until the walk ends or it is stopped.
+    """Publish the reference, following the team's clock, until the walk ends or it is stopped.
 
     Args:
         config: the team's configuration.
@@ -82,17 +82,17 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
 
 
 def _next_tick(bus: Bus, tick: int) -> tuple[int, bool]:
-    """The world's time as far as it has come, and whether the walk is over.
+    """The team's time as far as it has come, and whether the walk is over.
 
     A walk ends at the same tick for an operator who is behind: equal walks have equal references.
     """
     packet = bus.get(POLL)
     if packet is None:
-        return tick, members.SIM not in bus.members_at(HERE)
+        return tick, not members.has_lead(bus.members_at(HERE))
     for key, payload in (packet, *bus.drain()):
         try:
-            if key == TRUTH.key(bus.team):
-                tick = max(tick, decode(payload, Truth).tick)
+            if key == CLOCK.key(bus.team):
+                tick = max(tick, decode(payload, Clock).tick)
                 continue
             event = decode(payload, Event)
         except MessageError:

@@ -14,8 +14,8 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.members import LAUNCHER
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Event, Truth
-from quadriga.shared.wire.topics import TRUTH, topics_for
+from quadriga.shared.wire.messages import Clock, Event, Truth
+from quadriga.shared.wire.topics import CLOCK, TRUTH, topics_for
 
 
 class WalkProgress:
@@ -33,21 +33,25 @@ class WalkProgress:
         self._bar = build_progress(console, "{task.fields[text]}", hidden=False)
         self._task = self._bar.add_task("starting", total=config.world.seconds, text="")
         self._begun = 0.0
+        self._speed = ""  # unknown of robots whose plant does not know it
         self.fallen: list[str] = []
 
     def update(self) -> None:
         """Show what has arrived since the last call."""
-        truth = None
+        clock = None
         for key, payload in self._bus.drain():
             try:
-                if key == TRUTH.key(self._bus.team):
-                    truth = decode(payload, Truth)
+                if key == CLOCK.key(self._bus.team):
+                    clock = decode(payload, Clock)
+                elif key == TRUTH.key(self._bus.team):
+                    velocity = decode(payload, Truth).base_vel.mean(axis=0)
+                    self._speed = f"{float(np.linalg.norm(velocity[:2])):.2f} m/s  "
                 else:
                     self._show_event(decode(payload, Event))
             except MessageError:
                 continue  # the recorder keeps it
-        if truth is not None:
-            self._show_truth(truth)
+        if clock is not None:
+            self._show_time(clock.tick / 1000)
 
     def _show_event(self, event: Event) -> None:
         if event.kind == "fall":
@@ -58,16 +62,15 @@ class WalkProgress:
                 markup=False,
             )
 
-    def _show_truth(self, truth: Truth) -> None:
-        now, seconds = monotonic(), truth.tick / 1000
+    def _show_time(self, seconds: float) -> None:
+        now = monotonic()
         self._begun = self._begun or now - seconds
-        speed = float(np.linalg.norm(truth.base_vel.mean(axis=0)[:2]))
         pace = seconds / max(now - self._begun, 1e-3)
         self._bar.update(
             self._task,
             description="walking",
             completed=seconds,
-            text=f"{seconds:.1f}/{self._config.world.seconds:g} s  {speed:.2f} m/s  "
+            text=f"{seconds:.1f}/{self._config.world.seconds:g} s  {self._speed}"
             f"{pace:.2f} × real time",
         )
 

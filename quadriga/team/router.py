@@ -6,9 +6,9 @@ import sys
 from collections.abc import Callable
 from typing import Final
 
+from quadriga.shared.bus.barrier import lead
 from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
 from quadriga.shared.config.sections import Config
-from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.signals import stop_on_signals
 
@@ -33,6 +33,6 @@ def run(
     with Bus.route(listen, config.team.name) as bus:
         print(f"routing at {listen}", file=sys.stderr, flush=True)
         if once:
-            bus.wait_for(READY, [SIM], _STAGES * config.bus.barrier_timeout, stopped)
+            bus.wait_for(READY, [lead(config)], _STAGES * config.bus.barrier_timeout, stopped)
         while not stopped() and (bus.linked or not once):
             sleep(POLL)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from rich.console import Console
 
@@ -17,7 +17,14 @@ from quadriga.report.page import PAGE, write_page
 from quadriga.report.run import build_run, read_run
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codes import SIGNAL
+from quadriga.shared.wire.codes import PLANT_GONE, SIGNAL
+
+# Of an end that should not be, by the code of its event; "" where none was recorded.
+_CAUSES: Final = {
+    "": "the sim server or its link failed",
+    SIGNAL: "the sim server was told to stop",
+    PLANT_GONE: "one robot's plant failed, left or fell silent",
+}
 
 
 def report_folder(run_dir: Path, *, pictures: bool, console: Console) -> dict[str, Any]:
@@ -36,7 +43,7 @@ def report_folder(run_dir: Path, *, pictures: bool, console: Console) -> dict[st
     run = build_run(recording, traces, summary)
     write_figures(run, run_dir)
     write_page(run, run_dir / PAGE)
-    if pictures:
+    if pictures and run.has_truth:  # nobody else knows where the trunks were
         with console.status("rendering"):
             render(run_dir)
     print_summary(summary, console)
@@ -75,10 +82,10 @@ def has_failed(summary: dict[str, Any]) -> bool:
 
 def _check_end(summary: dict[str, Any]) -> None:
     end = summary["end_code"]
-    if end in ("", SIGNAL):
+    if end in _CAUSES:
         raise ProcessError(
             "the walk",
             f"an end at {summary['duration']:.1f} s",
             "world.seconds or a fall",
-            "the sim server was told to stop" if end else "the sim server or its link failed",
+            _CAUSES[end],
         )

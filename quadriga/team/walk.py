@@ -20,6 +20,7 @@ from quadriga.shared.runtime.signals import stop_flag
 from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.team.launch import Launch, ProcessSpec, process_table
+from quadriga.team.plants import plant_factory
 from quadriga.team.progress import WalkProgress
 from quadriga.team.run_folder import CONFIG, make_run_dir
 from quadriga.team.run_report import has_failed, report_folder
@@ -43,6 +44,7 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
         ProcessError: a process failed or left too early, or the walk did not come to its end.
         QuadrigaError: anything a user can put right before the walk begins.
     """
+    plant_factory(config)
     build_scenario(config, build_loads(config))
     trace_of(config)
     run_dir = make_run_dir(out)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
-from quadriga.shared.members import SIM, Member, team_members
+from quadriga.shared.members import LEADS, Member, has_lead, team_members
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import robot_names
 
@@ -18,12 +18,18 @@ def processes(config: Config) -> tuple[Member, ...]:
         robot_names(config.team.robots),
         central=find_kind(config.planner.kind).central,
         recorded=config.recorder.enabled,
+        plant_each=config.team.plants == "each",
     )
 
 
 def members(config: Config) -> frozenset[str]:
     """Names of all processes of a team."""
     return frozenset(member.name for member in processes(config))
+
+
+def lead(config: Config) -> str:
+    """Name of the process that drives the team's time, with which all others leave."""
+    return next(member.name for member in processes(config) if member.name in LEADS)
 
 
 def meet(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
@@ -37,7 +43,7 @@ def meet(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
     """
     bus.declare(HERE)
     present = bus.wait_for(HERE, members(config), config.bus.barrier_timeout, stopped)
-    if present and SIM in bus.members_at(READY):
+    if present and has_lead(bus.members_at(READY)):
         raise BusError(
             f"team {bus.team!r} at {config.bus.endpoint}",
             "a team that walks already",
@@ -49,13 +55,16 @@ def meet(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
 
 
 def start_together(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
-    """The sim server's wait until all others are ready. False if `stopped()` came first.
+    """A plant's wait until all others are ready; the one that drives time starts the team.
+
+    False if `stopped()` came first.
 
     Raises:
         BusError: some were not ready in time, or two carry one name.
     """
-    others = members(config) - {SIM}
-    if not bus.wait_for(READY, others, config.bus.barrier_timeout, stopped):
+    if bus.name not in LEADS:
+        bus.declare(READY)
+    if not bus.wait_for(READY, members(config), config.bus.barrier_timeout, stopped):
         return False
     _check_single(bus, config)
     bus.declare(READY)

@@ -71,7 +71,7 @@ class Bus:
     ) -> Self:
         """Join the network as process `name` of `team`.
 
-        In peer mode the process named `sim` listens on `bus.endpoint`; all others connect to it,
+        In peer mode the process that drives time listens on `bus.endpoint`; all others connect,
         now or when it appears, and learn of each other through it, so that links are direct.
         In client mode the router must be there, or appear within `bus.barrier_timeout` if
         `stopped` is given.
@@ -97,7 +97,7 @@ class Bus:
     def join(cls, bus: BusConfig, team: str, name: str) -> Self:
         """Join the network at `bus.endpoint`; in peer mode be who listens there if nobody does.
 
-        For a process that must be found although no sim server runs. If somebody listens there,
+        For a process that must be found although no plant runs. If somebody listens there,
         this waits for the link to them.
 
         Raises:

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
-from quadriga.shared.members import SIM
+from quadriga.shared.members import LEADS
 
 NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
 _COMMON: Final = {
@@ -28,17 +28,17 @@ def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str
 
     Args:
         bus: the configuration.
-        name: of the process; in peer mode the one named `sim` is who they all find.
+        name: of the process; in peer mode the one that drives time is who they all find.
         hub: be who they find although the name is another.
     """
     peer = bus.mode == "peer"
-    hub = peer and (hub or name == SIM)
+    hub = peer and (hub or name in LEADS)
     listen = [bus.endpoint] if hub else [bus.listen] if peer else []
     return {
         "mode": bus.mode,
         "connect/endpoints": [] if hub else [bus.endpoint],
         "listen/endpoints": listen,
-        # The others may start before the sim server or the router: keep trying in the background.
+        # The others may start before the plant or the router: keep trying in the background.
         "connect/exit_on_failure": False,
         "connect/timeout_ms": -1 if peer else 0,
         "connect/retry": {
@@ -80,7 +80,7 @@ def opening_error(settings: dict[str, Any], at: str, name: str, error: str) -> B
         cause = "no interface of this machine has that address"
     else:
         cause = "a name that does not resolve, or not of the form tcp/HOST:PORT"
-    where = "sim server" if name == SIM else name
+    where = "sim server" if name in LEADS else name
     return BusError(
         f"{key} {endpoint!r} of {where}",
         error.split(" at /")[0],

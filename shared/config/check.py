@@ -6,7 +6,13 @@ import re
 from typing import Final
 
 from quadriga.shared.config.payload import carriers
-from quadriga.shared.config.sections import Config, GaitConfig, PlannerConfig, WorldConfig
+from quadriga.shared.config.sections import (
+    SIMULATED,
+    Config,
+    GaitConfig,
+    PlannerConfig,
+    WorldConfig,
+)
 from quadriga.shared.config.terrains import TERRAINS
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.planner_kinds import find_kind, read_options
@@ -33,6 +39,7 @@ def check(config: Config) -> None:
     _check_gait(config.gait)
     _check_world(config.world, robot_names(config.team.robots))
     _check_planner(config.planner, config.world)
+    _check_plants(config)
     _check_pairs(config)
 
 
@@ -106,6 +113,27 @@ def _check_planner(planner: PlannerConfig, world: WorldConfig) -> None:
             f"{world.command_timeout:g}",
             f"at least planner.peer_timeout + {_ANSWER:g} s = {least:g} s",
             "else robots that wait for a frozen peer's plan count as frozen too",
+        )
+
+
+def _check_plants(config: Config) -> None:
+    """What plants of a robot each cannot do: be yoked in simulation, or know the whole truth."""
+    team = config.team
+    if team.plants == "one":
+        return
+    if config.estimator.kind == "truth":
+        raise ConfigError(
+            "estimator.kind",
+            "'truth' with team.plants 'each'",
+            "'kalman', or team.plants = 'one'",
+            "the plant of one robot does not know where all are",
+        )
+    if team.plant == SIMULATED and team.robots > 1 and team.yokes != "none":
+        raise ConfigError(
+            "team.plants",
+            f"'each' with simulated robots and {team.yokes!r} yokes",
+            "team.yokes = 'none', or team.plants = 'one'",
+            "robots that are simulated in worlds of their own cannot pull at each other",
         )
 
 

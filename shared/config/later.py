@@ -13,6 +13,8 @@ from quadriga.shared.config.renamed import with_first_names
 LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
     {
         "team.robot": "a1",
+        "team.plant": "mujoco",
+        "team.plants": "one",
         "planner.options": "",
         "world.stairs_rise": 0.06,
         "world.stairs_run": 0.3,

@@ -8,12 +8,19 @@ from quadriga.shared.config.identification import IdentificationConfig
 from quadriga.shared.config.low_level import ControllerConfig, EstimatorConfig, GaitConfig
 from quadriga.shared.config.planner import PlannerConfig
 from quadriga.shared.config.reference import ReferenceConfig
-from quadriga.shared.config.team import BusConfig, RecorderConfig, RuntimeConfig, TeamConfig
+from quadriga.shared.config.team import (
+    SIMULATED,
+    BusConfig,
+    RecorderConfig,
+    RuntimeConfig,
+    TeamConfig,
+)
 from quadriga.shared.config.world import SensorsConfig, WorldConfig
 from quadriga.shared.robot.robots import ROBOTS
 from quadriga.shared.robot.spec import RobotSpec
 
 __all__ = [
+    "SIMULATED",
     "BusConfig",
     "Config",
     "ControllerConfig",

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from quadriga.shared.config.key import key
 from quadriga.shared.robot.robots import ROBOTS
+
+SIMULATED: Final = "mujoco"  # the kind of plant that is a simulated world
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,10 +25,24 @@ class TeamConfig:
         hint="all robots of a team are of one kind",
     )
     yokes: str = key(
-        "complete", "-", "which pairs are yoked", choices=("complete", "chain", "ring")
+        "complete", "-", "which pairs are yoked", choices=("complete", "chain", "ring", "none")
     )
     spacing: float = key(0.9, "m", "distance between neighbours at the start", low=0.6, high=3.0)
     alternate_phase: bool = key(True, "-", "every second robot trots half a gait period later")
+    plant: str = key(
+        SIMULATED, "-", "what the robots are: mujoco, or a kind that an installed package adds"
+    )
+    plants: str = key(
+        "one",
+        "-",
+        "one: a single process is the plant of all robots; each: every robot has one of its own",
+        choices=("one", "each"),
+    )
+
+    @property
+    def one_world(self) -> bool:
+        """Whether the plant is one simulated world of all robots: it knows the truth of all."""
+        return self.plant == SIMULATED and self.plants == "one"
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +56,9 @@ class BusConfig:
         choices=("peer", "client"),
     )
     endpoint: str = key(
-        "tcp/127.0.0.1:7447", "-", "where the sim server listens (peer) or the router is (client)"
+        "tcp/127.0.0.1:7447",
+        "-",
+        "where the sim server, or plant_r1, listens (peer) or the router is (client)",
     )
     listen: str = key(
         "tcp/127.0.0.1:0", "-", "peer mode: where every other process listens; port 0: any free one"
@@ -66,7 +85,7 @@ class RuntimeConfig:
     priority: str = key(
         "realtime",
         "-",
-        "realtime: agents, planner and sim server take precedence over ordinary processes "
+        "realtime: agents, planner and plants take precedence over ordinary processes "
         "(SCHED_RR) if the user may do so; ordinary: they do not",
         choices=("realtime", "ordinary"),
     )

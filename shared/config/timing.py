@@ -4,17 +4,29 @@ from __future__ import annotations
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.wire.topics import CONFIGURED, PLAN, SAMPLE_MS, STATUS, STATUS_MS, TABLE, TRUTH
+from quadriga.shared.wire.topics import (
+    CLOCK,
+    CONFIGURED,
+    PLAN,
+    SAMPLE_MS,
+    STATUS,
+    STATUS_MS,
+    TABLE,
+    TRUTH,
+)
 
 
 def periods(config: Config) -> dict[str, int]:
     """World time between two messages of a topic by its name, ms; 0: sent on event.
 
-    In real time an agent that was late says its status later.
+    In real time an agent that was late says its status later. Several plants in lock-step follow
+    every tick of the clock; an operator needs no more than every tenth.
     """
+    lockstep = config.world.mode == "lockstep"
     configured = {
+        CLOCK: 1 if lockstep and config.team.plants == "each" else SAMPLE_MS,
         PLAN: SAMPLE_MS * config.planner.applied,
-        STATUS: STATUS_MS if config.world.mode == "lockstep" else 0,
+        STATUS: STATUS_MS if lockstep else 0,
         TRUTH: 1 if config.estimator.kind == "truth" else SAMPLE_MS,
     }
     return {

@@ -6,7 +6,9 @@ import itertools
 
 
 def yoke_pairs(n: int, graph: str) -> tuple[tuple[int, int], ...]:
-    """Pairs of robots (0-based) that a yoke connects: `complete`, `chain` or `ring`."""
+    """Pairs of robots (0-based) that a yoke connects: `complete`, `chain`, `ring` or `none`."""
+    if graph == "none":
+        return ()
     if graph == "complete":
         return tuple(itertools.combinations(range(n), 2))
     chain = tuple((i, i + 1) for i in range(n - 1))

@@ -47,6 +47,10 @@ class Rate:
         self._next = now()
         self.overruns = 0
 
+    def delay(self, seconds: float) -> None:
+        """Move the turns to come to later, or to earlier if negative."""
+        self._next += seconds
+
     def wait(self) -> float:
         """Wait for the next turn and return how late it begins, in seconds."""
         self._next += self._period

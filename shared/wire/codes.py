@@ -32,6 +32,7 @@ MALFORMED: Final = "malformed"
 TIME_OVER: Final = "time-over"
 FALLEN: Final = "fallen"
 SIGNAL: Final = "signal"
+PLANT_GONE: Final = "plant-gone"
 
 EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
     {
@@ -48,6 +49,7 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         TIME_OVER: EventCode("stop", "the walk is over: world.seconds have passed"),
         FALLEN: EventCode("stop", "the walk is over: a robot fell"),
         SIGNAL: EventCode("stop", "the walk is over: the world was told to stop"),
+        PLANT_GONE: EventCode("stop", "the walk is over: one of several plants left or is silent"),
     }
 )
 # How details of events without a code end or begin (schema 1), by kind; the last one fits all.

@@ -13,9 +13,10 @@ _HEAD = """\
 # Topics and messages
 
 The messages between the processes of a team. A key on the bus is `<team>/<robot>/<topic>` where a
-topic is one per robot, else `<team>/<topic>`; the planner and the sim server have a `status` under
-their own names. Every message also carries `tick` [ms] and `stamp_ns` [ns], the world's time of its
-content. Periods and ages are world time; the last column tells what is recorded.
+topic is one per robot, else `<team>/<topic>`; the planner and the sim server (or each robot's
+plant, `plant_r1` …) have a `status` under their own names. Every message also carries `tick` [ms]
+and `stamp_ns` [ns], the world's time of its content. Periods and ages are world time; the last
+column tells what is recorded.
 This page is generated: `python -m quadriga.shared.wire.markdown > docs/messages.md`.
 
 | topic | per robot | message | from | to | period | maximum age | recorded |
@@ -49,11 +50,11 @@ def _time(ms: int, nothing: str) -> str:
 def _section(kind: type[Message]) -> str:
     summary = (kind.__doc__ or "").strip().splitlines()[0]
     lines = ["", f"## {kind.__name__}", "", summary, ""]
-    lines += ["| field | shape | unit | frame, or meaning |", "|---|---|---|---|"]
-    for item in fields(kind):
+    own = [item for item in fields(kind) if item.name not in ("tick", "stamp_ns")]
+    if own:
+        lines += ["| field | shape | unit | frame, or meaning |", "|---|---|---|---|"]
+    for item in own:
         meta = item.metadata
-        if item.name in ("tick", "stamp_ns"):
-            continue
         if "shape" in meta:
             shape = " × ".join(map(str, meta["shape"]))
             lines.append(f"| `{item.name}` | {shape} | {meta['unit']} | {meta['frame']} |")

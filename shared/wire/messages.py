@@ -236,6 +236,11 @@ class Truth(Message):
 
 
 @record
+class Clock(Message):
+    """How far the team's time has come, from the plant that drives it."""
+
+
+@record
 class Event(Message):
     """Something happened in the world.
 

@@ -23,7 +23,7 @@ STATUS_MS: Final = 100  # so often an agent gives account of itself in lock-step
 _PLANS: Final = (AGENT, PLANNER)  # who plans
 
 STATE: Final = Topic(
-    "state", msg.State, (SIM,), (AGENT,), per_robot=True, period_ms=1, max_age_ms=20
+    "state", msg.State, (SIM,), (AGENT, SIM), per_robot=True, period_ms=1, max_age_ms=20
 )
 COMMAND: Final = Topic(
     "command", msg.Command, (AGENT,), (SIM,), per_robot=True, period_ms=1, max_age_ms=20
@@ -46,16 +46,18 @@ REFERENCE: Final = Topic(
     period_ms=REFERENCE_EPOCH_MS, max_age_ms=500, repeats=True,
 )  # fmt: skip
 ESTOP: Final = Topic("estop", msg.EStop, (members.ESTOP,), (AGENT,), period_ms=0)
-TRUTH: Final = Topic(
-    "sim/truth", msg.Truth, (SIM,), (AGENT, OPERATOR, LAUNCHER, members.ESTOP),
-    period_ms=CONFIGURED,
-)  # fmt: skip
+TRUTH: Final = Topic("sim/truth", msg.Truth, (SIM,), (AGENT, LAUNCHER), period_ms=CONFIGURED)
 EVENT: Final = Topic(
-    "sim/event", msg.Event, (SIM,), (*_PLANS, OPERATOR, LAUNCHER), period_ms=0, repeats=True
+    "sim/event", msg.Event, (SIM,), (*_PLANS, OPERATOR, LAUNCHER, SIM), period_ms=0, repeats=True
 )
+# Not recorded: the states of every tick tell the same.
+CLOCK: Final = Topic(
+    "clock", msg.Clock, (SIM,), (OPERATOR, LAUNCHER, members.ESTOP, SIM),
+    period_ms=CONFIGURED, recorded=False,
+)  # fmt: skip
 
 _OWN: Final = (
-    STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, ESTOP, TRUTH, EVENT,
+    STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, ESTOP, TRUTH, EVENT, CLOCK,
 )  # fmt: skip
 TABLE: Final = (*_OWN, *plugin_topics(_OWN))
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}

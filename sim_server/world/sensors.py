@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -53,9 +54,17 @@ class Sensors:
     So a robot's noise depends neither on the number of robots nor on what the others do.
     """
 
-    def __init__(self, config: SensorsConfig, seed: int, names: tuple[str, ...]) -> None:
+    def __init__(
+        self,
+        config: SensorsConfig,
+        seed: int,
+        names: tuple[str, ...],
+        indices: Sequence[int] | None = None,
+    ) -> None:
+        """Sensors of the robots `names`; `indices` are theirs in the team, by default 0, 1, …."""
         self._names = names
-        self._streams = [np.random.default_rng((seed, _STREAM, i)) for i in range(len(names))]
+        indices = range(len(names)) if indices is None else indices
+        self._streams = [np.random.default_rng((seed, _STREAM, i)) for i in indices]
         self._sigma = np.empty(_TURN.stop)
         for channel, sigma in (
             (_Q, config.joint_position),

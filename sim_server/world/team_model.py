@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -36,22 +36,24 @@ _TRUNK_RGBA: Final = (
 
 @dataclass(frozen=True, slots=True)
 class TeamModel:
-    """A compiled team and what is needed to read its arrays.
+    """A compiled team, or some robots of it, and what is needed to read its arrays.
 
-    Robot i owns `qpos[19 i : 19 (i + 1)]`, `qvel[18 i : 18 (i + 1)]` and
+    Robot i of this world owns `qpos[19 i : 19 (i + 1)]`, `qvel[18 i : 18 (i + 1)]` and
     `sensordata[22 i : 22 (i + 1)]`, see `layout`; yoke k is tendon k and equality row k.
 
     Attributes:
         model: the MuJoCo model.
+        robots: names of this world's robots, and their indices in the team.
         terrain: the ground, for its height.
         trunks: body id of each trunk, shape (n,).
         yokes: the pairs of robot indices that are yoked.
         rest_length: length of each yoke at the spawn, shape (k,), m.
-        payload: load on each robot.
+        payload: load on each robot of the team.
         q_spawn: positions at the spawn, shape (19 n,); the terrain's bodies follow.
     """
 
     model: mujoco.MjModel
+    robots: Mapping[str, int]
     terrain: Terrain
     trunks: np.ndarray[tuple[int], np.dtype[np.intp]]
     yokes: tuple[tuple[int, int], ...]
@@ -84,56 +86,67 @@ def spawn_positions(config: Config) -> Array:
 
 
 def build_team_model(
-    config: Config, dress: Callable[[mujoco.MjSpec], None] | None = None
+    config: Config, dress: Callable[[mujoco.MjSpec], None] | None = None, names: Sequence[str] = ()
 ) -> TeamModel:
     """Build and compile the world of a configuration; equal configurations give equal models.
 
     Args:
-        config: of the run.
+        config: the team's configuration.
         dress: gets the world before it is compiled, to change what pictures of it show.
+        names: the robots that are in this world, at their places in the team; by default all.
 
     Raises:
         ConfigError: the payload names no robot, the reference's trace is no trace, or the robot's
             URDF is missing.
     """
-    names = robot_names(config.team.robots)
-    places, payload = spawn_positions(config), build_loads(config)
+    team = robot_names(config.team.robots)
+    robots = {name: i for i, name in enumerate(team) if not names or name in names}
+    places, payload = spawn_positions(config).tolist(), build_loads(config)
     # The flat place must not depend on where exactly the robots stand.
-    terrain = build_terrain(config, formation(len(names), config.team.spacing))
+    terrain = build_terrain(config, formation(len(team), config.team.spacing))
     spec = mujoco.MjSpec()
     _set_physics(spec)
     _set_visuals(spec)
     terrain.add_to(spec)
     robot = config.robot
     body = RobotBody(robot)
-    for i, (name, (x, y)) in enumerate(zip(names, places.tolist(), strict=True)):
+    for name, i in robots.items():
         colour = _TRUNK_RGBA[i % len(_TRUNK_RGBA)]
-        place = (x, y, robot.stand_height)
+        place = (*places[i], robot.stand_height)
         trunk = body.add_to(spec, f"{name}/", place, config.world.friction, colour)
-        if i == 0:
+        if name == next(iter(robots)):
             _add_sun(trunk)
         trunk.add_site(name=f"{name}/yoke", pos=robot.yoke, group=4)
         if payload[i].mass > 0.0:
             _add_payload(trunk, f"{name}/payload", payload[i], robot.yoke)
         _add_sensors(spec, f"{name}/")
-    pairs = yoke_pairs(len(names), config.team.yokes)
+    pairs = _pairs_within(robots, yoke_pairs(len(team), config.team.yokes))
     for i, j in pairs:
-        _add_yoke(spec, names[i], names[j])
-    terrain.relief.add_bodies(spec, len(names), config.world.friction)
+        _add_yoke(spec, *(list(robots)[k] for k in (i, j)))
+    terrain.relief.add_bodies(spec, len(robots), config.world.friction)
     if dress is not None:
         dress(spec)
     model = spec.compile()
     q_spawn = model.qpos0.copy()
-    q_spawn[: len(names) * NQ].reshape(len(names), NQ)[:, JOINT_POSITIONS] = robot.q_stand
+    q_spawn[: len(robots) * NQ].reshape(len(robots), NQ)[:, JOINT_POSITIONS] = robot.q_stand
     return TeamModel(
         model=model,
+        robots=robots,
         terrain=terrain,
-        trunks=np.array([model.body(f"{name}/trunk").id for name in names]),
+        trunks=np.array([model.body(f"{name}/trunk").id for name in robots]),
         yokes=pairs,
         rest_length=model.tendon_length0.copy(),
         payload=payload,
         q_spawn=q_spawn,
     )
+
+
+def _pairs_within(
+    robots: Mapping[str, int], pairs: Iterable[tuple[int, int]]
+) -> tuple[tuple[int, int], ...]:
+    """The pairs of which both robots are in this world, by their indices in it."""
+    here = {i: k for k, i in enumerate(robots.values())}
+    return tuple((here[i], here[j]) for i, j in pairs if i in here and j in here)
 
 
 def _set_physics(spec: mujoco.MjSpec) -> None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import mujoco
 import numpy as np
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, N_LEGS, Array, robot_names
+from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, N_LEGS, Array
 from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.messages import Command, Event, State, Truth
 from quadriga.sim_server.terrain.relief import FOLLOW_MS
@@ -46,22 +46,29 @@ class World:
     `mj_step`, and no sensor waits for `mj_step1`, which runs while the agents compute their
     commands. The forces of tick 0 are those of motors without torque.
 
+    Args:
+        config: the team's configuration.
+        names: the robots that are in this world, where robots have worlds of their own; by default
+            all of the team.
+
     Raises:
         ConfigError: the payload, a push or a weak motor names no robot or does not parse, the
             reference's trace is no trace, or the robot's URDF is missing.
     """
 
-    def __init__(self, config: Config) -> None:
-        self.names = robot_names(config.team.robots)
+    def __init__(self, config: Config, names: Sequence[str] = ()) -> None:
         self.tick = 0
-        self.team = build_team_model(config)
+        self.team = build_team_model(config, names=names)
+        self.names = tuple(self.team.robots)
+        self._indices = list(self.team.robots.values())
         self.physics = mujoco.MjData(self.team.model)
         self._scenario = build_scenario(config, self.team.payload)
         self._push_changes = self._scenario.changes()
         self._weakenings = self._scenario.weakenings()
+        events = [e for e in self._scenario.events if e.robot in ("", *self.names)]
         self._events = {
-            tick: tuple(event for event in self._scenario.events if event.tick == tick)
-            for tick in {event.tick for event in self._scenario.events}
+            tick: tuple(event for event in events if event.tick == tick)
+            for tick in {event.tick for event in events}
         }
         n = len(self.names)
         # Views of MuJoCo's own memory; behind the robots come the terrain's bodies.
@@ -79,7 +86,7 @@ class World:
         self._surely_up = _FALL_HEIGHT + self.team.terrain.top
         # Compiled functions are compiled, or loaded, now and not in the first tick.
         self._drive(np.empty_like(self._tau))
-        self._sensors = Sensors(config.sensors, config.world.seed, self.names)
+        self._sensors = Sensors(config.sensors, config.world.seed, self.names, self._indices)
 
         self.physics.qpos[:] = self.team.q_spawn
         mujoco.mj_forward(self.team.model, self.physics)
@@ -106,9 +113,10 @@ class World:
         """
         events = list(self._events.get(self.tick, ()))
         if self.tick in self._push_changes:
-            self.physics.xfrc_applied[self.team.trunks, :3] = self._scenario.forces(self.tick)
+            forces = self._scenario.forces(self.tick)
+            self.physics.xfrc_applied[self.team.trunks, :3] = forces[self._indices]
         if self.tick in self._weakenings:
-            self._strength = self._scenario.strength(self.tick)
+            self._strength = self._scenario.strength(self.tick)[self._indices]
         rows = [commands.get(name, _DAMPED).row for name in self.names]
         np.concatenate(rows, out=self._commanded.reshape(-1))
         self._drive(self._tau)

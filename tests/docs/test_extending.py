@@ -24,7 +24,7 @@ SECTIONS: Final = {
 
 
 def test_every_section_has_commands() -> None:
-    assert {"A planner", "A robot", "A terrain", "A topic"} <= SECTIONS.keys()
+    assert {"A planner", "A plant", "A robot", "A terrain", "A topic"} <= SECTIONS.keys()
     assert all(SECTIONS.values())
 
 

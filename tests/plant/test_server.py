@@ -13,8 +13,8 @@ from quadriga.plant.server import FALL_LINGER_MS, PlantServer
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import MAX_TEXT, decode
-from quadriga.shared.wire.messages import Command, Event, State
-from quadriga.shared.wire.topics import COMMAND, EVENT, STATE, TRUTH
+from quadriga.shared.wire.messages import Clock, Command, Event, State
+from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, STATE, TRUTH
 from quadriga.sim_server.world.world import World
 from tests.sim_server.standing import configured
 
@@ -65,10 +65,11 @@ def test_in_real_time_nothing_but_the_end_waits_for_who_does_not_listen(mode: st
     server.publish()
     for code in (codes.PUSH, codes.BACK, codes.FALL, codes.SIGNAL):
         server.announce(code, "", "")
-    droppable = {key: drop for key, drop, _ in listener.packets[:2]}
+    droppable = {key: drop for key, drop, _ in listener.packets[:3]}
     assert droppable == {
         STATE.key("team", "r1"): mode == "realtime",
         TRUTH.key("team"): mode == "realtime",
+        CLOCK.key("team"): mode == "realtime",
     }
     assert [drop for key, drop, _ in listener.packets if key == EVENT.key("team")] == [
         *[mode == "realtime"] * 3,
@@ -79,7 +80,7 @@ def test_in_real_time_nothing_but_the_end_waits_for_who_does_not_listen(mode: st
 class BlindPlant:
     """One robot that stands, or falls at the first tick; nobody knows where it is."""
 
-    names = ("r1",)
+    names: tuple[str, ...] = ("r1",)
 
     def __init__(self, *, falls: bool = False) -> None:
         self.tick, self._falls = 0, falls
@@ -107,7 +108,10 @@ def test_any_plant_is_served(falls: bool) -> None:
     while end is None:
         server.publish()
         end = server.step({})
-    assert {key for key, _, _ in listener.packets} <= {STATE.key("team", "r1"), EVENT.key("team")}
+    ours = {STATE.key("team", "r1"), EVENT.key("team"), CLOCK.key("team")}
+    assert {key for key, _, _ in listener.packets} <= ours
+    clock = [decode(p, Clock).tick for key, _, p in listener.packets if key == CLOCK.key("team")]
+    assert clock == list(range(0, server.plant.tick, 10))
     fallen, over = (codes.FALLEN, "fall of r1"), (codes.TIME_OVER, "end of world.seconds")
     assert end == (fallen if falls else over)
     assert server.plant.tick == (1 + FALL_LINGER_MS if falls else 2000)

@@ -15,7 +15,7 @@ from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
-from quadriga.shared.members import SIM
+from quadriga.shared.members import has_lead
 from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import die_with_parent, stop_on_signals
@@ -41,7 +41,7 @@ def run(config: Config, robot: str) -> None:
         while not (stopped() or ended):
             packet = bus.get(POLL)
             if packet is None:
-                ended = SIM not in bus.members_at(HERE)
+                ended = not has_lead(bus.members_at(HERE))
                 continue
             newest = None
             for key, payload in (packet, *bus.drain()):

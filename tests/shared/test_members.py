@@ -7,7 +7,16 @@ from collections import Counter
 import pytest
 
 from quadriga.commands.parser import build_parser
-from quadriga.shared.members import LAST, RECORDER, ROLES, SIM, Role, team_members
+from quadriga.shared.members import (
+    LAST,
+    RECORDER,
+    ROLES,
+    SIM,
+    Role,
+    has_lead,
+    plant_name,
+    team_members,
+)
 
 ROBOTS = ("r1", "r2")
 
@@ -18,6 +27,24 @@ def test_a_team_has_what_its_configuration_asks_for(central: bool, recorded: boo
     names = [m.name for m in team_members(ROBOTS, central=central, recorded=recorded)]
     planner, recorder = ["planner"] * central, ["recorder"] * recorded
     assert names == ["sim", "r1", "r2", *planner, "operator", *recorder]
+
+
+def test_each_robot_may_have_a_plant_of_its_own() -> None:
+    team = team_members(ROBOTS, central=False, recorded=False, plant_each=True)
+    assert [(m.name, m.role.name, m.robot) for m in team] == [
+        ("plant_r1", "sim", "r1"),
+        ("plant_r2", "sim", "r2"),
+        ("r1", "agent", "r1"),
+        ("r2", "agent", "r2"),
+        ("operator", "operator", ""),
+    ]
+
+
+@pytest.mark.parametrize(("robots", "each"), [(1, True), (3, True), (3, False)])
+def test_one_process_drives_time(robots: int, each: bool) -> None:
+    names = [f"r{i + 1}" for i in range(robots)]
+    team = team_members(names, central=True, recorded=True, plant_each=each)
+    assert [m.name for m in team if has_lead([m.name])] == [plant_name("r1" if each else "")]
 
 
 @pytest.mark.parametrize("role", ROLES, ids=lambda role: role.name)

@@ -33,6 +33,16 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
         (["sim", "--set", "world.sed=1"], "did you mean 'world.seed'?"),
         (["sim", "--set", "nonsense"], "expected section.key=value"),
         (["sim", "--config", "/nowhere/team.toml"], "/nowhere/team.toml: got No such file"),
+        (["sim", "--robot", "r1"], "--robot: got 'r1', expected nothing (team.plants is 'one')"),
+        (
+            ["sim", "--yokes", "none", "--set", "team.plants=each"],
+            "--robot: got '', expected one of r1, r2, r3 (team.plants is 'each')",
+        ),
+        (
+            ["sim", "--set", "team.plant=mujoko"],
+            "team.plant: got 'mujoko', expected one of mujoco (did you mean 'mujoco'?)",
+        ),
+        (["walk", "--set", "team.plant=mujoko"], "team.plant: got 'mujoko'"),
         (["agent", "--robot", "r4"], "--robot: got 'r4', expected one of r1, r2, r3"),
         (["agent", "--robot", "r1", "--predictor", "/nowhere/p.npz"], "/nowhere/p.npz"),
         (

@@ -94,6 +94,12 @@ def test_a_preset_replaces_what_was_said_before_it_and_not_what_is_said_with_it(
         ("a-b:planner.kind=none,a_b:planner.kind=none", [], {}, "in more than punctuation"),
         ("none", [], {"world__seed": 4}, "expected --seeds"),
         ("none", [], {"world__push": "r9:80:90:3:0.2"}, "r9"),
+        (
+            "none",
+            [],
+            {"team__plants": "each", "team__yokes": "none"},
+            "team.plant, team.plants: got 'mujoco', 'each', expected 'mujoco', 'one'",
+        ),
         ("none", ["world.payload_on=team,r7"], {"world__payload": 2.0}, "r7"),
         ("later:world.seed=3", [], {}, "variant later: world.seed"),
         (

@@ -36,6 +36,14 @@ def test_each_topic_is_expected_once_a_period(kind: str, truth_ms: int) -> None:
         assert {k: count for k, count in missing.items() if count} == {key: 2}
 
 
+def test_truth_is_expected_of_one_simulated_world_alone() -> None:
+    ticks = whole(10)
+    del ticks["team/sim/truth"]
+    assert missing_ticks(configured(), ticks)["team/sim/truth"] == 99
+    for other in ({"team__plants": "each"}, {"team__plant": "puppet"}):
+        assert "team/sim/truth" not in missing_ticks(configured(**other), ticks)
+
+
 def test_a_robot_of_which_nothing_came_lacks_everything() -> None:
     missing = missing_ticks(configured(team__robots=2), whole(10))
     assert missing["team/r2/state"] == missing["team/r2/command"] == 999

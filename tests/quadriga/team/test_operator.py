@@ -6,7 +6,6 @@ from pathlib import Path
 from threading import Event as Flag
 from threading import Thread
 
-import numpy as np
 import pytest
 
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
@@ -15,8 +14,8 @@ from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.members import OPERATOR, SIM
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.wire.codec import MAX_TEXT, MAX_TICK, decode, encode
-from quadriga.shared.wire.messages import EStop, Event, Truth
-from quadriga.shared.wire.topics import ESTOP, EVENT, TRUTH
+from quadriga.shared.wire.messages import Clock, EStop, Event
+from quadriga.shared.wire.topics import CLOCK, ESTOP, EVENT
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.operator import _next_tick, reference_at, stop_team
 
@@ -53,33 +52,17 @@ def test_a_trace_is_followed_from_the_first_step_on(tmp_path: Path) -> None:
 def test_a_walk_ends_at_the_same_tick_for_who_is_behind(late: bool) -> None:
     """Else the last references of two equal walks would depend on who was faster."""
     config = BusConfig(endpoint=free_endpoint())
-    zero = np.zeros((1, 3))
     with Bus.open(config, "team", SIM) as sim, Bus.open(config, "team", OPERATOR) as operator:
-        for key in (TRUTH.key("team"), EVENT.key("team")):
+        for key in (CLOCK.key("team"), EVENT.key("team")):
             operator.subscribe(key)
         operator.declare(HERE)
         assert sim.wait_for(HERE, {OPERATOR}, 10.0, lambda: False)
         sim.declare(HERE)
         assert operator.wait_for(HERE, {SIM}, 10.0, lambda: False)
-        truth, event = sim.publisher(TRUTH.key("team")), sim.publisher(EVENT.key("team"))
+        clock, event = sim.publisher(CLOCK.key("team")), sim.publisher(EVENT.key("team"))
         newest = 0
         for tick in range(0, 800, 10):
-            truth(
-                encode(
-                    Truth(
-                        tick,
-                        tick * 10**6,
-                        ("r1",),
-                        zero,
-                        np.zeros((1, 4)),
-                        zero,
-                        zero,
-                        np.zeros((1, 4, 3)),
-                        np.zeros(0),
-                        np.zeros(0),
-                    )
-                )
-            )
+            clock(encode(Clock(tick, tick * 10**6)))
             while not late and newest < tick:
                 newest, over = _next_tick(operator, newest)
                 assert not over
@@ -93,11 +76,11 @@ def test_a_walk_ends_at_the_same_tick_for_who_is_behind(late: bool) -> None:
 
 
 def said_stop(reason: str, tick: int) -> EStop:
-    """What a robot hears of an emergency stop while somebody tells a tick on the truth's key."""
+    """What a robot hears of an emergency stop while somebody tells a tick on the clock's key."""
     config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint()})
     with Bus.open(config.bus, "team", SIM) as sim, Bus.open(config.bus, "team", "r1") as r1:
         r1.subscribe(ESTOP.key("team"))
-        put, over = sim.publisher(TRUTH.key("team")), Flag()
+        put, over = sim.publisher(CLOCK.key("team")), Flag()
         event = encode(Event(tick, 0, "", "", "", ""))
 
         def tell() -> None:

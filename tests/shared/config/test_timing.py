@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config, EstimatorConfig, PlannerConfig, WorldConfig
 from quadriga.shared.config.timing import max_ages, periods
@@ -18,6 +20,17 @@ def test_periods_follow_the_configuration() -> None:
     )
     assert (periods(other)["plan"], periods(other)["sim/truth"]) == (20, 1)
     assert periods(other)["status"] == 0
+
+
+@pytest.mark.parametrize(
+    ("mode", "plants", "period"),
+    [("lockstep", "one", 10), ("lockstep", "each", 1), ("realtime", "each", 10)],
+)
+def test_plants_in_lock_step_follow_every_tick_of_the_clock(
+    mode: str, plants: str, period: int
+) -> None:
+    given = {"world.mode": mode, "team.plants": plants, "team.yokes": "none"}
+    assert periods(load(None, given))["clock"] == period
 
 
 def test_what_the_table_says_holds_whatever_is_configured() -> None:

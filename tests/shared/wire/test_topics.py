@@ -84,6 +84,7 @@ def test_the_keys_are_the_contract_with_other_tools() -> None:
         "team/estop",
         "team/sim/truth",
         "team/sim/event",
+        "team/clock",
     ]
 
 

@@ -1,0 +1,67 @@
+"""SHELL of a plant: receives the robots' commands, steps the plant, sends what it measures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from quadriga.plant.lockstep import run_lockstep
+from quadriga.plant.protocol import Plant
+from quadriga.plant.realtime import run_realtime
+from quadriga.plant.server import PlantServer
+from quadriga.plant.team_time import team_time
+from quadriga.shared.bus.barrier import meet, start_together
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import BusError
+from quadriga.shared.members import plant_name
+from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.runtime.collector import end_collection
+from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.signals import stop_on_signals
+from quadriga.shared.wire import codes
+from quadriga.shared.wire.topics import COMMAND
+
+PlantFactory = Callable[[Config, tuple[str, ...]], Plant]
+
+
+def run(
+    config: Config, build: PlantFactory, robot: str = "", stopped: Callable[[], bool] | None = None
+) -> None:
+    """Be the plant until `world.seconds` are over, a robot has fallen, or it is stopped.
+
+    The others learn of the end from the event `stop`, and from the absence of the process that
+    drives time.
+
+    Args:
+        config: the team's configuration.
+        build: makes the plant of the robots with these names.
+        robot: the robot that this process is the plant of; "": of all.
+        stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
+
+    Raises:
+        ConfigError: the plant cannot be built from the configuration.
+        BusError: the bus cannot be opened, the team is not complete in time, or another plant
+            left while the team walked.
+    """
+    stopped = stopped or stop_on_signals()
+    team, name, time = config.team.name, plant_name(robot), team_time(config, robot)
+    plant = build(config, (robot,) if robot else robot_names(config.team.robots))
+    with Bus.open(config.bus, team, name, stopped) as bus:
+        for key in sorted({*time.keys, *(COMMAND.key(team, own) for own in plant.names)}):
+            bus.subscribe(key)
+        server = PlantServer(config, plant, bus, time, name)
+        if not (meet(bus, config, stopped) and start_together(bus, config, stopped)):
+            return
+        end_collection()
+        take_priority(config.runtime.priority)
+        loop = run_realtime if config.world.mode == "realtime" else run_lockstep
+        end = loop(server, stopped)
+        if time.drives:
+            server.announce(end.code, "", end.detail)
+    if time.end is not None and time.end.code == codes.PLANT_GONE:
+        raise BusError(
+            f"team {team!r}",
+            time.end.detail,
+            "the plants of all robots until the end",
+            "it failed, was stopped, or lost its link: see what it says itself",
+        )

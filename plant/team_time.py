@@ -1,0 +1,165 @@
+"""The plants of a team among each other: who drives time, who waits for whom, when one must end.
+
+The plant of all robots has nobody to ask. Where each robot has a plant of its own, that of the
+first robot drives time and the others follow its clock. In lock-step no follower takes a tick
+before the clock has come to its end, and the clock waits for every state and command of a tick:
+so the team ends as one, and what is recorded does not depend on who was faster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Final
+
+from quadriga.plant.end import End
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import MessageError
+from quadriga.shared.members import has_lead, plant_name
+from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.wire import codes
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.messages import Clock, Event
+from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, STATE
+
+_DRIFT_MS: Final = 3  # that two clocks of one team may differ: a message under way is no drift
+_JUMP_MS: Final = 5000  # no clock of a team that still walks is so far ahead
+
+
+class TeamTime:
+    """Of the plant of all robots: it drives time, and nobody else has a part in it.
+
+    Attributes:
+        drives: whether this plant drives the team's time and ends the walk.
+        alone: whether it is the plant of all robots.
+        keys: what to subscribe to.
+        end: why this plant must end before its own time is over; None: it need not.
+        falls: falls of robots that other plants have, until they are taken out.
+    """
+
+    drives, alone = True, True
+
+    def __init__(self) -> None:
+        self.keys: frozenset[str] = frozenset()
+        self.end: End | None = None
+        self.falls: list[Event] = []
+
+    def take(self, key: str, payload: bytes, tick: int) -> None:
+        """Take in a packet of one of `keys` at this plant's `tick`."""
+
+    def awaited(self, tick: int) -> frozenset[str]:
+        """Plants without which this one may not take `tick` in lock-step."""
+        return frozenset()
+
+    def ahead(self, tick: int) -> int:
+        """Ticks by which this plant is ahead of who drives time, negative if behind; told once."""
+        return 0
+
+    def look(self, present: Collection[str]) -> None:
+        """Set `end` if a plant on which this one depends is not among those `present`."""
+
+
+class LeadTime(TeamTime):
+    """Of the first robot's plant: it drives time for the plants of the others."""
+
+    alone = False
+
+    def __init__(self, config: Config, robot: str) -> None:
+        super().__init__()
+        team = config.team.name
+        others = [name for name in robot_names(config.team.robots) if name != robot]
+        self._states = {STATE.key(team, name): name for name in others}
+        self._commands = {COMMAND.key(team, name): name for name in others}
+        self._event = EVENT.key(team)
+        self.keys = frozenset({*self._states, *self._commands, self._event})
+        # By robot: how far it is, and its agent, −1 before the first message.
+        self._reached, self._answered = dict.fromkeys(others, -1), dict.fromkeys(others, -1)
+        self._silent: set[str] = set()
+
+    def take(self, key: str, payload: bytes, tick: int) -> None:
+        if key == self._event:
+            self._take_event(payload)
+            return
+        head = envelope(payload)
+        if head is None or head[0] > tick:  # nobody is ahead of who drives time
+            return
+        newest = self._reached if key in self._states else self._answered
+        robot = (self._states if key in self._states else self._commands)[key]
+        newest[robot] = max(newest[robot], head[0])
+
+    def _take_event(self, payload: bytes) -> None:
+        try:
+            event = decode(payload, Event)
+        except MessageError:
+            return
+        if event.robot not in self._reached:
+            return
+        if event.code == codes.FALL:
+            self.falls.append(event)
+        elif event.code in (codes.SILENT, codes.GONE):
+            self._silent.add(event.robot)
+        elif event.code == codes.BACK:
+            self._silent.discard(event.robot)
+
+    def awaited(self, tick: int) -> frozenset[str]:
+        return frozenset(
+            plant_name(name)
+            for name, reached in self._reached.items()
+            if reached < tick or (self._answered[name] < tick and name not in self._silent)
+        )
+
+    def look(self, present: Collection[str]) -> None:
+        gone = [plant_name(n) for n in self._reached if plant_name(n) not in present]
+        if gone and self.end is None:
+            self.end = plant_gone(gone, "gone")
+
+
+class FollowerTime(TeamTime):
+    """Of any other robot's plant: it follows the clock and leaves with who drives it."""
+
+    drives = alone = False
+
+    def __init__(self, config: Config) -> None:
+        super().__init__()
+        self._key, self._event = CLOCK.key(config.team.name), EVENT.key(config.team.name)
+        self.keys = frozenset({self._key, self._event})
+        self._lead = frozenset({plant_name(robot_names(config.team.robots)[0])})
+        self._now, self._fresh = -1, False
+
+    def take(self, key: str, payload: bytes, tick: int) -> None:
+        try:
+            if key == self._event:
+                event = decode(payload, Event)
+                if event.kind == "stop":
+                    self.end = self.end or End(event.code, event.detail)
+                return
+            now = decode(payload, Clock).tick
+        except MessageError:
+            return
+        if self._now < now <= tick + _JUMP_MS:
+            self._now, self._fresh = now, True
+
+    def awaited(self, tick: int) -> frozenset[str]:
+        return self._lead if self._now <= tick else frozenset()
+
+    def ahead(self, tick: int) -> int:
+        drift = tick - self._now if self._fresh else 0
+        self._fresh = False
+        return drift if abs(drift) > _DRIFT_MS else 0
+
+    def look(self, present: Collection[str]) -> None:
+        if self.end is None and not has_lead(present):
+            self.end = plant_gone(sorted(self._lead), "gone")
+
+
+def team_time(config: Config, robot: str) -> TeamTime:
+    """The part in the team's time of a robot's plant, or with "" of the plant of all robots."""
+    if not robot:
+        return TeamTime()
+    leads = robot == robot_names(config.team.robots)[0]
+    return LeadTime(config, robot) if leads else FollowerTime(config)
+
+
+def plant_gone(plants: Sequence[str], how: str) -> End:
+    """The end of a walk because of plants that are not there any more."""
+    return End(codes.PLANT_GONE, f"{', '.join(plants)} {how}")

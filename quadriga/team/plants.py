@@ -1,0 +1,41 @@
+"""The kinds of plant: the simulated world, and what installed packages add by an entry point."""
+
+from __future__ import annotations
+
+from importlib.metadata import entry_points
+from typing import Final
+
+from quadriga.plant.process import PlantFactory
+from quadriga.shared.config.sections import SIMULATED, Config
+from quadriga.shared.errors import ConfigError, did_you_mean
+
+GROUP: Final = "quadriga.plants"  # of the entry points; each is a `PlantFactory`
+
+
+def plant_kinds() -> tuple[str, ...]:
+    """What `team.plant` may be, the simulated world first."""
+    return (SIMULATED, *sorted(entry_points(group=GROUP).names - {SIMULATED}))
+
+
+def plant_factory(config: Config) -> PlantFactory:
+    """What builds the plant that a configuration asks for.
+
+    Raises:
+        ConfigError: there is no such kind, or its package cannot be imported.
+    """
+    kind = config.team.plant
+    if kind == SIMULATED:
+        from quadriga.sim_server.world.world import World
+
+        return World
+    found = entry_points(group=GROUP, name=kind)
+    if not found:
+        kinds = plant_kinds()
+        hint = did_you_mean(kind, kinds) or "is the package that adds it installed here?"
+        raise ConfigError("team.plant", repr(kind), f"one of {', '.join(kinds)}", hint)
+    point = next(iter(found))
+    try:
+        factory: PlantFactory = point.load()
+    except (ImportError, AttributeError) as error:
+        raise ConfigError("team.plant", f"{kind!r}: {error}", f"what {point.value} names") from None
+    return factory

@@ -1,0 +1,122 @@
+"""Who waits for whom when each robot has a plant of its own, and when a plant must end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from quadriga.plant.team_time import FollowerTime, LeadTime, TeamTime, team_time
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.conventions import N_JOINTS
+from quadriga.shared.wire import codes
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Clock, Command, Event, State
+from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, STATE
+
+
+@pytest.fixture
+def config() -> Config:
+    return load(None, {"team.robots": 3, "team.yokes": "none", "team.plants": "each"})
+
+
+def state(tick: int) -> bytes:
+    return encode(State.from_row(tick, tick * 10**6, np.zeros(50)))
+
+
+def command(tick: int) -> bytes:
+    return encode(Command(tick, tick * 10**6, *np.zeros((5, N_JOINTS))))
+
+
+def clock(tick: int) -> bytes:
+    return encode(Clock(tick, tick * 10**6))
+
+
+def event(code: str, robot: str = "", tick: int = 0) -> bytes:
+    return encode(Event.of(tick, code, robot, ""))
+
+
+def test_the_first_robot_s_plant_drives_time_for_the_others(config: Config) -> None:
+    assert type(team_time(config, "")) is TeamTime
+    assert type(team_time(config, "r1")) is LeadTime
+    assert type(team_time(config, "r3")) is FollowerTime
+
+
+def test_who_drives_time_waits_for_every_state_and_command_of_the_tick(config: Config) -> None:
+    time = LeadTime(config, "r1")
+    for robot in ("r2", "r3"):
+        time.take(STATE.key("team", robot), state(0), 0)
+    assert time.awaited(0) == {"plant_r2", "plant_r3"}
+    time.take(COMMAND.key("team", "r2"), command(0), 0)
+    assert time.awaited(0) == {"plant_r3"}
+    time.take(COMMAND.key("team", "r3"), command(0), 0)
+    assert not time.awaited(0)
+    assert time.awaited(1) == {"plant_r2", "plant_r3"}
+
+
+def test_it_waits_for_the_plant_of_a_silent_robot_but_not_for_its_commands(config: Config) -> None:
+    time = LeadTime(config, "r1")
+    for robot in ("r2", "r3"):
+        time.take(STATE.key("team", robot), state(7), 7)
+    time.take(COMMAND.key("team", "r3"), command(7), 7)
+    for code, awaited in ((codes.GONE, set()), (codes.BACK, {"plant_r2"}), (codes.SILENT, set())):
+        time.take(EVENT.key("team"), event(code, "r2"), 7)
+        assert time.awaited(7) == awaited
+    assert time.awaited(8) == {"plant_r2", "plant_r3"}
+
+
+@pytest.mark.parametrize("forged", [b"", b"\xc1", state(900), command(900)])
+def test_nobody_is_believed_to_be_ahead_of_who_drives_time(config: Config, forged: bytes) -> None:
+    time = LeadTime(config, "r1")
+    for topic in (STATE, COMMAND):
+        time.take(topic.key("team", "r2"), forged, 5)
+    assert "plant_r2" in time.awaited(0)
+
+
+def test_a_fall_in_another_plant_is_heard(config: Config) -> None:
+    time = LeadTime(config, "r1")
+    time.take(EVENT.key("team"), event(codes.FALL, "r3", 700), 700)
+    time.take(EVENT.key("team"), event(codes.FALL, "stranger", 700), 700)
+    assert [(fall.robot, fall.tick) for fall in time.falls] == [("r3", 700)]
+
+
+def test_a_follower_takes_a_tick_once_the_clock_is_past_it(config: Config) -> None:
+    time = FollowerTime(config)
+    assert time.awaited(0) == {"plant_r1"}
+    time.take(CLOCK.key("team"), clock(0), 0)
+    assert time.awaited(0) == {"plant_r1"}
+    time.take(CLOCK.key("team"), clock(1), 0)
+    assert not time.awaited(0)
+    time.take(CLOCK.key("team"), clock(10**7), 0)
+    time.take(CLOCK.key("team"), b"", 0)
+    assert time.awaited(1) == {"plant_r1"}, "no clock of a team that walks jumps so far"
+
+
+def test_a_follower_knows_once_for_each_clock_how_far_it_has_drifted(config: Config) -> None:
+    time = FollowerTime(config)
+    drift = []
+    for now, tick in ((100, 101), (110, 120), (120, 90), (130, 131)):
+        time.take(CLOCK.key("team"), clock(now), tick)
+        drift += [time.ahead(tick), time.ahead(tick)]
+    assert drift == [0, 0, 10, 0, -30, 0, 0, 0]
+
+
+def test_followers_leave_by_the_same_event_as_all_others(config: Config) -> None:
+    time = FollowerTime(config)
+    time.take(EVENT.key("team"), event(codes.FALL, "r1"), 5)
+    assert time.end is None
+    time.take(EVENT.key("team"), event(codes.TIME_OVER), 5)
+    assert time.end is not None
+    assert time.end.code == codes.TIME_OVER
+
+
+def test_a_plant_ends_when_one_that_it_depends_on_is_gone(config: Config) -> None:
+    lead, follower = LeadTime(config, "r1"), FollowerTime(config)
+    for time, dear, others in (
+        (lead, "plant_r2", {"plant_r3", "r1", "r2", "r3"}),
+        (follower, "plant_r1", {"plant_r3", "r1", "r2", "r3"}),
+    ):
+        time.look({dear, *others})
+        assert time.end is None
+        time.look(others)
+        assert time.end == (codes.PLANT_GONE, f"{dear} gone")

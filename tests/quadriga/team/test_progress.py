@@ -1,0 +1,42 @@
+"""The progress line follows the clock, and shows a speed where the truth is known."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.config.load import load
+from quadriga.shared.members import SIM
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Clock, Truth
+from quadriga.shared.wire.topics import CLOCK, TRUTH
+from quadriga.team.endpoint import free_endpoint
+from quadriga.team.progress import WalkProgress
+
+WAIT = 20.0  # s
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_time_is_the_clock_s_and_speed_the_truth_s(known: bool) -> None:
+    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint(), "world.seconds": 8.0})
+    text = io.StringIO()
+    console = Console(file=text, force_terminal=True, width=120)
+    with Bus.open(config.bus, "team", SIM) as sim:
+        clock, truth = sim.publisher(CLOCK.key("team")), sim.publisher(TRUTH.key("team"))
+        still = (np.zeros((1, 4)), np.array([[0.3, 0.4, 0.0]]), np.zeros((1, 3)))
+        none = (np.zeros((1, 4, 3)), np.zeros(0), np.zeros(0))
+        with WalkProgress(config, console) as progress:
+            deadline = monotonic() + WAIT
+            while "2.5/8 s" not in text.getvalue():
+                assert monotonic() < deadline, text.getvalue()
+                if known:
+                    truth(encode(Truth(2500, 0, ("r1",), np.zeros((1, 3)), *still, *none)))
+                clock(encode(Clock(2500, 0)))
+                sleep(0.05)
+                progress.update()
+    assert ("0.50 m/s" in text.getvalue()) == known

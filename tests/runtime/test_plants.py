@@ -1,0 +1,209 @@
+"""Plants that are no simulated world of the whole team: another kind, and one for each robot."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.errors import ProcessError
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.places import SOURCE
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import (
+    Clock,
+    Command,
+    Event,
+    Measurement,
+    Reference,
+    State,
+    Truth,
+)
+from quadriga.shared.wire.topics import CLOCK
+from quadriga.team import launch
+from tests.runtime.conftest import WAIT, Make, Team
+
+FOREVER = 600.0  # s of world time
+Watcher = Callable[..., Bus]
+EACH = {"team__plants": "each", "team__yokes": "none"}
+LOCKSTEP, REALTIME = {"world__mode": "lockstep"}, {"world__mode": "realtime"}
+
+pytestmark = pytest.mark.usefixtures("_compiled")
+
+
+def never() -> bool:
+    return False
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the package of `tests/plugins/puppet`, installed."""
+    folder = tmp_path_factory.mktemp("site")
+    package = folder / "source"  # a copy: pip builds where the source is
+    shutil.copytree(SOURCE / "tests" / "plugins" / "puppet", package)
+    pip = (sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check")
+    flags = ("--no-deps", "--no-build-isolation", "--no-index", "--target", str(folder))
+    subprocess.run([*pip, *flags, str(package)], check=True, timeout=WAIT)
+    return folder
+
+
+@pytest.fixture
+def puppets(site: Path, make_team: Make, monkeypatch: pytest.MonkeyPatch) -> Make:
+    """A function that makes a team whose robots are puppets."""
+    path = os.pathsep.join(filter(None, (str(site), os.environ.get("PYTHONPATH", ""))))
+    monkeypatch.setenv("PYTHONPATH", path)
+    return lambda **keys: make_team(team__plant="puppet", **keys)
+
+
+def check_walked_to_the_end(recording: Recording, *, lockstep: bool) -> None:
+    """Both robots were measured and commanded until 1 s was over, by the same clock."""
+    for robot in ("r1", "r2"):
+        states = [message.tick for message in recording.messages(State, robot)]
+        commands = [message.tick for message in recording.messages(Command, robot)]
+        if lockstep:
+            assert states == commands == list(range(1000))
+        else:  # a busy machine may lose some
+            assert states[-1] >= 500
+            assert len(commands) > 100
+    assert {m.tick for m in recording.messages(Reference)} >= set(range(0, 1000, 100))
+    events = list(recording.messages(Event))
+    assert [(e.tick, e.code) for e in events if e.kind == "stop"] == [(1000, "time-over")]
+
+
+@pytest.mark.parametrize("mode", [LOCKSTEP, REALTIME], ids=lambda mode: mode["world__mode"])
+@pytest.mark.parametrize("plants", [{}, EACH], ids=["one plant", "a plant each"])
+def test_a_plant_of_another_package_walks(
+    puppets: Make, mode: dict[str, str], plants: dict[str, str]
+) -> None:
+    team = puppets(recorder__enabled=True, world__seconds=1.0, **mode, **plants)
+    recording = team.run(standing=False)
+    check_walked_to_the_end(recording, lockstep=mode is LOCKSTEP)
+    assert not list(recording.messages(Truth)), "nobody knows it"
+    assert not list(recording.entries({CLOCK.name}))
+
+
+def test_robots_in_worlds_of_their_own_walk_and_every_walk_is_the_same(make_team: Make) -> None:
+    team = make_team(recorder__enabled=True, world__seconds=2.0, **EACH)
+    digests = []
+    for run in ("first", "second"):
+        folder = team.folder / run
+        folder.mkdir()
+        recording = Team(team.config, folder).run(standing=False)
+        for robot in ("r1", "r2"):
+            speed = [m.y[1] for m in recording.messages(Measurement, robot)]
+            assert max(speed) > 0.3, "it walks"
+        digests.append(payloads(recording))
+    assert {"team/r1/state", "team/r2/command", "team/reference"} <= digests[0].keys()
+    assert digests[0] == digests[1]
+
+
+def await_clock(bus: Bus, tick: int) -> None:
+    """Wait until the team's clock has come to a tick."""
+    deadline, now = monotonic() + WAIT, -1
+    while now < tick:
+        assert monotonic() < deadline
+        packet = bus.get(1.0)
+        if packet is not None and packet[0] == CLOCK.key(bus.team):
+            now = decode(packet[1], Clock).tick
+
+
+def payloads(recording: Recording) -> dict[str, str]:
+    """Digest of the payloads of every key that one process sends by world time alone."""
+    found: dict[str, Any] = defaultdict(hashlib.sha256)
+    for entry in recording.entries():
+        if not entry.key.endswith(("/status", "/event")):
+            found[entry.key].update(len(entry.payload).to_bytes(4) + entry.payload)
+    return {key: digest.hexdigest() for key, digest in found.items()}
+
+
+def test_a_fall_in_one_world_ends_the_walk_of_all(make_team: Make) -> None:
+    push = "r2:2000:0:0.1:0.2"
+    team = make_team(recorder__enabled=True, world__seconds=9.0, world__push=push, **EACH)
+    events = list(team.run().messages(Event))
+    fall = next(e for e in events if e.kind == "fall")
+    stop = next(e for e in events if e.kind == "stop")
+    assert (fall.robot, stop.code, stop.tick) == ("r2", "fallen", fall.tick + 1000)
+    assert stop.detail.endswith("r2")
+    assert [e.kind for e in events].count("start") == 1
+
+
+@pytest.mark.parametrize("mode", [LOCKSTEP, REALTIME], ids=lambda mode: mode["world__mode"])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_plant_that_dies_stops_the_team_and_is_named(
+    puppets: Make, watcher: Watcher, mode: dict[str, str], number: signal.Signals
+) -> None:
+    team = puppets(world__seconds=FOREVER, **EACH, **mode)
+    with team.launch() as running:
+        pids = running.pids
+        await_clock(watcher(team), 100)
+        os.kill(pids["plant_r2"], number)
+        team.await_log("plant_r1", "stop  plant_r2 gone")
+        with pytest.raises(ProcessError, match=r"process plant_r[12]"):
+            running.watch(never)
+    assert "got plant_r2 gone, expected the plants of all robots" in team.log("plant_r1")
+    assert not [pid for pid in pids.values() if os.path.exists(f"/proc/{pid}")]
+
+
+@pytest.mark.parametrize("mode", [LOCKSTEP, REALTIME], ids=lambda mode: mode["world__mode"])
+def test_the_others_leave_when_who_drives_time_dies(
+    puppets: Make, watcher: Watcher, mode: dict[str, str]
+) -> None:
+    team = puppets(world__seconds=FOREVER, **EACH, **mode)
+    with team.launch() as running:
+        pids = running.pids
+        await_clock(watcher(team), 100)
+        os.kill(pids["plant_r1"], signal.SIGKILL)
+        team.await_log("plant_r2", "got plant_r1 gone, expected the plants of all robots")
+        with pytest.raises(ProcessError, match=r"process plant_r[12]"):
+            running.watch(never)
+    assert not [pid for pid in pids.values() if os.path.exists(f"/proc/{pid}")]
+
+
+def test_a_frozen_plant_stops_the_team_and_is_named(make_team: Make) -> None:
+    team = make_team(world__seconds=FOREVER, world__command_timeout=0.5, **EACH)
+    with team.launch() as running:
+        team.await_log("plant_r1", "start")
+        os.kill(running.pids["plant_r2"], signal.SIGSTOP)
+        team.await_log("plant_r1", "stop  plant_r2 silent for 1 s")
+        os.kill(running.pids["plant_r2"], signal.SIGCONT)
+        with pytest.raises(ProcessError, match="process plant_r1"):
+            running.watch(never)
+
+
+def test_a_robot_that_leaves_is_damped_by_its_own_plant(make_team: Make) -> None:
+    team = make_team(world__seconds=FOREVER, **EACH)
+    with team.launch() as running:
+        team.await_log("plant_r1", "start")
+        os.kill(running.pids["r2"], signal.SIGKILL)
+        team.await_log("plant_r2", "fault r2 gone: its joints are damped, the world goes on")
+        team.await_log("plant_r2", "fall r2")
+        team.await_log("plant_r1", "stop  fall of")
+
+
+def test_a_walk_that_is_told_to_stop_leaves_no_plant_behind(make_team: Make) -> None:
+    team = make_team(world__seconds=FOREVER, **EACH)
+    team.rows(standing=False)
+    file = str(team.folder / "config.toml")
+    walk = (*launch.QUADRIGA, "walk", "--config", file, "--out", str(team.folder / "out"))
+    with subprocess.Popen(walk, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
+        log = team.folder / "out" / "logs" / "plant_r1.log"
+        deadline = monotonic() + WAIT
+        while not (log.exists() and "start" in log.read_text(encoding="utf-8")):
+            assert monotonic() < deadline
+            sleep(0.05)
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        assert len(children) == 5, "two plants, two agents, the operator"
+        process.terminate()
+        assert process.wait(WAIT) == 130
+    assert not [pid for pid in children if os.path.exists(f"/proc/{pid}")]
