@@ -33,7 +33,7 @@ def test_info_says_it_all(small: Path, run_command: RunCommand) -> None:
         r"  end +fall of r2",
         r"  predictor +cdcdcdcdcdcdcdcd",
         r"  versions +python",
-        r"  team +team, 2 robots, lockstep, flat, seed 7",
+        r"  team +team, 2 × Unitree A1, lockstep, flat, seed 7",
         r"  team/r1/state +State +601 +1000\.0 +0 +600 +0",
         r"  team/r2/plan +Plan +5 +25\.0 +400 +560 +0",
         r"  world\.seed +7  \(default 0\)",
