@@ -21,11 +21,11 @@ GRAPHS = ("complete", "chain", "ring")
 
 
 @pytest.mark.parametrize("kind", ROBOTS)
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(8))
 def test_equals_pinocchio_in_mass_matrix_bias_and_foot_jacobians(kind: str, seed: int) -> None:
     random = np.random.default_rng(seed)
     # The Go1's URDF has a link of 1 mg above its trunk, which the world leaves out.
-    atol = 2e-6 if kind == "go1" else 1e-9
+    atol, bias_atol = (2e-6, 6e-5) if kind == "go1" else (1e-9, 1e-9)
     config = configured()
     team = build_team_model(replace(config, team=replace(config.team, robot=kind)))
     m, d = team.model, mujoco.MjData(team.model)
@@ -55,7 +55,7 @@ def test_equals_pinocchio_in_mass_matrix_bias_and_foot_jacobians(kind: str, seed
     np.testing.assert_allclose(T.T @ M @ T, M_pin, atol=atol)
     bias = T.T @ (M @ T_dot_v + d.qfrc_bias)
     expected = pin.nonLinearEffects(model, data, q_pin, v_pin)
-    np.testing.assert_allclose(bias, expected, atol=30.0 * atol)
+    np.testing.assert_allclose(bias, expected, atol=bias_atol)
     pin.computeJointJacobians(model, data, q_pin)
     pin.updateFramePlacements(model, data)
     for foot in FOOT_FRAMES:
