@@ -45,7 +45,7 @@ def load_checked(path: Path, config: Config) -> tuple[Predictor, Provenance]:
         PredictorError: a figure is beyond its gate's limit.
     """
     predictor, provenance = read(path)
-    _check_meta(path, predictor.meta, PredictorMeta.of(config))
+    check_fitted_for(config, path, predictor)
     gates = gates_in_force(provenance.gates, config, predictor)
     gates.check(config.planner.kind)
     return predictor, replace(provenance, gates=gates)
@@ -73,7 +73,18 @@ def gates_in_force(gates: GateReport, config: Config, predictor: Predictor) -> G
     return replace(gates, radius=radius, Q=planner.Q, R=planner.R, cost_probes=probes)
 
 
-def _check_meta(path: Path, got: PredictorMeta, expected: PredictorMeta) -> None:
+def check_fitted_for(config: Config, path: Path, predictor: Predictor) -> None:
+    """Refuse a predictor of another team, gait, horizon, interface or low level.
+
+    Args:
+        config: the team's configuration.
+        path: the predictor's file, for the error.
+        predictor: what was read from it.
+
+    Raises:
+        PredictorFileError: it was fitted for another setting.
+    """
+    got, expected = predictor.meta, PredictorMeta.of(config)
     pairs = [(name, getattr(got, name), getattr(expected, name)) for name in _MATCHED]
     fitted = dict(got.controller)
     pairs += [(f"controller.{k}", fitted.get(k), wanted) for k, wanted in expected.controller]

@@ -25,6 +25,7 @@ from quadriga.commands import (
     plan,
     play,
     prepare,
+    probe,
     record,
     recover,
     replay,
@@ -49,8 +50,8 @@ INTERRUPTED: Final = 130
 _COMMANDS: Final = (
     walk.add, scenarios.add, sim.add, agent.add, plan.add, record.add, report.add, play.add,
     resim.add, export.add, info.add, recover.add, check.add, echo.add, hz.add, replay.add,
-    router.add, prepare.add, operate.add, collect.add, fit.add, campaign.add, experiments.add,
-    estop.add, config.add, version.add,
+    router.add, prepare.add, operate.add, collect.add, fit.add, probe.add, campaign.add,
+    experiments.add, estop.add, config.add, version.add,
 )  # fmt: skip
 
 

@@ -8,15 +8,16 @@ from pathlib import Path
 
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.planner.checked_predictor import gates_in_force, load_checked
 from quadriga.agents.planner.gates import run_gates
 from quadriga.agents.predictor.fits import fit as fit_predictor
 from quadriga.agents.predictor.gate_report import GateReport
-from quadriga.agents.predictor.predictor import PredictorMeta
-from quadriga.agents.predictor.store import Provenance, save, versions
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.store import Provenance, read, save, versions
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.collect import collect, training_seconds
 from quadriga.identification.dataset import Dataset, check_excitation, read_data, write_data
+from quadriga.identification.fit_report import refusal
 from quadriga.progress import build_progress
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
@@ -36,6 +37,30 @@ def ensure_predictor(config: Config, console: Console) -> Path:
     dataset = ensure_data(config, console)
     fit(config, dataset, path, console)
     return path
+
+
+def fit_or_read(config: Config, console: Console) -> tuple[Predictor, GateReport]:
+    """The predictor of `config` with the figures of its gates, whatever they say.
+
+    It is read if it is kept. Else it is fitted, to data that are collected if there are none, and
+    kept if its gates accept it.
+
+    Raises:
+        PredictorError: the data are too little or not exciting.
+    """
+    path = predictor_path(config)
+    if path.is_file():
+        predictor, origin = read(path)
+        return predictor, gates_in_force(origin.gates, config, predictor)
+    dataset = ensure_data(config, console)
+    use_one_blas_thread()
+    check_excitation(config, dataset.training)
+    with console.status(f"fitting the predictor {config.identification.predictor}"):
+        predictor = fit_predictor(dataset.training, PredictorMeta.of(config))
+        gates = run_gates(config, predictor, dataset.held_out)
+    if refusal(gates, config.planner.kind) is None:
+        save(path, predictor, build_provenance(config, dataset, gates))
+    return predictor, gates
 
 
 def ensure_data(config: Config, console: Console) -> Dataset:
