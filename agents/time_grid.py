@@ -43,6 +43,16 @@ def walking_steps(config: Config) -> range:
     return range(first, first + lcm(2 * config.gait.stance_ms, step_ms(config)) // step_ms(config))
 
 
+def distinct_steps(config: Config, phases: int) -> tuple[int, ...]:
+    """One planning step for each pair of a phase and the stance patterns of all robots."""
+    distinct: dict[tuple[int, bytes], int] = {}
+    for step in walking_steps(config):
+        robots = range(config.team.robots)
+        patterns = b"".join(horizon_stance(config, i, step).tobytes() for i in robots)
+        distinct.setdefault((phase_of(config, step, phases), patterns), step)
+    return tuple(distinct.values())
+
+
 def place_in(cycle: range, step: int) -> int:
     """The step of the first cycle (`walking_steps`) that does the same as `step`."""
     return cycle.start + (step - cycle.start) % len(cycle) if step >= cycle.start else step

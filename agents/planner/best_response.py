@@ -1,8 +1,7 @@
-"""The best-response map of the agents' plans; its spectral radius tells whether they converge."""
+"""Whether the iteration of the agents' plans converges: its spectral radius, for either cost."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -10,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from quadriga.agents.planner.cooperation import cooperative_radius, is_cooperative, team_hessian
 from quadriga.agents.planner.planner_qp import build_problem
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
+from quadriga.agents.time_grid import distinct_steps, horizon_stance, phase_of
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.robot.conventions import Array
 
@@ -61,20 +61,39 @@ def best_response_radius(config: Config, predictor: Predictor) -> float:
         return 0.0
     return max(
         float(np.abs(linalg.eigvals(best_response_map(config, predictor, step))).max())
-        for step in _distinct_steps(config, predictor)
+        for step in distinct_steps(config, predictor.phases)
     )
+
+
+def iteration_radius(config: Config, predictor: Predictor) -> float:
+    """Spectral radius of the iteration of the agents' plans with the configured cost."""
+    if is_cooperative(config):
+        return cooperative_radius(config, predictor)
+    return best_response_radius(config, predictor)
+
+
+def radius_limit(config: Config) -> float:
+    """What the radius must be below.
+
+    Cooperative plans converge wherever it is below 1, bounds or not. Of best responses none knows
+    where bounds are active, hence the margin `identification.max_radius`.
+    """
+    return 1.0 if is_cooperative(config) else config.identification.max_radius
 
 
 def probe_costs(config: Config, predictor: Predictor) -> tuple[float, ...]:
     """Numbers that tell the QPs that a radius belongs to: Σ pᵀ H p and Σ pᵀ G_uᵀ Q̄ q of each step.
 
     p and q are fixed, so that any key that changes a cost changes them, whatever it is called.
-    Two numbers for each distinct planning step; () for a single robot.
+    Two numbers for each distinct planning step; () for a single robot. Of cooperative agents they
+    are pᵀ H p of the team, after a negative number that tells them apart and has the damping.
     """
     if predictor.meta.robots == 1:
         return ()
+    if is_cooperative(config):
+        return _probe_team(config, predictor)
     probes: list[float] = []
-    for step in _distinct_steps(config, predictor):
+    for step in distinct_steps(config, predictor.phases):
         random = np.random.default_rng(0)
         hessian = gradient = 0.0
         for cost in _local_costs(config, predictor, step):
@@ -82,6 +101,15 @@ def probe_costs(config: Config, predictor: Predictor) -> tuple[float, ...]:
             hessian += float(p @ cost.H @ p)
             gradient += float(p @ cost.gradient @ q)
         probes += [hessian, gradient]
+    return tuple(probes)
+
+
+def _probe_team(config: Config, predictor: Predictor) -> tuple[float, ...]:
+    probes = [-1.0 - config.planner.damping]
+    for step in distinct_steps(config, predictor.phases):
+        H, _ = team_hessian(config, predictor, step)
+        p = np.random.default_rng(0).uniform(0.5, 1.5, len(H))
+        probes.append(float(p @ H @ p))
     return tuple(probes)
 
 
@@ -112,13 +140,3 @@ def _local_costs(config: Config, predictor: Predictor, step: int) -> list[_Local
         nv = len(problem.columns)
         costs.append(_LocalCost(problem.H[:nv, :nv], problem.gradient, problem.columns))
     return costs
-
-
-def _distinct_steps(config: Config, predictor: Predictor) -> Iterable[int]:
-    """One planning step for each pair of a phase and the stance patterns of all robots."""
-    distinct: dict[tuple[int, bytes], int] = {}
-    for step in walking_steps(config):
-        robots = range(predictor.meta.robots)
-        patterns = b"".join(horizon_stance(config, i, step).tobytes() for i in robots)
-        distinct.setdefault((phase_of(config, step, predictor.phases), patterns), step)
-    return distinct.values()

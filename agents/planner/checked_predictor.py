@@ -8,10 +8,12 @@ from typing import Final
 
 from quadriga.agents.planner.best_response import (
     are_same_costs,
-    best_response_radius,
+    iteration_radius,
     probe_costs,
+    radius_limit,
     with_usual_costs,
 )
+from quadriga.agents.planner.cooperation import OWN, cost_of
 from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import REMEDY, Provenance, read
@@ -36,8 +38,7 @@ def load_checked(path: Path, config: Config) -> tuple[Predictor, Provenance]:
     """Read a predictor and refuse any that is not for this team or has not passed its gates.
 
     The figures are compared with the limits of `config`. If the agents respond to each other's
-    plans, and their QPs are not those that the best-response radius was computed for, the radius is
-    computed again.
+    plans, and their QPs are not those that the stored radius is of, it is computed again.
 
     Raises:
         PredictorFileError: no such file, not a predictor, corrupt, fitted for another team, gait,
@@ -60,7 +61,9 @@ def gates_in_force(gates: GateReport, config: Config, predictor: Predictor) -> G
         predictor: whose figures these are.
     """
     limits = config.identification
-    gates = replace(gates, gain_limits=tuple(limits.gain_range), radius_limit=limits.max_radius)
+    gates = replace(gates, gain_limits=tuple(limits.gain_range))
+    if find_kind(config.planner.kind).needs_peers or gates.cost == OWN:
+        gates = replace(gates, radius_limit=radius_limit(config))
     if not find_kind(config.planner.kind).needs_peers:
         return gates
     planner, probes = config.planner, probe_costs(config, predictor)
@@ -69,8 +72,14 @@ def gates_in_force(gates: GateReport, config: Config, predictor: Predictor) -> G
         known = probe_costs(with_usual_costs(config, gates.Q, gates.R), predictor)
     if are_same_costs(probes, known):
         return gates
-    radius = best_response_radius(config, predictor)
-    return replace(gates, radius=radius, Q=planner.Q, R=planner.R, cost_probes=probes)
+    return replace(
+        gates,
+        radius=iteration_radius(config, predictor),
+        cost=cost_of(config),
+        Q=planner.Q,
+        R=planner.R,
+        cost_probes=probes,
+    )
 
 
 def check_fitted_for(config: Config, path: Path, predictor: Predictor) -> None:

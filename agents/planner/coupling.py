@@ -20,12 +20,12 @@ class Coupling:
     read.
 
     Args:
-        G: the peers' blocks G_ij side by side, (n − 1, 6 N, 18 T_ini + 12 N).
+        G: the block G_ij of each peer, (6 N, 18 T_ini + 12 N), or one with any other rows.
         stance: of each peer over its plan, (N, 4).
     """
 
-    def __init__(self, G: Array, stance: Sequence[NDArray[np.bool_]]) -> None:
-        width = G.shape[2] if len(G) else 0
+    def __init__(self, G: Sequence[Array] | Array, stance: Sequence[NDArray[np.bool_]]) -> None:
+        width = G[0].shape[1] if len(G) else 0
         force_columns = [
             np.concatenate(
                 [np.arange(width - 3 * legs.size), width - 3 * legs.size + stance_columns(legs)]
@@ -39,7 +39,10 @@ class Coupling:
         self._rows = np.ascontiguousarray(rows, dtype=np.float32)
 
     def effect(self, z: NDArray[np.float32]) -> Array:
-        """The sum for all peers' deviations [u_ini; y_ini; u], (n − 1)(18 T_ini + 12 N). (6 N,)."""
+        """The sum for all peers' deviations [u_ini; y_ini; u], (n − 1)(18 T_ini + 12 N).
+
+        Shape (6 N,), or as many as the blocks have rows.
+        """
         return (self._rows @ z[self._places]).astype(np.float64)
 
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import linalg
 
-from quadriga.agents.planner.best_response import best_response_radius, probe_costs
+from quadriga.agents.planner.best_response import iteration_radius, probe_costs, radius_limit
+from quadriga.agents.planner.cooperation import cost_of
 from quadriga.agents.predictor.episode import Y_SCALE, Episode
 from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor
@@ -42,8 +43,9 @@ def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode])
         gain_times=_GAIN_TIMES,
         gains=tuple(tuple(row) for row in height_gains(config, predictor).tolist()),
         gain_limits=tuple(config.identification.gain_range),
-        radius=best_response_radius(config, predictor),
-        radius_limit=config.identification.max_radius,
+        radius=iteration_radius(config, predictor),
+        radius_limit=radius_limit(config),
+        cost=cost_of(config),
         Q=tuple(config.planner.Q),
         R=tuple(config.planner.R),
         condition=predictor.condition,

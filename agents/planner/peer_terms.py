@@ -8,12 +8,18 @@ from dataclasses import field
 import numpy as np
 from numpy.typing import NDArray
 
+from quadriga.agents.planner.cooperation import (
+    brings_forward,
+    is_cooperative,
+    peer_slope,
+    team_slope,
+)
 from quadriga.agents.planner.coupling import Coupling, fill_deviations
 from quadriga.agents.planner.neighbours import PeerData, PeerSelection
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robot.conventions import N_OUTPUTS, Array
 from quadriga.shared.runtime.record import record
 
 
@@ -23,8 +29,11 @@ class PeerTerms:
 
     Attributes:
         effect: Σ G_ij [u_ini; y_ini; u] over the peers, (6 N,).
+        slope: Σ M_ij [u_ini; y_ini; u] over the peers, what they add to the slope of the team's
+            cost by own stance forces, (nv,); 0 where each agent has its own cost.
         deviations: [u_ini; y_ini; u] of each peer with a usable plan, (18 T_ini + 12 N,).
-        held: last share of the effect of each silent peer, (6 N,).
+        held: last effect of each silent peer, (6 N,); where the cost is the team's, on all robots,
+            (6 N n,).
         steps: planning step, and step at which the peers' windows end.
         used: step of the plan used, by peer.
         lost: peers given up; the agent stops if there are any.
@@ -32,6 +41,7 @@ class PeerTerms:
     """
 
     effect: Array | float = 0.0
+    slope: Array | float = 0.0
     deviations: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     held: Mapping[str, Array] = field(default_factory=dict)
     steps: tuple[int, int] = (0, 0)
@@ -55,7 +65,8 @@ class Peers:
         # Memo of the couplings, one for each step of the gait's cycle; it changes no result.
         self._couplings: dict[tuple[int, int], Coupling] = {}
         self._cycle = walking_steps(config)
-        behind = {0 if config.planner.compensation else 1}
+        self._cooperative = is_cooperative(config)
+        behind = {0 if brings_forward(config) else 1}
         if config.planner.exchanges:
             behind.add(0)
         # The cycle's first step is set up twice: later its plans also begin at a step of the walk.
@@ -86,12 +97,36 @@ class Peers:
             share = self._last_share(before, peer)
             if share is not None:
                 held[peer.robot] = share
-        effect = self._coupling(step, selection.window_step).effect(z)
+        effect, slope = self._divide(self._coupling(step, selection.window_step).effect(z))
         for share in held.values():
-            effect += share
+            effect += self._own_part(share)
+            slope += self._slope_of(share, step)
         ages = {peer.robot: peer.age for peer in selection.peers}
         steps = step, selection.window_step
-        return PeerTerms(effect, deviations, held, steps, selection.used, selection.lost, ages)
+        return PeerTerms(
+            effect, slope, deviations, held, steps, selection.used, selection.lost, ages
+        )
+
+    def _divide(self, effect: Array) -> tuple[Array, Array | float]:
+        """A coupling's effect on own outputs, and on the slope of the team's cost."""
+        if not self._cooperative:
+            return effect, 0.0
+        outputs = N_OUTPUTS * self._config.planner.N
+        return effect[:outputs], effect[outputs:]
+
+    def _own_part(self, share: Array) -> Array:
+        """The effect on own outputs of what a silent peer did last."""
+        if not self._cooperative:
+            return share
+        outputs = N_OUTPUTS * self._config.planner.N
+        return share[self._index * outputs : (self._index + 1) * outputs]
+
+    def _slope_of(self, share: Array, step: int) -> Array | float:
+        """The slope of the team's cost at a planning step that an effect on all outputs makes."""
+        if not self._cooperative:
+            return 0.0
+        slopes = self._slopes(step)
+        return np.tensordot(slopes, share.reshape(len(slopes), -1), axes=([0, 2], [0, 1]))
 
     def _last_share(self, before: PeerTerms, peer: PeerData) -> Array | None:
         """A silent peer's last share of the effect, (6 N,); None if it never sent a plan.
@@ -101,6 +136,11 @@ class Peers:
         part = before.deviations.get(peer.robot)
         if part is None:
             return before.held.get(peer.robot)
+        if self._cooperative:
+            phase = self._phase(before.steps[0])
+            robots = range(self._config.team.robots)
+            blocks = [self._predictor.block(j, peer.index, phase) for j in robots]
+            return np.concatenate([block @ part for block in blocks])
         z = self._zero_deviations()
         self._part(z, peer.index)[:] = part
         return self._coupling(*before.steps).effect(z)
@@ -120,8 +160,26 @@ class Peers:
         place = place_in(self._cycle, step), place_in(self._cycle, window_step)
         coupling = self._couplings.get(place)
         if coupling is None:
-            phase = phase_of(self._config, step, self._predictor.phases)
-            G = self._predictor.G[phase][self._index, self._others]
             stance = [horizon_stance(self._config, j, window_step) for j in self._others]
-            coupling = self._couplings[place] = Coupling(G, stance)
+            coupling = self._couplings[place] = Coupling(self._blocks(step), stance)
         return coupling
+
+    def _blocks(self, step: int) -> list[Array]:
+        """G_ij of each peer; with the team's cost [G_ij; M_ij]."""
+        phase = self._phase(step)
+        blocks = [self._predictor.block(self._index, j, phase) for j in self._others]
+        if not self._cooperative:
+            return blocks
+        slopes = self._slopes(step)
+        return [
+            np.concatenate([block, peer_slope(slopes, self._predictor, j, phase)])
+            for block, j in zip(blocks, self._others, strict=True)
+        ]
+
+    def _slopes(self, step: int) -> Array:
+        """See `team_slope`."""
+        stance = horizon_stance(self._config, self._index, step)
+        return team_slope(self._config, self._predictor, self._index, self._phase(step), stance)
+
+    def _phase(self, step: int) -> int:
+        return phase_of(self._config, step, self._predictor.phases)

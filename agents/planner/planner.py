@@ -9,6 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces, nominal_table
+from quadriga.agents.planner.cooperation import (
+    build_team_problem,
+    is_cooperative,
+    new_plan_share,
+    stay_near_last,
+)
 from quadriga.agents.planner.free_step import FreeStep, OwnWindow
 from quadriga.agents.planner.neighbours import PeerSelection
 from quadriga.agents.planner.peer_terms import Peers, PeerTerms
@@ -71,11 +77,13 @@ class PlannerState:
     Attributes:
         step: its planning step; −1 before the first one.
         du: its force deviations, (N, 12), N.
+        y: the outputs it predicts, (N, 6).
         solves: QPs solved so far.
     """
 
     step: int = -1
     du: Array | None = None
+    y: Array | None = None
     solves: int = 0
 
 
@@ -133,6 +141,8 @@ class Planner:
         check_sizes(config, predictor)
         self._config, self._index, self._predictor = config, index, predictor
         self._cycle, self._peers = walking_steps(config), Peers(config, index, predictor)
+        self._cooperative = is_cooperative(config)
+        self._new_share = new_plan_share(config, predictor) if self._cooperative else 1.0
         # Memo of the set-ups, one for each step of the gait's cycle; it changes no result.
         self._setups: dict[int, _Setup] = {}
         for step in self._cycle:
@@ -167,20 +177,24 @@ class Planner:
         if setup.free is not None and not peers.lost:
             result = _plan_freely(setup.free, inputs, peers)
             if result is not None:
-                return PlannerState(inputs.step, result.du, state.solves + 1), result
+                return PlannerState(inputs.step, result.du, result.y, state.solves + 1), result
         # Any number may be measured; one that overflows shows in the result.
         with np.errstate(over="ignore", invalid="ignore"):
             return self._plan_by_solver(setup, state, inputs, peers)
 
     def problem_of(
-        self, inputs: PlannerInputs, peers: PeerTerms, G_ii: Array | None = None
+        self,
+        state: PlannerState,
+        inputs: PlannerInputs,
+        peers: PeerTerms,
+        G_ii: Array | None = None,
     ) -> SolvedQp | None:
         """The QP of `step` for the same arguments; None if a peer is lost: then no QP is solved."""
         if peers.lost:
             return None
         setup = self._setup(inputs.step, G_ii)
         with np.errstate(over="ignore", invalid="ignore"):
-            return _solve(setup, inputs, _free_response(setup, inputs, peers))
+            return self._solve(setup, state, inputs, peers, _free_response(setup, inputs, peers))
 
     def _plan_by_solver(
         self, setup: _Setup, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
@@ -191,9 +205,9 @@ class Planner:
         if peers.lost:
             solution, solves = no_solution(problem, PEER_LOST), 0
         else:
-            solution, solves = _solve(setup, inputs, y_free).solution, 1
+            solution, solves = self._solve(setup, state, inputs, peers, y_free).solution, 1
         x, status = solution.x, solution.status
-        if self._config.planner.damping and status == SOLVED:
+        if self._config.planner.damping and status == SOLVED and not self._cooperative:
             x = self._mix_with_last(problem, x, state, inputs.step)
         du, dy = unpack(problem, x, y_free)
         y, y_nominal = inputs.y_base + dy, inputs.y_base + y_free.reshape(dy.shape)
@@ -212,7 +226,34 @@ class Planner:
             residuals=solution.residuals,
             iterations=solution.iterations,
         )
-        return PlannerState(inputs.step, du, state.solves + solves), result
+        return PlannerState(inputs.step, du, y, state.solves + solves), result
+
+    def _solve(
+        self,
+        setup: _Setup,
+        state: PlannerState,
+        inputs: PlannerInputs,
+        peers: PeerTerms,
+        y_free: Array,
+    ) -> SolvedQp:
+        """Solve the QP of a step with this free response of the agent's own outputs."""
+        problem, y_des = setup.problem, (inputs.y_des - inputs.y_base).ravel()
+        error = y_free - y_des
+        if self._cooperative:
+            f = problem.linear_term(inputs.past(), y_des) + peers.slope
+            last, news = self._last(problem, state, inputs.step), self._news(state, inputs)
+            f = stay_near_last(problem, f, self._new_share, last, news)
+        else:
+            f = problem.pad(problem.gradient @ error)
+        lower, upper = problem.bounds(error)
+        solution = setup.solver.solve(f, lower, upper)
+        return SolvedQp(
+            problem,
+            f,
+            problem.lower if lower is None else lower,
+            problem.upper if upper is None else upper,
+            solution,
+        )
 
     def _mix_with_last(
         self, problem: PlannerProblem, x: Array, state: PlannerState, step: int
@@ -221,14 +262,30 @@ class Planner:
 
         Both satisfy the constraints on forces; these are convex, so the mixture satisfies them too.
         """
+        share, nv = self._config.planner.damping, len(problem.columns)
+        mixed = x.copy()
+        mixed[:nv] = (1.0 - share) * x[:nv] + share * self._last(problem, state, step)
+        return mixed
+
+    def _last(self, problem: PlannerProblem, state: PlannerState, step: int) -> Array:
+        """The last plan's deviations of the QP's forces, brought forward to a step. (nv,), N."""
         skipped = self._config.planner.applied * (step - state.step)
         last = np.zeros((self._config.planner.N, 12))
         if state.du is not None and 0 <= skipped < len(last):
             last[: len(last) - skipped] = state.du[skipped:]
-        share, nv = self._config.planner.damping, len(problem.columns)
-        mixed = x.copy()
-        mixed[:nv] = (1.0 - share) * x[:nv] + share * last.ravel()[problem.columns]
-        return mixed
+        return last.ravel()[problem.columns]
+
+    def _news(self, state: PlannerState, inputs: PlannerInputs) -> Array:
+        """Past deviations less those that the last plan predicted; zero where it predicted none."""
+        T_ini, since = len(inputs.u_ini), self._config.planner.applied * (inputs.step - state.step)
+        news = inputs.past()
+        if state.du is None or state.y is None or not 0 <= since <= T_ini:
+            return np.zeros_like(news)
+        u, y = news[: 12 * T_ini].reshape(T_ini, 12), news[12 * T_ini :].reshape(T_ini, 6)
+        u[: T_ini - since] = y[: T_ini - since] = 0.0
+        u[T_ini - since :] -= state.du[:since]
+        y[T_ini - since :] = inputs.y_ini[T_ini - since :] - state.y[:since]
+        return news
 
     def phase(self, step: int) -> int:
         """The contact phase of a planning step, which chooses the transition matrix."""
@@ -248,12 +305,16 @@ class Planner:
     def _build_setup(self, step: int, G_ii: Array) -> _Setup:
         past, weight = self._predictor.meta.past, self._config.robot.weight
         stance = horizon_stance(self._config, self._index, step)
-        problem = build_problem(
-            self._config.planner, weight, G_ii[:, past:], stance, G_ii[:, :past]
-        )
+        if self._cooperative:
+            problem = build_team_problem(self._config, self._predictor, self._index, step)
+        else:
+            problem = build_problem(
+                self._config.planner, weight, G_ii[:, past:], stance, G_ii[:, :past]
+            )
         solver = SOLVERS[self._config.planner.solver](problem)
         nominal = nominal_forces(stance, weight)
-        closed = None if self._config.planner.damping else solver.closed_form
+        plain = not self._cooperative and not self._config.planner.damping
+        closed = solver.closed_form if plain else None
         free = None if closed is None else FreeStep(problem, closed, nominal, nominal_table(weight))
         return _Setup(problem, solver, nominal, free)
 
@@ -278,19 +339,3 @@ def _free_response(setup: _Setup, inputs: PlannerInputs, peers: PeerTerms) -> Ar
     """Output deviations under nominal forces, y_free of eq. 11. Shape (6 N,)."""
     y_free: Array = setup.problem.condensed.Y_past @ inputs.past() + peers.effect
     return y_free
-
-
-def _solve(setup: _Setup, inputs: PlannerInputs, y_free: Array) -> SolvedQp:
-    """Solve the QP of a step with this free response."""
-    problem = setup.problem
-    error = y_free - (inputs.y_des - inputs.y_base).ravel()
-    f = problem.pad(problem.gradient @ error)
-    lower, upper = problem.bounds(error)
-    solution = setup.solver.solve(f, lower, upper)
-    return SolvedQp(
-        problem,
-        f,
-        problem.lower if lower is None else lower,
-        problem.upper if upper is None else upper,
-        solution,
-    )

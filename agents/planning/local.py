@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.modes import WALK
+from quadriga.agents.planner.cooperation import brings_forward, is_cooperative, relevant_peers
 from quadriga.agents.planner.neighbours import Neighbours
 from quadriga.agents.planner.peer_memory import PeerMemory
 from quadriga.agents.planner.peer_terms import PeerTerms
@@ -138,7 +139,7 @@ class LocalPlanning:
         if request is None:
             return None
         G_ii = self._own_block(state.correction, request.inputs.step)
-        return self._planner.problem_of(request.inputs, request.terms, G_ii)
+        return self._planner.problem_of(state.planner, request.inputs, request.terms, G_ii)
 
     def _take_in(
         self, state: LocalState, inputs: PlanningInputs
@@ -214,7 +215,7 @@ class LocalPlanning:
 
     def _terms(self, state: LocalState, step: int, references: tuple[Reference, ...]) -> PeerTerms:
         """The peers' terms of a planning step, made of what they sent up to the step before."""
-        end = step if self._config.planner.compensation else step - 1
+        end = step if brings_forward(self._config) else step - 1
         selection = self._neighbours.select(
             state.peers, step - 1, self._first_step, window_step=end
         )
@@ -288,4 +289,6 @@ def _coupled_peers(config: Config, index: int, predictor: Predictor) -> frozense
     others = frozenset(range(config.team.robots)) - {index}
     if predictor.meta.neighbours == "all":
         return others
+    if is_cooperative(config):
+        return relevant_peers(predictor, index)
     return frozenset(j for j in others if predictor.G[:, index, j].any())

@@ -21,9 +21,10 @@ class GateReport:
         gain_times: times after the step of force at which the height response is compared [s].
         gains: predicted over physical height response, per robot and time, of the worst phase.
         gain_limits: every gain must lie between these.
-        radius: spectral radius of the best-response map, the worst of all stance patterns
-            and phases.
+        radius: spectral radius of the iteration of the agents' plans, the worst of all stance
+            patterns and phases.
         radius_limit: must be below this.
+        cost: that the agents minimise: "own", then the plans are best responses; "team".
         Q, R: planner weights that the radius was computed for.
         cost_probes: tell the QPs that the radius was computed for, whatever their cost is made of;
             () in a file of an earlier version, whose cost had no other weights than Q and R.
@@ -47,6 +48,12 @@ class GateReport:
     coupling: tuple[tuple[float, ...], ...] = ()
     size: int = 0
     cost_probes: tuple[float, ...] = ()
+    cost: str = "own"
+
+    @property
+    def iteration(self) -> str:
+        """What is iterated, in words."""
+        return "best-response" if self.cost == "own" else "cooperative"
 
     def to_dict(self) -> dict[str, Any]:
         """A dictionary that can be written as JSON."""
@@ -96,8 +103,13 @@ class GateReport:
                     )
         if find_kind(kind).needs_peers and not self.radius < self.radius_limit:
             raise PredictorError(
-                "predictor: radius of the best-response map",
+                f"predictor: radius of the {self.iteration} map",
                 f"{self.radius:.3f}",
                 f"below {self.radius_limit:g}",
-                "the agents' plans would diverge; raise identification.block_weight",
+                "the agents' plans would diverge; "
+                + (
+                    "raise identification.block_weight, or plan with planner.cost = 'team'"
+                    if self.cost == "own"
+                    else "leave planner.damping at 0, which chooses it"
+                ),
             )

@@ -87,7 +87,7 @@ def _build_figures(report: FitReport) -> Table:
             for k, time in enumerate(gates.gain_times)
             for robot, gain in zip(_list_robots(report), (r[k] for r in gates.gains), strict=True)
         ),
-        ("best-response radius", format_number(gates.radius), f"< {gates.radius_limit:g}"),
+        (f"{gates.iteration} radius", format_number(gates.radius), f"< {gates.radius_limit:g}"),
         ("condition number", format_number(gates.condition, ".3g"), ""),
         ("size of G", f"{format_number(gates.size, '.1f', 1e-6)} MB", ""),
         ("fit", f"{format_number(report.fit_seconds, '.1f')} s", ""),

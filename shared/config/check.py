@@ -97,6 +97,8 @@ def _check_planner(planner: PlannerConfig, world: WorldConfig) -> None:
         )
     if not kind.publishes:
         return
+    if planner.cost == "team" and kind.needs_peers:
+        _check_cooperation(planner)
     latency = max(1, planner.latency_ms) if kind.central else planner.latency_ms
     longest = SAMPLE_MS * (planner.N - planner.applied)
     if latency > longest:
@@ -114,6 +116,21 @@ def _check_planner(planner: PlannerConfig, world: WorldConfig) -> None:
             f"at least planner.peer_timeout + {_ANSWER:g} s = {least:g} s",
             "else robots that wait for a frozen peer's plan count as frozen too",
         )
+
+
+def _check_cooperation(planner: PlannerConfig) -> None:
+    """What a plan for the whole team cannot heed: other agents' outputs, and their corrections."""
+    for name, value in (
+        ("output_bounds", planner.output_bounds),
+        ("adaptation", planner.adaptation),
+    ):
+        if value != "none":
+            raise ConfigError(
+                f"planner.{name}",
+                f"{value!r} with planner.cost 'team'",
+                "'none', or planner.cost = 'own'",
+                "each agent would plan with bounds or a G of its own that its peers do not know",
+            )
 
 
 def _check_plants(config: Config) -> None:

@@ -32,6 +32,7 @@ ROBOTS, SECONDS = 2, 1.2
 KINDS: dict[str, dict[str, object]] = {
     "centralised": {"planner.kind": "centralised", "planner.latency_ms": 8},
     "deepc": {"planner.kind": "deepc"},
+    "cooperative": {"planner.cost": "team", "planner.exchanges": 1},
     "exchanged": {"planner.exchanges": 2, "planner.compensation": True, "planner.damping": 0.2},
     "fast": {"planner.preset": "fast", "planner.footholds": "planned"},
 }

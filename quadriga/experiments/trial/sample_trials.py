@@ -41,7 +41,7 @@ _TRIALS: Final[tuple[dict[str, Any], ...]] = (
         "world.weak_motor": "r1:FL_calf:0.3,any:any:0.5", "world.weak_share": 0.6,
     },
     _NONE | _SHORT | {"team.robots": 1, "world.terrain": "pebbles", "world.terrain_height": 0.02},
-    _NONE | _SHORT | {"team.robots": 1, "world.terrain": "gravel", "controller.preset": "paper"},
+    _NONE | _SHORT | {"team.robots": 1, "world.terrain": "gravel", "controller.preset": "plain"},
     _NONE | _SHORT | {
         "team.robots": 1, "world.terrain": "heightfield", "estimator.kind": "truth",
         "controller.preset": "soft",
@@ -60,7 +60,11 @@ _TRIALS: Final[tuple[dict[str, Any], ...]] = (
     },
     _SHORT | {
         "team.robots": 2, "planner.kind": "distributed", "planner.interface": "force",
-        "planner.solver": "osqp", "controller.preset": "paper",
+        "planner.solver": "osqp", "controller.preset": "plain",
+    },
+    _SHORT | {
+        "team.robots": 3, "planner.kind": "distributed", "planner.cost": "team",
+        "planner.exchanges": 1,
     },
     _SHORT | {"team.robots": 2, "planner.kind": "centralised"},
     _SHORT | {"team.robots": 2, "planner.kind": "deepc"},

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from quadriga.agents.planner.cooperation import is_cooperative
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.time_grid import step_ms
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
@@ -127,5 +128,9 @@ def _peers(config: Config, index: int, names: tuple[str, ...]) -> tuple[str, ...
     if not find_kind(config.planner.kind).needs_peers:
         return ()
     if config.identification.neighbours == "yoked":
-        return tuple(names[j] for j in neighbours(len(names), config.team.yokes, index))
+        near = {*neighbours(len(names), config.team.yokes, index)}
+        if is_cooperative(config):
+            # Those count too whose forces matter to the outputs of a neighbour.
+            near |= {k for j in near for k in neighbours(len(names), config.team.yokes, j)}
+        return tuple(names[j] for j in sorted(near) if j != index)
     return tuple(name for j, name in enumerate(names) if j != index)

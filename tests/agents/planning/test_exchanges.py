@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -50,6 +51,24 @@ def test_every_step_has_its_plan_and_its_answers_each_with_what_it_used() -> Non
             assert plan.tick == 40 * plan.step
             asked = plan.step if plan.exchange else plan.step - 1
             assert plan.used == ({} if plan.serial == (8, 0) else {peer: asked})
+
+
+def test_who_plans_for_the_team_looks_at_its_peers_as_they_are_now() -> None:
+    """Windows end at the step itself, of a new plan by its peers' plans, of an answer measured."""
+    config = replace(ANSWERING, planner=replace(ANSWERING.planner, cost="team"))
+    steps = record(Rollout(config, coupled(config, 1.5), every_100_ms), 600)
+    looked = 0
+    for name, peer in (("r1", "r2"), ("r2", "r1")):
+        for before, after in itertools.pairwise(steps[name]):
+            plan = before.outputs.plan
+            if plan is None or plan.step <= FIRST_PLAN // 40:
+                continue
+            assert plan.status == "solved"
+            assert plan.used == {peer: plan.step if plan.exchange else plan.step - 1}
+            terms = after.before.planning.terms
+            assert terms.steps == (plan.step, plan.step)
+            looked += 1
+    assert looked == 2 * 6 * (ANSWERS + 1)
 
 
 def test_awaited_are_the_peer_s_answers_in_turn() -> None:

@@ -1,0 +1,235 @@
+"""Cooperative planning: each agent minimises the cost of the whole team over its own forces.
+
+With z_l = [u_ini; y_ini; u] of robot l and e the commanded less the base outputs, which the team's
+robots have in common, the team's cost is
+
+    V(u_1 … u_n) = Σ_j ½‖Σ_l G_jl z_l − e‖²_Q̄ + ½‖u_j‖²_R̄.
+
+Agent i minimises it over u_i alone, with its peers' plans fixed, and stays near its own last plan
+u_i, brought forward to now:
+
+    u_i⁺ = argmin over the feasible u of V(…, u, …) + ½ (1/w − 1) ‖u − u_i‖²_Dᵢ,
+
+D_i = H_ii being the Hessian of V by u_i. Where no bound is active that is the convex combination
+w û_i + (1 − w) u_i of the best new plan û_i and the last one.
+
+Why that converges, whatever the coupling. Let d = u⁺ − u, D the block diagonal of the Hessian H of
+V. Each u_i⁺ is optimal in a convex set that holds u_i, so ∇V · d ≤ −dᵀ D d / w, and
+
+    V(u + d) − V(u) ≤ −dᵀ D d / w + ½ dᵀ H d ≤ −(1/w − ½ λ_max) dᵀ D d
+
+with λ_max the largest eigenvalue of D⁻¹H: V falls, bounds or not, for any w < 2/λ_max; λ_max ≤ n,
+so that w = 1/n always will do (Stewart, Venkat, Rawlings, Wright and Pannocchia, Cooperative
+distributed model predictive control, Systems & Control Letters 59, 2010). V is strictly convex and
+each agent's bounds are its own, so the limit is the optimum of eq. 7.
+
+What an agent has measured since its last plan its peers do not know yet, so nobody else reacts to
+it. Before it counts as the last plan, u_i is therefore moved by the agent's best reaction to that
+news, the difference δ between its window and the one that its last plan predicted:
+−D_i⁻¹ Σ_j G_jiᵀ Q̄ G_ji,past δ. Only what all know is answered with the share w. In an iteration on
+the same windows there is no news, and nothing of the above changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+from scipy.sparse.linalg import eigsh
+
+from quadriga.agents.planner.planner_qp import Condensed, PlannerProblem, constrain, stance_columns
+from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.time_grid import distinct_steps, horizon_stance, phase_of
+from quadriga.shared.config.sections import Config
+from quadriga.shared.planner_kinds import find_kind
+from quadriga.shared.robot.conventions import N_OUTPUTS, Array
+
+OWN: Final = "own"  # values of planner.cost
+TEAM: Final = "team"
+_TOLERANCE: Final = 1e-6  # of the eigenvalues
+
+
+def is_cooperative(config: Config) -> bool:
+    """Whether each agent of a team plans for all of it, knowing its peers' plans."""
+    planner = config.planner
+    several = config.team.robots > 1
+    return several and planner.cost == TEAM and find_kind(planner.kind).needs_peers
+
+
+def cost_of(config: Config) -> str:
+    """Whose cost each agent minimises: "own" or "team"."""
+    return TEAM if is_cooperative(config) else OWN
+
+
+def brings_forward(config: Config) -> bool:
+    """Whether peers' windows and plans are brought forward by their age.
+
+    Who plans for the team needs its peers' outputs from now on, so it does without being asked.
+    """
+    return config.planner.compensation or is_cooperative(config)
+
+
+def relevant_peers(predictor: Predictor, index: int) -> frozenset[int]:
+    """Robots whose forces matter to an output that those of robot `index` matter to."""
+    n = predictor.meta.robots
+    acts = np.array(
+        [[any(predictor.block(j, i, p).any() for p in range(predictor.phases)) for i in range(n)]
+         for j in range(n)]
+    )  # fmt: skip
+    reached = acts[acts[:, index]].any(axis=0)
+    return frozenset(np.flatnonzero(reached).tolist()) - {index}
+
+
+def team_slope(
+    config: Config, predictor: Predictor, index: int, phase: int, stance: NDArray[np.bool_]
+) -> Array:
+    """[G_1i; …; G_ni]ᵀ Q̄ of the stance forces of agent i, the slope of V by team outputs.
+
+    Args:
+        config: weights and sizes.
+        predictor: of the team.
+        index: i, 0-based.
+        phase: chooses the transition matrix.
+        stance: of robot i over the horizon, (N, 4).
+
+    Returns:
+        Shape (n, nv, 6 N), by robot whose outputs they are.
+    """
+    columns, Q = stance_columns(stance), np.tile(config.planner.Q, config.planner.N)
+    blocks = [predictor.future_block(j, index, phase) for j in range(config.team.robots)]
+    return np.stack([block[:, columns].T * Q for block in blocks])
+
+
+def build_team_problem(
+    config: Config, predictor: Predictor, index: int, step: int
+) -> PlannerProblem:
+    """The QP of agent i over its own stance forces v, with the team's cost and its own constraints.
+
+        H = Σ_j G_jiᵀ Q̄ G_ji + R̄,   f = Σ_j G_jiᵀ Q̄ (G_ji,past past_i − e) + Σ_l≠i M_il z_l
+
+    The last sum comes from the peers (`peer_slope`). The predicted outputs are the agent's own.
+
+    Args:
+        config: the team's configuration.
+        predictor: of the team.
+        index: i, 0-based.
+        step: planning step, which chooses phase and stance.
+    """
+    phase, stance = phase_of(config, step, predictor.phases), horizon_stance(config, index, step)
+    past, columns = predictor.meta.past, stance_columns(stance)
+    slopes = team_slope(config, predictor, index, phase, stance)
+    F_past = np.zeros((len(columns), past))
+    H = np.diag(np.tile(config.planner.R, len(columns) // 3))
+    for j, slope in enumerate(slopes):
+        block = predictor.block(j, index, phase)
+        F_past += slope @ block[:, :past]
+        H += slope @ block[:, past + columns]
+    own = predictor.block(index, index, phase)
+    condensed = Condensed(
+        H=0.5 * (H + H.T),
+        F_past=F_past,
+        F_des=-slopes.sum(axis=0),
+        Y_v=np.ascontiguousarray(own[:, past + columns]),
+        Y_past=np.ascontiguousarray(own[:, :past]),
+    )
+    return constrain(config.planner, config.robot.weight, condensed, stance)
+
+
+def peer_slope(slopes: Array, predictor: Predictor, peer: int, phase: int) -> Array:
+    """M_il = Σ_j G_jiᵀ Q̄ G_jl of one peer l: what its z_l adds to f. (nv, 18 T_ini + 12 N).
+
+    Args:
+        slopes: `team_slope` of agent i.
+        predictor: of the team.
+        peer: l, 0-based.
+        phase: chooses the transition matrix.
+    """
+    M = np.zeros((slopes.shape[1], predictor.meta.width))
+    for j, slope in enumerate(slopes):
+        M += slope @ predictor.block(j, peer, phase)
+    return M
+
+
+def team_hessian(config: Config, predictor: Predictor, step: int) -> tuple[Array, list[int]]:
+    """Hessian of V by all agents' stance forces, (s, s), and how many of them each agent has."""
+    robots, phase = range(config.team.robots), phase_of(config, step, predictor.phases)
+    columns = [stance_columns(horizon_stance(config, i, step)) for i in robots]
+    G = np.block([[predictor.future_block(i, j, phase)[:, columns[j]] for j in robots]
+                  for i in robots])  # fmt: skip
+    H = (G.T * np.tile(config.planner.Q, len(G) // N_OUTPUTS)) @ G
+    H.flat[:: len(H) + 1] += np.tile(config.planner.R, len(H) // 3)
+    return 0.5 * (H + H.T), [len(places) for places in columns]
+
+
+def eigenvalue_range(H: Array, sizes: Sequence[int]) -> tuple[float, float]:
+    """Least and largest eigenvalue of D⁻¹H, D being the blocks of these sizes on the diagonal of H.
+
+    They are those of the symmetric L⁻¹ H L⁻ᵀ with D = L Lᵀ. Their mean is 1, which lies between.
+    """
+    whitened, ends = H.copy(), np.cumsum(sizes)
+    for end, size in zip(ends, sizes, strict=True):
+        part = slice(end - size, end)
+        factor = linalg.cholesky(H[part, part], lower=True)
+        whitened[part] = linalg.solve_triangular(factor, whitened[part], lower=True)
+        whitened[:, part] = linalg.solve_triangular(factor, whitened[:, part].T, lower=True).T
+    # A start that is fixed, so that equal data give equal bits.
+    least, most = eigsh(
+        0.5 * (whitened + whitened.T),
+        k=2,
+        which="BE",
+        v0=np.ones(len(H)),
+        tol=_TOLERANCE,
+        return_eigenvectors=False,
+    )
+    return float(least), float(most)
+
+
+def stay_near_last(problem: PlannerProblem, f: Array, w: float, last: Array, news: Array) -> Array:
+    """The linear term of w times the QP that stays near the last plan; its Hessian is that of V.
+
+    Args:
+        problem: of `build_team_problem`.
+        f: linear term of V by own stance forces, (nv,).
+        w: share of the new plan.
+        last: the last plan's deviations of these forces, (nv,), N.
+        news: δ, window less the one that the last plan predicted, (18 T_ini,).
+    """
+    condensed = problem.condensed
+    return w * f + (1.0 - w) * (condensed.F_past @ news - condensed.H @ last)
+
+
+def new_plan_share(config: Config, predictor: Predictor) -> float:
+    """w, the share of û_i in an agent's plan: 1 less `planner.damping`, unless that is 0.
+
+    Then it is the one with which the iteration of the plans contracts fastest where no bound is
+    active, and at most 1: its eigenvalues are 1 − w λ, the largest of them in size least at
+    w = 2/(λ_min + λ_max). That is below 2/λ_max, so V falls with bounds, too. Of all planning
+    steps the least w.
+    """
+    return _choose_share(config, _eigenvalue_ranges(config, predictor))
+
+
+def cooperative_radius(config: Config, predictor: Predictor) -> float:
+    """Spectral radius of the iteration u ← u − w D⁻¹(H u + f), the largest of all planning steps.
+
+    Below 1 exactly where w < 2/λ_max, which is enough for convergence with bounds as well.
+    """
+    ranges = _eigenvalue_ranges(config, predictor)
+    w = _choose_share(config, ranges)
+    return max(abs(1.0 - w * end) for ends in ranges for end in ends)
+
+
+def _eigenvalue_ranges(config: Config, predictor: Predictor) -> list[tuple[float, float]]:
+    return [
+        eigenvalue_range(*team_hessian(config, predictor, step))
+        for step in distinct_steps(config, predictor.phases)
+    ]
+
+
+def _choose_share(config: Config, ranges: Sequence[tuple[float, float]]) -> float:
+    if config.planner.damping:
+        return 1.0 - config.planner.damping
+    return min(1.0, *(2.0 / (least + most) for least, most in ranges))

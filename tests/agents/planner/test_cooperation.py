@@ -1,0 +1,389 @@
+"""Cooperative plans: each step lowers the team's cost, and they become the central planner's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import linalg
+
+from quadriga.agents.planner.best_response import (
+    are_same_costs,
+    best_response_radius,
+    iteration_radius,
+    probe_costs,
+    radius_limit,
+)
+from quadriga.agents.planner.cooperation import (
+    cooperative_radius,
+    eigenvalue_range,
+    is_cooperative,
+    new_plan_share,
+    relevant_peers,
+    team_hessian,
+)
+from quadriga.agents.planner.gates import run_gates
+from quadriga.agents.planner.neighbours import HELD, LOST, SHIFTED, PeerData, PeerSelection
+from quadriga.agents.planner.peer_terms import PeerTerms
+from quadriga.agents.planner.planner import Planner, PlannerInputs
+from quadriga.agents.planner.team_planner import build_centralised
+from quadriga.agents.predictor.fits import fit_ridge
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.time_grid import horizon_stance, walking_steps
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.conventions import Array
+from tests.a1 import WEIGHT, nominal_forces
+from tests.agents.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, terms_of
+
+ROUNDS = 200  # within which strongly coupled plans are as good as the central planner's
+
+
+def cooperative(config: Config, robots: int = 3, **changes: Any) -> Config:
+    """The configuration with the team's cost."""
+    planner = replace(config.planner, cost="team", **changes)
+    return replace(config, team=replace(config.team, robots=robots), planner=planner)
+
+
+def coupled(config: Config, seed: int, strength: float) -> Predictor:
+    """Any G of a plausible size whose blocks off the diagonal are `strength` times as large.
+
+    What a robot does to itself it does to others too, in part, so that the blocks are alike.
+    """
+    meta = PredictorMeta.of(config)
+    rng, n = np.random.default_rng(seed), meta.robots
+    shape = (meta.N, 6, meta.width)
+    size = 1e-4 * np.array([1.0, 30.0, 30.0, 10.0, 10.0, 30.0])[:, None]
+    own = [rng.normal(size=shape) * size for _ in range(n)]
+    G = np.empty((1, n, n, 6 * meta.N, meta.width))
+    for i in range(n):
+        for j in range(n):
+            mixed = own[j] if i == j else strength * (own[j] + 0.3 * rng.normal(size=shape) * size)
+            G[0, i, j] = mixed.reshape(6 * meta.N, meta.width)
+    return Predictor(meta, G)
+
+
+class Round:
+    """A team whose windows stay as they are, and whose agents plan again and again."""
+
+    def __init__(self, config: Config, predictor: Predictor, seed: int, size: float) -> None:
+        rng, planner = np.random.default_rng(seed), config.planner
+        scale = size * np.array([0.004, 0.1, 0.1, 0.02, 0.02, 0.1])
+        y_des = np.tile(BASE + 0.2 * scale * rng.normal(size=6), (planner.N, 1))
+        self.config, self.predictor = config, predictor
+        self.inputs = [
+            inputs_of(
+                config,
+                u_ini=nominal_forces(np.ones((planner.T_ini, 4), dtype=np.bool_))
+                + 5.0 * size * rng.normal(size=(planner.T_ini, 12)),
+                y_ini=BASE + scale * rng.normal(size=(planner.T_ini, 6)),
+                y_des=y_des,
+            )
+            for _ in range(config.team.robots)
+        ]
+        self.planners = [Planner(config, i, predictor) for i in range(config.team.robots)]
+        self.states = [planner.initial() for planner in self.planners]
+        self.du = np.zeros((config.team.robots, planner.N, 12))
+
+    def plan(self) -> None:
+        """Every agent plans with its peers' last plans."""
+        new = []
+        for i, planner in enumerate(self.planners):
+            peers = tuple(self._data(j) for j in range(len(self.planners)) if j != i)
+            base = self.inputs[i].y_base_ini
+            terms = planner.peer_terms(NOTHING, PeerSelection(peers, STEP), STEP, base)
+            self.states[i], result = planner.step(self.states[i], self.inputs[i], terms)
+            assert result.status == "solved"
+            new.append(result.du)
+        self.du = np.array(new)
+
+    def best(self) -> Array:
+        """Force deviations of the central planner, (n, N, 12)."""
+        result = build_centralised(self.config, self.predictor).step(self.inputs)
+        stance = [horizon_stance(self.config, i, STEP) for i in range(len(self.inputs))]
+        return result.u - nominal_forces(np.stack(stance))
+
+    def cost(self, du: Array) -> float:
+        """The team's cost, written out."""
+        return team_cost(self.config, self.predictor, self.inputs, du)
+
+    def _data(self, j: int) -> PeerData:
+        own = self.inputs[j]
+        du_ini = own.u_ini - nominal_forces(own.stance_ini)
+        return peer(
+            self.config,
+            robot=f"r{j + 1}",
+            index=j,
+            step=STEP,
+            du_ini=du_ini,
+            y_ini=own.y_ini,
+            du=self.du[j],
+        )
+
+
+def team_cost(
+    config: Config, predictor: Predictor, inputs: list[PlannerInputs], du: Array
+) -> float:
+    z = np.stack([np.concatenate([r.past(), f.ravel()]) for r, f in zip(inputs, du, strict=True)])
+    y = predictor.predict(z).reshape(len(inputs), -1, 6)
+    total = 0.0
+    for robot, predicted, forces in zip(inputs, y, du, strict=True):
+        error = robot.y_base + predicted - robot.y_des
+        total += float((error**2 @ config.planner.Q).sum())
+        total += float((forces.reshape(-1, 4, 3) ** 2 @ config.planner.R).sum())
+    return total
+
+
+@given(seed=st.integers(0, 2**32 - 1), n=st.integers(2, 4), rows=st.integers(1, 30))
+@settings(deadline=None, max_examples=30)
+def test_eigenvalues_are_those_of_the_damped_problem(seed: int, n: int, rows: int) -> None:
+    """Of any sum of a matrix of any rank and a positive diagonal, in blocks of unequal sizes."""
+    rng = np.random.default_rng(seed)
+    sizes = rng.integers(2, 6, n).tolist()
+    G = rng.normal(size=(rows, sum(sizes))) * 10.0 ** rng.uniform(-2, 2)
+    H = G.T @ G + np.diag(rng.uniform(0.5, 2.0, sum(sizes)))
+    ends = np.cumsum(sizes)
+    D = linalg.block_diag(*[H[e - s : e, e - s : e] for e, s in zip(ends, sizes, strict=True)])
+    expected = linalg.eigh(H, D, eigvals_only=True)
+    least, most = eigenvalue_range(H, sizes)
+    assert least == pytest.approx(expected[0], rel=1e-5)
+    assert most == pytest.approx(expected[-1], rel=1e-5)
+    assert 0.0 < least <= 1.0 + 1e-9
+    assert 1.0 - 1e-9 <= most <= n + 1e-9
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    strength=st.floats(0.0, 3.0),
+    size=st.sampled_from([0.1, 1.0, 4.0]),
+    damping=st.sampled_from([0.0, 2 / 3, 0.9]),
+)
+@settings(deadline=None, max_examples=6)
+def test_no_round_of_plans_raises_the_team_s_cost(
+    small: Config, seed: int, strength: float, size: float, damping: float
+) -> None:
+    """With bounds that are active or not, with the automatic share of the last plan or 1 − 1/n."""
+    config = cooperative(small, damping=damping)
+    predictor = coupled(config, seed, strength)
+    assert cooperative_radius(config, predictor) < 1.0
+    rounds = Round(config, predictor, seed, size)
+    cost = rounds.cost(rounds.du)
+    for _ in range(5):
+        rounds.plan()
+        now = rounds.cost(rounds.du)
+        assert now <= cost * (1.0 + 1e-9)
+        cost = now
+
+
+@pytest.mark.parametrize(("size", "bounded"), [(0.3, False), (3.0, True)])
+def test_strongly_coupled_plans_become_the_central_planner_s(
+    small: Config, size: float, bounded: bool
+) -> None:
+    """Where best responses diverge, with forces at their bounds or none there.
+
+    What is lost against the optimum falls below 0.1 % of what was lost without plans.
+    """
+    config = cooperative(small)
+    predictor = coupled(config, 5, 0.5)
+    assert best_response_radius(config, predictor) > 1.1
+    assert iteration_radius(config, predictor) < 1.0
+    rounds = Round(config, predictor, 7, size)
+    first, best = rounds.cost(rounds.du), rounds.best()
+    lowest = rounds.cost(best)
+    at_bounds = np.abs(best[..., 0::3]) > small.planner.deviation_max[0] - 1e-6
+    assert (at_bounds.mean() > 0.05) == bounded
+    for _ in range(ROUNDS):
+        rounds.plan()
+    assert 0.0 <= rounds.cost(rounds.du) - lowest < 1e-3 * (first - lowest)
+    np.testing.assert_allclose(rounds.du, best, atol=1.0)
+
+
+def test_best_responses_of_the_same_team_do_not(small: Config) -> None:
+    config = cooperative(small)
+    predictor = coupled(config, 5, 0.5)
+    rounds = Round(small_own(config), predictor, 7, 0.3)
+    lowest = rounds.cost(rounds.best())
+    for _ in range(ROUNDS):
+        rounds.plan()
+    assert rounds.cost(rounds.du) > 100.0 * lowest
+
+
+def test_the_slope_is_that_of_the_team_s_cost(small: Config, linear_team: Team) -> None:
+    """At the last plan that of the QP is w times it, against differences of the cost."""
+    config = cooperative(small)
+    meta = replace(PredictorMeta.of(config), ridge=1e-10, block_weight=1.0)
+    rounds = Round(config, fit_ridge([linear_team(3).episode(2500, 1)], meta), 3, 1.0)
+    rounds.plan()
+    at, planner = rounds.du, rounds.planners[1]
+    peers = tuple(rounds._data(j) for j in (0, 2))
+    base = rounds.inputs[1].y_base_ini
+    terms = planner.peer_terms(NOTHING, PeerSelection(peers, STEP), STEP, base)
+    qp = planner.problem_of(rounds.states[1], rounds.inputs[1], terms)
+    assert qp is not None
+    w = new_plan_share(config, rounds.predictor)
+    slope = (qp.problem.H @ at[1].ravel()[qp.problem.columns] + qp.f) / w
+    for place in range(0, len(slope), 7):
+        step = np.zeros_like(at)
+        step[1].flat[qp.problem.columns[place]] = 0.1
+        rise = (rounds.cost(at + step) - rounds.cost(at - step)) / 0.4  # the cost is twice V
+        assert slope[place] == pytest.approx(rise, rel=1e-4, abs=1e-4 * np.abs(slope).max())
+
+
+def test_news_is_answered_in_full_and_all_else_in_part(small: Config) -> None:
+    """One step after a plan: the same window as it predicted, and one that is off it."""
+    config = cooperative(small)
+    predictor = coupled(config, 4, 0.5)
+    planner, w = Planner(config, 0, predictor), new_plan_share(config, predictor)
+    assert w < 0.9
+    before, applied, T_ini = inputs_of(config, STEP), small.planner.applied, small.planner.T_ini
+    terms = terms_of(config, planner, peer(config), peer(config, robot="r3", index=2))
+    state, first = planner.step(planner.initial(), before, terms)
+    stance = horizon_stance(config, 0, STEP)[:applied]
+    expected = inputs_of(
+        config,
+        STEP + 1,
+        u_ini=np.concatenate([before.u_ini[applied:], nominal_forces(stance) + first.du[:applied]]),
+        y_ini=np.concatenate([before.y_ini[applied:], first.y[:applied]]),
+        stance_ini=np.concatenate([before.stance_ini[applied:], stance]),
+    )
+    calm = planner.step(state, expected, terms)[1]
+    off = np.zeros((T_ini, 6))
+    off[-1] = 0.003, 0.05, 0.05, 0.01, 0.01, 0.05
+    surprised = planner.step(state, replace(expected, y_ini=expected.y_ini + off), terms)[1]
+    qp = planner.problem_of(state, expected, terms)
+    assert qp is not None
+    F_past, H = qp.problem.condensed.F_past, qp.problem.H
+    news = np.concatenate([np.zeros(12 * T_ini), off.ravel()])
+    answer = -np.linalg.solve(H, F_past @ news)
+    moved = (surprised.du - calm.du).ravel()[qp.problem.columns]
+    np.testing.assert_allclose(moved, answer, atol=1e-6)
+    assert np.abs(answer).max() > 0.01
+
+
+def test_the_share_is_the_one_that_contracts_fastest(small: Config) -> None:
+    config = cooperative(small)
+    predictor = coupled(config, 11, 0.8)
+    automatic = cooperative_radius(config, predictor)
+    last = 1.0 - new_plan_share(config, predictor)
+    assert 0.0 < last < 2 / 3
+    for other in (0.8 * last, 1.2 * last, 2 / 3):
+        assert cooperative_radius(cooperative(small, damping=other), predictor) > automatic
+    H, sizes = team_hessian(config, predictor, walking_steps(config)[0])
+    ends = np.cumsum(sizes)
+    D = linalg.block_diag(*[H[e - s : e, e - s : e] for e, s in zip(ends, sizes, strict=True)])
+    one_step = np.eye(len(H)) - (1.0 - last) * linalg.solve(D, H)
+    assert np.abs(linalg.eigvals(one_step)).max() <= automatic + 1e-6
+
+
+def test_without_coupling_the_plan_is_the_agent_s_own(small: Config) -> None:
+    config = cooperative(small)
+    predictor = coupled(config, 2, 0.0)
+    assert new_plan_share(config, predictor) == pytest.approx(1.0)
+    selfish = replace(config, planner=replace(config.planner, cost="own"))
+    mine, theirs = Round(config, predictor, 1, 1.0), Round(selfish, predictor, 1, 1.0)
+    mine.plan()
+    theirs.plan()
+    np.testing.assert_allclose(mine.du, theirs.du, atol=1e-6)
+
+
+def test_too_little_of_the_last_plan_is_refused(small: Config, linear_team: Team) -> None:
+    config = cooperative(small, damping=0.01)
+    plant = replace(config, controller=replace(config.controller, ki_z=0.0))
+    meta = replace(PredictorMeta.of(plant), ridge=1e-9, block_weight=1.0)
+    exact = fit_ridge([linear_team(3).episode(2500, 1)], meta)
+    alike = exact.G.copy()
+    for i in range(3):
+        for j in range(3):
+            alike[0, i, j, :, meta.past :] = exact.G[0, j, j, :, meta.past :]
+    wild = Predictor(exact.meta, alike)
+    assert cooperative_radius(plant, wild) > 1.0
+    report = replace(
+        run_gates(plant, exact, [linear_team(3).episode(200, 50)]),
+        radius=cooperative_radius(plant, wild),
+    )
+    assert (report.cost, report.radius_limit) == ("team", radius_limit(plant)) == ("team", 1.0)
+    with pytest.raises(PredictorError, match=r"cooperative map.*below 1.*planner\.damping"):
+        report.check()
+    automatic = cooperative(plant, damping=0.0)
+    assert cooperative_radius(automatic, wild) < 1.0
+    probes = [probe_costs(c, wild) for c in (plant, automatic, small_own(plant))]
+    assert not any(are_same_costs(a, b) for k, a in enumerate(probes) for b in probes[k + 1 :])
+
+
+def small_own(config: Config) -> Config:
+    return replace(config, planner=replace(config.planner, cost="own"))
+
+
+def test_who_has_no_peers_minimises_its_own_cost(small: Config) -> None:
+    assert is_cooperative(cooperative(small))
+    assert not is_cooperative(cooperative(small, robots=1))
+    assert not is_cooperative(cooperative(small, kind="decentralised"))
+
+
+def test_those_matter_who_reach_a_neighbour(small: Config) -> None:
+    """In a chain of four whose ends know nothing of each other."""
+    config = cooperative(small, robots=4)
+    G = coupled(config, 1, 0.5).G.copy()
+    for i in range(4):
+        for j in range(4):
+            G[:, i, j] *= abs(i - j) <= 1
+    predictor = Predictor(PredictorMeta.of(config), G)
+    assert [sorted(relevant_peers(predictor, i)) for i in range(4)] == [
+        [1, 2],
+        [0, 2, 3],
+        [0, 1, 3],
+        [1, 2],
+    ]
+
+
+def test_an_older_plan_counts_from_where_it_is_now_and_a_silent_peer_s_effect_is_held(
+    small: Config, linear_team: Callable[..., Any]
+) -> None:
+    config = cooperative(small)
+    meta = replace(PredictorMeta.of(config), ridge=1e-10, block_weight=1.0)
+    predictor = fit_ridge([linear_team(3).episode(2500, 1)], meta)
+    planner = Planner(config, 0, predictor)
+    base = np.tile(BASE, (small.planner.T_ini, 1))
+    stance = np.repeat(horizon_stance(config, 1, STEP), 3, axis=1)
+    pushing = np.where(stance, np.tile([20.0, 5.0, 0.0], (8, 4)), 0.0)
+    third = peer(config, robot="r3", index=2)
+
+    def terms(step: int, before: PeerTerms, *peers: PeerData) -> PeerTerms:
+        return planner.peer_terms(before, PeerSelection(peers, step), step, base)
+
+    fresh = terms(STEP, NOTHING, peer(config, du=pushing), third)
+    z = np.zeros((3, predictor.meta.width))
+    z[1, predictor.meta.past :] = pushing.ravel()
+    effect = predictor.predict(z)
+
+    def slope_of(step: int) -> Array:
+        asked = terms(step, NOTHING, third)
+        problem = planner.problem_of(planner.initial(), inputs_of(config, step), asked)
+        assert problem is not None
+        columns, Q = problem.problem.columns, np.tile(config.planner.Q, config.planner.N)
+        total: Array = sum(
+            predictor.future_block(j, 0)[:, columns].T @ (Q * effect[j]) for j in range(3)
+        )
+        return total
+
+    np.testing.assert_allclose(fresh.effect, effect[0], atol=1e-6 * np.abs(effect).max())
+    np.testing.assert_allclose(fresh.slope, slope_of(STEP), rtol=1e-4, atol=1e-4)
+    shifted = terms(STEP, NOTHING, peer(config, status=SHIFTED, age=1, du=pushing), third)
+    np.testing.assert_array_equal(shifted.slope, fresh.slope)
+    now = fresh
+    for step in range(STEP + 1, STEP + 7):
+        silent = peer(config, status=HELD, step=STEP, age=step - STEP)
+        now = terms(step, now, silent, third)
+        np.testing.assert_allclose(now.effect, effect[0], atol=1e-6 * np.abs(effect).max())
+        expected = slope_of(step)
+        np.testing.assert_allclose(now.slope, expected, atol=1e-5 * np.abs(expected).max())
+    gone = terms(STEP + 7, now, peer(config, status=LOST, age=9), third)
+    state, result = planner.step(planner.initial(), inputs_of(config, STEP + 7), gone)
+    assert result.status == "nominal:peer-lost"
+    assert state.solves == 0
+    assert inputs_of(config).weight == WEIGHT
