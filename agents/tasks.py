@@ -24,6 +24,8 @@ class Tasks:
 
     def __init__(self, config: Config) -> None:
         self._feedforward = config.planner.interface == "feedforward"
+        # Planned height and tilt are in general not tracked: the reference would follow the error.
+        self._tracks_all = not self._feedforward and config.planner.tracked == "outputs"
         self._planned_footholds = config.planner.footholds == "planned"
         self._stance_ms = config.gait.stance_ms
 
@@ -52,17 +54,17 @@ class Tasks:
         if mode.name != WALK:
             deviation = _ZERO
         factor = mode.speed_factor(tick)
-        vx, vy = factor * reference.vx, factor * reference.vy
+        vx, vy, wz = factor * reference.vx, factor * reference.vy, factor * reference.wz
+        height, roll, pitch = reference.height, 0.0, 0.0
         ahead = None
         if v_ref is not None:
             if not self._feedforward:
-                # Planned roll and pitch are not tracked: the reference would follow the error.
                 vx, vy = float(v_ref[0, 0]), float(v_ref[0, 1])
             if self._planned_footholds:
                 ahead = self._velocity_ahead(v_ref, progress)
-        return Task(
-            vx, vy, factor * reference.wz, reference.height, deviation, self._feedforward, ahead
-        )
+        if self._tracks_all and setpoint.y_ref is not None:
+            height, _, _, roll, pitch, wz = map(float, setpoint.y_ref)
+        return Task(vx, vy, wz, height, deviation, self._feedforward, ahead, roll=roll, pitch=pitch)
 
     def _velocity_ahead(self, v_ref: Array, progress: float) -> Array:
         """Mean planned velocity until the middle of the next stance, (2,), m/s.

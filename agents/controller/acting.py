@@ -52,6 +52,7 @@ class TaskLayout(NamedTuple):
         ahead: likewise; NaN for the velocity of now.
         dt: time since the last tick, s.
         new_sample: 1 if a sample of forces begins with this tick, else 0.
+        tilt: see `Task`.
     """
 
     deviation: slice
@@ -62,10 +63,13 @@ class TaskLayout(NamedTuple):
     ahead: slice
     dt: int
     new_sample: int
+    tilt: slice
 
 
 TASK: Final = TaskLayout(
-    **places(deviation=N_FORCES, v=2, wz=1, height=1, feedforward=1, ahead=2, dt=1, new_sample=1)
+    **places(
+        deviation=N_FORCES, v=2, wz=1, height=1, feedforward=1, ahead=2, dt=1, new_sample=1, tilt=2
+    )
 )
 TASK_SIZE: Final = row_size(TASK)
 
@@ -194,7 +198,7 @@ def _track_reference(
         memory[MEMORY.yaw_des],
     )
     height = memory[MEMORY.ground_height] + task[TASK.height]
-    reference = TrunkReference(task[TASK.v], task[TASK.wz], height)
+    reference = TrunkReference(task[TASK.v], task[TASK.wz], height, task[TASK.tilt])
     after, push, v_des = feedback(before, gains, trunk, reference, dt)
     memory[MEMORY.height_integral], memory[MEMORY.yaw_des] = after.height, after.yaw
     memory[MEMORY.speed_integral] = after.speed

@@ -55,6 +55,7 @@ class Task:
             swing is not applied.
         feedforward: whether the deviation also becomes accelerations of the trunk.
         ahead: velocity with which footholds count, (2,), m/s; None: the one of now.
+        roll, pitch: of the trunk, rad.
     """
 
     vx: float
@@ -64,6 +65,8 @@ class Task:
     deviation: Array
     feedforward: bool
     ahead: Array | None = None
+    roll: float = 0.0
+    pitch: float = 0.0
 
 
 @record
@@ -178,7 +181,8 @@ def _row_of(task: Task, dt: float, new_sample: bool) -> Array:
     x, y = (math.nan, math.nan) if task.ahead is None else task.ahead
     # At once: each number that numpy is given by itself costs as much as this.
     numbers = task.vx, task.vy, task.wz, task.height, task.feedforward, x, y, dt, new_sample
-    _NUMBERS.pack_into(row, _NUMBERS_AT, *numbers)  # type: ignore[arg-type]  # it is a buffer
+    tilt = task.roll, task.pitch
+    _NUMBERS.pack_into(row, _NUMBERS_AT, *numbers, *tilt)  # type: ignore[arg-type]  # a buffer
     return row
 
 

@@ -49,11 +49,13 @@ class TrunkReference(NamedTuple):
         v: vx and vy, (2,), m/s, yaw frame.
         wz: yaw rate, rad/s.
         height: of its origin, m, odometry frame.
+        tilt: roll and pitch, (2,), rad.
     """
 
     v: Array
     wz: float
     height: float
+    tilt: Array
 
 
 class Integrators(NamedTuple):
@@ -114,7 +116,7 @@ def feedback(
     out[2] = gains.kp_z * z_error - gains.kd_z * trunk.velocity[2] + gains.ki_z * height
     speed, position_error, out[:2] = _plane_feedback(before, gains, trunk, reference, c, s, dt)
     yaw = _desired_heading(before.yaw, rpy[2], reference.wz, dt)
-    out[3:] = _attitude_feedback(gains, trunk, rpy, yaw, reference.wz)
+    out[3:] = _attitude_feedback(gains, trunk, rpy, yaw, reference)
     return Integrators(height, speed, position_error, yaw), out, v_des
 
 
@@ -165,20 +167,24 @@ def _desired_heading(before: float, yaw: float, wz: float, dt: float) -> float:
 
 @compiled
 def _attitude_feedback(
-    gains: TrunkGains, trunk: TrunkState, rpy: Array, yaw_des: float, wz: float
+    gains: TrunkGains, trunk: TrunkState, rpy: Array, yaw_des: float, reference: TrunkReference
 ) -> Array:
-    """Angular acceleration towards level and the desired heading, (3,), rad/s², odometry frame."""
+    """Angular acceleration towards tilt and heading asked for, (3,), rad/s², odometry frame."""
     c, s = np.cos(rpy[2]), np.sin(rpy[2])
     omega = trunk.R @ trunk.omega
     yaw_error = min(_YAW_LIMIT, max(-_YAW_LIMIT, wrap_angle(yaw_des - rpy[2])))
     # Tilt error about the horizontal axes of the yaw frame, taken to the odometry frame.
-    roll_push = -gains.kp_tilt * rpy[0] - gains.kd_tilt * (c * omega[0] + s * omega[1])
-    pitch_push = -gains.kp_tilt * rpy[1] - gains.kd_tilt * (-s * omega[0] + c * omega[1])
+    roll_push = gains.kp_tilt * (reference.tilt[0] - rpy[0]) - gains.kd_tilt * (
+        c * omega[0] + s * omega[1]
+    )
+    pitch_push = gains.kp_tilt * (reference.tilt[1] - rpy[1]) - gains.kd_tilt * (
+        -s * omega[0] + c * omega[1]
+    )
     return np.array(
         [
             c * roll_push - s * pitch_push,
             s * roll_push + c * pitch_push,
-            gains.kp_yaw * yaw_error + gains.kd_yaw * (wz - omega[2]),
+            gains.kp_yaw * yaw_error + gains.kd_yaw * (reference.wz - omega[2]),
         ]
     )
 

@@ -28,12 +28,14 @@ class Fitted:
         sha256: its digest; empty without one.
         data: the file of what it was fitted to, if the planner needs that too.
         refused: why it must not walk; empty if it may.
+        radius: of the iteration of the agents' plans; None where they do not use their peers'.
     """
 
     path: Path | None = None
     sha256: str = ""
     data: Path | None = None
     refused: str = ""
+    radius: float | None = None
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -70,10 +72,15 @@ def file_sha256(path: Path) -> str:
 def _prepare(config: Config, console: Console) -> Fitted:
     try:
         path = ensure_predictor(config, console)
-        sha256 = predictor_sha256(load_checked(path, config)[0])
+        predictor, provenance = load_checked(path, config)
     except PredictorFileError:
         raise  # of which no other predictor is to blame
     except PredictorError as error:
         return Fitted(refused=reason(error))
-    needs_data = find_kind(config.planner.kind).needs_data
-    return Fitted(path, sha256, data_path(config) if needs_data else None)
+    kind = find_kind(config.planner.kind)
+    return Fitted(
+        path,
+        predictor_sha256(predictor),
+        data_path(config) if kind.needs_data else None,
+        radius=float(f"{provenance.gates.radius:.6g}") if kind.needs_peers else None,
+    )

@@ -91,6 +91,8 @@ class Line:
         wall_s: what they took, s of one core.
         tally: what came of them.
         beside: against the baseline; None for that itself, or without any pair.
+        radius: of the iteration of the agents' plans, of all worlds together the largest; None if
+            there is no such iteration, or nobody has noted it.
     """
 
     world: World
@@ -100,6 +102,7 @@ class Line:
     wall_s: float
     tally: Tally
     beside: Beside | None
+    radius: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

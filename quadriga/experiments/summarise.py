@@ -13,7 +13,12 @@ from quadriga.recordings.traces import ERRORS
 
 
 def build_lines(
-    rows: Sequence[TrialOutcome], wanted: Mapping[Group, int], baseline: str, *, pooled: bool
+    rows: Sequence[TrialOutcome],
+    wanted: Mapping[Group, int],
+    baseline: str,
+    *,
+    pooled: bool,
+    radii: Mapping[Group, float] | None = None,
 ) -> tuple[Line, ...]:
     """A line for each group that has a trial, then for each variant in all worlds together.
 
@@ -22,7 +27,9 @@ def build_lines(
         wanted: how many trials of each group there should be, in the order of the lines.
         baseline: the variant that the others are compared with.
         pooled: whether there are lines of all worlds together.
+        radii: of the iteration of the agents' plans, by group.
     """
+    known = radii or {}
     groups: dict[Group, list[TrialOutcome]] = {group: [] for group in wanted}
     for row in sorted(rows, key=lambda row: row.seed):
         groups[row.group].append(row)
@@ -36,7 +43,9 @@ def build_lines(
     def build_line(world: tuple[str, ...], name: str, rows: list[TrialOutcome], of: int) -> Line:
         beside = None if name == baseline else compare_with_baseline(rows, base)
         spent = sum(row.wall_s for row in rows)
-        return Line(world, name, of, len(rows), spent, tally_trials(rows), beside)
+        noted = [known[group] for group in {row.group for row in rows} if group in known]
+        radius = max(noted, default=None)
+        return Line(world, name, of, len(rows), spent, tally_trials(rows), beside, radius)
 
     lines = [
         build_line(group.world, group.variant, trials, wanted[group])

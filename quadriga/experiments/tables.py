@@ -52,6 +52,7 @@ COLUMNS: Final[Mapping[str, Column]] = {
     "p50": ("plan p50 [ms]", _of(lambda tally: tally.planner_ms_p50, ".2f")),
     "p99": ("p99 [ms]", _of(lambda tally: tally.planner_ms_p99, ".2f")),
     "plans": ("plans", _plans),
+    "radius": ("radius", lambda line: format_number(line.radius, ".2f")),
     **{f"rmse-{name}": (f"RMSE {label_output(name)}", _rmse(name)) for name in ERRORS},
 }
 

@@ -17,7 +17,7 @@ _WALK: Final = {"gait.stand_ms": 100, "identification.hold": 0.2}
 _WALKS: Final[tuple[dict[str, Any], ...]] = (
     {"team.robots": 2, "team.alternate_phase": False},
     {"team.robots": 1, "estimator.kind": "truth", "controller.preset": "soft"},
-    {"team.robots": 1, "controller.preset": "paper", "planner.interface": "force"},
+    {"team.robots": 1, "controller.preset": "plain", "planner.interface": "force"},
 )
 
 

@@ -11,6 +11,13 @@ from quadriga.shared.config.key import key
 class IdentificationConfig:
     """Data collection and the predictor's fit and gates."""
 
+    preset: str = key(
+        "usual",
+        "-",
+        "usual; paper: the pseudo-inverse, whatever its best-response radius: replaces the "
+        "defaults below",
+        choices=("usual", "paper"),
+    )
     seconds: float = key(
         0.0,
         "s",

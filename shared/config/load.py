@@ -12,7 +12,7 @@ from typing import Any
 from quadriga.shared.config.check import check
 from quadriga.shared.config.presets import PRESETS, preset_keys
 from quadriga.shared.config.reference_trace import ROW_END, inline_trace
-from quadriga.shared.config.renamed import RENAMED
+from quadriga.shared.config.renamed import RENAMED, current_value
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean, name_file_errors
 from quadriga.shared.robot.robots import ROBOTS
@@ -81,6 +81,7 @@ def build(given: Mapping[str, Any]) -> Config:
     for section, presets in PRESETS.items():
         keys = given.get(section, {})
         if isinstance(keys, dict):
+            keys = {key: current_value(f"{section}.{key}", value) for key, value in keys.items()}
             given = {**given, section: {**presets.get(str(keys.get("preset")), {}), **keys}}
     given = _with_robots_values(given)
     known = {item.name: item for item in fields(Config)}

@@ -45,8 +45,9 @@ class ControllerConfig:
     preset: str = key(
         "robust",
         "-",
-        "robust, soft (lets planned forces through) or paper: replaces the defaults below",
-        choices=("robust", "soft", "paper"),
+        "robust, soft (lets planned forces through) or plain (without what keeps a team up on "
+        "uneven ground): replaces the defaults below",
+        choices=("robust", "soft", "plain"),
     )
     gamma_tau: float = key(1e2, "1", "gamma_1, weight of torques", low=0.0, high=1e9)
     gamma_force: float = key(1e3, "1", "gamma_2, weight of force errors", low=0.0, high=1e9)

@@ -16,9 +16,10 @@ class PlannerConfig:
     preset: str = key(
         "usual",
         "-",
-        "usual: plans every 40 ms, as in the paper; fast: every 10 ms and with weights of its "
-        "own, for a network that delivers messages in less time: replaces the defaults below",
-        choices=("usual", "fast"),
+        "usual: plans every 40 ms, as in the paper, with other weights; fast: every 10 ms, for a "
+        "network that delivers messages in less time, with weights of its own; paper: as the paper "
+        "writes it, with its Q and R: replaces the defaults below",
+        choices=("usual", "fast", "paper"),
     )
     kind: str = key(
         "distributed",
@@ -32,11 +33,24 @@ class PlannerConfig:
         "-",
         "numbers that a plug-in's planner lets be set: name=number pairs, separated by spaces",
     )
+    cost: str = key(
+        "own",
+        "-",
+        "distributed: what each agent minimises over its own forces. own: its own cost (eq. 12); "
+        "team: that of the whole team, with peers' windows and plans brought forward and the new "
+        "plan mixed with its last one: plans approach a central planner's whatever the coupling",
+        choices=("own", "team"),
+    )
     compensation: bool = key(
         False, "-", "distributed: bring peers' windows and plans forward by their age"
     )
     damping: float = key(
-        0.0, "1", "share of an agent's own last plan that its new one keeps", low=0.0, high=0.95
+        0.0,
+        "1",
+        "share of an agent's own last plan that its new one keeps; 0: none, or, with the cost "
+        "'team', the share with which the plans converge fastest",
+        low=0.0,
+        high=0.95,
     )
     exchanges: int = key(
         0, "-", "distributed: best responses to the peers' plans of the same step", low=0, high=8
@@ -70,6 +84,13 @@ class PlannerConfig:
         "feedforward: force deviations become accelerations of the pre-stabilised trunk; "
         "force: planned forces and speeds are tracked by the whole-body QP (the paper)",
         choices=("feedforward", "force"),
+    )
+    tracked: str = key(
+        "speeds",
+        "-",
+        "interface force: what of a plan's outputs the whole-body QP tracks. speeds: vx and vy; "
+        "outputs: all of them (the paper)",
+        choices=("speeds", "outputs"),
     )
     footholds: str = key(
         "measured",

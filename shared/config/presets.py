@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
-# The plain setting of the paper: scheduled contacts, flat ground, a position reference of limited
-# lead, moderate gains. Walks on flat ground; see `robust` for what keeps a team up elsewhere.
-_PAPER: Final = MappingProxyType(
+# This project's choice of a low level as plain as the paper's may be, of which the paper gives the
+# weights gamma alone: scheduled contacts, flat ground, a position reference of limited lead,
+# moderate gains. Walks on flat ground; see `robust` for what keeps a team up elsewhere.
+_PLAIN: Final = MappingProxyType(
     {
         "ki_z": 0.0, "kp_xy": 100.0, "kd_xy": 20.0, "ki_xy": 0.0, "position_error_limit": 0.05,
         "kp_tilt": 400.0, "kd_tilt": 40.0, "contact_detection": False, "swing_height": 0.07,
@@ -37,11 +38,26 @@ _FAST: Final = MappingProxyType(
     }
 )  # fmt: skip
 
+# The planner as the paper writes it: its Q and R, forces and all planned outputs handed on to the
+# whole-body QP, plans in effect at once; no bound on forces but the friction cone, no fading. The
+# bound and the range stand for none: no plan reaches them.
+_PAPER_PLANNER: Final = MappingProxyType(
+    {
+        "interface": "force", "tracked": "outputs", "latency_ms": 0,
+        "Q": (1e6, 1e5, 1e5, 2e5, 1e5, 1e4), "R": (0.05, 0.05, 0.5),
+        "deviation_max": (1e4, 1e4, 1e4), "fade": (1e6, 1e6, 1e6, 1e6),
+    }
+)  # fmt: skip
+
+# The pseudo-inverse, and no gate on its best responses: the paper has none.
+_PAPER_FIT: Final = MappingProxyType({"predictor": "pinv", "max_radius": 10.0})
+
 _USUAL: Final = MappingProxyType[str, Any]({})
 PRESETS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = MappingProxyType(
     {
-        "controller": MappingProxyType({"robust": _USUAL, "soft": _SOFT, "paper": _PAPER}),
-        "planner": MappingProxyType({"usual": _USUAL, "fast": _FAST}),
+        "controller": MappingProxyType({"robust": _USUAL, "soft": _SOFT, "plain": _PLAIN}),
+        "planner": MappingProxyType({"usual": _USUAL, "fast": _FAST, "paper": _PAPER_PLANNER}),
+        "identification": MappingProxyType({"usual": _USUAL, "paper": _PAPER_FIT}),
     }
 )
 

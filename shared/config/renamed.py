@@ -1,4 +1,4 @@
-"""Keys of the configuration that had another name once: by their first name, `section.key`."""
+"""Keys and values of the configuration that had another name once."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
+# By their first name, `section.key`. Who writes it is told the new one.
 RENAMED: Final[Mapping[str, str]] = MappingProxyType(
     {
         "controller.follow_fall": "controller.track_sinking_trunk",
@@ -16,7 +17,14 @@ RENAMED: Final[Mapping[str, str]] = MappingProxyType(
         "controller.tell_sides": "controller.reject_side_contacts",
     }
 )
+# By key, today's name of each value by its first one, which is still read.
+RENAMED_VALUES: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
+    {"controller.preset": MappingProxyType({"paper": "plain"})}
+)
 _FIRST: Final = {new: old for old, new in RENAMED.items()}
+_FIRST_VALUES: Final = {
+    key: {new: old for old, new in values.items()} for key, values in RENAMED_VALUES.items()
+}
 
 
 def current_name(name: str) -> str:
@@ -24,9 +32,17 @@ def current_name(name: str) -> str:
     return RENAMED.get(name, name)
 
 
+def current_value(name: str, value: Any) -> Any:
+    """What a value of `section.key`, today's name, is called today."""
+    return _rename_value(name, value, RENAMED_VALUES)
+
+
 def with_current_names(sections: Mapping[str, Any]) -> dict[str, Any]:
     """Values by section and key as another version wrote them, under today's names."""
-    return {section: _rename(section, keys, RENAMED) for section, keys in sections.items()}
+    return {
+        section: _rename(section, keys, RENAMED, RENAMED_VALUES)
+        for section, keys in sections.items()
+    }
 
 
 def with_first_names(sections: Mapping[str, Any]) -> dict[str, Any]:
@@ -34,13 +50,22 @@ def with_first_names(sections: Mapping[str, Any]) -> dict[str, Any]:
 
     What is hashed or compared across versions has these: a new name alone changes no hash.
     """
-    return {section: _rename(section, keys, _FIRST) for section, keys in sections.items()}
+    return {
+        section: _rename(section, keys, _FIRST, _FIRST_VALUES) for section, keys in sections.items()
+    }
 
 
-def _rename(section: str, keys: Any, names: Mapping[str, str]) -> Any:
+def _rename(
+    section: str, keys: Any, names: Mapping[str, str], values: Mapping[str, Mapping[str, str]]
+) -> Any:
     if not isinstance(keys, dict):
         return keys
-    return {
-        names.get(f"{section}.{key}", f"{section}.{key}").partition(".")[2]: value
-        for key, value in keys.items()
-    }
+    renamed = {}
+    for key, value in keys.items():
+        name = f"{section}.{key}"
+        renamed[names.get(name, name).partition(".")[2]] = _rename_value(name, value, values)
+    return renamed
+
+
+def _rename_value(name: str, value: Any, values: Mapping[str, Mapping[str, str]]) -> Any:
+    return values.get(name, {}).get(value, value) if isinstance(value, str) else value

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from quadriga.experiments.plan import Group
 from quadriga.experiments.trial.origin import is_same_code
-from quadriga.shared.config.renamed import current_name
+from quadriga.shared.config.renamed import current_name, current_value
 from quadriga.shared.errors import ConfigError
 
 FILE: Final = "campaign.json"
@@ -27,7 +27,8 @@ class GroupEntry:
 
     `config_sha256` is that of its configuration with seed 0, and of the trace that this names;
     `plugin` names the package that its planner comes with, its version and the digest of its files
-    (`plugin_origin`), and is empty for a built-in planner.
+    (`plugin_origin`), and is empty for a built-in planner; `radius` is that of the iteration of the
+    agents' plans, None where they do not use their peers' or where nobody has noted it.
     """
 
     scenario: str
@@ -37,6 +38,7 @@ class GroupEntry:
     predictor_sha256: str
     seeds: tuple[int, ...]
     plugin: str = ""
+    radius: float | None = None
 
     @property
     def group(self) -> Group:
@@ -90,7 +92,10 @@ class Manifest:
             SweepEntry(**{**sweep, "key": current_name(sweep["key"])}) for sweep in body["sweeps"]
         )
         variants = {
-            variant: {current_name(key): value for key, value in dict(keys).items()}
+            variant: {
+                current_name(key): current_value(current_name(key), value)
+                for key, value in dict(keys).items()
+            }
             for variant, keys in dict(body["variants"]).items()
         }
         read = {"groups": groups, "sweeps": sweeps, "variants": variants}
@@ -143,7 +148,11 @@ class Manifest:
                         f"of {new}",
                         _REMEDY,
                     )
-            groups[entry.group] = replace(known, seeds=tuple(sorted({*known.seeds, *entry.seeds})))
+            groups[entry.group] = replace(
+                known,
+                seeds=tuple(sorted({*known.seeds, *entry.seeds})),
+                radius=entry.radius if known.radius is None else known.radius,
+            )
         return replace(
             more,
             typed=(*self.typed, *(t for t in more.typed if t not in self.typed)),

@@ -26,13 +26,14 @@ from quadriga.shared.errors import ConfigError
 from quadriga.tables import Table
 
 _WALKS: Final = (
-    "trials", "success", "falls", "stops", "time-to-fall", "vx", "transport", "p50", "p99", "plans",
+    "trials", "success", "falls", "stops", "time-to-fall", "vx", "transport", "p50", "p99",
+    "radius", "plans",
 )  # fmt: skip
 _NOTES: Final = {
     "success": "Success: every robot walked to the end; in brackets Wilson's 95 % interval. "
     "Medians: time to fall over the falls; mean vx and cost of transport (∑|τ·q̇|dt / (m g d), "
     "payload included) over the walks to the end; plan times over the trials' own quantiles, on a "
-    "loaded machine.",
+    "loaded machine. Radius: of the iteration of the robots' plans, which converges below 1.",
     "falls": "Pairs: the same world and seed with the baseline. Difference of the fall rates, "
     "negative where the variant falls less, with Newcombe's 95 % interval for paired proportions; "
     "p of McNemar's exact two-sided test, each of a single test, not corrected for their number.",
@@ -128,7 +129,13 @@ def read_report(folder: Path, baseline: str | None, worst: int) -> CampaignRepor
         variants=tuple(manifest.variants),
         worlds=worlds,
         swept=tuple(sweep.name for sweep in manifest.sweeps),
-        lines=build_lines(rows, wanted, base, pooled=len(worlds) > 1),
+        lines=build_lines(
+            rows,
+            wanted,
+            base,
+            pooled=len(worlds) > 1,
+            radii={e.group: e.radius for e in manifest.groups if e.radius is not None},
+        ),
         seeds=tuple(sorted({seed for entry in manifest.groups for seed in entry.seeds})),
         versions=(manifest.versions,),
     )

@@ -133,6 +133,7 @@ def build_manifest(plan: CampaignPlan, fitted: Mapping[Config, Fitted], typed: s
                 fitted[config].sha256,
                 tuple(sorted(plan.seeds)),
                 plugin_origin(config.planner.kind),
+                fitted[config].radius,
             )
             for group, config in plan.configs.items()
         ),

@@ -14,7 +14,9 @@ from quadriga.shared.runtime.places import SOURCE
 CHECKOUT: Final = SOURCE
 FOLDER: Final = CHECKOUT / "deploy" / "experiments"
 # In this order on the page: what was promised, then what explains it, then how far it goes.
-_ORDER: Final = ("paper", "hard", "low-level", "ideas", "central", "beyond", "ten", "sweeps")
+_ORDER: Final = (
+    "paper", "as-written", "hard", "low-level", "ideas", "central", "beyond", "ten", "sweeps",
+)  # fmt: skip
 _SUFFIX: Final = ".toml"
 
 

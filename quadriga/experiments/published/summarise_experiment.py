@@ -41,6 +41,12 @@ def summarise_experiment(experiment: Experiment, campaigns: Sequence[CampaignTri
             dict.fromkeys(experiment.groups(), len(seeds)),
             experiment.baseline,
             pooled=len(worlds) > 1 and not sweeps,
+            radii={
+                entry.group: entry.radius
+                for manifest, _ in campaigns
+                for entry in manifest.groups
+                if entry.radius is not None
+            },
         ),
         seeds=tuple(sorted({row.seed for row in rows})),
         versions=tuple(

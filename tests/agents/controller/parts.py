@@ -103,7 +103,12 @@ def trunk_acceleration(
 ) -> tuple[Integrators, Array, Array]:
     """One step of the trunk's references."""
     trunk = trunk_at(estimate)
-    reference = TrunkReference(np.array([task.vx, task.vy]), task.wz, ground_height + task.height)
+    reference = TrunkReference(
+        np.array([task.vx, task.vy]),
+        task.wz,
+        ground_height + task.height,
+        np.array([task.roll, task.pitch]),
+    )
     after, push, v_des = feedback(previous, gains, trunk, reference, dt)
     if task.feedforward:
         push += feedforward(task.deviation, stance, trunk, estimate.p_foot, rigid(body))

@@ -85,13 +85,13 @@ def test_a_wrong_command_line_shows_the_usage(
 def test_the_configuration_in_force_can_be_printed_and_read_back(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    options = ["--robots", "5", "--preset", "paper", "--set", "planner.R=[1,2,3]"]
+    options = ["--robots", "5", "--preset", "plain", "--set", "planner.R=[1,2,3]"]
     status, out, _ = run(capsys, "config", *options)
     assert status == 0
     path = tmp_path / "team.toml"
     path.write_text(out, encoding="utf-8")
     config = load(path)
-    assert (config.team.robots, config.controller.preset) == (5, "paper")
+    assert (config.team.robots, config.controller.preset) == (5, "plain")
     assert config.planner.R == (1.0, 2.0, 3.0)
     assert run(capsys, "config", "--config", str(path)) == (0, out, "")
 

@@ -59,7 +59,7 @@ def test_every_variant_walks_in_the_same_worlds_seed_by_seed(scenario: str) -> N
 def test_later_values_of_a_key_win(scenario: str, tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text("[world]\nseconds = 5.0\n[reference]\nvx = 0.3\n", encoding="utf-8")
-    variants = parse_variants(["plain:controller.preset=paper", "none"], None)
+    variants = parse_variants(["plain:controller.preset=plain", "none"], None)
     plan = build_plan([scenario], variants, (), (0,), "plain", file, {"world.friction": 0.6})
     config = plan.configs[Group("steps", "plain", ())]
     assert config.team.robots == 2

@@ -71,7 +71,7 @@ def test_without_noise_the_estimated_velocity_is_the_true_one() -> None:
     np.testing.assert_allclose(error[300:, 0].mean(axis=0), 0.0, atol=0.01)
 
 
-@pytest.mark.parametrize("preset", ["paper", "soft"])
+@pytest.mark.parametrize("preset", ["plain", "soft"])
 def test_the_other_settings_walk_on_flat_ground_too(preset: str) -> None:
     config = load(None, {"team.robots": 1, "controller.preset": preset})
     found = walk(config, 2000)

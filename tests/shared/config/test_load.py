@@ -49,7 +49,7 @@ def test_what_is_written_loads_as_the_same(tmp_path: Path) -> None:
 
 
 def test_a_preset_replaces_defaults_but_not_what_is_given(tmp_path: Path) -> None:
-    path = write(tmp_path, '[controller]\npreset = "paper"\nkp_z = 333.0\n')
+    path = write(tmp_path, '[controller]\npreset = "plain"\nkp_z = 333.0\n')
     controller = load(path).controller
     assert (controller.kp_z, controller.kp_tilt, controller.contact_detection) == (333, 400, False)
 

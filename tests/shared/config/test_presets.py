@@ -33,21 +33,21 @@ def test_a_preset_sets_its_keys_and_leaves_the_others(section: str, name: str) -
 
 
 def test_an_explicit_key_wins_over_the_preset() -> None:
-    found = load(None, {"controller.preset": "paper", "controller.kp_tilt": 123.0}).controller
+    found = load(None, {"controller.preset": "plain", "controller.kp_tilt": 123.0}).controller
     assert found.kp_tilt == 123.0
-    assert found.kd_tilt == PRESETS["controller"]["paper"]["kd_tilt"]
+    assert found.kd_tilt == PRESETS["controller"]["plain"]["kd_tilt"]
 
 
-def test_the_papers_setting_is_the_plain_one() -> None:
+def test_the_plain_setting_is_without_what_the_robust_one_adds() -> None:
     """Scheduled contacts, no integrators, and the paper's weights of the QP."""
-    paper = load(None, {"controller.preset": "paper"}).controller
-    assert not paper.contact_detection
-    assert paper.ki_z == paper.ki_xy == 0.0
-    assert not any((paper.reject_side_contacts, paper.track_sinking_trunk, paper.flight))
-    assert paper.tilt_length == paper.swing_weight == 1.0
-    assert paper.liftoff_hold_ms == paper.reflex_ms == 0
-    assert paper.swing_delay == paper.slip_speed == 0.0
-    assert (paper.gamma_tau, paper.gamma_force, paper.gamma_defect) == (1e2, 1e3, 1e6)
+    plain = load(None, {"controller.preset": "plain"}).controller
+    assert not plain.contact_detection
+    assert plain.ki_z == plain.ki_xy == 0.0
+    assert not any((plain.reject_side_contacts, plain.track_sinking_trunk, plain.flight))
+    assert plain.tilt_length == plain.swing_weight == 1.0
+    assert plain.liftoff_hold_ms == plain.reflex_ms == 0
+    assert plain.swing_delay == plain.slip_speed == 0.0
+    assert (plain.gamma_tau, plain.gamma_force, plain.gamma_defect) == (1e2, 1e3, 1e6)
 
 
 def test_a_fast_planner_holds_peers_plans_as_long_as_the_usual_one() -> None:
@@ -62,4 +62,4 @@ def test_a_fast_planner_holds_peers_plans_as_long_as_the_usual_one() -> None:
 
 def test_presets_cannot_be_changed() -> None:
     with pytest.raises(TypeError):
-        PRESETS["controller"]["paper"]["kp_z"] = 1.0  # type: ignore[index]
+        PRESETS["controller"]["plain"]["kp_z"] = 1.0  # type: ignore[index]
