@@ -67,6 +67,18 @@ def test_planned_speeds_are_tracked_with_the_interface_force(
         assert task.ahead is None
 
 
+def test_all_planned_outputs_are_tracked_if_that_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = Watched(monkeypatch, interface="force", tracked="outputs").walk(600).asked
+    assert len(seen) > 200
+    for tick, _, task, plan in seen:
+        asked = [task.height, task.vx, task.vy, task.roll, task.pitch, task.wz]
+        np.testing.assert_array_equal(asked, plan.y[(tick - plan.tick) // SAMPLE_MS])
+    tilts = {task.roll for _, _, task, _ in seen} | {task.pitch for _, _, task, _ in seen}
+    assert len(tilts) > 50
+
+
 def test_by_default_speeds_are_the_operators_and_footholds_count_on_what_is_measured(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 
 import pytest
@@ -141,6 +142,23 @@ def test_refused_variants_say_why() -> None:
     table = build_walks_table(summarise(every), ("trials", "success"))
     assert table.rows[1] == ("steps", "damped", "refused", "–")
     assert table.notes == ("damped was refused: radius 0.7, not below 0.5.",)
+
+
+def test_the_radius_of_a_variant_is_shown_and_of_all_worlds_the_largest() -> None:
+    every = [row("none"), row("damped"), row("damped", scenario="flat")]
+    wanted = {
+        Group(where, name, ()): 1 for where in ("steps", "flat") for name in ("none", "damped")
+    }
+    radii = {Group("steps", "damped", ()): 0.25, Group("flat", "damped", ()): 1.31}
+    lines = build_lines(every, wanted, "none", pooled=True, radii=radii)
+    shown = {(*line.world, line.variant): line.radius for line in lines}
+    assert shown == {
+        ("steps", "none"): None,
+        ("steps", "damped"): 0.25,
+        ("flat", "damped"): 1.31,
+        (ALL, "none"): None,
+        (ALL, "damped"): 1.31,
+    }
 
 
 def test_a_group_that_nobody_walked_has_no_line() -> None:

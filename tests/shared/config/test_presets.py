@@ -50,6 +50,26 @@ def test_the_plain_setting_is_without_what_the_robust_one_adds() -> None:
     assert (plain.gamma_tau, plain.gamma_force, plain.gamma_defect) == (1e2, 1e3, 1e6)
 
 
+def test_the_papers_planner_has_its_weights_and_nothing_that_it_does_not_name() -> None:
+    """Fawcett et al., section V.B: Q, R, horizons, 40 ms; U is the friction cone alone."""
+    paper = load(None, {"planner.preset": "paper", "identification.preset": "paper"})
+    planner = paper.planner
+    assert planner.Q == (1e6, 1e5, 1e5, 2e5, 1e5, 1e4)
+    assert planner.R == (0.05, 0.05, 0.5)
+    assert (planner.N, planner.T_ini, planner.applied) == (25, 10, 4)
+    assert (planner.interface, planner.tracked, planner.output_bounds) == (
+        "force",
+        "outputs",
+        "none",
+    )
+    assert planner.latency_ms == planner.damping == planner.exchanges == 0
+    assert not planner.compensation
+    weight = paper.robot.weight
+    assert min(planner.deviation_max) > 10 * weight
+    assert min(planner.fade) > 1e3
+    assert paper.identification.predictor == "pinv"
+
+
 def test_a_fast_planner_holds_peers_plans_as_long_as_the_usual_one() -> None:
     usual, fast = Config().planner, load(None, {"planner.preset": "fast"}).planner
     assert fast.applied < usual.applied

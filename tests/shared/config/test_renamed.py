@@ -10,6 +10,7 @@ from typing import cast
 
 import pytest
 
+from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.commands.parser import main
 from quadriga.shared.config.later import hashed_sections
 from quadriga.shared.config.load import build, load
@@ -31,6 +32,8 @@ KEYS = {
     for section in fields(Config)
     for key in fields(getattr(Config(), section.name))
 }
+# That of the preset "plain" when it was called "paper".
+PLAIN_SHA256 = "584344a32dda3626a6d289e099c7c8324647bcaeb6e9b47d533ac656565439a5"
 # The hash of all defaults under the names and with the values that keys had before any was renamed.
 FIRST_NAMES_SHA256 = "1ef0cbe238d0ab9e18d4bba4d9a55d45aabc813083288aed69ec7899b1eb43d7"
 
@@ -94,6 +97,26 @@ def test_a_recorded_configuration_of_an_earlier_version_is_read() -> None:
     recording = Metadata(with_first_names(asdict(config)))
     assert "mu_least" in recording.metadata["config_json"]
     assert recorded_config(cast(Recording, recording)) == config
+
+
+def test_a_value_of_an_earlier_version_is_read_wherever_it_stands(tmp_path: Path) -> None:
+    plain = load(None, {"controller.preset": "plain"})
+    path = tmp_path / "team.toml"
+    path.write_text('[controller]\npreset = "paper"\n')
+    assert load(path) == load(None, {"controller.preset": "paper"}) == plain
+    first = with_first_names(asdict(plain))
+    assert first["controller"]["preset"] == "paper"
+    assert recorded_config(cast(Recording, Metadata(first))) == plain
+    assert config_sha256(plain) == PLAIN_SHA256
+    planner = load(None, {"planner.preset": "paper"}).planner
+    assert planner.preset == "paper", "another key's value of the same name"
+
+
+def test_a_predictor_of_the_plain_low_level_is_one_of_the_first_name() -> None:
+    meta = PredictorMeta.of(load(None, {"controller.preset": "plain"}))
+    body = json.loads(json.dumps(meta.to_dict()))
+    assert body["controller"]["preset"] == "paper"
+    assert PredictorMeta.from_dict(body) == meta
 
 
 def test_a_recorded_key_that_no_version_had_is_refused() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from contextlib import chdir
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,8 @@ from quadriga.experiments.published.catalogue import CHECKOUT, FOLDER, list_name
 from quadriga.experiments.published.experiment_file import read_experiment
 from quadriga.experiments.published.walk_experiment import build_plans
 from quadriga.experiments.variants import PLANNERS
+from quadriga.shared.config.load import build, layers
+from quadriga.shared.config.write import departures
 from quadriga.shared.errors import ConfigError
 
 SMALL = """
@@ -167,9 +170,25 @@ def test_what_is_promised_can_be_walked_and_is_not_published() -> None:
     assert {one.measure for one in found.requirements} >= {"success", "slowest", "max-z"}
 
 
+def test_from_the_paper_to_the_default_one_thing_changes_at_a_time() -> None:
+    """A key, or a preset with what it sets; the default is among the steps."""
+    experiment = load_experiments(["as-written"])[0][0]
+    configs = {v.name: build(layers(None, dict(v.keys))) for v in experiment.variants}
+    assert next(iter(configs)) == experiment.baseline == "as-written"
+    for before, after in itertools.pairwise(configs.values()):
+        changed = {key for key, *_ in departures(after, before)}
+        sections = {key.partition(".")[0] for key in changed}
+        if len(changed - {"planner.preset"}) > 1:
+            assert changed == {"planner.Q", "planner.R"} or sections == {"controller"}
+    free = {"identification.max_radius", "world.seconds"}
+    same = {key for key, *_ in departures(configs["robust"], build({}))}
+    assert same <= free
+
+
 def test_all_that_are_promised_are_there_in_order() -> None:
     assert list_names() == (
         "paper",
+        "as-written",
         "hard",
         "low-level",
         "ideas",
@@ -181,7 +200,7 @@ def test_all_that_are_promised_are_there_in_order() -> None:
 
 
 def test_a_name_that_is_none_lists_those_there_are(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="experiments: got 'papers', expected names of paper, h"):
+    with pytest.raises(ConfigError, match="experiments: got 'papers', expected names of paper, a"):
         load_experiments(["papers"])
     namesake = tmp_path / "paper.toml"
     namesake.write_text(SMALL, encoding="utf-8")
