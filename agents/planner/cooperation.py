@@ -33,6 +33,8 @@ the same windows there is no news, and nothing of the above changes.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -222,11 +224,35 @@ def cooperative_radius(config: Config, predictor: Predictor) -> float:
     return max(abs(1.0 - w * end) for ends in ranges for end in ends)
 
 
-def _eigenvalue_ranges(config: Config, predictor: Predictor) -> list[tuple[float, float]]:
-    return [
-        eigenvalue_range(*team_hessian(config, predictor, step))
-        for step in distinct_steps(config, predictor.phases)
-    ]
+class _Same:
+    """A predictor that equals itself alone, whatever is in it."""
+
+    def __init__(self, predictor: Predictor) -> None:
+        self.predictor = predictor
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and self.predictor is other.predictor
+
+    def __hash__(self) -> int:
+        return id(self.predictor)
+
+
+def _eigenvalue_ranges(config: Config, predictor: Predictor) -> tuple[tuple[float, float], ...]:
+    """Of each distinct planning step.
+
+    Remembered, which changes no result: the agents of a walk in one process have the same, and so
+    do the next walk's.
+    """
+    free = replace(config, world=Config().world, planner=replace(config.planner, damping=0.0))
+    return _compute_ranges(free, _Same(predictor))
+
+
+@lru_cache(maxsize=2)
+def _compute_ranges(config: Config, same: _Same) -> tuple[tuple[float, float], ...]:
+    return tuple(
+        eigenvalue_range(*team_hessian(config, same.predictor, step))
+        for step in distinct_steps(config, same.predictor.phases)
+    )
 
 
 def _choose_share(config: Config, ranges: Sequence[tuple[float, float]]) -> float:
