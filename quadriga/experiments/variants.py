@@ -45,7 +45,7 @@ PLANNERS: Final[Mapping[str, Keys]] = {
     "compensated": _planner("distributed", compensation=True),
     "damped": _planner("distributed", damping=0.5),
     "exchanged": _planner("distributed", exchanges=2),
-    "cooperative": {**_planner("distributed"), "planner.cost": "team"},
+    "cooperative": {**_planner("distributed", exchanges=8), "planner.cost": "team"},
     "centralised": _planner("centralised"),
     "deepc": _planner("deepc"),
     "configured": {},  # the planner of the configuration, whatever it is

@@ -35,6 +35,7 @@ WALKED = {
 FITTED = {
     f"identification.{k}"
     for k in (
+        "preset",
         "predictor",
         "neighbours",
         "phases",
