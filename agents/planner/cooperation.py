@@ -77,10 +77,7 @@ def brings_forward(config: Config) -> bool:
 def relevant_peers(predictor: Predictor, index: int) -> frozenset[int]:
     """Robots whose forces matter to an output that those of robot `index` matter to."""
     n = predictor.meta.robots
-    acts = np.array(
-        [[any(predictor.block(j, i, p).any() for p in range(predictor.phases)) for i in range(n)]
-         for j in range(n)]
-    )  # fmt: skip
+    acts = np.array([[predictor.couples(j, i) for i in range(n)] for j in range(n)])
     reached = acts[acts[:, index]].any(axis=0)
     return frozenset(np.flatnonzero(reached).tolist()) - {index}
 

@@ -50,7 +50,7 @@ def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode])
         R=tuple(config.planner.R),
         condition=predictor.condition,
         coupling=tuple(tuple(row) for row in coupling_table(predictor).tolist()),
-        size=predictor.G.nbytes,
+        size=predictor.nbytes,
         cost_probes=probe_costs(config, predictor),
     )
 
@@ -104,8 +104,18 @@ def _predict_windows(predictor: Predictor, episode: Episode, z: Array) -> Array:
 
 def coupling_table(predictor: Predictor) -> Array:
     """Frobenius norms of the blocks G_ij of the scaled predictor, largest phase. Shape (n, n)."""
-    blocks = scaled_blocks(predictor.G, predictor.meta)
-    table: Array = np.linalg.norm(blocks, axis=(-2, -1)).max(axis=0)
+    robots = range(predictor.meta.robots)
+    norms = [
+        [
+            [
+                np.linalg.norm(scaled_blocks(predictor.block(i, j, phase), predictor.meta))
+                for j in robots
+            ]
+            for i in robots
+        ]
+        for phase in range(predictor.phases)
+    ]
+    table: Array = np.max(norms, axis=0)
     return table
 
 

@@ -114,8 +114,10 @@ def build_centralised(config: Config, predictor: Predictor) -> TeamPlanner:
     past = predictor.meta.past
 
     def formulation(phase: int, stance: NDArray[np.bool_]) -> Condensed:
-        G = predictor.G[phase]
-        G_past, G_u = (np.concatenate([*part], axis=1) for part in _stack_columns(G, past))
+        robots = range(config.team.robots)
+        columns = [np.concatenate([predictor.block(i, j, phase) for i in robots]) for j in robots]
+        G_past = np.concatenate([column[:, :past] for column in columns], axis=1)
+        G_u = np.concatenate([column[:, past:] for column in columns], axis=1)
         return condense(config.planner, G_past, G_u, stance)
 
     return TeamPlanner(config, formulation, predictor.phases)
@@ -157,9 +159,3 @@ def build_deepc_team(
     return build_deepc(
         config, build_model(reduction, planner, planner.lambda_g, planner.lambda_sigma)
     )
-
-
-def _stack_columns(G: Array, past: int) -> tuple[list[Array], list[Array]]:
-    """Blocks (n, n, p, w) as columns of robot j over the rows of all robots, past and future."""
-    tall = [np.concatenate([*G[:, j]]) for j in range(G.shape[1])]
-    return [column[:, :past] for column in tall], [column[:, past:] for column in tall]

@@ -291,4 +291,4 @@ def _coupled_peers(config: Config, index: int, predictor: Predictor) -> frozense
         return others
     if is_cooperative(config):
         return relevant_peers(predictor, index)
-    return frozenset(j for j in others if predictor.G[:, index, j].any())
+    return frozenset(j for j in others if predictor.couples(index, j))

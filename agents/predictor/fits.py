@@ -11,6 +11,7 @@ import numpy as np
 from quadriga.agents.predictor.arx import roll_out
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.least_squares import solve_gamma, solve_pinv
+from quadriga.agents.predictor.periodic import fit_periodic
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.regression import (
     check_episodes,
@@ -126,6 +127,7 @@ FITS: Final[Mapping[str, Fit]] = {
     "causal": fit_causal,
     "arx": fit_arx,
     "phase": fit_phase,
+    "periodic": fit_periodic,
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
@@ -139,6 +140,24 @@ class Predictor:
         block: Array = self.G[phase, i, j, :, self.meta.past :]
         return block
 
+    def row(self, i: int, phase: int = 0) -> Array:
+        """Blocks G_i1 … G_in side by side. Shape (6 N, n (18 T_ini + 12 N))."""
+        robots = range(self.meta.robots)
+        return np.concatenate([self.block(i, j, phase) for j in robots], axis=1)
+
+    def couples(self, i: int, j: int) -> bool:
+        """Whether anything that robot j does has an effect on robot i."""
+        return bool(self.G[:, i, j].any())
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of what it is made of."""
+        return self.G.nbytes
+
+    def arrays(self) -> Mapping[str, Array]:
+        """What it is made of, by name: with the meta all that a file must hold."""
+        return {"G": self.G}
+
     def predict(self, z: Array, phase: int = 0) -> Array:
         """Predicted output deviations of the whole team.
 
@@ -151,8 +170,7 @@ class Predictor:
             Shape (n, 6 N) or (n, 6 N, C).
         """
         stacked = z.reshape(-1, *z.shape[2:])
-        rows = [np.concatenate(list(row), axis=1) @ stacked for row in self.G[phase]]
-        return np.stack(rows)
+        return np.stack([self.row(i, phase) @ stacked for i in range(self.meta.robots)])
 
 
 def check_sizes(config: Config, predictor: Predictor) -> None:

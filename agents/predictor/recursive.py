@@ -110,7 +110,8 @@ def take_in(
         )
     if not (np.isfinite(z).all() and np.isfinite(y).all()):
         raise PredictorError("window", "NaN or infinity", "finite numbers")
-    left = y - np.einsum("jab,jb->a", predictor.G[phase, state.robot], z)
+    blocks = np.stack([predictor.block(state.robot, j, phase) for j in range(meta.robots)])
+    left = y - np.einsum("jab,jb->a", blocks, z)
     z_scale, y_scale = scales(meta)
     return update(state, z[state.robot] / z_scale, left / y_scale, how)
 

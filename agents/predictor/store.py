@@ -15,8 +15,10 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.agents.predictor.gate_report import GateReport
+from quadriga.agents.predictor.periodic_predictor import FACTORS, PeriodicFactors, PeriodicPredictor
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.errors import PredictorFileError, name_file_errors
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.atomic import atomic_write
 
 FORMAT: Final = 2
@@ -66,9 +68,12 @@ def versions() -> dict[str, str]:
 
 def predictor_sha256(predictor: Predictor) -> str:
     """Digest of G and its meta: equal predictors have equal digests, however they were stored."""
-    G = np.ascontiguousarray(predictor.G, dtype="<f8")
-    head = json.dumps([predictor.meta.to_dict(), G.shape], sort_keys=True)
-    return hashlib.sha256(head.encode() + b"\0" + G.tobytes()).hexdigest()
+    arrays = [np.ascontiguousarray(array, dtype="<f8") for array in predictor.arrays().values()]
+    head = json.dumps(
+        [predictor.meta.to_dict(), *(array.shape for array in arrays)], sort_keys=True
+    )
+    content = b"".join(array.tobytes() for array in arrays)
+    return hashlib.sha256(head.encode() + b"\0" + content).hexdigest()
 
 
 def save(path: Path, predictor: Predictor, provenance: Provenance) -> str:
@@ -90,7 +95,8 @@ def save(path: Path, predictor: Predictor, provenance: Provenance) -> str:
     with name_file_errors(PredictorFileError, path, "a file that can be written"):
         path.parent.mkdir(parents=True, exist_ok=True)
         with atomic_write(path) as partial, partial.open("wb") as file:
-            np.savez(file, G=predictor.G, document=np.array(json.dumps(document, sort_keys=True)))
+            text = np.array(json.dumps(document, sort_keys=True))
+            np.savez(file, allow_pickle=False, document=text, **predictor.arrays())
     return digest
 
 
@@ -103,14 +109,16 @@ def read(path: Path) -> tuple[Predictor, Provenance]:
     try:
         # An own handle: numpy leaves its open when the archive turns out to be broken.
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            G, document = archive["G"], json.loads(str(archive["document"]))
+            document = json.loads(str(archive["document"]))
+            names = FACTORS if "response" in archive.files else ("G",)
+            arrays = {name: np.asarray(archive[name], dtype=np.float64) for name in names}
         if document["format"] != FORMAT:
             raise PredictorFileError(
                 f"predictor {path}", f"format {document['format']}", f"format {FORMAT}", REMEDY
             )
         meta = PredictorMeta.from_dict(document["meta"])
         provenance = Provenance.from_dict(document["provenance"])
-        predictor = Predictor(meta, np.asarray(G, dtype=np.float64), provenance.gates.condition)
+        predictor = _build(meta, arrays, provenance.gates.condition)
     except FileNotFoundError:
         raise PredictorFileError(f"predictor {path}", "no such file", "a file", REMEDY) from None
     except (
@@ -136,3 +144,9 @@ def read(path: Path) -> tuple[Predictor, Provenance]:
             f"corrupt: delete it; {REMEDY}",
         )
     return predictor, provenance
+
+
+def _build(meta: PredictorMeta, arrays: dict[str, Array], condition: float | None) -> Predictor:
+    if "G" in arrays:
+        return Predictor(meta, arrays["G"], condition)
+    return PeriodicPredictor(meta, PeriodicFactors(**arrays), condition)

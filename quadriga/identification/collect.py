@@ -24,10 +24,12 @@ from quadriga.shared.wire.topics import SAMPLE_MS
 from quadriga.workers import run_each
 
 _LEAST = 2000  # samples, however few the rule asks for
+_LEAST_WRENCHES = (20_000, 60_000)  # the same for net wrenches of one robot, of several
 _MARGIN = 2  # times what the rule asks for: data far in excess average the noise out
 _LEAST_EPISODE_S = 3.0  # a walk that ended in a fall earlier is not worth keeping
 _BEFORE_FALL = 50  # samples cut off before a fall
 _CLIP = 2.5  # standard deviations of the force noise
+N_COMPONENTS = 5  # of a net wrench that two feet on a diagonal can exert
 _RAMP_MS = 500  # from one random speed to the next: jumps would drown what the forces do
 
 Progress = Callable[[int, int], None]
@@ -44,7 +46,11 @@ def training_seconds(config: Config) -> float:
         config.planner.N,
         config.identification.order_per_robot * n,
     )
-    return 1e-3 * SAMPLE_MS * max(_LEAST, _MARGIN * rule)
+    least = _LEAST
+    if any(config.identification.wrench_noise):
+        # What peers do is a fraction of what a robot does itself, and is to be told from noise.
+        least = _LEAST_WRENCHES[n > 1]
+    return 1e-3 * SAMPLE_MS * max(least, _MARGIN * rule)
 
 
 def collection_config(config: Config, seed: int) -> Config:
@@ -141,6 +147,23 @@ def collect_episode(config: Config, number: int, seconds: float) -> Episode | No
     return Episode(**dict(zip(SIGNALS, signals, strict=True)), first_tick=first)
 
 
+def force_patterns(feet: Array) -> Array:
+    """Forces of four feet that add up to net forces, and to couples that two of them can exert.
+
+    Along x, y and z; vertical couple: the front feet up, the hind ones down; horizontal couple:
+    every foot along the circle about the trunk. One newton at every foot. Shape (5, 12).
+
+    Args:
+        feet: where they are under the trunk, (4, 2), m.
+    """
+    patterns = np.zeros((N_COMPONENTS, len(feet), 3))
+    patterns[[0, 1, 2], :, [0, 1, 2]] = 1.0
+    patterns[3, :, 2] = np.sign(feet[:, 0])
+    tangent = np.stack([-feet[:, 1], feet[:, 0]], axis=1)
+    patterns[4, :, :2] = tangent / np.linalg.norm(tangent, axis=1)[:, None]
+    return patterns.reshape(N_COMPONENTS, N_FORCES)
+
+
 class _RandomWalk:
     """Random references and force noise of one episode, all drawn beforehand from its seed."""
 
@@ -156,7 +179,9 @@ class _RandomWalk:
         self._noise_hold = ident.noise_hold_ms
         shape = (ticks // self._noise_hold + 2, config.team.robots, 4, 3)
         noise = np.clip(random.normal(size=shape), -_CLIP, _CLIP) * np.array(ident.noise)
-        self._noise = noise.reshape(*shape[:2], N_FORCES)
+        together = random.choice([-1.0, 1.0], (*shape[:2], N_COMPONENTS)) * ident.wrench_noise
+        patterns = force_patterns(config.robot.feet_under_hips)
+        self._noise = noise.reshape(*shape[:2], N_FORCES) + together @ patterns
         self._index = {name: i for i, name in enumerate(robot_names(config.team.robots))}
         self._height = config.reference.height
 

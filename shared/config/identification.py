@@ -27,7 +27,16 @@ class IdentificationConfig:
     )
     held_out: float = key(8.0, "s", "world time held out of the fit", low=2.0, high=600.0)
     episode: float = key(10.5, "s", "length of one episode", low=3.0, high=600.0)
-    noise: tuple[float, ...] = key((15.0, 15.0, 35.0), "N", "force noise (std) fx, fy, fz", low=0.0)
+    noise: tuple[float, ...] = key(
+        (15.0, 15.0, 35.0), "N", "force noise (std) fx, fy, fz of each foot for itself", low=0.0
+    )
+    wrench_noise: tuple[float, ...] = key(
+        (0.0, 0.0, 0.0, 0.0, 0.0),
+        "N",
+        "force noise of a robot's feet together, of either sign, at each stance foot: along x, y, "
+        "z, vertical couple, horizontal couple",
+        low=0.0,
+    )
     noise_hold_ms: int = key(20, "ms", "how long one draw of noise is held", low=10, high=500)
     vx: tuple[float, ...] = key((-0.2, 0.7), "m/s", "range of random forward speeds", low=-2.0)
     vy: tuple[float, ...] = key((-0.2, 0.2), "m/s", "range of random sideways speeds", low=-2.0)
@@ -39,8 +48,9 @@ class IdentificationConfig:
         "-",
         "the fit of G; pinv: the paper's; ridge: regularised, block-weighted; gamma: LQ "
         "factorisation; causal: no force acts on outputs before it; arx: one-step model rolled "
-        "out; phase: one G for each part of the gait's period",
-        choices=("ridge", "pinv", "gamma", "causal", "arx", "phase"),
+        "out; phase: one G for each part of the gait's period; periodic: a function of the gait's "
+        "phase, causal, with peers' forces by their net wrench",
+        choices=("ridge", "pinv", "gamma", "causal", "arx", "phase", "periodic"),
     )
     neighbours: str = key(
         "all",

@@ -19,6 +19,7 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "planner.cost": "own",
         "planner.tracked": "speeds",
         "identification.preset": "usual",
+        "identification.wrench_noise": (0.0, 0.0, 0.0, 0.0, 0.0),
         "world.stairs_rise": 0.06,
         "world.stairs_run": 0.3,
         "world.stairs_count": 8,

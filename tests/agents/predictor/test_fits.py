@@ -111,7 +111,7 @@ def test_every_fit_reproduces_the_true_response(seed: int, robots: int) -> None:
     H = mosaic([np.concatenate(episode.scaled_deviations(), axis=1) for episode in data], T_INI + N)
     assert np.linalg.matrix_rank(H) == 12 * robots * (T_INI + N) + 4 * robots
     unseen = random_walk(robots, 60, seed, data=3)
-    for kind in FITS:
+    for kind in [kind for kind in FITS if kind != "periodic"]:  # which shrinks: a test of its own
         meta = meta_for(
             robots, kind=kind, ridge=1e-12, block_weight=1.0, phases=4 if kind == "phase" else 1
         )

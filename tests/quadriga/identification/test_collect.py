@@ -24,10 +24,15 @@ from quadriga.shared.config.sections import Config, WorldConfig
 from quadriga.shared.errors import PredictorError
 
 NOISE = (10.0, 20.0, 30.0)
+TOGETHER = (16.0, 12.0, 8.0, 14.0, 10.0)
 
 
 def config_of(robots: int = 1, **keys: Any) -> Config:
-    given = {"team.robots": robots, "identification.noise": NOISE}
+    given = {
+        "team.robots": robots,
+        "identification.noise": NOISE,
+        "identification.wrench_noise": (0.0,) * 5,
+    }
     return load(None, given | {name.replace("__", "."): value for name, value in keys.items()})
 
 
@@ -67,6 +72,41 @@ def test_noise_has_the_spread_asked_for_and_no_outliers(episode: Episode) -> Non
     within = (noise != 0.0) & (np.abs(noise) < 2.4 * np.array(NOISE))
     first, second = (noise[:, robot][within[:, robot]] for robot in range(2))
     assert not np.isin(first, second).any()  # every robot has its own
+
+
+def test_a_robots_feet_push_together() -> None:
+    """Draws of net forces and couples alone: each is of the size asked for, of either sign."""
+    keys: dict[str, Any] = {"noise": (0.0, 0.0, 0.0), "wrench_noise": TOGETHER}
+    config = config_of(2, **{f"identification__{name}": value for name, value in keys.items()})
+    episode = collect_episode(config, 0, 1.0)
+    assert episode is not None
+    stance = episode.u_nominal[:, :, 2::3] > 0.0
+    noise = episode.deviations()[0].reshape(100, 2, 4, 3)
+    patterns = module.force_patterns(config.robot.feet_under_hips).reshape(5, 4, 3)
+    signs = np.zeros((100, 2, 5))
+    for k, robot in np.ndindex(100, 2):
+        feet = stance[k, robot]
+        of_feet = (patterns[:, feet] * np.array(TOGETHER)[:, None, None]).reshape(5, -1)
+        signs[k, robot], rest, *_ = np.linalg.lstsq(of_feet.T, noise[k, robot, feet].ravel())
+        assert rest < 1e-15
+    np.testing.assert_allclose(np.abs(signs), 1.0, atol=1e-9)
+    np.testing.assert_allclose(signs[0::2], signs[1::2], atol=1e-9)
+    assert (np.abs(signs.mean(axis=0)) < 0.5).all()
+    assert (signs[:, 0] != signs[:, 1]).any(axis=0).all()
+
+
+def test_patterns_of_forces_add_up_to_net_forces_and_couples() -> None:
+    feet = config_of().robot.feet_under_hips
+    patterns = module.force_patterns(feet).reshape(5, 4, 3)
+    np.testing.assert_array_equal(patterns[:3].sum(axis=1), 4.0 * np.eye(3))
+    arms = np.column_stack([feet, np.zeros(4)])
+    for pair in ([0, 3], [1, 2]):  # the feet that stand together
+        couples = patterns[3:, pair]
+        np.testing.assert_allclose(couples.sum(axis=1), 0.0, atol=1e-12)
+        moments = np.cross(arms[pair], couples).sum(axis=1)
+        assert moments[0, 2] == 0.0
+        assert moments[0, 1] == pytest.approx(-2.0 * feet[0, 0])
+        assert moments[1] == pytest.approx([0.0, 0.0, 2.0 * np.linalg.norm(feet[0])])
 
 
 def test_outputs_are_counted_from_what_was_asked(episode: Episode) -> None:
@@ -169,6 +209,8 @@ def test_what_is_collected_follows_from_the_rule_unless_it_is_given() -> None:
     assert training_seconds(config) == pytest.approx(0.01 * 2 * rule)
     assert training_seconds(config_of(1)) >= 20.0
     assert training_seconds(config_of(3, identification__seconds=7.0)) == 7.0
+    assert training_seconds(config_of(1, identification__wrench_noise=TOGETHER)) == 200.0
+    assert training_seconds(config_of(3, identification__wrench_noise=TOGETHER)) == 600.0
 
 
 def test_walks_that_all_end_in_a_fall_are_reported_with_figures() -> None:
