@@ -18,6 +18,7 @@ from quadriga.shared.errors import ConfigError
 from quadriga.sim_server.world.world import World
 from quadriga.team import scenarios
 
+_TOGETHER: Final = 8  # seeds that are walked by every variant before the next ones
 _OURS: Final = ("world.seed", "world.mode")  # keys that a campaign sets itself
 
 
@@ -59,8 +60,12 @@ class CampaignPlan:
     configs: Mapping[Group, Config]
 
     def trials(self) -> list[tuple[Group, int]]:
-        """Every trial, those of one seed together, so that what is done is always pairs."""
-        return [(group, seed) for seed in self.seeds for group in self.configs]
+        """Every trial, those of a few seeds together, so that nearly all that is done is pairs.
+
+        Within these one group after the other, so that a worker keeps its agents for a while.
+        """
+        few = [self.seeds[k : k + _TOGETHER] for k in range(0, len(self.seeds), _TOGETHER)]
+        return [(group, seed) for seeds in few for group in self.configs for seed in seeds]
 
 
 def build_plan(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
 from quadriga.agents.planner.team_planner import TeamPlanner
@@ -16,12 +17,13 @@ from quadriga.agents.planning.team import Central, CentralState
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import PLANNER
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.wire.messages import Event, Measurement, Plan, Reference
 from quadriga.sim_server.world.world import World
 
 Plans = tuple[tuple[str, Plan], ...]
+M = TypeVar("M", Measurement, Plan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +35,21 @@ class Tick:
     events: tuple[Event, ...]
 
 
+def build_agents(
+    config: Config, predictor: Predictor | None, clock_ns: Callable[[], int] = lambda: 0
+) -> dict[str, Agent]:
+    """The team's agents by name; they remember nothing, so that they may walk again and again.
+
+    Args:
+        config: the team's configuration; they do not look at its world.
+        predictor: for agents that plan for themselves, or None.
+        clock_ns: read around their planners, for `Outputs.planner_ns` alone.
+    """
+    use_one_blas_thread()
+    names = robot_names(config.team.robots)
+    return {name: Agent(config, name, predictor, clock_ns) for name in names}
+
+
 class Rollout:
     """A world and its agents, advanced tick by tick.
 
@@ -42,7 +59,7 @@ class Rollout:
         references: the reference that starts at a tick, or None.
         excitation: force deviation (12,) of a robot at a tick, or None; data collection only.
         planner: the planner of the whole team, if `planner.kind` is one process for all.
-        clock_ns: read around the agents' own planners, for `Outputs.planner_ns` alone.
+        agents: of the team, made before (`build_agents`); by default they are made now.
     """
 
     def __init__(
@@ -52,12 +69,11 @@ class Rollout:
         references: Callable[[int], Reference | None],
         excitation: Callable[[str, int], Array] | None = None,
         planner: TeamPlanner | None = None,
-        clock_ns: Callable[[], int] = lambda: 0,
+        agents: Mapping[str, Agent] | None = None,
     ) -> None:
         use_one_blas_thread()
         self.world = World(config)
-        names = self.world.names
-        self.agents = {name: Agent(config, name, predictor, clock_ns) for name in names}
+        self.agents = build_agents(config, predictor) if agents is None else dict(agents)
         self.states: dict[str, AgentState] = {n: a.initial() for n, a in self.agents.items()}
         self._references = references
         self._excitation = excitation
@@ -83,25 +99,29 @@ class Rollout:
         central: Mapping[str, Plans] = {}
         if self._central is not None:
             central = self._central.step(tick, self._measurements, references)
+        measurements, plans = self._measurements, self._plans
         outputs: dict[str, Outputs] = {}
         for name, agent in self.agents.items():
             inputs = Inputs(
                 states[name],
-                tuple(item for item in self._measurements if item[0] != name),
-                central.get(name) or tuple(item for item in self._plans if item[0] != name),
+                measurements and _of_others(measurements, name),
+                central.get(name) or (plans and _of_others(plans, name)),
                 references,
                 truth=truth,
                 excitation=None if self._excitation is None else self._excitation(name, tick),
             )
             self.states[name], outputs[name] = agent.step(self.states[name], inputs)
+        sent = outputs.items()
         self._measurements = tuple(
-            (name, out.measurement) for name, out in outputs.items() if out.measurement is not None
+            [(name, out.measurement) for name, out in sent if out.measurement is not None]
         )
-        self._plans = tuple(
-            (name, out.plan) for name, out in outputs.items() if out.plan is not None
-        )
+        self._plans = tuple([(name, out.plan) for name, out in sent if out.plan is not None])
         events = self.world.step({name: out.command for name, out in outputs.items()})
         return Tick(tick, outputs, events)
+
+
+def _of_others(messages: tuple[tuple[str, M], ...], name: str) -> tuple[tuple[str, M], ...]:
+    return tuple(item for item in messages if item[0] != name)
 
 
 class _CentralPlanner:

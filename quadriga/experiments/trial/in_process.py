@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
+from quadriga.agents.agent import Agent
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.team_planner import TeamPlanner, TeamResult
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.experiments.trial.figures_of_merit import Walk
-from quadriga.identification.rollout import Rollout, Tick
+from quadriga.identification.rollout import Rollout, Tick, build_agents
 from quadriga.recordings.traces import MeasurementTrace, Traces
 from quadriga.recordings.truth import build_truth_trace, ticks_of
 from quadriga.shared.config.sections import Config
@@ -20,16 +22,30 @@ from quadriga.shared.members import PLANNER
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic_ns
+from quadriga.shared.runtime.collector import collector_off
 from quadriga.shared.wire.messages import Event, Measurement, Status, Truth
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 from quadriga.sim_server.world.layout import NV
 from quadriga.sim_server.world.world import World
 from quadriga.team.operator import reference_at, references_of
 
+_SUMMED: Final = 100  # ticks whose work is summed up at once
+
+
+def build_timed_agents(config: Config, predictor: Predictor | None) -> dict[str, Agent]:
+    """The team's agents by name, whose planners are timed; they may walk again and again.
+
+    Args:
+        config: the team's configuration; they do not look at its world.
+        predictor: None without a planner.
+    """
+    of_agents = predictor if find_kind(config.planner.kind).agents_predict else None
+    return build_agents(config, of_agents, monotonic_ns)
+
 
 def roll_out(
     config: Config,
-    predictor: Predictor | None,
+    agents: Mapping[str, Agent],
     planner: TeamPlanner | None,
     watch: Callable[[Tick], None] | None = None,
 ) -> Walk:
@@ -37,25 +53,23 @@ def roll_out(
 
     Args:
         config: the team's configuration.
-        predictor: None without a planner.
+        agents: of the team, see `build_timed_agents`.
         planner: of the whole team, for the kinds of planner that are one process.
         watch: shown every tick.
     """
     timed = None if planner is None else _TimedPlanner(planner)
-    of_agents = predictor if find_kind(config.planner.kind).agents_predict else None
-    rollout = Rollout(
-        config, of_agents, references_of(config), planner=timed, clock_ns=monotonic_ns
-    )
+    rollout = Rollout(config, None, references_of(config), planner=timed, agents=agents)
     log, meter = _WalkLog(config), _WorkMeter(rollout.world)
     last = round(1000 * config.world.seconds)
-    while rollout.world.tick < last and not rollout.world.fallen():
-        if rollout.world.tick % SAMPLE_MS == 0:
-            log.truth.append(rollout.world.truth())
-        tick = rollout.step()
-        log.add(tick)
-        meter.add_tick()
-        if watch is not None:
-            watch(tick)
+    with collector_off():
+        while rollout.world.tick < last and not rollout.world.fallen():
+            if rollout.world.tick % SAMPLE_MS == 0:
+                log.truth.append(rollout.world.truth())
+            tick = rollout.step()
+            log.add(tick)
+            meter.add_tick()
+            if watch is not None:
+                watch(tick)
     if timed is not None:
         log.planner_ms[PLANNER] = timed.ms
         log.plans += timed.plans
@@ -90,11 +104,28 @@ class _WorkMeter:
         # Views of MuJoCo's own memory.
         self._torque = physics.qfrc_applied[: n * NV].reshape(n, NV)[:, 6:]
         self._rate = physics.qvel[: n * NV].reshape(n, NV)[:, 6:]
-        self.work = 0.0
+        self._power = np.empty((_SUMMED, n, NV - 6))  # of the last ticks, W
+        self._count = 0  # of these
+        self._work = 0.0
 
     def add_tick(self) -> None:
         """Add the tick that has just been walked."""
-        self.work += 1e-3 * float(np.abs(self._torque * self._rate).sum())
+        if self._count == _SUMMED:
+            self._sum_up()
+        np.multiply(self._torque, self._rate, out=self._power[self._count])
+        self._count += 1
+
+    @property
+    def work(self) -> float:
+        """Of all ticks so far, J."""
+        self._sum_up()
+        return self._work
+
+    def _sum_up(self) -> None:
+        ticks = np.abs(self._power[: self._count]).reshape(self._count, self._power[0].size)
+        for power in ticks.sum(axis=1).tolist():
+            self._work += 1e-3 * power
+        self._count = 0
 
 
 class _WalkLog:

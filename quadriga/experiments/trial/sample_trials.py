@@ -11,7 +11,7 @@ from quadriga.agents.planner.team_planner import TeamPlanner
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.experiments.trial.figures_of_merit import Figures, compute_figures
-from quadriga.experiments.trial.in_process import roll_out
+from quadriga.experiments.trial.in_process import build_timed_agents, roll_out
 from quadriga.identification.behaviour import numbers
 from quadriga.identification.central_planner import choose_central_planner
 from quadriga.identification.rollout import Tick
@@ -82,7 +82,9 @@ def samples() -> Iterator[Array]:
 
         needs_one = find_kind(config.planner.kind).needs_predictor
         predictor = sample_predictor(config) if needs_one else None
-        walk = roll_out(config, predictor, _team_planner(config, predictor), watch)
+        walk = roll_out(
+            config, build_timed_agents(config, predictor), _team_planner(config, predictor), watch
+        )
         yield from seen
         truth = walk.traces.truth
         yield from (truth.base_pos, truth.base_quat_wxyz, truth.grf, truth.yoke_force)

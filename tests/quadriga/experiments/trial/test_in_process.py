@@ -11,7 +11,7 @@ from rich.console import Console
 
 from quadriga.agents.planner.checked_predictor import load_checked
 from quadriga.experiments.trial.figures_of_merit import Figures, compute_figures
-from quadriga.experiments.trial.in_process import roll_out
+from quadriga.experiments.trial.in_process import build_timed_agents, roll_out
 from quadriga.experiments.trial.over_bus import walk_over_bus
 from quadriga.identification.predictors import fit
 from quadriga.identification.rollout import Tick
@@ -55,7 +55,8 @@ def test_over_the_bus_a_trial_comes_to_the_same(tmp_path: Path) -> None:
                 if (message := getattr(out, topic)) is not None:
                     sent[f"team/{name}/{topic}"].append(encode(message))
 
-    alone = compute_figures(roll_out(config, load_checked(path, config)[0], None, watch))
+    agents = build_timed_agents(config, load_checked(path, config)[0])
+    alone = compute_figures(roll_out(config, agents, None, watch))
     assert alone.cost is not None
     assert alone.plans
     together = compute_figures(walk_over_bus(config, run_dir, path, sha256))
@@ -74,7 +75,7 @@ def test_over_the_bus_a_trial_comes_to_the_same(tmp_path: Path) -> None:
 def test_the_motors_work_is_that_of_a_trot() -> None:
     """The cost of transport of a trot; and robots that merely stand do next to nothing."""
     config = config_of(planner__kind="none", world__seconds=3.0)
-    found = compute_figures(roll_out(config, None, None))
+    found = compute_figures(roll_out(config, build_timed_agents(config, None), None))
     assert found.work is not None
     assert found.distance is not None
     assert found.cost_of_transport is not None
@@ -82,11 +83,8 @@ def test_the_motors_work_is_that_of_a_trot() -> None:
     weight = 2 * TOTAL_MASS * GRAVITY
     assert found.cost_of_transport == pytest.approx(found.work / (weight * found.distance))
     assert 0.3 < found.cost_of_transport < 3.0
-    still = compute_figures(
-        roll_out(
-            config_of(planner__kind="none", world__seconds=0.5, gait__stand_ms=1000), None, None
-        )
-    )
+    config = config_of(planner__kind="none", world__seconds=0.5, gait__stand_ms=1000)
+    still = compute_figures(roll_out(config, build_timed_agents(config, None), None))
     assert still.work is not None
     assert still.work < 0.05 * found.work
     assert still.cost_of_transport is None
