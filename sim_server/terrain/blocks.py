@@ -17,6 +17,7 @@ from quadriga.sim_server.terrain.relief import Relief
 _CELL: Final = 0.35  # m, one block per square of this size
 _SIZE: Final = (0.1, 0.4)  # m, range of the horizontal edges
 _LEAST_HEIGHT: Final = 0.2  # of the greatest height
+_AT_ONCE: Final = 64  # positions whose heights are computed together
 _RGBA: Final = ((0.72, 0.53, 0.30, 1.0), (0.80, 0.62, 0.38, 1.0), (0.62, 0.44, 0.24, 1.0))
 
 
@@ -43,8 +44,17 @@ class Blocks(Relief):
 
     def height(self, x: Array, y: Array) -> Array:
         """Height of the highest block at each position, or zero. Shape of x, m."""
-        dx = np.asarray(x)[..., None] - self.centre[:, 0]
-        dy = np.asarray(y)[..., None] - self.centre[:, 1]
+        x, y = np.asarray(x), np.asarray(y)
+        height = np.empty(x.size)
+        for first in range(0, x.size, _AT_ONCE):
+            part = slice(first, first + _AT_ONCE)
+            height[part] = self._heights(x.reshape(-1)[part], y.reshape(-1)[part])
+        return height.reshape(x.shape)
+
+    def _heights(self, x: Array, y: Array) -> Array:
+        """The same for so few positions that the processor's caches hold what is in between."""
+        dx = x[:, None] - self.centre[:, 0]
+        dy = y[:, None] - self.centre[:, 1]
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
         inside = np.abs(cos * dx + sin * dy) <= self.half[:, 0]
         inside &= np.abs(cos * dy - sin * dx) <= self.half[:, 1]
