@@ -193,7 +193,9 @@ class Agent:
         """Sense, plan, act. Each of them sees the mode after the stops that came up before it."""
         tick = inputs.state.tick
         dt = 1e-3 if state.tick < 0 else min(_LONGEST_DT, 1e-3 * (tick - state.tick))
-        references = remember_references(state.references, inputs.references, tick)
+        references = state.references
+        if inputs.references:
+            references = remember_references(references, inputs.references, tick)
         reference, reference_age = reference_at(references, tick, self._height)
 
         course = state.mode if state.mode.name == WALK else self._course(state, tick)

@@ -38,12 +38,17 @@ def force_max(robot: RobotSpec) -> float:
 def is_plausible(config: Config, u: Array, y: Array) -> bool:
     """Whether forces u, (…, 12), N, and outputs y, (…, 6), are numbers that a robot can mean."""
     most = force_max(config.robot) + max(config.planner.deviation_max)
-    return bool(np.abs(u).max() <= most) and are_plausible_outputs(y)
+    return _largest(u) <= most and are_plausible_outputs(y)
 
 
 def are_plausible_outputs(y: Array) -> bool:
     """Whether outputs y, (…, 6), are numbers that a robot can mean."""
-    return bool(np.abs(y).max() <= OUTPUT_MAX)  # false for NaN
+    return _largest(y) <= OUTPUT_MAX  # false for NaN
+
+
+def _largest(array: Array) -> float:
+    """Greatest magnitude, NaN if there is one; the method `max` takes twice the time."""
+    return float(np.maximum.reduce(np.abs(array), axis=None))
 
 
 def is_orientation(quat_wxyz: Array) -> bool:

@@ -7,7 +7,7 @@ Pure: messages in, selection out; lost, repeated, late and foreign messages are 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Final
 
 import numpy as np
@@ -202,30 +202,35 @@ class Neighbours:
         """The T_ini samples that end at step `end`: measured, else as the peer planned them."""
         T_ini, weight = self._config.planner.T_ini, self._config.robot.weight
         first_tick = end * step_ms(self._config) - SAMPLE_MS * (T_ini - 1)
-        known = np.zeros(T_ini, dtype=np.bool_)
-        du, y = np.zeros((T_ini, N_FORCES)), np.zeros((T_ini, N_OUTPUTS))
         measured: dict[int, Measurement] = {}
         for sample in history.measurements:
             place = (sample.tick - first_tick) // SAMPLE_MS
             if 0 <= place < T_ini and sample.tick <= last * step_ms(self._config):
                 measured[place] = sample
-        if len(measured) < T_ini:
-            ticks = sample_starts(first_tick - SAMPLE_MS, T_ini)
-            nominal = nominal_forces(scheduled_stance(self._config, index, ticks), weight)
-            for plan in plans:  # ascending, so that a newer plan overwrites older ones
-                ahead = (ticks - plan.tick) // SAMPLE_MS
-                covered = (ahead >= 0) & (ahead < len(plan.u))
-                known |= covered
-                du[covered] = plan.u[ahead[covered]] - nominal[covered]
-                y[covered] = plan.y[ahead[covered]]
+        if len(measured) == T_ini:  # as nearly always; they are in the order of their ticks
+            return np.ones(T_ini, dtype=np.bool_), *_deviations(measured.values(), weight)
+        known = np.zeros(T_ini, dtype=np.bool_)
+        du, y = np.zeros((T_ini, N_FORCES)), np.zeros((T_ini, N_OUTPUTS))
+        ticks = sample_starts(first_tick - SAMPLE_MS, T_ini)
+        nominal = nominal_forces(scheduled_stance(self._config, index, ticks), weight)
+        for plan in plans:  # ascending, so that a newer plan overwrites older ones
+            ahead = (ticks - plan.tick) // SAMPLE_MS
+            covered = (ahead >= 0) & (ahead < len(plan.u))
+            known |= covered
+            du[covered] = plan.u[ahead[covered]] - nominal[covered]
+            y[covered] = plan.y[ahead[covered]]
         if measured:
             places = list(measured)
-            samples = list(measured.values())
             known[places] = True
-            stance = np.array([sample.stance for sample in samples]) > 0.5
-            du[places] = np.array([sample.u for sample in samples]) - nominal_forces(stance, weight)
-            y[places] = [sample.y for sample in samples]
+            du[places], y[places] = _deviations(measured.values(), weight)
         return known, du, y
+
+
+def _deviations(samples: Collection[Measurement], weight: float) -> tuple[Array, Array]:
+    """Force deviations of samples, (k, 12), N, and their outputs, (k, 6)."""
+    stance = np.array([sample.stance for sample in samples]) > 0.5
+    du = np.array([sample.u for sample in samples]) - nominal_forces(stance, weight)
+    return du, np.array([sample.y for sample in samples])
 
 
 def _age(newest: Plan | None, last: int, first_step: int) -> int:

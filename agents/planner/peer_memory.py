@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
 from typing import TypeVar
 
 from quadriga.agents.plausibility import is_plausible
@@ -57,7 +56,7 @@ def remember(
         if history is None or extended is None:
             refused += 1
         else:
-            peers[robot] = replace(history, measurements=extended)
+            peers[robot] = PeerHistory(extended, history.plans)
     for robot, plan in plans:
         history = peers.get(robot)
         kept_plans = None
@@ -66,7 +65,7 @@ def remember(
         if history is None or kept_plans is None:
             refused += 1
         else:
-            peers[robot] = replace(history, plans=kept_plans)
+            peers[robot] = PeerHistory(history.measurements, kept_plans)
     return PeerMemory(peers, refused)
 
 
@@ -109,8 +108,12 @@ def _insert(
     held: tuple[M, ...], new: M, oldest: K, order: Callable[[M], K]
 ) -> tuple[M, ...] | None:
     """`held` with `new` sorted in, without items before `oldest`; None if it has `new` already."""
-    place: int = bisect_left(held, order(new), key=order)
-    if place < len(held) and order(held[place]) == order(new):
-        return None
-    start: int = bisect_left(held, oldest, key=order)
+    place: int = len(held)
+    if held and order(held[-1]) >= order(new):  # it is not the newest, as nearly all are
+        place = bisect_left(held, order(new), key=order)
+        if order(held[place]) == order(new):
+            return None
+    start: int = 0
+    while start < len(held) and order(held[start]) < oldest:  # one at a time gets too old
+        start += 1
     return (*held[start:place], new, *held[place:])

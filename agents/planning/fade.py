@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -24,9 +25,14 @@ def fade_factor(config: PlannerConfig, error: Array) -> float:
         config: the range.
         error: present outputs less the desired ones, shape (6,).
     """
-    ranges = np.array(config.fade)[[0, 1, 1, 2, 2, 3]]
-    share = float(np.clip(2.0 - np.max(np.abs(error) / ranges), 0.0, 1.0))
-    return share if share > 0.0 else 0.0
+    share = 2.0 - float(np.maximum.reduce(np.abs(error) / _ranges(config.fade)))
+    return min(1.0, share) if share > 0.0 else 0.0  # 0 if it is NaN
+
+
+@lru_cache
+def _ranges(fade: tuple[float, ...]) -> Array:
+    """Of the six outputs, (6,)."""
+    return np.array(fade)[[0, 1, 1, 2, 2, 3]]
 
 
 def outputs_to_follow(result: PlanResult, factor: float, y_des: Array) -> Array:

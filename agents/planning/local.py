@@ -146,7 +146,8 @@ class LocalPlanning:
     ) -> tuple[LocalState, _Request | None, tuple[str, ...]]:
         """The state with all that has arrived, what the planner is asked now, and counters."""
         refused: tuple[str, ...] = ()
-        if inputs.plans or inputs.measurements:
+        arrived = inputs.plans or inputs.measurements
+        if arrived:
             before = state.peers.refused
             peers = self._neighbours.remember(
                 state.peers, inputs.tick, inputs.measurements, inputs.plans
@@ -155,7 +156,9 @@ class LocalPlanning:
             refused = (REFUSED,) * (peers.refused - before)
         if inputs.measurement is not None:
             state = replace(state, own=(*state.own, inputs.measurement)[-self._kept :])
-        if inputs.mode.name != WALK:
+        # Between the ticks of plans and answers nothing is due but what arrivals make possible.
+        idle = not arrived and inputs.tick % self._step_ms % self._exchange_ms
+        if idle or inputs.mode.name != WALK:
             return state, None, refused
         state, request, unusual = self._request(state, inputs)
         return state, request, (*unusual, *refused)

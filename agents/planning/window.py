@@ -41,7 +41,7 @@ def build_planner_inputs(
         y_ini=np.array([sample.y for sample in window]),
         stance_ini=np.array([sample.stance for sample in window]) > 0.5,
         y_base_ini=base_of_window(config, end, references),
-        y_base=np.tile(output_base(config, now), (planner.N, 1)),
-        y_des=np.tile(commanded_outputs(now), (planner.N, 1)),
+        y_base=np.repeat(output_base(config, now)[None], planner.N, axis=0),
+        y_des=np.repeat(commanded_outputs(now)[None], planner.N, axis=0),
         weight=config.robot.weight,
     )

@@ -83,6 +83,7 @@ class World:
         self._torque_limit = config.robot.torque_limit
         self._feet_under_hips = config.robot.feet_under_hips
         self._fallen = [False] * n
+        self._down: tuple[str, ...] = ()  # names of these
         self._surely_up = _FALL_HEIGHT + self.team.terrain.top
         # Compiled functions are compiled, or loaded, now and not in the first tick.
         self._drive(np.empty_like(self._tau))
@@ -121,10 +122,10 @@ class World:
         np.concatenate(rows, out=self._commanded.reshape(-1))
         self._drive(self._tau)
         self._motor[:] = self._tau
-        self.settle()
+        if not self._settled:  # and so nobody has asked for the truth of this tick
+            self._evaluate()
         mujoco.mj_step2(self.team.model, self.physics)
         self._settled = False
-        self._yoke_force = self._read_yoke_force()
         self.tick += 1
         self._states = self._measure()
         return (*events, *self._falls())
@@ -136,10 +137,14 @@ class World:
     def settle(self) -> None:
         """Evaluate what depends on this tick's positions and velocities, once per tick.
 
-        The next step calls it if nobody has. While the robots answer there is time for it.
+        The next step does it if nobody has. While the robots answer there is time for it.
         """
         if self._settled:
             return
+        self._yoke_force = self._read_yoke_force()  # the rows of the next tick take their place
+        self._evaluate()
+
+    def _evaluate(self) -> None:
         if self._moving is not None and (self.tick - 1) % FOLLOW_MS == 0:
             self._moving.follow(self.physics.geom_xpos[self._feet])
         mujoco.mj_step1(self.team.model, self.physics)
@@ -165,7 +170,7 @@ class World:
 
     def fallen(self) -> tuple[str, ...]:
         """Robots that have fallen so far."""
-        return tuple(name for name, down in zip(self.names, self._fallen, strict=True) if down)
+        return self._down
 
     def _measure(self) -> dict[str, State]:
         return self._sensors.measure(self.tick, self._q, self._v, self._tau, self._sensed)
@@ -195,6 +200,8 @@ class World:
             )
             if not (cosine >= _FALL_COSINE and above >= _FALL_HEIGHT):
                 self._fallen[i] = True
+                pairs = zip(self.names, self._fallen, strict=True)
+                self._down = tuple(name for name, down in pairs if down)
                 detail = f"tilt {math.acos(max(-1.0, cosine)):.2f} rad, height {above:.3f} m"
                 events.append(Event.of(self.tick, FALL, self.names[i], detail))
         return events
