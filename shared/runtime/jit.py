@@ -15,6 +15,7 @@ from typing import Final, TypeVar, cast
 import numba
 
 from quadriga.shared.runtime.imports import followed_files
+from quadriga.shared.runtime.jit_references import count_references_plainly
 from quadriga.shared.runtime.places import SOURCE, cache_dir
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -79,4 +80,5 @@ def _key_by_all_sources() -> None:
                 return
 
 
+count_references_plainly()
 _key_by_all_sources()

@@ -10,13 +10,16 @@ from pathlib import Path
 import pytest
 
 from quadriga.shared import errors
-from quadriga.shared.runtime import imports, jit, places
+from quadriga.shared.runtime import imports, jit, jit_references, places
 
 FILES = {
     "quadriga/__init__.py": "",
     "quadriga/shared/__init__.py": "",
     "quadriga/shared/runtime/__init__.py": "",
     "quadriga/shared/runtime/jit.py": Path(jit.__file__).read_text(encoding="utf-8"),
+    "quadriga/shared/runtime/jit_references.py": Path(jit_references.__file__).read_text(
+        encoding="utf-8"
+    ),
     "quadriga/shared/errors.py": Path(errors.__file__).read_text(encoding="utf-8"),
     "quadriga/shared/runtime/imports.py": Path(imports.__file__).read_text(encoding="utf-8"),
     "quadriga/shared/runtime/places.py": Path(places.__file__).read_text(encoding="utf-8"),
