@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from quadriga.agents.planner.cooperation import is_cooperative
 from quadriga.recordings.metadata import recorded_versions
 from quadriga.report.run import Run
 from quadriga.shared.config.reference_trace import ROW_END
@@ -77,7 +78,8 @@ def list_facts(run: Run) -> Iterator[tuple[str, str]]:
     speeds = f"vx {asked.vx:g} m/s, vy {asked.vy:g} m/s, wz {asked.wz:g} rad/s"
     rows = asked.trace.count(ROW_END)
     yield "asked for", f"a trace of {rows} lines" if rows else asked.trace or speeds
-    yield "planner", f"{config.planner.kind}, {config.planner.interface}"
+    whose = ", for the team's cost" if is_cooperative(config) else ""
+    yield "planner", f"{config.planner.kind}{whose}, {config.planner.interface}"
     digest = traces.metadata.get("predictor_sha256", "")
     kind = config.identification.predictor
     yield "predictor", f"{kind}, {digest[:_DIGITS]}" if digest else "none named"
