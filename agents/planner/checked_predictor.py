@@ -62,6 +62,8 @@ def gates_in_force(gates: GateReport, config: Config, predictor: Predictor) -> G
     """
     limits = config.identification
     gates = replace(gates, gain_limits=tuple(limits.gain_range))
+    if gates.peers is not None:
+        gates = replace(gates, peers=replace(gates.peers, harm_limit=limits.max_peers_harm))
     if find_kind(config.planner.kind).needs_peers or gates.cost == OWN:
         gates = replace(gates, radius_limit=radius_limit(config))
     if not find_kind(config.planner.kind).needs_peers:

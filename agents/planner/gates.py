@@ -9,11 +9,13 @@ from scipy import linalg
 
 from quadriga.agents.planner.best_response import iteration_radius, probe_costs, radius_limit
 from quadriga.agents.planner.cooperation import cost_of
+from quadriga.agents.planner.peers_gate import peers_figures
 from quadriga.agents.predictor.episode import Y_SCALE, Episode
 from quadriga.agents.predictor.gate_report import GateReport
+from quadriga.agents.predictor.held_out import predict_windows, window_phases
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.regression import scaled_blocks
-from quadriga.agents.time_grid import gait_phase, horizon_stance, phase_of, walking_steps
+from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import N_LEGS, N_OUTPUTS, OUTPUTS, Array
@@ -52,6 +54,7 @@ def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode])
         coupling=tuple(tuple(row) for row in coupling_table(predictor).tolist()),
         size=predictor.nbytes,
         cost_probes=probe_costs(config, predictor),
+        peers=peers_figures(predictor, held_out, config.identification.max_peers_harm),
     )
 
 
@@ -70,7 +73,8 @@ def held_out_error(
             continue
         z, dy = episode.windows(T_ini, N)
         n, _, windows = dy.shape
-        error = (_predict_windows(predictor, episode, z) - dy).reshape(n, N, N_OUTPUTS, windows)
+        predicted = predict_windows(predictor, window_phases(predictor, episode, windows), z)
+        error = (predicted - dy).reshape(n, N, N_OUTPUTS, windows)
         squares += (error**2).sum(axis=(0, 1, 3))
         for start in range(windows):
             future = episode.y[start + T_ini : start + length]
@@ -87,19 +91,6 @@ def held_out_error(
     rmse, persistence = np.sqrt(squares / total), np.sqrt(naive / total)
     ratio = np.linalg.norm(rmse / Y_SCALE) / np.linalg.norm(persistence / Y_SCALE)
     return count, rmse.tolist(), persistence.tolist(), float(ratio)
-
-
-def _predict_windows(predictor: Predictor, episode: Episode, z: Array) -> Array:
-    """Predictions for all windows of an episode, each by the G of its phase. Shape (n, 6 N, C)."""
-    meta = predictor.meta
-    ends = episode.first_tick + SAMPLE_MS * (meta.T_ini - 1 + np.arange(z.shape[2]))
-    phase = np.array(
-        [gait_phase(int(end), meta.stand_ms, meta.stance_ms, predictor.phases) for end in ends]
-    )
-    y = np.empty((meta.robots, N_OUTPUTS * meta.N, z.shape[2]))
-    for p in np.unique(phase):
-        y[:, :, phase == p] = predictor.predict(z[:, :, phase == p], int(p))
-    return y
 
 
 def coupling_table(predictor: Predictor) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from quadriga.agents.predictor.peers_figures import PeersFigures
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.planner_kinds import find_kind
 
@@ -31,6 +32,8 @@ class GateReport:
         condition: number of the regression, penalty included; None if it is not known.
         coupling: norm of the scaled G_ij, the largest of all phases, per robot i and j.
         size: of G, bytes.
+        peers: what it says of the effect of peers' forces, against held-out data; None of a single
+            robot, and in a file of an earlier version.
     """
 
     windows: int
@@ -49,6 +52,7 @@ class GateReport:
     size: int = 0
     cost_probes: tuple[float, ...] = ()
     cost: str = "own"
+    peers: PeersFigures | None = None
 
     @property
     def iteration(self) -> str:
@@ -71,14 +75,16 @@ class GateReport:
         }
         for table in ("gains", "coupling"):
             frozen[table] = tuple(tuple(row) for row in frozen.get(table, ()))
+        if frozen.get("peers") is not None:
+            frozen["peers"] = PeersFigures.from_dict(frozen["peers"])
         return cls(**frozen)
 
     def check(self, kind: str = "distributed") -> None:
         """Refuse the predictor if a figure is beyond its limit.
 
         Args:
-            kind: of planner that will use it; the radius matters only if its agents respond to
-                each other's plans.
+            kind: of planner that will use it; the radius and the effect of peers matter only if
+                its agents respond to each other's plans.
 
         Raises:
             PredictorError: a figure is beyond its limit; the message names both.
@@ -101,7 +107,9 @@ class GateReport:
                         "forces in the data that follow the outputs (feedback bias), "
                         "or a controller stiffer than the interface assumes",
                     )
-        if find_kind(kind).needs_peers and not self.radius < self.radius_limit:
+        if not find_kind(kind).needs_peers:
+            return
+        if not self.radius < self.radius_limit:
             raise PredictorError(
                 f"predictor: radius of the {self.iteration} map",
                 f"{self.radius:.3f}",
@@ -113,3 +121,5 @@ class GateReport:
                     else "leave planner.damping at 0, which chooses it"
                 ),
             )
+        if self.peers is not None:
+            self.peers.check()

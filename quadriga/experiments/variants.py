@@ -50,16 +50,14 @@ PLANNERS: Final[Mapping[str, Keys]] = {
     "deepc": _planner("deepc"),
     "configured": {},  # the planner of the configuration, whatever it is
 }
-# The plain ones are let through a gate that refuses them: without block weights the distributed
-# scheme iterates with a radius above 1, and what then happens is worth seeing.
+_THROUGH: Final[Keys] = {"identification.max_radius": 10.0, "identification.max_peers_harm": 1e3}
+# The plain ones are let through the gates that refuse them: without block weights the distributed
+# scheme iterates with a radius above 1, and with effects of peers that are not there. What then
+# happens is worth seeing.
 PREDICTORS: Final[Mapping[str, Keys]] = {
     **{kind: {"identification.predictor": kind} for kind in FITS},
-    "plain": {
-        "identification.predictor": "ridge",
-        "identification.block_weight": 1.0,
-        "identification.max_radius": 10.0,
-    },
-    "paper": {"identification.predictor": "pinv", "identification.max_radius": 10.0},
+    "plain": {"identification.predictor": "ridge", "identification.block_weight": 1.0, **_THROUGH},
+    "paper": {"identification.predictor": "pinv", **_THROUGH},
 }
 
 

@@ -22,7 +22,7 @@ _LIBRARIES: Final = ("mujoco", "pin", "numpy", "numba", "daqp", "example-robot-d
 # Keys of the identification that the walks do not depend on, only what is made of them.
 _FITTED: Final = (
     "preset", "predictor", "neighbours", "phases", "phase_ridge", "ridge", "block_weight",
-    "max_radius", "gain_range",
+    "max_radius", "max_peers_harm", "gain_range",
 )  # fmt: skip
 
 

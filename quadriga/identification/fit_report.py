@@ -7,13 +7,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.gate_report import GateReport
+from quadriga.agents.predictor.held_out import predict_windows, window_phases
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance
-from quadriga.agents.time_grid import gait_phase
 from quadriga.shared.errors import PredictorError, QuadrigaError
 from quadriga.shared.robot.conventions import N_OUTPUTS, OUTPUTS, Array
 from quadriga.shared.wire.topics import SAMPLE_MS
@@ -122,11 +121,8 @@ def horizon_errors(predictor: Predictor, held_out: Sequence[Episode]) -> Horizon
         if episode.samples < meta.T_ini + meta.N:
             continue
         z, dy = episode.windows(meta.T_ini, meta.N)
-        phases = _phases(predictor, episode, z.shape[2])
-        for phase in np.unique(phases):
-            now = phases == phase
-            error = predictor.predict(z[:, :, now], int(phase)) - dy[:, :, now]
-            squares += (error.reshape(*shape, -1) ** 2).mean(axis=0).sum(axis=-1)
+        error = predict_windows(predictor, window_phases(predictor, episode, z.shape[2]), z) - dy
+        squares += (error.reshape(*shape, -1) ** 2).mean(axis=0).sum(axis=-1)
         for end in range(meta.T_ini, meta.T_ini + z.shape[2]):
             held = episode.y[end : end + meta.N] - episode.y[end - 1]
             naive += (held**2).mean(axis=1)
@@ -139,11 +135,3 @@ def horizon_errors(predictor: Predictor, held_out: Sequence[Episode]) -> Horizon
             "did every held-out walk end in a fall?",
         )
     return HorizonErrors(np.sqrt(squares / count), np.sqrt(naive / count))
-
-
-def _phases(predictor: Predictor, episode: Episode, windows: int) -> NDArray[np.int64]:
-    """Phase of the gait at the end of each window's past. Shape (windows,)."""
-    meta = predictor.meta
-    ends = episode.first_tick + SAMPLE_MS * (meta.T_ini - 1 + np.arange(windows))
-    phases = [gait_phase(int(t), meta.stand_ms, meta.stance_ms, predictor.phases) for t in ends]
-    return np.array(phases, dtype=np.int64)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from quadriga.agents.predictor.peers_figures import LEFT_OUT, UNDERSTATED, Bounds, PeersFigures
 from quadriga.identification.fit_report import FitReport, Unfit, reason
 from quadriga.shared.robot.conventions import OUTPUTS, robot_names
 from quadriga.shared.wire.topics import SAMPLE_MS
@@ -18,9 +19,11 @@ def build_report_tables(report: FitReport, *, whole: bool = False) -> list[Table
     """Everything about one predictor; `whole`: with the errors at every sample of the horizon."""
     N = report.meta.N
     shown = np.arange(N) if whole else np.linspace(0, N - 1, min(N, _SHOWN)).round().astype(int)
+    peers = report.gates.peers
     return [
         _build_figures(report),
         _build_outputs(report),
+        *([] if peers is None else [_build_peers(peers)]),
         _build_horizon(report, shown.tolist()),
         _build_coupling(report),
     ]
@@ -46,6 +49,7 @@ def build_comparison(reports: Sequence[FitReport | Unfit]) -> Table:
             f"{low:g} … {high:g}; radius: of the map of the robots' best responses."
         )
     notes += [f"{r.name}: {_describe_verdict(r)}." for r in reports if r.refused]
+    notes += [f"{r.name}, effect of peers: {_describe_peers(r)}." for r in fitted]
     return Table("Predictors on the same data: held-out RMSE", columns, tuple(rows), notes)
 
 
@@ -71,6 +75,11 @@ def _describe_verdict(report: FitReport | Unfit) -> str:
     return f"refused: {reason(report.refused)}" if report.refused else "accepted"
 
 
+def _describe_peers(report: FitReport) -> str:
+    peers = report.gates.peers
+    return NOTHING if peers is None else peers.describe() or "nothing invented or left out"
+
+
 def _build_figures(report: FitReport) -> Table:
     gates, origin, meta = report.gates, report.provenance, report.meta
     low, high = gates.gain_limits
@@ -88,6 +97,7 @@ def _build_figures(report: FitReport) -> Table:
             for robot, gain in zip(_list_robots(report), (r[k] for r in gates.gains), strict=True)
         ),
         (f"{gates.iteration} radius", format_number(gates.radius), f"< {gates.radius_limit:g}"),
+        ("effect of peers", _describe_peers(report), ""),
         ("condition number", format_number(gates.condition, ".3g"), ""),
         ("size of G", f"{format_number(gates.size, '.1f', 1e-6)} MB", ""),
         ("fit", f"{format_number(report.fit_seconds, '.1f')} s", ""),
@@ -112,6 +122,35 @@ def _build_outputs(report: FitReport) -> Table:
     columns = ("output", "RMSE", "persistence", "ratio")
     note = f"All robots, {gates.windows} held-out windows of {report.meta.N} samples."
     return Table("Held-out error", columns, tuple(rows), (note,))
+
+
+def _build_peers(peers: PeersFigures) -> Table:
+    rows = tuple(
+        (
+            label,
+            format_number(peers.share[name], ".3f"),
+            _format_bounds(peers.slope[name], ".2f"),
+            _format_bounds(peers.harm[name], ".1f", 100.0),
+            peers.verdict(name),
+        )
+        for name, label in zip(OUTPUTS, LABELS, strict=True)
+    )
+    columns = ("output", "of the own", "measured / predicted", "more squared error [%]", "verdict")
+    notes = (
+        "Part of held-out predictions that is due to the forces of peers: its size for one peer "
+        "over that of the robot's own forces; how much of it is measured, and how much larger the "
+        "squared error is with it than without it, with 95 % intervals. Invented: certainly worse "
+        f"than without. Understated: certainly {UNDERSTATED:g} times as much is measured. "
+        f"Left out: smaller than {LEFT_OUT:g} of the own. Confirmed: certainly better with it.",
+        f"Limit of a planner whose agents respond to each other's plans: certainly more than "
+        f"{100.0 * peers.harm_limit:g} % is refused.",
+    )
+    return Table("Effect of peers", columns, rows, notes)
+
+
+def _format_bounds(bounds: Bounds, digits: str, factor: float = 1.0) -> str:
+    value, low, high = (format_number(number, digits, factor) for number in bounds)
+    return value if bounds.low is None else f"{value} ({low} … {high})"
 
 
 def _build_horizon(report: FitReport, samples: Sequence[int]) -> Table:

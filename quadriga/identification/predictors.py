@@ -103,6 +103,8 @@ def fit(config: Config, dataset: Dataset, path: Path, console: Console) -> tuple
     with console.status("fitting the predictor"):
         predictor = fit_predictor(dataset.training, PredictorMeta.of(config))
         report = run_gates(config, predictor, dataset.held_out)
+    if report.peers is not None and (found := report.peers.describe()):
+        console.print(f"effect of peers as predicted: {found}; see `quadriga fit`", highlight=False)
     report.check(config.planner.kind)
     return save(path, predictor, build_provenance(config, dataset, report)), report
 

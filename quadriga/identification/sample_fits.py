@@ -43,6 +43,9 @@ def samples() -> Iterator[Array]:
             # Not the condition: its last bit depends on where in memory the arrays lie.
             yield numbers(gates.error, gates.radius)
             yield from (np.array(gates.gains), np.array(gates.coupling))
+            if gates.peers is not None:
+                slopes, harms = gates.peers.slope.values(), gates.peers.harm.values()
+                yield from (numbers(*bounds) for bounds in (*slopes, *harms))
             yield np.array([*gates.rmse.values(), *gates.rmse_persistence.values()])
 
 

@@ -81,6 +81,14 @@ class IdentificationConfig:
     max_radius: float = key(
         0.5, "1", "gate: spectral radius of the best-response map", low=0.01, high=10.0
     )
+    max_peers_harm: float = key(
+        0.02,
+        "1",
+        "gate: share by which the predicted effect of peers may raise the squared error of an "
+        "output on held-out data; beyond its 95 % interval it is refused",
+        low=0.0,
+        high=1000.0,
+    )
     gain_range: tuple[float, ...] = key(
         (0.3, 2.0), "1", "gate: predicted over physical height response", low=-10.0
     )

@@ -49,8 +49,11 @@ _PAPER_PLANNER: Final = MappingProxyType(
     }
 )  # fmt: skip
 
-# The pseudo-inverse, and no gate on its best responses: the paper has none.
-_PAPER_FIT: Final = MappingProxyType({"predictor": "pinv", "max_radius": 10.0})
+# The pseudo-inverse, and no gate on its best responses nor on its effects of peers: the paper has
+# none.
+_PAPER_FIT: Final = MappingProxyType(
+    {"predictor": "pinv", "max_radius": 10.0, "max_peers_harm": 1000.0}
+)
 
 _USUAL: Final = MappingProxyType[str, Any]({})
 PRESETS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = MappingProxyType(

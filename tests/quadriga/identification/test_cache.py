@@ -43,6 +43,7 @@ FITTED = {
         "ridge",
         "block_weight",
         "max_radius",
+        "max_peers_harm",
         "gain_range",
     )
 }
