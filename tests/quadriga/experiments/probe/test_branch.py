@@ -50,6 +50,7 @@ def test_a_branch_that_is_killed_is_an_error() -> None:
 
 
 def test_no_branch_is_left_behind() -> None:
-    run_branch(bytes)
+    branch = int(run_branch(lambda: str(os.getpid()).encode()))
+    assert branch != os.getpid()
     with pytest.raises(ChildProcessError):
-        os.waitpid(-1, os.WNOHANG)
+        os.waitpid(branch, os.WNOHANG)
