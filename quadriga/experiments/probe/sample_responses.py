@@ -15,7 +15,7 @@ _SHORT: Final = {
 }  # fmt: skip
 _TEAMS: Final[tuple[dict[str, Any], ...]] = (
     {"team.robots": 2, "world.terrain": "boxes"},
-    {"team.robots": 1, "planner.interface": "force", "controller.preset": "paper"},
+    {"team.robots": 1, "planner.interface": "force", "controller.preset": "plain"},
 )
 
 
