@@ -121,7 +121,7 @@ class _Ours:
         ):
             terms = self._body.terms(case.q, case.v)
             R, p_foot = trunk_of(case.sensed).R, feet_of(case.sensed)
-            self._x = solve_goal(terms, R, p_foot, goal, self._weights, A1.torque_limit).x
+            self._x = solve_goal(terms, R, p_foot, goal, self._weights, A1.torque_bounds).x
 
     def torques(self) -> Array:
         """Of the last tick, (12,), N·m."""

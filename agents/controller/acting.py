@@ -29,6 +29,7 @@ from quadriga.agents.controller.sensed import (
     trunk_of,
 )
 from quadriga.agents.controller.swing import MotionReference
+from quadriga.agents.controller.torque_bounds import torque_bounds
 from quadriga.agents.controller.trunk_feedback import (
     Integrators,
     SingleRigidBody,
@@ -150,7 +151,8 @@ def act(
 
     weights = with_mu(fixed.weights, fixed.weights.mu - memory[MEMORY.mu_reduction])
     x[:] = 0.0
-    return solve_closed_form(terms, trunk.R, p_foot, goal, weights, fixed.torque_limit, x)
+    bounds = torque_bounds(sensed[SENSED.v_joint], fixed.motors)
+    return solve_closed_form(terms, trunk.R, p_foot, goal, weights, bounds, x)
 
 
 @compiled

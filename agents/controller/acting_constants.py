@@ -11,6 +11,7 @@ from quadriga.agents.controller.friction import N_FRICTION_RULE, FrictionRule, f
 from quadriga.agents.controller.maths.links import LINK_SIZE, N_LINKS
 from quadriga.agents.controller.maths.rows import numbers, places
 from quadriga.agents.controller.model import RigidBody
+from quadriga.agents.controller.torque_bounds import MotorLimits, motor_limits
 from quadriga.agents.controller.trunk_feedback import (
     N_TRUNK_GAINS,
     SingleRigidBody,
@@ -27,13 +28,13 @@ class ActingConstants(NamedTuple):
     """The row, taken apart.
 
     Attributes:
-        links: `link_table`, (13, 13), of the bare robot.
+        links: `link_table`, (13, 14), of the bare robot.
         body: the bare robot as one rigid body.
         trunk: gains of the trunk's feedback.
         feet: what feet are asked for.
         weights: of the whole-body QP.
         friction: how much friction to count on.
-        torque_limit: of each motor, (12,), N·m.
+        motors: limits of their torques.
         weight: of the bare robot, N; nominal forces carry it.
         free_fall: whether a robot without contact is asked to fall freely.
     """
@@ -44,7 +45,7 @@ class ActingConstants(NamedTuple):
     feet: FeetGains
     weights: Weights
     friction: FrictionRule
-    torque_limit: Array
+    motors: MotorLimits
     weight: float
     free_fall: bool
 
@@ -60,7 +61,7 @@ class ConstantsLayout(NamedTuple):
     feet: slice
     weights: slice
     friction: slice
-    torque_limit: slice
+    motors: slice
     weight: int
     free_fall: int
 
@@ -75,7 +76,7 @@ _LAYOUT: Final = ConstantsLayout(
         feet=N_FEET_GAINS,
         weights=N_WEIGHTS,
         friction=N_FRICTION_RULE,
-        torque_limit=N_JOINTS,
+        motors=3 * N_JOINTS,
         weight=1,
         free_fall=1,
     )
@@ -95,7 +96,7 @@ def acting_constants(config: Config, body: RigidBody, weights: Weights) -> Array
             feet_gains(config),
             weights,
             friction_rule(controller),
-            robot.torque_limit,
+            *motor_limits(config),
             [robot.weight, float(controller.flight)],
         ]
     )
@@ -107,6 +108,7 @@ def unpack_constants(row: Array) -> ActingConstants:
     body = SingleRigidBody(
         row[_LAYOUT.mass], row[_LAYOUT.com], row[_LAYOUT.inertia_inverse].reshape(3, 3)
     )
+    motors = row[_LAYOUT.motors].reshape(3, N_JOINTS)
     return ActingConstants(
         row[_LAYOUT.links].reshape(N_LINKS, LINK_SIZE),
         body,
@@ -114,7 +116,7 @@ def unpack_constants(row: Array) -> ActingConstants:
         FeetGains(*numbers(row[_LAYOUT.feet], N_FEET_GAINS)),
         Weights(*numbers(row[_LAYOUT.weights], N_WEIGHTS)),
         FrictionRule(*numbers(row[_LAYOUT.friction], N_FRICTION_RULE)),
-        row[_LAYOUT.torque_limit],
+        MotorLimits(motors[0], motors[1], motors[2]),
         row[_LAYOUT.weight],
         row[_LAYOUT.free_fall] > 0.5,
     )

@@ -22,6 +22,7 @@ from quadriga.agents.controller.model import RigidBody
 from quadriga.agents.controller.schedule import Schedule
 from quadriga.agents.controller.sensed import SENSED, SENSED_SIZE, Sensed
 from quadriga.agents.controller.sensing import place, sense, sensing_constants
+from quadriga.agents.controller.torque_bounds import motor_limits, torque_bounds
 from quadriga.agents.controller.whole_body.assembly import build
 from quadriga.agents.controller.whole_body.problem import (
     SOLUTION_SIZE,
@@ -99,10 +100,10 @@ class Controller:
 
     def __init__(self, config: Config) -> None:
         robot = config.robot
-        self.body = RigidBody(robot)
+        self.body = RigidBody(robot, rotors=config.motors.rotor_inertia)
         self.weights = qp_weights(config.controller)
         self._sensing = sensing_constants(config)
-        self._robot = robot
+        self._robot, self._motors = robot, motor_limits(config)
         self._acting = acting_constants(config, self.body, self.weights)
 
     def sense(self, memory: Memory | None, state: State, schedule: Schedule, dt: float) -> Sensed:
@@ -171,7 +172,8 @@ class Controller:
         """
         terms = self.body.terms(sensed.q, sensed.v, memory.load)
         weights = self.weights._replace(mu=self.weights.mu - memory.mu_reduction)
-        return build(terms, sensed.R, sensed.p_foot, goal, weights, self._robot.torque_limit)
+        bounds = torque_bounds(sensed.v[6:], self._motors)
+        return build(terms, sensed.R, sensed.p_foot, goal, weights, bounds)
 
 
 def _row_of(task: Task, dt: float, new_sample: bool) -> Array:

@@ -25,6 +25,10 @@ def _single_rigid_body(model: pin.Model, q_joint: Array) -> tuple[Array, Array]:
 class RigidBody:
     """What is constant of one robot, taken from Pinocchio's model of its URDF.
 
+    Args:
+        robot: its kind.
+        rotors: whether its joints have the inertia of their motors' rotors.
+
     Attributes:
         links: `link_table`.
         mass: kg.
@@ -32,8 +36,8 @@ class RigidBody:
         inertia_inverse: inverse of the inertia about it, trunk frame, (3, 3), 1/(kg·m²).
     """
 
-    def __init__(self, robot: RobotSpec) -> None:
-        model = build_pinocchio_model(robot)
+    def __init__(self, robot: RobotSpec, *, rotors: bool = False) -> None:
+        model = build_pinocchio_model(robot, rotors=rotors)
         self.links = link_table(model)
         self.mass: float = float(pin.computeTotalMass(model))
         self.inertia_inverse, self.com = _single_rigid_body(model, robot.q_stand)

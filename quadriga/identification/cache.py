@@ -34,6 +34,7 @@ def data_key(config: Config) -> str:
     sections: dict[str, Any] = {
         "team": {k: team[k] for k in ("robots", "robot", "yokes", "spacing", "alternate_phase")},
         "sensors": asdict(config.sensors),
+        "motors": asdict(config.motors),
         "estimator": asdict(config.estimator),
         "gait": asdict(config.gait),
         "controller": asdict(config.controller),

@@ -101,13 +101,12 @@ def problems_of(agent: Agent, before: AgentState, inputs: Inputs, about: str) ->
 
 def _save_whole_body(problems: StepProblems, about: str) -> SavedQp:
     qp, answer = problems.whole_body, problems.whole_body_solution
-    box = qp.tau_max
     return SavedQp(
         qp.H,
         qp.g,
         qp.C,
-        np.concatenate([-box, qp.c]),
-        np.concatenate([box, np.full(len(qp.c), _FAR)]),
+        np.concatenate([qp.tau_min, qp.c]),
+        np.concatenate([qp.tau_max, np.full(len(qp.c), _FAR)]),
         answer.tau,
         f"whole-body QP of {about}, {answer.status}: x is the torques [N·m]",
     )

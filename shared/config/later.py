@@ -24,6 +24,16 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "world.stairs_rise": 0.06,
         "world.stairs_run": 0.3,
         "world.stairs_count": 8,
+        "world.leg_collisions": False,
+        "motors.preset": "ideal",
+        "motors.torque_speed": False,
+        "motors.friction": 0.0,
+        "motors.viscous_friction": 0.0,
+        "motors.rotor_inertia": False,
+        "motors.bandwidth": 0.0,
+        "motors.delay_ms": 0,
+        "motors.hard_stops": False,
+        "motors.heat_time": 0.0,
     }
 )
 
@@ -31,13 +41,34 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
 def hashed_sections(sections: Mapping[str, Any]) -> dict[str, Any]:
     """Values by section and key as they are hashed and compared across versions.
 
-    A key that came later is left out while it has its value of `LATER_KEYS`; all others stand under
-    the names that they had first. So neither a new key nor a new name alone changes a hash.
+    A key that came later is left out while it has its value of `LATER_KEYS`, and a section of which
+    no key is left; all others stand under the names that they had first. So neither a new key nor a
+    new name alone changes a hash.
 
     Args:
         sections: values by section and key under today's names, as `asdict` gives them.
     """
-    return with_first_names({section: _leave_out(section, k) for section, k in sections.items()})
+    left = {section: _leave_out(section, keys) for section, keys in sections.items()}
+    return with_first_names(
+        {section: keys for section, keys in left.items() if keys != {} or not sections[section]}
+    )
+
+
+def with_older_values(sections: Mapping[str, Any]) -> dict[str, Any]:
+    """What another version wrote down in full, with the keys that it did not know yet.
+
+    They have the value that all that is older was made with, not today's default.
+
+    Args:
+        sections: values by section and key under today's names.
+    """
+    filled = dict(sections)
+    for name, value in LATER_KEYS.items():
+        section, _, key = name.partition(".")
+        keys = filled.get(section, {})
+        if isinstance(keys, dict):
+            filled[section] = {key: value, **keys}
+    return filled
 
 
 def _leave_out(section: str, keys: Any) -> Any:

@@ -55,10 +55,19 @@ _PAPER_FIT: Final = MappingProxyType(
     {"predictor": "pinv", "max_radius": 10.0, "max_peers_harm": 1000.0}
 )
 
+# What a motor would do without friction, inertia, delay or heat.
+_IDEAL_MOTORS: Final = MappingProxyType(
+    {
+        "torque_speed": False, "friction": 0.0, "viscous_friction": 0.0, "rotor_inertia": False,
+        "bandwidth": 0.0, "delay_ms": 0, "hard_stops": False, "heat_time": 0.0,
+    }
+)  # fmt: skip
+
 _USUAL: Final = MappingProxyType[str, Any]({})
 PRESETS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = MappingProxyType(
     {
         "controller": MappingProxyType({"robust": _USUAL, "soft": _SOFT, "plain": _PLAIN}),
+        "motors": MappingProxyType({"realistic": _USUAL, "ideal": _IDEAL_MOTORS}),
         "planner": MappingProxyType({"usual": _USUAL, "fast": _FAST, "paper": _PAPER_PLANNER}),
         "identification": MappingProxyType({"usual": _USUAL, "paper": _PAPER_FIT}),
     }

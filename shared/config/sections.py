@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from quadriga.shared.config.identification import IdentificationConfig
 from quadriga.shared.config.low_level import ControllerConfig, EstimatorConfig, GaitConfig
+from quadriga.shared.config.motors import MotorsConfig
 from quadriga.shared.config.planner import PlannerConfig
 from quadriga.shared.config.reference import ReferenceConfig
 from quadriga.shared.config.team import (
@@ -27,6 +28,7 @@ __all__ = [
     "EstimatorConfig",
     "GaitConfig",
     "IdentificationConfig",
+    "MotorsConfig",
     "PlannerConfig",
     "RecorderConfig",
     "ReferenceConfig",
@@ -45,6 +47,7 @@ class Config:
     bus: BusConfig = field(default_factory=BusConfig)
     world: WorldConfig = field(default_factory=WorldConfig)
     sensors: SensorsConfig = field(default_factory=SensorsConfig)
+    motors: MotorsConfig = field(default_factory=MotorsConfig)
     estimator: EstimatorConfig = field(default_factory=EstimatorConfig)
     gait: GaitConfig = field(default_factory=GaitConfig)
     controller: ControllerConfig = field(default_factory=ControllerConfig)

@@ -43,6 +43,12 @@ class WorldConfig:
     stairs_run: float = key(0.3, "m", "terrain stairs: depth of a tread", low=0.1, high=2.0)
     stairs_count: int = key(8, "1", "terrain stairs: steps up, and down again", low=1, high=50)
     friction: float = key(0.8, "1", "friction coefficient of feet on ground", low=0.05, high=2.0)
+    leg_collisions: bool = key(
+        True,
+        "-",
+        "hips, thighs and calves collide with the ground, thighs, calves, feet and trunks with "
+        "those of others; false: feet and trunks collide, and with the ground alone",
+    )
     payload: float = key(0.0, "kg", "load unknown to the agents", low=0.0, high=60.0)
     payload_on: str = key(
         "team",

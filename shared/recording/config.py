@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+from quadriga.shared.config.later import with_older_values
 from quadriga.shared.config.load import build
 from quadriga.shared.config.renamed import with_current_names
 from quadriga.shared.config.sections import Config
@@ -14,6 +15,8 @@ from quadriga.shared.recording.salvage import Salvage
 
 def recorded_config(recording: Recording | Salvage) -> Config:
     """The configuration of a recorded run.
+
+    What its version did not know yet is as it was then, see `with_older_values`.
 
     Raises:
         RecordingError: the recording holds none, or one with keys or values that this version
@@ -28,7 +31,7 @@ def recorded_config(recording: Recording | Salvage) -> Config:
             str(recording.path), "metadata without a configuration", "config_json in the metadata"
         )
     try:
-        return build(with_current_names(sections))
+        return build(with_older_values(with_current_names(sections)))
     except ConfigError as error:
         raise RecordingError(
             f"configuration of {recording.path}",

@@ -1,4 +1,10 @@
-"""Unitree A1."""
+"""Unitree A1.
+
+Torques, speeds and angles are the URDF's. Unitree publishes a torque-speed curve of the Go2's motor
+alone, see `go2`; the corner speed is the same share of the speed limit. Rotor inertia: MuJoCo
+Menagerie, `unitree_a1`. Continuous torque: chosen so that a walk with 3 kg overheats a knee after
+5 to 7 minutes, as Qian et al. found on an A1 (arXiv:2603.01631).
+"""
 
 from __future__ import annotations
 
@@ -21,6 +27,9 @@ A1: Final = RobotSpec(
     yoke=(0.0, 0.0, 0.08),
     torque=(33.5, 33.5, 33.5),
     speed=(21.0, 21.0, 21.0),
+    corner_speed=(9.45, 9.45, 9.45),
+    continuous_torque=(12.0, 12.0, 12.0),
+    rotor_inertia=(0.01, 0.01, 0.01),
     lower=4 * (-0.802851455917, -1.0471975512, -2.69653369433),
     upper=4 * (0.802851455917, 4.18879020479, -0.916297857297),
     stand_height=0.26,

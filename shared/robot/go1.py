@@ -1,4 +1,10 @@
-"""Unitree Go1."""
+"""Unitree Go1.
+
+Torques, speeds and angles are the URDF's, and so is the rotors' inertia: 1.118e-4 kg·m² in
+`FL_hip_rotor` and its like, behind a gear of 6, at the knee of 9. Unitree publishes a torque-speed
+curve of the Go2's motor alone, see `go2`; the corner speed is the same share of the speed limit.
+Continuous torque: the same share of the peak as the A1's.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +25,9 @@ GO1: Final = RobotSpec(
     yoke=(0.0, 0.0, 0.08),
     torque=(23.7, 23.7, 35.55),
     speed=(30.1, 30.1, 20.06),
+    corner_speed=(13.5, 13.5, 9.0),
+    continuous_torque=(8.5, 8.5, 12.75),
+    rotor_inertia=(0.00403, 0.00403, 0.00906),
     lower=4 * (-0.863, -0.686, -2.818),
     upper=4 * (0.863, 4.501, -0.888),
     stand_height=0.28,

@@ -56,6 +56,10 @@ class RobotSpec:
         yoke: where the ball joint of the yokes and the payload sit, (3,), m, trunk frame.
         torque: limits of the motors of hip, thigh and calf, (3,), N·m.
         speed: likewise, (3,), rad/s.
+        corner_speed: up to which they give their full torque, (3,), rad/s; from there on it falls
+            linearly, to zero at `speed`.
+        continuous_torque: that they can give for any time without overheating, (3,), N·m.
+        rotor_inertia: of their rotors, as the joints feel it behind the gears, (3,), kg·m².
         lower, upper: limits of the joint angles, in the order of `JOINT_NAMES`, (12,), rad.
         stand_height: of the trunk's origin above the ground when it stands, m.
         reach: how far under the hip a foot may be lowered, m.
@@ -72,6 +76,9 @@ class RobotSpec:
     yoke: tuple[float, float, float]
     torque: tuple[float, float, float]
     speed: tuple[float, float, float]
+    corner_speed: tuple[float, float, float]
+    continuous_torque: tuple[float, float, float]
+    rotor_inertia: tuple[float, float, float]
     lower: tuple[float, ...]
     upper: tuple[float, ...]
     stand_height: float
@@ -93,6 +100,16 @@ class RobotSpec:
     def torque_limit(self) -> Array:
         """Of every joint, in the order of `JOINT_NAMES`. Shape (12,), N·m."""
         return _read_only(np.tile(self.torque, N_LEGS))
+
+    @cached_property
+    def torque_bounds(self) -> Array:
+        """Least and greatest torque of every joint that stands. Shape (2, 12), N·m."""
+        return _read_only(np.stack([-self.torque_limit, self.torque_limit]))
+
+    @cached_property
+    def rotor_inertias(self) -> Array:
+        """Of every joint, in the order of `JOINT_NAMES`. Shape (12,), kg·m²."""
+        return _read_only(np.tile(self.rotor_inertia, N_LEGS))
 
     @cached_property
     def q_stand(self) -> Array:

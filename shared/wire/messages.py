@@ -223,7 +223,10 @@ class EStop(Message):
 
 @record
 class Truth(Message):
-    """The world as the simulator knows it; no agent may use it outside `--estimator truth`."""
+    """The world as the simulator knows it; no agent may use it outside `--estimator truth`.
+
+    `grf` is what acts on the feet alone; what a shank or a trunk bears is not in it.
+    """
 
     robots: tuple[str, ...] = plain(list, "robot names, the order of the first axis")
     base_pos: Array = array("n", 3, entries=XYZ, unit="m", frame="world")

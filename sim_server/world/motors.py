@@ -1,25 +1,42 @@
-"""Motors: the torques they give for a command, and the ones that weaken."""
+"""Motors and joints: from commands, as they arrive, to the torques that act on the joints.
+
+A motor evaluates its command every tick at the joint's angle and rate of that tick. Its torque
+follows what is asked for as a first-order lag and stays within what speed and temperature leave of
+it; the joint's friction is then taken off:
+
+    τ* = τ_ff + k_p (q_des − q) + k_d (q̇_des − q̇)          of the command sent `delay_ms` before
+    τ ← τ + (1 − e^(−2π f Δt)) (τ* − τ),  |τ| ≤ limit        f: the bandwidth
+    τ_joint = τ − c tanh(q̇ / v₀) − b q̇                       c, b: dry and viscous friction
+
+Where torque and rate point the same way the limit is full up to the corner speed and falls linearly
+to zero at the joint's speed limit, as in Unitree's torque-speed curves; a motor that brakes has its
+full torque. Losses in the winding heat it: h' = ((τ/τ_c)² − h) / T, where h = 1 is the temperature
+that the continuous torque τ_c reaches in the end. Above h = 0.8 the limit falls, to τ_c at h = 1.
+Friction has the shape of Unitree's actuator models; its size lies between that of the Go1's URDF
+(0.2 N·m, 0.01 N·m·s/rad) and of the G1's motor of like torque, N5020-16 (0.6, 0.06;
+unitree_rl_lab). Bandwidth and delay are those of good drives on a serial bus at 500 to 1000 Hz;
+no source states Unitree's.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from collections import deque
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array, robot_names
+from quadriga.shared.config.motors import MotorsConfig
+from quadriga.shared.robot.conventions import N_JOINTS, N_LEGS, Array
+from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.robot.torque_speed import available_torque
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.world.layout import JOINT_POSITIONS, JOINT_RATES
 
-_KEY: Final = "world.weak_motor"
-_GRAMMAR: Final = "'robot:joint:start[s]', commas between motors"
-_ANY: Final = "any"
-_JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
-_LATEST: Final = 3600.0  # s
+_TICK: Final = 1e-3  # s
+_WARM: Final = 0.8  # of the temperature that continuous torque reaches: from here on torque falls
+_CREEP: Final = 0.05  # rad/s, v₀: a joint slower than this may be kept still by dry friction
 # Where a command's row has its fields.
 _TAU: Final = Command.CUTS["tau"]
 _Q_DES: Final = Command.CUTS["q_des"]
@@ -28,91 +45,129 @@ _KP: Final = Command.CUTS["kp"]
 _KD: Final = Command.CUTS["kd"]
 
 
-@dataclass(frozen=True, slots=True)
-class WeakMotor:
-    """A motor that gives only `share` of its torque from tick `start` on.
+class MotorData(NamedTuple):
+    """What motors and joints are like; arrays are by joint, (12,).
 
     Attributes:
-        robot: its index.
-        joint: its index in `JOINT_NAMES`.
-        start: tick, ms.
-        share: of the torque that a sound motor would give.
+        peak: torque limit of a cool motor that stands, N·m.
+        continuous: torque limit of a hot one, N·m.
+        corner: speed from which on the torque falls, rad/s; infinite if it does not.
+        top: speed at which none is left, rad/s.
+        follow: share of a torque error that is made up for in a tick.
+        friction: dry friction, N·m.
+        viscous: friction by rate, N·m·s/rad.
+        heating: share of a tick in the filter of the temperature; 0: it stays.
     """
 
-    robot: int
-    joint: int
-    start: int
-    share: float
+    peak: Array
+    continuous: Array
+    corner: Array
+    top: Array
+    follow: float
+    friction: float
+    viscous: float
+    heating: float
 
-    @property
-    def detail(self) -> str:
-        """Detail of the event that announces the weakening."""
-        return f"{_JOINTS[self.joint]} gives {100 * self.share:g} % of its torque"
+
+def motor_data(robot: RobotSpec, config: MotorsConfig) -> MotorData:
+    """The motors of a robot as a configuration has them."""
+    corner, top = (np.tile(speeds, N_LEGS) for speeds in (robot.corner_speed, robot.speed))
+    lag = 1.0 - math.exp(-2.0 * math.pi * config.bandwidth * _TICK)
+    return MotorData(
+        peak=robot.torque_limit,
+        continuous=np.tile(robot.continuous_torque, N_LEGS),
+        corner=corner if config.torque_speed else np.full(N_JOINTS, np.inf),
+        top=top,
+        follow=lag if config.bandwidth > 0.0 else 1.0,
+        friction=config.friction,
+        viscous=config.viscous_friction,
+        heating=_TICK / config.heat_time if config.heat_time > 0.0 else 0.0,
+    )
+
+
+class Motors:
+    """The motors of all robots of a world.
+
+    Attributes:
+        torque: what they gave in the last tick, as their currents tell it, (n, 12), N·m.
+        joint_torque: what of it was left for the joints, (n, 12), N·m.
+        heat: temperature above the surroundings, 1 where the continuous torque leads, (n, 12).
+    """
+
+    def __init__(self, robot: RobotSpec, config: MotorsConfig, robots: int, idle: Command) -> None:
+        """Cool motors that have got the command `idle` so far."""
+        shape = (robots, N_JOINTS)
+        self.torque, self.joint_torque = np.zeros(shape), np.zeros(shape)
+        self.heat = np.zeros(shape)
+        self._sound = np.zeros(shape)
+        self._data = motor_data(robot, config)
+        on_the_way = [np.tile(idle.row, (robots, 1)) for _ in range(config.delay_ms)]
+        self._on_the_way: deque[Array] = deque(on_the_way)
+
+    def send(self, rows: list[Array]) -> Array:
+        """Send rows of `Command`s, one of each robot; those that arrive now, (n, 60)."""
+        self._on_the_way.append(np.stack(rows))
+        return self._on_the_way.popleft()
+
+    def drive(self, arrived: Array, q: Array, v: Array, strength: Array) -> None:
+        """Let a tick pass under commands that have arrived.
+
+        Args:
+            arrived: rows of the robots' `Command`s, (n, 60).
+            q: coordinates of each robot, its joints behind the trunk's seven, (n, 19).
+            v: velocities, its joints behind the trunk's six, (n, 18).
+            strength: the share of its limited torque that each motor gives, (n, 12).
+        """
+        _drive(arrived, q, v, strength, self._data, self._sound, self.heat, self.torque)
+        _take_off_friction(v, self.torque, self._data, self.joint_torque)
 
 
 @compiled
-def drive(commands: Array, q: Array, v: Array, strength: Array, limit: Array, tau: Array) -> None:
-    """Fill `tau`, (n, 12), with the motors' torques: tau + kp (q_des − q) + kd (v_des − v).
+def derated(peak: float, continuous: float, heat: float) -> float:
+    """What temperature leaves of a motor's torque limit, N·m."""
+    share = min(1.0, max(0.0, (1.0 - heat) / (1.0 - _WARM)))
+    return continuous + share * (peak - continuous)
 
-    Args:
-        commands: rows of the robots' `Command`s, (n, 60).
-        q: coordinates of each robot, its joints behind the trunk's seven, (n, 19).
-        v: velocities, its joints behind the trunk's six, (n, 18).
-        strength: the share of its limited torque that each motor gives, (n, 12).
-        limit: of each joint's torque, (12,), N·m.
-        tau: N·m.
-    """
+
+@compiled
+def _drive(
+    commands: Array,
+    q: Array,
+    v: Array,
+    strength: Array,
+    data: MotorData,
+    sound: Array,
+    heat: Array,
+    torque: Array,
+) -> None:
+    """Fill `torque`, and advance what sound motors would give and the temperatures, (n, 12)."""
     for i in range(len(commands)):
         row, angles, rates = commands[i], q[i, JOINT_POSITIONS], v[i, JOINT_RATES]
         tau_ff, q_des, v_des = row[_TAU], row[_Q_DES], row[_V_DES]
         kp, kd = row[_KP], row[_KD]
         for k in range(N_JOINTS):
-            torque = kp[k] * (q_des[k] - angles[k])
-            torque += kd[k] * (v_des[k] - rates[k])
-            torque += tau_ff[k]
-            torque = min(max(torque, -limit[k]), limit[k])
-            tau[i, k] = strength[i, k] * torque
+            wanted = kp[k] * (q_des[k] - angles[k])
+            wanted += kd[k] * (v_des[k] - rates[k])
+            wanted += tau_ff[k]
+            limit = data.peak[k]
+            if data.heating > 0.0:
+                limit = derated(limit, data.continuous[k], heat[i, k])
+            driving = available_torque(limit, rates[k], data.corner[k], data.top[k])
+            upper, lower = (driving, -limit) if rates[k] > 0.0 else (limit, -driving)
+            if data.follow < 1.0:
+                wanted = sound[i, k] + data.follow * (wanted - sound[i, k])
+            sound[i, k] = min(max(wanted, lower), upper)
+            torque[i, k] = strength[i, k] * sound[i, k]
+            loss = (torque[i, k] / data.continuous[k]) ** 2
+            heat[i, k] += data.heating * (loss - heat[i, k])
 
 
-def weak_motors(config: Config, random: np.random.Generator) -> tuple[WeakMotor, ...]:
-    """The motors that `world.weak_motor` describes, in the order written.
-
-    Raises:
-        ConfigError: the text does not follow the grammar, or names no such robot or joint.
-    """
-    text, names = config.world.weak_motor, robot_names(config.team.robots)
-    if not text:
-        return ()
-    share = config.world.weak_share
-    return tuple(_parse(part.strip(), names, share, random) for part in text.split(","))
-
-
-def _parse(
-    part: str, names: tuple[str, ...], share: float, random: np.random.Generator
-) -> WeakMotor:
-    fields = [word.strip() for word in part.split(":")]
-    if len(fields) != 3:
-        raise ConfigError(_KEY, repr(part), _GRAMMAR)
-    robots = [i for i, name in enumerate(names) if fields[0] in (name, _ANY)]
-    joints = [i for i, name in enumerate(_JOINTS) if fields[1] in (name, *name.split("_"), _ANY)]
-    if not robots:
-        raise ConfigError(_KEY, f"robot {fields[0]!r}", f"'any' or one of {', '.join(names)}")
-    if not joints:
-        raise ConfigError(
-            _KEY,
-            f"joint {fields[1]!r}",
-            f"'any', a part, a leg or {_JOINTS[0]}",
-            "parts are hip, thigh, calf; legs are FL, FR, RL, RR",
-        )
-    try:
-        start = float(fields[2])
-    except ValueError:
-        start = math.nan
-    if not 0.0 <= start <= _LATEST:
-        raise ConfigError(_KEY, f"start {fields[2]!r} in {part!r}", f"0 … {_LATEST:g} s")
-    return WeakMotor(
-        robot=int(random.choice(robots)),
-        joint=int(random.choice(joints)),
-        start=round(1000 * start),
-        share=share,
-    )
+@compiled
+def _take_off_friction(v: Array, torque: Array, data: MotorData, left: Array) -> None:
+    """Fill `left` with what friction leaves of the motors' torques, (n, 12)."""
+    for i in range(len(v)):
+        rates = v[i, JOINT_RATES]
+        for k in range(N_JOINTS):
+            left[i, k] = torque[i, k]
+            if data.friction > 0.0 or data.viscous > 0.0:
+                left[i, k] -= data.friction * math.tanh(rates[k] / _CREEP) + data.viscous * rates[k]

@@ -9,10 +9,11 @@ from typing import Final
 import mujoco
 import numpy as np
 
+from quadriga.shared.config.motors import MotorsConfig
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import FOOT_FRAMES, Array
+from quadriga.shared.robot.conventions import FOOT_FRAMES, JOINT_NAMES, Array
 from quadriga.shared.robot.spec import RobotSpec
-from quadriga.sim_server.terrain.contact import NO_CONTACT, ROBOT_CONTACT
+from quadriga.sim_server.terrain.contact import LEG_CONTACT, NO_CONTACT, ROBOT_CONTACT
 
 TRUNK: Final = "trunk"  # the trunk's body and box, whatever the URDF calls its link
 VISUAL_GROUP: Final = 1
@@ -20,7 +21,11 @@ FOOT_SOLREF: Final = (0.01, 1.0)  # s, damping ratio
 _TOUCH: Final = 1.5  # radius of the touch sensor over the foot's: every contact lies inside
 _LIMB_RGBA: Final = (0.25, 0.26, 0.28, 1.0)
 _FOOT_RGBA: Final = (0.1, 0.1, 0.1, 1.0)
-_LIMB_RADIUS: Final = {"hip": 0.03, "thigh": 0.016, "calf": 0.01}
+# m. Thigh and calf are as thick as the boxes of the A1's and Go1's URDF, the hip is its motor.
+_LIMB_RADIUS: Final = {"hip": 0.04, "thigh": 0.016, "calf": 0.01}
+_NEXT: Final = {"hip": "thigh", "thigh": "calf", "calf": "foot"}
+_LIMB_SOLREF: Final = (0.01, 1.0)  # s, damping ratio
+_STOP_SOLREF: Final = (0.003, 1.0)  # s, damping ratio, of a joint's end stops
 
 
 class RobotBody:
@@ -29,12 +34,23 @@ class RobotBody:
     Children are added in the order of their joints' names, which is Pinocchio's joint order, so
     joint vectors need no permutation between the two. Links on fixed joints become welded bodies.
 
+    Args:
+        robot: its kind.
+        motors: what its joints are like.
+        leg_collisions: whether its limbs collide, with the ground and with other legs.
+
     Raises:
         ConfigError: the URDF is not installed or uses something this parser does not know.
     """
 
-    def __init__(self, robot: RobotSpec) -> None:
-        self._robot = robot
+    def __init__(self, robot: RobotSpec, motors: MotorsConfig, *, leg_collisions: bool) -> None:
+        self._robot, self._motors = robot, motors
+        self._contact = LEG_CONTACT if leg_collisions else ROBOT_CONTACT
+        self._limb = {
+            "hip": ROBOT_CONTACT if leg_collisions else NO_CONTACT,
+            "thigh": LEG_CONTACT if leg_collisions else NO_CONTACT,
+            "calf": LEG_CONTACT if leg_collisions else NO_CONTACT,
+        }
         root = ET.parse(robot.urdf_path()).getroot()
         self._links = {str(link.get("name")): link for link in root.findall("link")}
         self._joints: dict[str, list[ET.Element]] = {name: [] for name in self._links}
@@ -70,9 +86,13 @@ class RobotBody:
             mass=0.0,
             priority=1,
             friction=[friction, 0.005, 0.0001],
-            **ROBOT_CONTACT,
+            **self._contact,
         )
         self._fill(trunk, robot.trunk_link, prefix, friction)
+        for foot in FOOT_FRAMES:
+            # The hip lies between them, and its range keeps them apart, but a box is no shell.
+            thigh = foot.replace("foot", "thigh")
+            spec.add_exclude(bodyname1=prefix + TRUNK, bodyname2=prefix + thigh)
         return trunk
 
     def _fill(self, body: mujoco.MjsBody, link: str, prefix: str, friction: float) -> None:
@@ -81,7 +101,7 @@ class RobotBody:
             body, self._links[link], robot.trunk_mass if link == robot.trunk_link else None
         )
         if link in FOOT_FRAMES:
-            _add_foot(body, prefix + link, robot.geometry.foot_radius, friction)
+            _add_foot(body, prefix + link, robot.geometry.foot_radius, friction, self._contact)
         for joint in self._joints[link]:
             name = _child(joint, "child").get("link", "")
             kind = joint.get("type")
@@ -91,27 +111,56 @@ class RobotBody:
             child = body.add_body(name=prefix + name, pos=pos)
             child.quat = _rotation(joint)
             if kind == "revolute":
-                _add_joint(child, joint, prefix)
+                self._add_joint(child, joint, prefix)
             elif kind != "fixed":
                 raise ConfigError(
                     "the robot's URDF", f"a joint of type {kind!r}", "fixed or revolute"
                 )
-            _add_limb(body, link, pos)
+            self._add_limb(body, link, name, pos, friction)
             self._fill(child, name, prefix, friction)
 
+    def _add_joint(self, body: mujoco.MjsBody, joint: ET.Element, prefix: str) -> None:
+        name, limit = str(joint.get("name")), _child(joint, "limit")
+        added = body.add_joint(
+            name=prefix + name,
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=_numbers(_child(joint, "axis").get("xyz", "")),
+            limited=1,
+            range=[float(limit.get("lower", "")), float(limit.get("upper", ""))],
+        )
+        if self._motors.hard_stops:
+            added.solref_limit = _STOP_SOLREF
+        if self._motors.rotor_inertia:
+            added.armature = float(self._robot.rotor_inertias[JOINT_NAMES.index(name)])
 
-def _add_joint(body: mujoco.MjsBody, joint: ET.Element, prefix: str) -> None:
-    limit = _child(joint, "limit")
-    body.add_joint(
-        name=prefix + str(joint.get("name")),
-        type=mujoco.mjtJoint.mjJNT_HINGE,
-        axis=_numbers(_child(joint, "axis").get("xyz", "")),
-        limited=1,
-        range=[float(limit.get("lower", "")), float(limit.get("upper", ""))],
-    )
+    def _add_limb(
+        self, body: mujoco.MjsBody, link: str, child: str, end: list[float], friction: float
+    ) -> None:
+        """A capsule from the link's origin to its child's, without mass."""
+        leg, _, part = link.partition("_")
+        radius = _LIMB_RADIUS.get(part)
+        if radius is None:
+            return
+        # Covers of motors hang on a link as its children too, but the limb leads to the next one.
+        next_one = _NEXT.get(part, "")
+        contact = self._limb[part] if child == f"{leg}_{next_one}" else NO_CONTACT
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            fromto=[0.0, 0.0, 0.0, *end],
+            size=[radius, 0.0, 0.0],
+            mass=0.0,
+            rgba=_LIMB_RGBA,
+            group=VISUAL_GROUP,
+            solref=_LIMB_SOLREF,
+            priority=1,
+            friction=[friction, 0.005, 0.0001],
+            **contact,
+        )
 
 
-def _add_foot(body: mujoco.MjsBody, name: str, radius: float, friction: float) -> None:
+def _add_foot(
+    body: mujoco.MjsBody, name: str, radius: float, friction: float, contact: Mapping[str, int]
+) -> None:
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
@@ -121,26 +170,11 @@ def _add_foot(body: mujoco.MjsBody, name: str, radius: float, friction: float) -
         solref=FOOT_SOLREF,
         priority=1,
         friction=[friction, 0.005, 0.0001],
-        **ROBOT_CONTACT,
+        **contact,
     )
     body.add_site(
         name=name, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_TOUCH * radius, 0.0, 0.0], group=4
     )
-
-
-def _add_limb(body: mujoco.MjsBody, link: str, end: list[float]) -> None:
-    """A visual capsule from the link's origin to its child's, without mass or contact."""
-    radius = _LIMB_RADIUS.get(link.partition("_")[2])
-    if radius is not None:
-        body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            fromto=[0.0, 0.0, 0.0, *end],
-            size=[radius, 0.0, 0.0],
-            mass=0.0,
-            rgba=_LIMB_RGBA,
-            group=VISUAL_GROUP,
-            **NO_CONTACT,
-        )
 
 
 def _set_inertia(body: mujoco.MjsBody, link: ET.Element, mass: float | None) -> None:

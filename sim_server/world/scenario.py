@@ -14,9 +14,9 @@ from quadriga.shared.config.terrains import TERRAINS
 from quadriga.shared.robot.conventions import N_JOINTS, Array, robot_names
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Event
-from quadriga.sim_server.world.motors import WeakMotor, weak_motors
 from quadriga.sim_server.world.payload import Load
 from quadriga.sim_server.world.pushes import Push, all_pushes
+from quadriga.sim_server.world.weak_motors import WeakMotor, weak_motors
 
 _PUSHES: Final = 3  # separate streams of the seed, so that a new push changes no motor
 _MOTORS: Final = 4

@@ -109,7 +109,7 @@ def build_team_model(
     _set_visuals(spec)
     terrain.add_to(spec)
     robot = config.robot
-    body = RobotBody(robot)
+    body = RobotBody(robot, config.motors, leg_collisions=config.world.leg_collisions)
     for name, i in robots.items():
         colour = _TRUNK_RGBA[i % len(_TRUNK_RGBA)]
         place = (*places[i], robot.stand_height)

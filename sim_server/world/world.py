@@ -15,7 +15,7 @@ from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.messages import Command, Event, State, Truth
 from quadriga.sim_server.terrain.relief import FOLLOW_MS
 from quadriga.sim_server.world import layout
-from quadriga.sim_server.world.motors import drive
+from quadriga.sim_server.world.motors import Motors
 from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.sim_server.world.sensors import Sensors
 from quadriga.sim_server.world.team_model import build_team_model
@@ -46,6 +46,9 @@ class World:
     `mj_step`, and no sensor waits for `mj_step1`, which runs while the agents compute their
     commands. The forces of tick 0 are those of motors without torque.
 
+    Attributes:
+        motors: of all robots.
+
     Args:
         config: the team's configuration.
         names: the robots that are in this world, where robots have worlds of their own; by default
@@ -75,18 +78,18 @@ class World:
         self._q = self.physics.qpos[: n * layout.NQ].reshape(n, layout.NQ)
         self._v = self.physics.qvel[: n * layout.NV].reshape(n, layout.NV)
         applied = self.physics.qfrc_applied[: n * layout.NV].reshape(n, layout.NV)
-        self._motor = applied[:, layout.JOINT_RATES]
+        self._applied = applied[:, layout.JOINT_RATES]
         self._sensed = self.physics.sensordata.reshape(n, layout.N_SENSORS)
-        self._commanded = np.zeros((n, len(_DAMPED.row)))
-        self._tau = np.zeros((n, N_JOINTS))
+        self.motors = Motors(config.robot, config.motors, n, _DAMPED)
         self._strength = np.ones((n, N_JOINTS))
-        self._torque_limit = config.robot.torque_limit
         self._feet_under_hips = config.robot.feet_under_hips
         self._fallen = [False] * n
         self._down: tuple[str, ...] = ()  # names of these
         self._surely_up = _FALL_HEIGHT + self.team.terrain.top
         # Compiled functions are compiled, or loaded, now and not in the first tick.
-        self._drive(np.empty_like(self._tau))
+        Motors(config.robot, config.motors, n, _DAMPED).drive(
+            np.zeros((n, len(_DAMPED.row))), self._q, self._v, self._strength
+        )
         self._sensors = Sensors(config.sensors, config.world.seed, self.names, self._indices)
 
         self.physics.qpos[:] = self.team.q_spawn
@@ -108,9 +111,8 @@ class World:
     def step(self, commands: Mapping[str, Command]) -> tuple[Event, ...]:
         """Advance by one tick under the motors' torques and return what happened.
 
-        Each motor applies tau + kp (q_des − q) + kd (v_des − v) within its limit, and a weak motor
-        its share of that. The motors of a robot without a command damp its joints with
-        `MOTOR_DAMPING`.
+        The motors follow the commands as `motors` tells, a weak one with its share of the torque.
+        Those of a robot without a command damp its joints with `MOTOR_DAMPING`.
         """
         events = list(self._events.get(self.tick, ()))
         if self.tick in self._push_changes:
@@ -119,9 +121,8 @@ class World:
         if self.tick in self._weakenings:
             self._strength = self._scenario.strength(self.tick)[self._indices]
         rows = [commands.get(name, _DAMPED).row for name in self.names]
-        np.concatenate(rows, out=self._commanded.reshape(-1))
-        self._drive(self._tau)
-        self._motor[:] = self._tau
+        self.motors.drive(self.motors.send(rows), self._q, self._v, self._strength)
+        self._applied[:] = self.motors.joint_torque
         if not self._settled:  # and so nobody has asked for the truth of this tick
             self._evaluate()
         mujoco.mj_step2(self.team.model, self.physics)
@@ -129,10 +130,6 @@ class World:
         self.tick += 1
         self._states = self._measure()
         return (*events, *self._falls())
-
-    def _drive(self, tau: Array) -> None:
-        """Fill `tau` with the torques for the present commands, N·m."""
-        drive(self._commanded, self._q, self._v, self._strength, self._torque_limit, tau)
 
     def settle(self) -> None:
         """Evaluate what depends on this tick's positions and velocities, once per tick.
@@ -173,7 +170,7 @@ class World:
         return self._down
 
     def _measure(self) -> dict[str, State]:
-        return self._sensors.measure(self.tick, self._q, self._v, self._tau, self._sensed)
+        return self._sensors.measure(self.tick, self._q, self._v, self.motors.torque, self._sensed)
 
     def _read_yoke_force(self) -> Array:
         """Force of each yoke on its two robots, positive when it pushes them apart, N. Shape (k,).

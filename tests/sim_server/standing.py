@@ -8,6 +8,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from quadriga.shared.config.motors import MotorsConfig
+from quadriga.shared.config.presets import PRESETS
 from quadriga.shared.config.sections import Config, SensorsConfig, TeamConfig, WorldConfig
 from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.wire.messages import Command
@@ -15,12 +17,21 @@ from quadriga.sim_server.world.world import World
 from tests.a1 import q_stand
 
 SILENT = SensorsConfig(**{item.name: 0.0 for item in fields(SensorsConfig)})
+# Motors that give at once what is commanded.
+IDEAL_MOTORS = MotorsConfig(preset="ideal", **PRESETS["motors"]["ideal"])
 
 
 def configured(
-    robots: int = 1, *, yokes: str = "complete", noise: bool = False, **world: Any
+    robots: int = 1,
+    *,
+    yokes: str = "complete",
+    noise: bool = False,
+    motors: MotorsConfig = IDEAL_MOTORS,
+    **world: Any,
 ) -> Config:
-    config = Config(team=TeamConfig(robots=robots, yokes=yokes), world=WorldConfig(**world))
+    """A team with ideal motors and silent sensors, where nothing else is said."""
+    team, walked = TeamConfig(robots=robots, yokes=yokes), WorldConfig(**world)
+    config = Config(team=team, world=walked, motors=motors)
     return config if noise else replace(config, sensors=SILENT)
 
 

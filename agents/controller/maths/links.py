@@ -40,21 +40,23 @@ class LinkLayout(NamedTuple):
         com: centre of mass, (3,), m, in the link's frame.
         moments: of inertia about the centre of mass, xx, xy, xz, yy, yz, zz, (6,), kg·m².
         joint: where the link's joint is, (3,), m, in the frame of the link before.
+        rotor: inertia of the joint's motor behind its gear, kg·m².
     """
 
     mass: int
     com: slice
     moments: slice
     joint: slice
+    rotor: int
 
 
-LINK: Final = LinkLayout(**places(mass=1, com=3, moments=6, joint=3))
+LINK: Final = LinkLayout(**places(mass=1, com=3, moments=6, joint=3, rotor=1))
 LINK_SIZE: Final = row_size(LINK)
 N_LINKS: Final = 13  # the trunk and three of each leg
 
 
 def link_table(model: pin.Model) -> Array:
-    """What `rigid_body_terms` knows of the trunk and the twelve links, (13, 13), see `LinkLayout`.
+    """What `rigid_body_terms` knows of the trunk and the twelve links, (13, 14), see `LinkLayout`.
 
     Raises:
         ConfigError: the model is not a trunk with four legs whose joints turn about x, y and y.
@@ -69,11 +71,11 @@ def link_table(model: pin.Model) -> Array:
             "four legs with a hip that turns about x, a thigh and a calf about y",
             "another robot",
         )
-    upper = np.triu_indices(3)
+    upper, rotors = np.triu_indices(3), [0.0, *model.armature[6:]]
     return np.array(
         [
-            [link.mass, *link.lever, *link.inertia[upper], *place.translation]
-            for link, place in zip(inertias, places, strict=True)
+            [link.mass, *link.lever, *link.inertia[upper], *place.translation, rotor]
+            for link, place, rotor in zip(inertias, places, rotors, strict=True)
         ]
     )
 
@@ -99,7 +101,7 @@ def leg_state(links: Array, q: Array, rates: Array, trunk: Spatial, gravity: Spa
     """The state of a leg, by recursive Newton-Euler and composite rigid bodies.
 
     Args:
-        links: its rows of `link_table`, (3, 13).
+        links: its rows of `link_table`, (3, 14).
         q: its joint angles, (3,), rad.
         rates: its joint rates, (3,), rad/s.
         trunk: motion of the trunk.

@@ -14,7 +14,16 @@ from typing import NamedTuple
 import numpy as np
 
 from quadriga.agents.controller.maths.dense import cholesky, cholesky_solve, product
-from quadriga.agents.controller.maths.links import ZERO, LegState, X, Y, Z, leg_state, link_inertia
+from quadriga.agents.controller.maths.links import (
+    LINK,
+    ZERO,
+    LegState,
+    X,
+    Y,
+    Z,
+    leg_state,
+    link_inertia,
+)
 from quadriga.agents.controller.maths.rotation import rotation_matrix
 from quadriga.agents.controller.maths.spatial import (
     Inertia,
@@ -82,7 +91,7 @@ def rigid_body_terms(q: Array, v: Array, links: Array) -> RigidBodyTerms:
         (S1, S2, S3), (v1, v2, v3) = state.axes, state.velocity
         f1, f2, f3 = state.force
         nle[first], nle[first + 1], nle[first + 2] = power(S1, f1), power(S2, f2), power(S3, f3)
-        _eliminate(state, leg, reaction, reduced, M_inverse)
+        _eliminate(state, rows, leg, reaction, reduced, M_inverse)
         for column, S, motion in ((first, S1, v1), (first + 1, S2, v2), (first + 2, S3, v3)):
             linear, angular = to_world(R, position, S)
             _set_column(J, column, linear, angular)
@@ -107,15 +116,18 @@ def _fill_trunk_columns(R: Array, position: Vector, velocity: Spatial, J: Array,
 
 @compiled
 def _eliminate(
-    state: LegState, leg: int, reaction: Array, reduced: Array, M_inverse: Array
+    state: LegState, links: Array, leg: int, reaction: Array, reduced: Array, M_inverse: Array
 ) -> None:
     """Fill F D⁻¹ of a leg and its D⁻¹, subtract F D⁻¹ Fᵀ from the trunk's block.
 
-    F is the momentum that unit rates of the joints give the leg, D = Sᵀ F.
+    F is the momentum that unit rates of the joints give the leg, D = Sᵀ F + diag(rotors): a rotor
+    turns its gear's ratio faster than its joint, so that only its own joint feels its inertia.
     """
     (S1, S2, S3), (link1, link2, link3) = state.axes, state.inertia
     F1, F2, F3 = momentum_of(link1, S1), momentum_of(link2, S2), momentum_of(link3, S3)
-    D1, D2, D3 = power(S1, F1), power(S2, F2), power(S3, F3)
+    D1 = power(S1, F1) + links[0][LINK.rotor]
+    D2 = power(S2, F2) + links[1][LINK.rotor]
+    D3 = power(S3, F3) + links[2][LINK.rotor]
     D = (D1, power(S1, F2), power(S1, F3), D2, power(S2, F3), D3)
     xx, xy, xz, yy, yz, zz = _inverse(D)
     first = 3 * leg

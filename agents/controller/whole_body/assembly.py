@@ -25,12 +25,7 @@ from quadriga.shared.runtime.jit import compiled
 
 @compiled
 def build(
-    terms: RigidBodyTerms,
-    R: Array,
-    p_foot: Array,
-    goal: Goal,
-    weights: Weights,
-    torque_limit: Array,
+    terms: RigidBodyTerms, R: Array, p_foot: Array, goal: Goal, weights: Weights, bounds: Array
 ) -> WholeBodyProblem:
     """Assemble the reduced QP at one instant; it holds NaN where no slip cannot be had.
 
@@ -40,7 +35,7 @@ def build(
         p_foot: foot centres, (4, 3), m, odometry frame.
         goal: what is asked for.
         weights: of the QP.
-        torque_limit: τ_max of each motor, (12,), N·m.
+        bounds: τ_min and τ_max of each motor, (2, 12), N·m.
     """
     on, off = _split_feet(terms, p_foot, goal)
     affine, acceleration = _resolve_contacts(terms, on)
@@ -49,7 +44,7 @@ def build(
     B, defect0 = outputs[:, :12].copy(), outputs[:, 12].copy()
     H, g = _cost(A, a0, outputs, on.desired, weights)
     C, c = _friction_cone(A, a0, weights)
-    return WholeBodyProblem(H, g, C, c, A, a0, B, defect0, torque_limit)
+    return WholeBodyProblem(H, g, C, c, A, a0, B, defect0, bounds[0], bounds[1])
 
 
 class StackedFeet(NamedTuple):

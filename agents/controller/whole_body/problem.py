@@ -3,7 +3,7 @@
 min  γ₁/2 |τ|² + γ₂/2 |f − f_des|² + γ₃/2 |W δ|²
 s.t. ḧ(τ, f) = a_des + δ   (output dynamics: trunk and swing feet; a_des holds −K_P h − K_D ḣ)
      r̈(τ, f) = 0           (no slip of the feet in contact)
-     |τ| ≤ τ_max,  f in the friction cone
+     τ_min ≤ τ ≤ τ_max,  f in the friction cone
 
 W = diag(1, 1, 1, ℓ, ℓ, ℓ, s, s, …) says what a rad/s² of the trunk and a m/s² of a swing foot weigh
 against a m/s² of the trunk (the paper: ℓ = 1 m, s = 1).
@@ -87,7 +87,7 @@ def with_mu(weights: Weights, mu: float) -> Weights:
 
 
 class WholeBodyProblem(NamedTuple):
-    """min ½ τᵀ H τ + gᵀ τ  s.t. |τ| ≤ τ_max, C τ ≥ c, with n_c feet in contact.
+    """min ½ τᵀ H τ + gᵀ τ  s.t. τ_min ≤ τ ≤ τ_max, C τ ≥ c, with n_c feet in contact.
 
     Attributes:
         H: (12, 12).
@@ -98,6 +98,7 @@ class WholeBodyProblem(NamedTuple):
         a0: forces of none, (3 n_c,), N.
         B: accelerations of the outputs of each torque, (18 − 3 n_c, 12).
         defect0: defect of none, b₀ − a_des, (18 − 3 n_c,), m/s², rad/s².
+        tau_min: (12,), N·m.
         tau_max: (12,), N·m.
     """
 
@@ -109,6 +110,7 @@ class WholeBodyProblem(NamedTuple):
     a0: Array
     B: Array
     defect0: Array
+    tau_min: Array
     tau_max: Array
 
 

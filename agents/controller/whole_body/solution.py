@@ -30,15 +30,10 @@ _OPTIMAL: Final = 1  # DAQP's flag
 
 
 def solve_goal(
-    terms: RigidBodyTerms,
-    R: Array,
-    p_foot: Array,
-    goal: Goal,
-    weights: Weights,
-    torque_limit: Array,
+    terms: RigidBodyTerms, R: Array, p_foot: Array, goal: Goal, weights: Weights, bounds: Array
 ) -> WholeBodySolution:
     """Build, solve, unpack; numbers beyond all bounds or a singular problem are no solution."""
-    problem = build(terms, R, p_foot, goal, weights, torque_limit)
+    problem = build(terms, R, p_foot, goal, weights, bounds)
     return unpack(problem, goal.contact, *solve(problem))
 
 
@@ -53,14 +48,14 @@ def solve(problem: WholeBodyProblem) -> tuple[Array, str]:
     upper = np.full(rows, _UNBOUNDED)
     lower = np.empty(rows)
     upper[:N_JOINTS] = problem.tau_max
-    lower[:N_JOINTS] = -problem.tau_max
+    lower[:N_JOINTS] = problem.tau_min
     lower[N_JOINTS:] = problem.c
     tau, _, flag, _ = daqp.solve(
         problem.H, problem.g, problem.C, upper, lower, np.zeros(rows, dtype=np.intc)
     )
     if flag != _OPTIMAL or not np.isfinite(tau).all():
         return np.zeros(N_JOINTS), with_detail(INFEASIBLE, str(flag))
-    return np.clip(tau, -problem.tau_max, problem.tau_max), CONSTRAINED
+    return np.clip(tau, problem.tau_min, problem.tau_max), CONSTRAINED
 
 
 def unpack(problem: WholeBodyProblem, contact: Array, tau: Array, status: str) -> WholeBodySolution:
@@ -77,7 +72,7 @@ def solve_closed_form(
     p_foot: Array,
     goal: Goal,
     weights: Weights,
-    torque_limit: Array,
+    bounds: Array,
     x: Array,
 ) -> int:
     """Fill `x`, see `WholeBodySolution`, with the optimum without limits.
@@ -88,13 +83,13 @@ def solve_closed_form(
         p_foot: foot centres, (4, 3), m, odometry frame.
         goal: what is asked for.
         weights: of the QP.
-        torque_limit: τ_max of each motor, (12,), N·m.
+        bounds: τ_min and τ_max of each motor, (2, 12), N·m.
         x: (42,), zero.
 
     Returns:
         The length of the defect; 0 if the optimum breaks a limit.
     """
-    problem = build(terms, R, p_foot, goal, weights, torque_limit)
+    problem = build(terms, R, p_foot, goal, weights, bounds)
     tau, feasible = _unconstrained(problem)
     _imply(problem, goal.contact, tau, x)
     return len(problem.defect0) if feasible else 0
@@ -109,7 +104,7 @@ def _unconstrained(problem: WholeBodyProblem) -> tuple[Array, bool]:
     C, c = problem.C, problem.c
     feasible = True
     for k in range(12):
-        if not abs(tau[k]) <= problem.tau_max[k]:
+        if not problem.tau_min[k] <= tau[k] <= problem.tau_max[k]:
             feasible = False
     for row in range(len(c)):
         if not dot(C[row], tau) >= c[row] - _TOLERANCE:

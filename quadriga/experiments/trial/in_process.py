@@ -96,13 +96,14 @@ class _WorkMeter:
     """Sums up what the motors do.
 
     A tick moves the joints by their rates at its end under the torques that acted in it, so that
-    the sum is the work itself, not an approximation of it.
+    the sum is the work itself, not an approximation of it. The torques are the motors', of which
+    friction takes its part before the joints have the rest.
     """
 
     def __init__(self, world: World) -> None:
         n, physics = len(world.names), world.physics
-        # Views of MuJoCo's own memory.
-        self._torque = physics.qfrc_applied[: n * NV].reshape(n, NV)[:, 6:]
+        self._torque = world.motors.torque
+        # A view of MuJoCo's own memory.
         self._rate = physics.qvel[: n * NV].reshape(n, NV)[:, 6:]
         self._power = np.empty((_SUMMED, n, NV - 6))  # of the last ticks, W
         self._count = 0  # of these

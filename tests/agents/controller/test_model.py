@@ -9,7 +9,10 @@ import pinocchio as pin
 import pytest
 
 from quadriga.agents.controller.maths.links import link_table
+from quadriga.agents.controller.model import RigidBody
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.robot import pinocchio_model
+from quadriga.shared.robot.a1 import A1
 from tests.a1 import TOTAL_MASS, q_stand
 from tests.agents.controller.poses import BODY, FEET, MODEL, random_pose
 
@@ -57,6 +60,18 @@ def test_an_attitude_need_not_be_of_unit_norm() -> None:
     q = pose.q.copy()
     q[3:7] *= 1.01
     np.testing.assert_allclose(replace(pose, q=q).terms().nle, pose.terms().nle, atol=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rotors_are_felt_by_their_own_joints_alone(seed: int) -> None:
+    pose = random_pose(np.random.default_rng(seed), tilt=1.0)
+    model = pinocchio_model.build_pinocchio_model(A1, rotors=True)
+    terms = RigidBody(A1, rotors=True).terms(pose.q, pose.v, 3.0)
+    bare = BODY.terms(pose.q, pose.v, 3.0)
+    M, without = np.linalg.inv(terms.M_inverse), np.linalg.inv(bare.M_inverse)
+    np.testing.assert_allclose(M - without, np.diag([*[0.0] * 6, *A1.rotor_inertias]), atol=1e-9)
+    np.testing.assert_array_equal(terms.nle, bare.nle)
+    assert link_table(model)[1:, -1].tolist() == A1.rotor_inertias.tolist()
 
 
 def test_another_kind_of_robot_is_refused() -> None:

@@ -7,7 +7,7 @@ from dataclasses import asdict, fields
 import pytest
 
 from quadriga.shared.config import later
-from quadriga.shared.config.later import LATER_KEYS, hashed_sections
+from quadriga.shared.config.later import LATER_KEYS, hashed_sections, with_older_values
 from quadriga.shared.config.load import load
 from quadriga.shared.config.renamed import with_first_names
 from quadriga.shared.config.sections import Config
@@ -41,3 +41,20 @@ def test_so_it_changes_the_hash_only_with_another_value(monkeypatch: pytest.Monk
     monkeypatch.undo()
     assert len(set(hashes)) == 3
     assert hashes[1:] == [config_sha256(load(None, {"world.friction": v})) for v in (0.3, 0.4)]
+
+
+def test_a_section_of_later_keys_alone_is_left_out_while_all_have_their_first_values() -> None:
+    ideal = asdict(load(None, {"motors.preset": "ideal"}))
+    assert "motors" not in hashed_sections(ideal)
+    assert hashed_sections(asdict(Config()))["motors"]["friction"] == Config().motors.friction
+    assert hashed_sections({"motors": {}}) == {"motors": {}}, "left to the check"
+
+
+def test_what_an_earlier_version_wrote_down_says_nothing_of_later_keys() -> None:
+    written = {"world": {"seed": 3}, "team": {"robots": 2, "robot": "go1"}, "bus": 5}
+    read = with_older_values(written)
+    assert read["world"] | {"seed": 3, "leg_collisions": False} == read["world"]
+    assert read["team"]["robot"] == "go1"
+    assert read["motors"] == asdict(load(None, {"motors.preset": "ideal"}))["motors"]
+    assert read["bus"] == 5
+    assert written["world"] == {"seed": 3}

@@ -1,51 +1,137 @@
+"""Motors and joints: what is left of a command on its way to the joints."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import JOINT_NAMES
-from quadriga.sim_server.world.motors import WeakMotor, weak_motors
-from tests.sim_server.standing import configured
+from quadriga.shared.config.motors import MotorsConfig
+from quadriga.shared.robot.a1 import A1
+from quadriga.shared.robot.conventions import N_JOINTS, Array
+from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robot.torque_speed import available_torque
+from quadriga.shared.wire.messages import Command
+from quadriga.sim_server.world.motors import Motors
+from quadriga.sim_server.world.world import World
+from tests.sim_server.standing import IDEAL_MOTORS, STAND, command, configured, stand
 
-
-def weak(text: str, seed: int = 0) -> tuple[WeakMotor, ...]:
-    return weak_motors(configured(3, weak_motor=text), np.random.default_rng(seed))
-
-
-def test_motors_are_named_by_robot_and_joint() -> None:
-    first, second = weak("r2:RL_thigh:1.5, r3:FL_hip:0")
-    assert (first.robot, JOINT_NAMES[first.joint], first.start) == (1, "RL_thigh_joint", 1500)
-    assert (second.robot, JOINT_NAMES[second.joint], second.start) == (2, "FL_hip_joint", 0)
-    assert first.share == 0.6
-    assert weak("") == ()
+SOUND = np.ones((1, N_JOINTS))
+IDLE = command()
 
 
-@pytest.mark.parametrize(
-    ("joint", "among"),
-    [
-        ("calf", {"FL_calf_joint", "FR_calf_joint", "RL_calf_joint", "RR_calf_joint"}),
-        ("RR", {"RR_hip_joint", "RR_thigh_joint", "RR_calf_joint"}),
-        ("any", set(JOINT_NAMES)),
-    ],
-)
-def test_what_is_left_open_is_drawn_from_the_seed(joint: str, among: set[str]) -> None:
-    found = [weak(f"any:{joint}:2", seed)[0] for seed in range(100)]
-    assert {JOINT_NAMES[motor.joint] for motor in found} == among
-    assert {motor.robot for motor in found} == {0, 1, 2}
-    assert weak(f"any:{joint}:2", 7) == weak(f"any:{joint}:2", 7)
+def motors(**changes: Any) -> Motors:
+    """The motors of one A1, ideal but for `changes`."""
+    return Motors(A1, replace(IDEAL_MOTORS, **changes), 1, IDLE)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("r1:calf", "robot:joint:start"),
-        ("r4:calf:0", "robot 'r4'"),
-        ("r1:knee:0", "joint 'knee'"),
-        ("r1:calf:soon", "start 'soon'"),
-        ("r1:calf:-1", "start '-1'"),
-        ("r1:calf:nan", "start 'nan'"),
-        ("r1:calf:0,", "robot:joint:start"),
-    ],
-)
-def test_a_wrong_motor_names_the_key_and_what_is_wrong(text: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=rf"^world\.weak_motor: .*{message}"):
-        weak(text)
+def drive(of: Motors, asked: Command, q: float = 0.0, v: float = 0.0) -> Array:
+    """Torques of the joints after a tick under a command, (12,), at equal angles and rates."""
+    arrived = of.send([asked.row])
+    of.drive(arrived, np.full((1, 19), q), np.full((1, 18), v), SOUND)
+    left: Array = of.joint_torque[0].copy()
+    return left
+
+
+def test_ideal_motors_give_what_is_commanded_within_their_limit() -> None:
+    asked = command(tau=np.linspace(-50, 50, N_JOINTS), q_des=0.3, v_des=1.0, kp=20.0, kd=2.0)
+    wanted = asked.tau + 20.0 * (0.3 - 0.1) + 2.0 * (1.0 + 15.0)
+    np.testing.assert_allclose(drive(motors(), asked, 0.1, -15.0), np.clip(wanted, -33.5, 33.5))
+
+
+@pytest.mark.parametrize("delay", [0, 1, 2, 7])
+def test_a_command_acts_as_late_as_the_delay_says(delay: int) -> None:
+    of = motors(delay_ms=delay)
+    given = [drive(of, command(tau=float(1 + tick)))[0] for tick in range(12)]
+    assert given == [0.0] * delay + [1.0 + tick for tick in range(12 - delay)]
+
+
+def test_torque_follows_as_a_first_order_lag() -> None:
+    of = motors(bandwidth=50.0)
+    given = [drive(of, command(tau=10.0))[0] for _ in range(20)]
+    expected = 10.0 * (1.0 - np.exp(-2.0 * math.pi * 50.0 * 1e-3 * np.arange(1, 21)))
+    np.testing.assert_allclose(given, expected, rtol=1e-12)
+
+
+@given(st.floats(-40.0, 40.0), st.floats(-60.0, 60.0), st.sampled_from(sorted(ROBOTS)))
+def test_no_motor_drives_beyond_its_torque_speed_line(v: float, tau: float, kind: str) -> None:
+    robot = ROBOTS[kind]
+    of = Motors(robot, replace(IDEAL_MOTORS, torque_speed=True), 1, IDLE)
+    given = drive(of, command(tau=tau), v=v)
+    for k in range(3):
+        line = np.interp(abs(v), [robot.corner_speed[k], robot.speed[k]], [robot.torque[k], 0.0])
+        limit = line if tau * v > 0.0 else robot.torque[k]
+        assert given[k] == pytest.approx(math.copysign(min(abs(tau), limit), tau), abs=1e-9)
+
+
+def test_the_line_is_full_up_to_the_corner_and_zero_from_the_top_speed_on() -> None:
+    assert available_torque(20.0, -9.9, 10.0, 30.0) == 20.0
+    assert available_torque(20.0, 20.0, 10.0, 30.0) == 10.0
+    assert available_torque(20.0, 30.0, 10.0, 30.0) == available_torque(20.0, -99, 10.0, 30.0) == 0
+    assert available_torque(20.0, 99.0, math.inf, 30.0) == 20.0
+
+
+@given(st.floats(-30.0, 30.0))
+def test_friction_only_ever_brakes_and_is_no_part_of_what_the_motor_feels(v: float) -> None:
+    of = motors(friction=0.4, viscous_friction=0.04)
+    taken = drive(of, command(tau=5.0), v=v) - 5.0
+    np.testing.assert_array_equal(of.torque[0], 5.0)
+    assert (taken * v <= 0.0).all()
+    if abs(v) > 0.3:
+        np.testing.assert_allclose(taken, -math.copysign(0.4, v) - 0.04 * v, atol=1e-4)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.85])
+def test_a_motor_heats_up_to_the_square_of_its_share_of_continuous_torque(share: float) -> None:
+    of = motors(heat_time=0.5)
+    tau = share * A1.continuous_torque[0]
+    for _ in range(700):
+        drive(of, command(tau=tau))
+    expected = share**2 * (1.0 - math.exp(-700 / 500))
+    np.testing.assert_allclose(of.heat, expected, rtol=2e-3)
+
+
+def test_a_hot_motor_is_left_with_its_continuous_torque() -> None:
+    of = motors(heat_time=0.2)
+    cold = drive(of, command(tau=33.5))[0]
+    for _ in range(5000):
+        hot = drive(of, command(tau=33.5))[0]
+    assert cold == 33.5
+    assert hot == pytest.approx(A1.continuous_torque[0], rel=0.05)
+    assert of.heat.max() < 1.1
+
+
+def test_a_standing_robot_with_real_motors_gets_neither_hot_nor_down() -> None:
+    world = World(configured(1, motors=MotorsConfig(heat_time=0.5)))
+    stand(world, 1500)
+    assert not world.fallen()
+    assert world.motors.heat.max() < 0.5
+
+
+def test_a_joint_that_is_thrown_against_its_stop_stays_within_its_range() -> None:
+    """A soft stop gives way by more than a hard one, and the hard one by less than 0.02 rad."""
+    beyond = {}
+    for hard in (True, False):
+        world = World(configured(1, motors=replace(IDEAL_MOTORS, hard_stops=hard)))
+        world.physics.qpos[2], world.physics.qpos[9::3] = 1.0, A1.lower[2] + 0.05
+        world.physics.qvel[8::3] = -12.0
+        greatest = 0.0
+        for _ in range(60):
+            world.step({"r1": IDLE})
+            greatest = max(greatest, float((A1.lower[2] - world.physics.qpos[9::3]).max()))
+        beyond[hard] = greatest
+    assert 0.0 < beyond[True] < 0.02 < beyond[False]
+
+
+def test_equal_worlds_with_real_motors_give_equal_bytes() -> None:
+    one, other = (World(configured(2, motors=MotorsConfig())) for _ in range(2))
+    for _ in range(100):
+        for world in (one, other):
+            world.step({"r1": STAND, "r2": STAND})
+    assert one.physics.qpos.tobytes() == other.physics.qpos.tobytes()
+    np.testing.assert_array_equal(one.motors.heat, other.motors.heat)

@@ -13,23 +13,27 @@ from quadriga.shared.robot.a1 import A1
 from quadriga.shared.robot.conventions import FOOT_FRAMES, JOINT_NAMES, N_JOINTS
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 from quadriga.shared.robot.robots import ROBOTS
-from quadriga.sim_server.world.layout import NQ
+from quadriga.sim_server.terrain.contact import TERRAIN_CONTACT
+from quadriga.sim_server.world.layout import CONTACT_FORCES, FOOT_FORCES, NQ
 from quadriga.sim_server.world.team_model import build_team_model, formation, spawn_positions
-from tests.sim_server.standing import configured
+from tests.sim_server.standing import IDEAL_MOTORS, configured
 
 GRAPHS = ("complete", "chain", "ring")
 
 
 @pytest.mark.parametrize("kind", ROBOTS)
 @pytest.mark.parametrize("seed", range(8))
-def test_equals_pinocchio_in_mass_matrix_bias_and_foot_jacobians(kind: str, seed: int) -> None:
+@pytest.mark.parametrize("rotors", [False, True])
+def test_equals_pinocchio_in_mass_matrix_bias_and_foot_jacobians(
+    kind: str, seed: int, rotors: bool
+) -> None:
     random = np.random.default_rng(seed)
     # The Go1's URDF has a link of 1 mg above its trunk, which the world leaves out.
     atol, bias_atol = (2e-6, 6e-5) if kind == "go1" else (1e-9, 1e-9)
-    config = configured()
+    config = configured(motors=replace(IDEAL_MOTORS, rotor_inertia=rotors))
     team = build_team_model(replace(config, team=replace(config.team, robot=kind)))
     m, d = team.model, mujoco.MjData(team.model)
-    model = build_pinocchio_model(ROBOTS[kind])
+    model = build_pinocchio_model(ROBOTS[kind], rotors=rotors)
     quat = random.standard_normal(4)
     quat /= np.linalg.norm(quat)
     joints = random.uniform(-1.5, 1.5, N_JOINTS)
@@ -136,8 +140,9 @@ def test_payload_adds_its_mass_above_the_trunk() -> None:
     assert 0.06 <= laden.body("r2/payload").pos[2] <= 0.12
 
 
-def test_robots_touch_the_ground_only() -> None:
-    team = build_team_model(configured(2))
+@pytest.mark.parametrize("leg_collisions", [False, True])
+def test_robots_touch_each_other_if_their_legs_collide(leg_collisions: bool) -> None:
+    team = build_team_model(configured(2, leg_collisions=leg_collisions))
     d = mujoco.MjData(team.model)
     d.qpos[:] = team.q_spawn
     d.qpos.reshape(2, NQ)[:, :3] = [0.0, 0.0, 0.15]  # both robots in one place, feet in the ground
@@ -145,4 +150,55 @@ def test_robots_touch_the_ground_only() -> None:
     mujoco.mj_forward(team.model, d)
     ground = team.model.geom("ground").id
     assert d.ncon >= 8
-    assert all(ground in pair for pair in d.contact.geom)
+    assert all(ground in pair for pair in d.contact.geom) != leg_collisions
+
+
+@pytest.mark.parametrize("kind", ROBOTS)
+def test_links_that_hang_on_each_other_do_not_touch(kind: str) -> None:
+    """Within the joints' limits only links farther apart meet: a foot and a trunk, or two legs."""
+    config = configured()
+    team = build_team_model(replace(config, team=replace(config.team, robot=kind)))
+    model, d, robot = team.model, mujoco.MjData(team.model), ROBOTS[kind]
+    d.qpos[:] = team.q_spawn
+    d.qpos[2] = 2.0
+    mujoco.mj_forward(model, d)
+    assert d.ncon == 0, "nothing touches while it stands"
+    random, seen = np.random.default_rng(3), 0
+    for _ in range(300):
+        d.qpos[7:] = random.uniform(robot.lower, robot.upper)
+        mujoco.mj_forward(model, d)
+        for pair in d.contact.geom:
+            seen += 1
+            welded = [int(model.body_weldid[model.geom_bodyid[geom]]) for geom in pair]
+            parents = [int(model.body_weldid[model.body_parentid[body]]) for body in welded]
+            assert welded[0] != welded[1]
+            assert welded[0] != parents[1]
+            assert welded[1] != parents[0]
+    assert seen > 0, "some of these poses fold legs into each other"
+
+
+def test_a_shank_on_a_block_is_felt_by_the_robot_but_by_no_foot() -> None:
+    """The sensors of feet and the truth's forces are those of feet alone."""
+
+    def put_block(spec: mujoco.MjSpec) -> None:
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[0.02, 0.2, 0.05],
+            pos=[0.09, 0.13, 1.1],  # under the front left calf of a robot in the air
+            **TERRAIN_CONTACT,
+        )
+
+    team = build_team_model(configured(), dress=put_block)
+    d = mujoco.MjData(team.model)
+    d.qpos[:] = team.q_spawn
+    calf = team.model.body("r1/FL_calf").id
+    for height in np.arange(1.5, 1.2, -0.002):
+        d.qpos[2] = height
+        mujoco.mj_forward(team.model, d)
+        if d.ncon:
+            break
+    bodies = {int(team.model.geom_bodyid[geom]) for pair in d.contact.geom for geom in pair}
+    assert bodies == {0, calf}
+    assert np.abs(d.qfrc_constraint).max() > 1.0
+    assert not d.sensordata[FOOT_FORCES].any()
+    assert not d.sensordata[CONTACT_FORCES].any()

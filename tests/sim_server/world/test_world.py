@@ -32,7 +32,9 @@ def test_standing_team_stays_up_and_the_ground_carries_its_weight(n: int) -> Non
 
 @pytest.mark.parametrize("terrain", TERRAINS)
 def test_team_stands_on_every_terrain(terrain: str) -> None:
-    world = World(configured(3, terrain=terrain, terrain_height=0.04, seconds=8.0))
+    # A shank that leans on a block would carry a share of the weight.
+    config = configured(3, terrain=terrain, terrain_height=0.04, seconds=8.0, leg_collisions=False)
+    world = World(config)
     shift(world, dx=3.0, dz=0.03)
     stand(world, 800)
     assert world.fallen() == ()
