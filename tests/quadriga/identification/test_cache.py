@@ -24,8 +24,9 @@ ALL = [
     for key in fields(getattr(Config(), section.name))
 ]
 # What a collected walk depends on: by section all keys but those named, or only those named.
+SECTIONS = ("sensors", "motors", "estimator", "gait", "controller")
 WALKED = {
-    *(name for name in ALL if name.split(".")[0] in ("sensors", "estimator", "gait", "controller")),
+    *(name for name in ALL if name.split(".")[0] in SECTIONS),
     "team.robots", "team.robot", "team.yokes", "team.spacing", "team.alternate_phase",
     "reference.height", "planner.interface",
     # As long as the length of the collection follows from the rule:
