@@ -76,13 +76,16 @@ def flipped(
     return change
 
 
+DELAY = Config().motors.delay_ms
+
+
 @pytest.mark.parametrize(
     ("change", "tick", "found"),
     [
         (flipped(State, 177, "imu_gyro", 2), 177, "team/r2/state.imu_gyro[2]"),
         (flipped(Truth, 210, "base_pos", 4), 210, "team/sim/truth.base_pos[1, 1]"),
-        # The last bit of a gain may be lost as torques are summed.
-        (flipped(Command, 200, "kp", 0, bit=20), 201, "team/r1/state"),
+        # The last bit of a gain may be lost as torques are summed; motors act on it with a delay.
+        (flipped(Command, 200, "kp", 0, bit=20), 201 + DELAY, "team/r1/state"),
     ],
 )
 def test_one_flipped_bit_is_found_at_its_tick(

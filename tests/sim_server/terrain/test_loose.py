@@ -71,7 +71,7 @@ def test_stones_give_way_under_feet_that_slide_over_them_and_the_others_stay() -
     pebbles, stones = parts(world)
     stand(world, 1000)
     moved = np.linalg.norm(places(stones)[:, :2] - pebbles.pose[:, :2], axis=1)
-    assert 5 <= (moved > 2e-3).sum() <= 60
+    assert 3 <= (moved > 2e-3).sum() <= 60
     assert moved.max() < 0.5
     feet = world.physics.geom_xpos[world._feet, :2]
     far = np.linalg.norm(pebbles.pose[:, None, :2] - feet, axis=-1).min(axis=1) > 0.5
