@@ -76,7 +76,7 @@ def flipped(
     return change
 
 
-DELAY = Config().motors.delay_ms
+DELAY = config().motors.delay_ms
 
 
 @pytest.mark.parametrize(
