@@ -44,7 +44,7 @@ def fit_periodic(episodes: Sequence[Episode], meta: PredictorMeta) -> PeriodicPr
 
 
 def estimate_response(walks: Sequence[Walked], hold: int, meta: PredictorMeta) -> Array:
-    """Harmonics of the response to a sample's wrench, scaled. (2k + 1, N, n, 6, n, 6).
+    """Coefficients of the response to a sample's wrench, scaled. (k, N, n, 6, n, 6).
 
     Args:
         walks: scaled episodes.

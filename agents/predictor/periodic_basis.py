@@ -1,10 +1,11 @@
-"""What a periodic predictor is written in: harmonics of the gait, net wrenches of the feet."""
+"""What a periodic predictor is written in: functions of the gait's phase, and net wrenches."""
 
 from __future__ import annotations
 
 from typing import Final
 
 import numpy as np
+from numpy.polynomial import legendre
 
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.predictor import PredictorMeta
@@ -14,6 +15,7 @@ from quadriga.shared.wire.topics import SAMPLE_MS
 
 N_WRENCH: Final = 6  # fx, fy, fz, mx, my, mz
 _FORCE_SCALE: Final = 40.0  # N: two stance feet with 20 N each
+_ROUNDING: Final = 1e-6  # rad: an angle this much before a half begins is meant to be its begin
 
 
 def harmonics(angle: Array, order: int) -> Array:
@@ -31,6 +33,37 @@ def harmonics(angle: Array, order: int) -> Array:
     return np.concatenate(
         [np.ones((*angle.shape, 1)), waves.reshape(*angle.shape, 2 * order)], axis=-1
     )
+
+
+def polynomials(angle: Array, degree: int) -> Array:
+    """Legendre polynomials in each half of the gait's period, orthonormal over the period.
+
+    Other feet stand in the other half: what a force does jumps from one half to the other.
+
+    Args:
+        angle: θ, the gait's phase as an angle, any shape, rad.
+        degree: of the highest polynomial.
+
+    Returns:
+        Shape (*angle.shape, 2 degree + 2): those of the first half, then those of the second; each
+        is zero in the other half.
+    """
+    turned = np.mod(angle + _ROUNDING, 2.0 * np.pi)
+    half = (turned >= np.pi).astype(int)
+    within = 2.0 * (turned - np.pi * half) / np.pi - 1.0
+    size = np.sqrt(2.0 * (2.0 * np.arange(degree + 1) + 1.0))
+    values = legendre.legvander(within, degree) * size
+    second = half[..., None] == 1
+    return np.concatenate([np.where(second, 0.0, values), np.where(second, values, 0.0)], axis=-1)
+
+
+def shift_polynomials(degree: int, angle: float) -> Array:
+    """M with polynomials(θ + angle) = polynomials(θ) M wherever both lie in the same half."""
+    inside = np.linspace(0.1, np.pi - angle - 0.1, 4 * (degree + 1))
+    theta = np.concatenate([inside, np.pi + inside])
+    now, later = polynomials(theta, degree), polynomials(theta + angle, degree)
+    M: Array = np.linalg.lstsq(now, later)[0].astype(np.float64)
+    return M
 
 
 def phase_angles(meta: PredictorMeta, first_tick: int, count: int) -> Array:

@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.predictor.episode import Y_SCALE, Episode
-from quadriga.agents.predictor.periodic_basis import N_WRENCH, harmonics, phase_angles, wrenches
+from quadriga.agents.predictor.periodic_basis import (
+    N_WRENCH,
+    harmonics,
+    phase_angles,
+    polynomials,
+    wrenches,
+)
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.shared.robot.conventions import N_OUTPUTS, Array
 
@@ -68,10 +74,10 @@ def modulated(x: Array, angle: Array, order: int) -> Array:
     return (waves[:, :, None] * x[:, None, :]).reshape(len(x), -1)
 
 
-def forced(walk: Walked, at: NDArray[np.int64], order: int) -> Array:
-    """Wrenches of all robots at samples `at` times the harmonics there. (len(at), (2k+1) 6n)."""
-    w = walk.w[at].reshape(len(at), -1)
-    return modulated(w, walk.angle[at], order)
+def forced(walk: Walked, at: NDArray[np.int64], degree: int) -> Array:
+    """Wrenches of all robots at samples `at` times the polynomials there. (len(at), columns)."""
+    w, values = walk.w[at].reshape(len(at), -1), polynomials(walk.angle[at], degree)
+    return (values[:, :, None] * w[:, None, :]).reshape(len(at), -1)
 
 
 def chunks(
@@ -94,9 +100,9 @@ def chunks(
             yield walk, at[begin : begin + size]
 
 
-def columns_of(n: int, order: int) -> int:
+def columns_of(n: int, degree: int) -> int:
     """Number of columns of `forced`."""
-    return (2 * order + 1) * n * N_WRENCH
+    return 2 * (degree + 1) * n * N_WRENCH
 
 
 def outputs_of(walk: Walked, at: NDArray[np.int64]) -> Array:

@@ -58,7 +58,7 @@ def fit_free(walks: Sequence[Walked], h: Array, T_ini: int, peers: NDArray[np.bo
 
     Args:
         walks: scaled episodes.
-        h: harmonics of the response to a sample's wrench, (2k + 1, N, n, 6, n, 6).
+        h: coefficients of the response to a sample's wrench, (k, N, n, 6, n, 6).
         T_ini: samples of the past.
         peers: whose past may matter to whom, (n responding, n).
 
@@ -84,11 +84,11 @@ def fit_free(walks: Sequence[Walked], h: Array, T_ini: int, peers: NDArray[np.bo
 
 def forced_outputs(walk: Walked, at: NDArray[np.int64], h: Array) -> Array:
     """What the wrenches from samples `at` on do to the outputs there. Shape (len(at), N, 6 n)."""
-    waves, N, n = h.shape[:3]
-    rows = h.transpose(1, 0, 2, 3, 4, 5).reshape(N, waves * n * N_WRENCH, n * N_OUTPUTS)
+    count, N, n = h.shape[:3]
+    rows = h.transpose(1, 0, 2, 3, 4, 5).reshape(N, count * n * N_WRENCH, n * N_OUTPUTS)
     y = np.zeros((len(at), N, n * N_OUTPUTS))
     for s in range(N):
-        w = forced(walk, at + s, waves // 2)
+        w = forced(walk, at + s, count // 2 - 1)
         later = rows[: N - s].transpose(1, 0, 2).reshape(w.shape[1], -1)
         y[:, s:] += (w @ later).reshape(len(at), N - s, -1)
     return y

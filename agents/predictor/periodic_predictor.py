@@ -1,4 +1,4 @@
-"""G as a function of the gait's phase: kept as harmonics of responses, expanded block by block."""
+"""G as a function of the gait's phase: coefficients of responses, expanded block by block."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.predictor.periodic_basis import N_WRENCH, harmonics
+from quadriga.agents.predictor.periodic_basis import N_WRENCH, harmonics, polynomials
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
@@ -21,8 +21,8 @@ class PeriodicFactors:
     """What a periodic G is made of, in physical units but for the wrenches' scale.
 
     Attributes:
-        response: harmonics of h, what a wrench of a sample does l samples later,
-            (2k + 1, N, n pushing, 6, n responding, 6).
+        response: coefficients of h, what a wrench of a sample does l samples later, as polynomials
+            of the phase, (2d + 2, N, n pushing, 6, n responding, 6).
         free: harmonics of the map from [w_ini; y_ini] to the outputs of the horizon,
             (2q + 1, n responding, n, 6 N, 12 T_ini).
         wrench: from the forces of four feet to their net wrench, (6, 12).
@@ -101,7 +101,7 @@ class PeriodicPredictor(Predictor):
         """See `Predictor.future_block`."""
         N, response = self.meta.N, self.factors.response[:, :, j, :, i]
         angle = 2.0 * np.pi * (phase + np.arange(N)) / self.phases
-        h = np.tensordot(harmonics(angle, len(response) // 2), response, axes=1)
+        h = np.tensordot(polynomials(angle, len(response) // 2 - 1), response, axes=1)
         by_force = np.einsum("slwo,wu->slou", h, self.factors.wrench)
         block = np.zeros((N, N_OUTPUTS, N, N_FORCES))
         for s in range(N):

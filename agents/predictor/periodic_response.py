@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from quadriga.agents.predictor.periodic_basis import N_WRENCH, harmonics
+from quadriga.agents.predictor.periodic_basis import N_WRENCH, harmonics, shift_polynomials
 from quadriga.agents.predictor.periodic_data import (
     Walked,
     chunks,
@@ -31,7 +31,7 @@ from quadriga.agents.predictor.periodic_data import (
 from quadriga.agents.predictor.ridge import factorise
 from quadriga.shared.robot.conventions import N_OUTPUTS, Array
 
-ORDER: Final = 5  # of the highest harmonic in a response
+DEGREE: Final = 3  # of the polynomials of the phase in a response
 FOLDS: Final = 10
 _PAST: Final = 6  # samples before a pulse that explain what would have happened without it
 _MEAN_ORDER: Final = 5  # harmonics of the mean walk
@@ -90,15 +90,15 @@ def sum_folds(walks: Sequence[Walked], N: int, hold: int) -> list[Sums]:
 
 
 def solve_lags(sums: Sums, n: int, hold: int) -> Array:
-    """Responses g to a held draw, as harmonics. Shape (2 ORDER + 1, N, n, 6, n, 6).
+    """Coefficients of the responses g to a held draw. Shape (2 DEGREE + 2, N, n, 6, n, 6).
 
-    Axes: harmonic, lag, robot that pushes, wrench, robot that responds, output.
+    Axes: polynomial, lag, robot that pushes, wrench, robot that responds, output.
 
     Raises:
         PredictorError: a singular problem.
     """
     N, K, _ = sums.zy.shape
-    kw = columns_of(n, ORDER)
+    kw = columns_of(n, DEGREE)
     penalised = sums.zz.copy(order="F")
     penalised.flat[:: K + 1] += _RIDGE * sums.rows
     factor = factorise(penalised)
@@ -108,42 +108,37 @@ def solve_lags(sums: Sums, n: int, hold: int) -> Array:
         for draw in range(lag // hold):
             rest -= sums.zw[draw] @ g[lag - hold * (draw + 1)]
         g[lag] = linalg.cho_solve((factor, True), rest, check_finite=False)[K - kw :]
-    return g.reshape(N, 2 * ORDER + 1, n, N_WRENCH, n, N_OUTPUTS).swapaxes(0, 1)
+    return g.reshape(N, 2 * DEGREE + 2, n, N_WRENCH, n, N_OUTPUTS).swapaxes(0, 1)
 
 
 def spread_over_samples(g: Array, hold: int, angle_step: float) -> Array:
     """Responses h to single samples that add up to the responses g to S samples in a row.
 
-    g_l(θ) = Σ_m h_{l−m}(θ + m δ), m = 0 … S − 1. Harmonic by harmonic this is a linear system in
-    complex amplitudes; what it leaves open is chosen smooth in the lag.
+    g_l(θ) = Σ_m h_{l−m}(θ + m δ), m = 0 … S − 1: linear in the polynomials' coefficients. What it
+    leaves open is chosen smooth in the lag.
 
     Args:
-        g: harmonics of the response to a held draw, (2k + 1, N, …).
+        g: coefficients of the response to a held draw, (2 DEGREE + 2, N, …).
         hold: S.
         angle_step: δ, what the phase advances in a sample, rad.
     """
     if hold == 1:
         return g
-    N = g.shape[1]
-    bend = np.diff(np.eye(N), n=2, axis=0)[1:]  # the first lag may jump
-    h = np.empty_like(g)
-    for k in range((len(g) + 1) // 2):
-        add = sum(np.exp(1j * k * m * angle_step) * np.eye(N, k=-m) for m in range(hold))
-        normal = add.conj().T @ add + _SMOOTH * bend.T @ bend
-        solve = linalg.solve(normal, add.conj().T, assume_a="her")
-        # a cos kθ + b sin kθ = Re((a − i b) exp(i kθ))
-        amplitude = g[0] + 0j if k == 0 else g[2 * k - 1] - 1j * g[2 * k]
-        spread = np.tensordot(solve, amplitude, axes=1)
-        if k == 0:
-            h[0] = spread.real
-        else:
-            h[2 * k - 1], h[2 * k] = spread.real, -spread.imag
-    return h
+    count, N = g.shape[:2]
+    shift = shift_polynomials(count // 2 - 1, angle_step)
+    add = np.eye(count * N)
+    for m in range(1, hold):
+        add += np.kron(np.linalg.matrix_power(shift, m), np.eye(N, k=-m))
+    bend = np.kron(np.eye(count), np.diff(np.eye(N), n=2, axis=0)[1:])  # the first lag may jump
+    normal = add.T @ add + _SMOOTH * bend.T @ bend
+    h = linalg.solve(normal, add.T @ g.reshape(count * N, -1), assume_a="pos")
+    spread: Array = h.reshape(g.shape)
+    return spread
 
 
 def _sum_rows(walk: Walked, at: NDArray[np.int64], N: int, hold: int) -> Sums:
     n = walk.w.shape[1]
-    pulse = forced(walk, at, ORDER)
+    pulse = forced(walk, at, DEGREE)
     ahead = at[:, None] + np.linspace(0, N, _COMMANDS + 1).astype(int)[1:] - 1
     commands = walk.base[ahead] - walk.base[at - 1][:, None]
     regressors = [
@@ -153,8 +148,8 @@ def _sum_rows(walk: Walked, at: NDArray[np.int64], N: int, hold: int) -> Sums:
         pulse,
     ]
     z = np.concatenate(regressors, axis=1)
-    later = [forced(walk, at + s, ORDER) for s in range(hold, N, hold)]
-    kw = columns_of(n, ORDER)
+    later = [forced(walk, at + s, DEGREE) for s in range(hold, N, hold)]
+    kw = columns_of(n, DEGREE)
     zw = np.stack([z.T @ w for w in later]) if later else np.zeros((0, z.shape[1], kw))
     zy = np.stack([z.T @ outputs_of(walk, at + lag) for lag in range(N)])
     return Sums(z.T @ z, zw, zy, len(at))

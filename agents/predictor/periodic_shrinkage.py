@@ -36,24 +36,23 @@ class Tested:
 def shrink(estimate: Array, without: Array) -> Tested:
     """Draw groups of a response towards zero by what of them is noise.
 
-    A group is one harmonic (cosine and sine, all lags) of one output's response to one component
+    A group is one polynomial of the phase, at all lags, of one output's response to one component
     of one robot's wrench. With v the variance of its estimate x̂, it is multiplied by
     max(0, 1 − v/|x̂|²) (James and Stein). A peer's effect on an output as a whole is left out if it
     is not significant, or small against the robot's own.
 
     Args:
-        estimate: from all data, (2k + 1, N, n pushing, 6, n responding, 6).
-        without: from all folds but one, (F, 2k + 1, N, n, 6, n, 6).
+        estimate: from all data, (k, N, n pushing, 6, n responding, 6).
+        without: from all folds but one, (F, k, N, n, 6, n, 6).
     """
     F = len(without)
     deviation = without - without.mean(axis=0)
     variance = (F - 1) / F * (deviation**2).sum(axis=0)
-    square, noise = _by_harmonic(estimate**2), _by_harmonic(variance)
+    square, noise = (x.sum(axis=1, keepdims=True) for x in (estimate**2, variance))
     tiny = np.finfo(float).tiny
-    order = (np.arange(len(estimate)) + 1) // 2
-    factor = np.clip(1.0 - noise / np.maximum(square, tiny), 0.0, 1.0)[order][:, None]
+    factor = np.clip(1.0 - noise / np.maximum(square, tiny), 0.0, 1.0)
     response = estimate * factor
-    weight = 1.0 / np.sqrt(np.maximum(noise, tiny))[order][:, None]
+    weight = 1.0 / np.sqrt(np.maximum(noise, tiny))
     kept = _is_significant((F * estimate - (F - 1) * without) * weight)
     size = np.einsum("kljwio,kljwio->jio", response, response)
     own = np.einsum("iio->io", size)
@@ -71,10 +70,3 @@ def _is_significant(folds: Array) -> NDArray[np.bool_]:
     error = np.sqrt((pairs**2).mean(axis=0) / len(pairs))
     significant: NDArray[np.bool_] = pairs.mean(axis=0) > _SIGNIFICANT * error
     return significant.transpose(1, 0, 2)
-
-
-def _by_harmonic(squares: Array) -> Array:
-    """Sums over lags, and over cosine and sine of each harmonic. (k + 1, n, 6, n, 6)."""
-    lagless = squares.sum(axis=1)
-    waves = lagless[1:].reshape(-1, 2, *lagless.shape[1:]).sum(axis=1)
-    return np.concatenate([lagless[:1], waves])

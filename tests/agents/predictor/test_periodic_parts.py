@@ -8,7 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.periodic_basis import N_WRENCH, harmonics, phase_angles, wrench_map
+from quadriga.agents.predictor.periodic_basis import (
+    N_WRENCH,
+    harmonics,
+    phase_angles,
+    polynomials,
+    wrench_map,
+)
 from quadriga.agents.predictor.periodic_data import scale_episodes
 from quadriga.agents.predictor.periodic_response import spread_over_samples
 from quadriga.agents.predictor.periodic_shrinkage import shrink
@@ -24,6 +30,24 @@ META = PredictorMeta.of(Config())
 def test_harmonics_are_orthonormal_over_a_period(order: int) -> None:
     F = harmonics(2 * np.pi * np.arange(40) / 40, order)
     np.testing.assert_allclose(F.T @ F / 40, np.eye(2 * order + 1), atol=1e-12)
+
+
+@given(degree=st.integers(0, 5))
+def test_polynomials_are_orthonormal_and_of_one_half_each(degree: int) -> None:
+    nodes, weights = np.polynomial.legendre.leggauss(degree + 2)
+    angle = np.concatenate([np.pi * (nodes + 1) / 2, np.pi + np.pi * (nodes + 1) / 2])
+    F = polynomials(angle, degree)
+    gram = F.T @ (np.tile(weights, 2)[:, None] / 4 * F)
+    np.testing.assert_allclose(gram, np.eye(2 * degree + 2), atol=1e-4)  # angles are nudged by 1e-6
+    assert not F[: degree + 2, degree + 1 :].any()
+    assert not F[degree + 2 :, : degree + 1].any()
+
+
+def test_a_half_begins_where_the_feet_change_whatever_the_rounding() -> None:
+    """Phases 0 and 20 of 40, and those of later periods."""
+    phases = np.array([0, 20, 40, 60, 80, 100, 119, 120])
+    first = polynomials(2 * np.pi * phases / 40, 0)[:, 0] > 0.0
+    assert first.tolist() == [True, False, True, False, True, False, False, True]
 
 
 def test_a_samples_angle_is_that_of_the_phase_it_begins_in() -> None:
@@ -51,14 +75,14 @@ def test_single_samples_add_up_to_a_held_draw(seed: int, hold: int) -> None:
     """A response that is smooth in its lag is found again from that to held draws."""
     random, step, N = np.random.default_rng(seed), 2 * np.pi / 40, 25
     decay = np.exp(-0.1 * np.arange(N))[:, None] * np.cos(0.2 * np.arange(N))[:, None]
-    h = random.normal(size=(5, 1, 4)) * decay
-    g = np.zeros_like(h)
-    for p in np.arange(40) * step:
-        held = sum(
-            np.pad(np.tensordot(harmonics(p + m * step, 2), h, axes=1), ((m, 0), (0, 0)))[:N]
-            for m in range(hold)
-        )
-        g += harmonics(np.array(p), 2)[:, None, None] * held / 40
+    h = random.normal(size=(6, 1, 4)) * decay
+    starts = np.array([k for k in range(40) if k % 20 + hold <= 20]) * step
+    F = polynomials(starts, 2)  # of draws that end in the half in which they begin
+    held = np.zeros((len(starts), N, 4))
+    for m in range(hold):
+        response = np.tensordot(polynomials(starts + m * step, 2), h, axes=1)
+        held[:, m:] += response[:, : N - m]
+    g = np.tensordot(np.linalg.pinv(F), held, axes=1)
     found = spread_over_samples(g, hold, step)
     assert np.linalg.norm(found - h) < 0.05 * np.linalg.norm(h)
 
