@@ -257,7 +257,13 @@ class Agent:
         truth = inputs.truth
         # One that is lost or late is bridged by the filter.
         if self._by_truth and truth is not None and inputs.state.tick - truth.tick <= _TRUTH_AGE_MS:
-            estimate = trunk_from_truth(truth, self.robot, inputs.state, self.config.robot.geometry)
+            estimate = trunk_from_truth(
+                truth,
+                self.robot,
+                inputs.state,
+                self.config.robot.geometry,
+                by_sensor=self.config.controller.foot_load == "sensor",
+            )
             return self._controller.place(state.low_level, estimate, schedule, dt)
         return self._controller.sense(state.low_level, inputs.state, schedule, dt)
 

@@ -8,11 +8,19 @@ from __future__ import annotations
 import numpy as np
 
 from quadriga.agents.agent import Agent, AgentState, Inputs
+from quadriga.agents.controller.maths.leg_kinematics import leg_kinematics
 from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.agents.planning.team import Central, CentralState
 from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS, N_LEGS, N_OUTPUTS, robot_names
+from quadriga.shared.robot.conventions import (
+    GRAVITY,
+    N_JOINTS,
+    N_LEGS,
+    N_OUTPUTS,
+    Array,
+    robot_names,
+)
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Measurement, Reference, State
@@ -57,19 +65,29 @@ def _stay(config: Config, tick: int = 0) -> Reference:
     return Reference(epoch, epoch * 1_000_000, 0.0, 0.0, 0.0, config.reference.height)
 
 
+def _standing_torques(robot: RobotSpec, force: float) -> Array:
+    """Torques, (12,), N·m, that press each foot on the ground with a force, N; legs weigh nothing.
+
+    τ = −Jᵀ f; a column of J is the foot's velocity at unit rate of a joint.
+    """
+    rates = np.tile(np.eye(3), N_LEGS)  # by joint of a leg
+    rising = [leg_kinematics(robot.q_stand, v, robot.geometry)[1][:, 2] for v in rates]
+    return -force * np.stack(rising, axis=1).ravel()
+
+
 def standing(robot: RobotSpec, tick: int, lean: float = 0.0) -> State:
     """What a robot that stands still on flat ground measures, or leans to its right, rad."""
     zero = np.zeros(N_JOINTS)
     quat = np.array([np.cos(0.5 * lean), np.sin(0.5 * lean), 0.0, 0.0])
-    weight = np.full(N_LEGS, robot.weight / N_LEGS)
+    share = robot.weight / N_LEGS
     return State(
         tick,
         tick * 1_000_000,
         robot.q_stand,
         zero,
-        zero,
+        _standing_torques(robot, share),
         quat,
         np.zeros(3),
         np.array([0.0, 0.0, GRAVITY]),
-        weight,
+        np.full(N_LEGS, share),
     )

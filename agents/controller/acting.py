@@ -137,7 +137,7 @@ def act(
     if fixed.free_fall:
         fall_freely(push, contact)
 
-    feet = FeetState(p_foot, foot_velocities(terms.J, v, p_foot), sensed[SENSED.foot_force])
+    feet = FeetState(p_foot, foot_velocities(terms.J, v, p_foot), sensed[SENSED.foot_load])
     memory[MEMORY.mu_reduction] = update_mu_reduction(
         memory0[MEMORY.mu_reduction], contact, phase, feet, fixed.friction, dt
     )

@@ -1,4 +1,4 @@
-"""From scheduled stance and foot force to the contacts the QP may push on, and the ground height.
+"""From scheduled stance and loaded feet to the contacts the QP may push on, and the ground height.
 
 With contact detection on, a swing foot that is loaded from below in the second half of swing
 becomes a stance foot early, and a stance foot without load for `lost_contact_ms` is taken out of
@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from quadriga.agents.controller.foot_load import Flags
 from quadriga.agents.controller.memory import FeetMemory
 from quadriga.agents.controller.schedule import GaitPhase
 from quadriga.shared.config.sections import Config
@@ -26,15 +26,12 @@ _EARLIEST_REFLEX = 0.12  # of swing, likewise
 _LATEST_REFLEX = 0.67  # of the half cycle: later, a new swing would be a kick, maybe into a gap
 _BELOW = 0.7  # share of the reaction that must point upwards for the ground to be below the foot
 
-Flags = NDArray[np.bool_]
-
 
 class ContactRule(NamedTuple):
     """When a foot is a contact.
 
     Attributes:
-        detection: 1: by force; 0: by the schedule alone.
-        least_force: force from which on a foot is loaded, N.
+        detection: 1: by load; 0: by the schedule alone.
         lost_after: time without load after which a stance foot is no contact, s.
         hold: share of the half cycle for which a foot waits for those that shall stand.
         reflex: time for which a foot backs off once nothing stops it any more, s; 0: never.
@@ -45,7 +42,6 @@ class ContactRule(NamedTuple):
     """
 
     detection: float
-    least_force: float
     lost_after: float
     hold: float
     reflex: float
@@ -62,7 +58,6 @@ def contact_rule(config: Config) -> ContactRule:
     controller = config.controller
     return ContactRule(
         detection=float(controller.contact_detection),
-        least_force=controller.contact_force,
         lost_after=1e-3 * controller.lost_contact_ms,
         hold=controller.liftoff_hold_ms / config.gait.stance_ms,
         reflex=1e-3 * controller.reflex_ms,
@@ -77,7 +72,7 @@ def update_contacts(
     feet: FeetMemory,
     ground_height0: float,
     phase: GaitPhase,
-    foot_force: Array,
+    loaded: Flags,
     foot_z: Array,
     rule: ContactRule,
     dt: float,
@@ -88,7 +83,7 @@ def update_contacts(
         feet: what is remembered of them; changed in place.
         ground_height0: filtered height of the ground under the stance feet at the last tick, m.
         phase: of the gait.
-        foot_force: measured normal forces, (4,), N.
+        loaded: which feet bear load, (4,).
         foot_z: heights of the foot centres, (4,), m, odometry frame.
         rule: when a foot is a contact.
         dt: time since the last tick, s.
@@ -100,7 +95,6 @@ def update_contacts(
     sole_z = foot_z - rule.foot_radius
     if rule.detection < 0.5:
         return _follow_schedule(feet, ground_height0, phase.stance, sole_z, rate)
-    loaded = foot_force >= rule.least_force
     carried = _update_stance(feet, phase, loaded, rule, dt)
     _update_swing(feet, phase, loaded, carried, rule, dt)
     return _update_ground(feet, ground_height0, phase.stance, loaded, sole_z, rate)

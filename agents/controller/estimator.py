@@ -2,7 +2,8 @@
 
 All noise is isotropic, so the three axes share one 6×6 covariance and every measurement is a
 scalar update of it. Absolute position drifts; the controller uses heights over the stance feet.
-Attitude and angular velocity are the IMU's.
+Angular velocity is the IMU's, and so is the attitude, less a constant error of roll and pitch that
+is found on the way: with it gravity seems to accelerate the trunk, and the legs deny that.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class Estimate(NamedTuple):
         p_foot: foot centres, (4, 3), m.
         q_joint: joint angles, (12,), rad.
         v_joint: joint rates, (12,), rad/s.
-        foot_force: measured normal forces, (4,), N.
+        foot_load: vertical forces of the ground on the feet, (4,), N.
         quat_wxyz: attitude that the IMU measures, (4,), of any positive norm.
     """
 
@@ -47,7 +48,7 @@ class Estimate(NamedTuple):
     p_foot: Array
     q_joint: Array
     v_joint: Array
-    foot_force: Array
+    foot_load: Array
     quat_wxyz: Array
 
 
@@ -118,13 +119,13 @@ def filter_at(estimate: Estimate) -> FilterState:
 
 @compiled
 def foot_trust(
-    stance: Array, progress: float, foot_force: Array, ramp: float, least_force: float
+    stance: Array, progress: float, foot_load: Array, ramp: float, least_force: float
 ) -> Array:
     """Trust (4,) in each foot as an anchor: ramps in and out of stance, zero without load."""
     trust = np.zeros(4)
     edge = 1.0 if ramp <= 0.0 else min(1.0, min(progress, 1.0 - progress) / ramp + 0.02)
     for leg in range(4):
-        if stance[leg] > 0.5 and foot_force[leg] >= least_force:
+        if stance[leg] > 0.5 and foot_load[leg] >= least_force:
             trust[leg] = edge
     return trust
 
@@ -205,23 +206,26 @@ def specific_force_at_origin(accel: Array, gyro: Array, imu: Array) -> Array:
 def filter_step(
     before: FilterState,
     readings: Readings,
+    foot_load: Array,
     trust: Array,
     noise: FilterNoise,
     body: FilterBody,
     dt: float,
-) -> tuple[FilterState, Estimate]:
+) -> tuple[FilterState, Estimate, Array]:
     """Predict with the accelerometer over `dt`, correct with the leg kinematics.
 
     Args:
         before: the filter at the last tick.
         readings: of the sensors.
+        foot_load: what each foot bears, (4,), N.
         trust: in each foot as an anchor, (4,), 0 (swing, unloaded) to 1.
         noise: the filter's.
         body: what it knows of the robot.
         dt: time since the last tick, s.
 
     Returns:
-        The filter now, and what it estimates.
+        The filter now, what it estimates, and how the legs corrected the trunk's velocity, (3,),
+        m/s, odometry frame.
     """
     R = rotation_matrix(readings.quat_wxyz)
     p_leg, v_leg, omega_leg = leg_kinematics(readings.q_joint, readings.v_joint, body.geometry)
@@ -232,6 +236,7 @@ def filter_step(
     omega = R @ readings.gyro
     roll_velocity = _rolling_velocity(R, omega, omega_leg, body.geometry.foot_radius)
     _predict(state, acceleration, roll_velocity, trust, noise, dt)
+    expected = mean[1].copy()
     for leg in range(4):
         reach, foot = R @ p_leg[leg], 2 + leg
         gain = covariance[:, foot] - covariance[:, 0]  # the foot's place less the trunk's
@@ -253,13 +258,16 @@ def filter_step(
         p_foot,
         readings.q_joint,
         readings.v_joint,
-        readings.foot_force,
+        foot_load,
         readings.quat_wxyz,
     )
-    return FilterState(mean, 0.5 * (covariance + covariance.T)), estimate
+    filtered = FilterState(mean, 0.5 * (covariance + covariance.T))
+    return filtered, estimate, mean[1] - expected
 
 
-def trunk_from_truth(truth: Truth, robot: str, state: State, geometry: Geometry) -> Estimate:
+def trunk_from_truth(
+    truth: Truth, robot: str, state: State, geometry: Geometry, *, by_sensor: bool
+) -> Estimate:
     """The estimate the simulator's truth gives, for comparison with the filter's.
 
     Args:
@@ -267,6 +275,7 @@ def trunk_from_truth(truth: Truth, robot: str, state: State, geometry: Geometry)
         robot: its name.
         state: what it measures.
         geometry: of its legs.
+        by_sensor: whether foot sensors measure what feet bear, N; else the truth tells that too.
     """
     index = truth.robots.index(robot)
     R = rotation_matrix(truth.base_quat_wxyz[index])
@@ -280,6 +289,6 @@ def trunk_from_truth(truth: Truth, robot: str, state: State, geometry: Geometry)
         position + p_leg @ R.T,
         state.q_joint,
         state.v_joint,
-        state.foot_force,
+        state.foot_force if by_sensor else truth.grf[index, :, 2].copy(),
         state.imu_quat_wxyz,
     )

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from quadriga.agents.controller.foot_load import FOOT_LOAD, FOOT_LOAD_SIZE
 from quadriga.agents.controller.maths.rows import places, row_size
 from quadriga.shared.robot.conventions import N_FORCES, N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
@@ -40,6 +41,8 @@ class MemoryLayout(NamedTuple):
     reaction: slice
     mu_reduction: int
     load: int
+    foot_load: slice
+    tilt_error: slice
 
 
 MEMORY: Final = MemoryLayout(
@@ -66,6 +69,8 @@ MEMORY: Final = MemoryLayout(
         reaction=N_LEGS * 3,
         mu_reduction=1,
         load=1,
+        foot_load=FOOT_LOAD_SIZE,
+        tilt_error=3,
     )
 )
 MEMORY_SIZE: Final = row_size(MEMORY)
@@ -217,6 +222,16 @@ class Memory:
     def load(self) -> float:
         """Estimate of what the robot carries, kg."""
         return float(self.flat[MEMORY.load])
+
+    @property
+    def tilt_error(self) -> Array:
+        """Estimated error of the IMU's roll and pitch, (2,), rad, trunk frame."""
+        return self.flat[MEMORY.tilt_error][:2]
+
+    @property
+    def reaction_force(self) -> Array:
+        """Force of the ground on each foot by the joints' torques, (4, 3), N, odometry frame."""
+        return self.flat[MEMORY.foot_load][FOOT_LOAD.force].reshape(4, 3)
 
     @property
     def height_integral(self) -> float:

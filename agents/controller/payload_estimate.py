@@ -13,18 +13,18 @@ _HEIGHT = 0.08  # m, of a load's centre above the trunk's origin
 
 
 @compiled
-def estimate_load(load0: float, foot_force: Array, mass: float, rate: float) -> float:
+def estimate_load(load0: float, foot_load: Array, mass: float, rate: float) -> float:
     """The load, kg, filtered: on average the feet bear the weight of robot and load.
 
     What yokes pull up or down counts as load. Robots that are lifted carry nothing.
 
     Args:
         load0: at the last tick, kg.
-        foot_force: measured normal forces, (4,), N.
+        foot_load: vertical forces of the ground on the feet, (4,), N.
         mass: of the robot alone, kg.
         rate: share of a tick in the filter.
     """
-    surplus = np.sum(foot_force) / GRAVITY - mass
+    surplus = np.sum(foot_load) / GRAVITY - mass
     return min(_MOST, max(0.0, load0 + rate * (surplus - load0)))
 
 

@@ -11,6 +11,7 @@ from quadriga.shared.wire.messages import State
 # Where `State.row` keeps what.
 _Q_JOINT: Final = State.CUTS["q_joint"]
 _V_JOINT: Final = State.CUTS["v_joint"]
+_TAU_JOINT: Final = State.CUTS["tau_joint"]
 _QUAT: Final = State.CUTS["imu_quat_wxyz"]
 _GYRO: Final = State.CUTS["imu_gyro"]
 _ACCEL: Final = State.CUTS["imu_accel"]
@@ -23,14 +24,16 @@ class Readings(NamedTuple):
     Attributes:
         q_joint: joint angles, (12,), rad.
         v_joint: joint rates, (12,), rad/s.
+        tau_joint: joint torques, (12,), N·m.
         quat_wxyz: attitude of the IMU, trunk to world, (4,).
         gyro: angular velocity, (3,), rad/s, trunk frame.
         accel: specific force, (3,), m/s², trunk frame.
-        foot_force: normal forces, (4,), N.
+        foot_force: what the foot sensors give, (4,), counts.
     """
 
     q_joint: Array
     v_joint: Array
+    tau_joint: Array
     quat_wxyz: Array
     gyro: Array
     accel: Array
@@ -43,8 +46,23 @@ def readings_of(state: Array) -> Readings:
     return Readings(
         state[_Q_JOINT],
         state[_V_JOINT],
+        state[_TAU_JOINT],
         state[_QUAT],
         state[_GYRO],
         state[_ACCEL],
         state[_FOOT_FORCE],
+    )
+
+
+@compiled
+def with_attitude(readings: Readings, quat_wxyz: Array) -> Readings:
+    """The same readings with another attitude."""
+    return Readings(
+        readings.q_joint,
+        readings.v_joint,
+        readings.tau_joint,
+        quat_wxyz,
+        readings.gyro,
+        readings.accel,
+        readings.foot_force,
     )

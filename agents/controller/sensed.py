@@ -26,7 +26,7 @@ class SensedLayout(NamedTuple):
         velocity: of the trunk's origin, (3,), m/s, odometry frame.
         outputs: the planner's y, (6,), see `outputs_at`.
         switched: 1 if stances and swings have just ended.
-        foot_force: measured normal forces, (4,), N.
+        foot_load: vertical forces of the ground on the feet, (4,), N.
     """
 
     position: slice
@@ -40,7 +40,7 @@ class SensedLayout(NamedTuple):
     velocity: slice
     outputs: slice
     switched: int
-    foot_force: slice
+    foot_load: slice
 
 
 SENSED: Final = SensedLayout(
@@ -56,7 +56,7 @@ SENSED: Final = SensedLayout(
         velocity=3,
         outputs=N_OUTPUTS,
         switched=1,
-        foot_force=N_LEGS,
+        foot_load=N_LEGS,
     )
 )
 SENSED_SIZE: Final = row_size(SENSED)
@@ -87,7 +87,7 @@ class FeetState(NamedTuple):
     Attributes:
         position: of their centres, (4, 3), m, odometry frame.
         velocity: of their centres, (4, 3), m/s, odometry frame.
-        force: measured normal forces, (4,), N.
+        force: vertical forces of the ground on them, (4,), N.
     """
 
     position: Array

@@ -20,14 +20,25 @@ from quadriga.agents.controller.estimator import (
     filter_noise,
     filter_step,
     foot_trust,
+    specific_force_at_origin,
 )
-from quadriga.agents.controller.maths.rotation import roll_pitch_yaw
+from quadriga.agents.controller.foot_load import (
+    N_FOOT_LOAD_RULE,
+    Flags,
+    FootLoadRule,
+    foot_load_rule,
+    update_foot_load,
+)
+from quadriga.agents.controller.maths.leg_reaction import LegMotion
+from quadriga.agents.controller.maths.links import LINK_SIZE, N_LINKS
+from quadriga.agents.controller.maths.rotation import roll_pitch_yaw, rotation_matrix
 from quadriga.agents.controller.maths.rows import numbers, places
 from quadriga.agents.controller.memory import MEMORY, FilterState, feet_memory_of, filter_state_of
 from quadriga.agents.controller.payload_estimate import estimate_load
-from quadriga.agents.controller.readings import readings_of
+from quadriga.agents.controller.readings import Readings, readings_of, with_attitude
 from quadriga.agents.controller.schedule import SCHEDULE, phase_of
 from quadriga.agents.controller.sensed import SENSED, feet_of, trunk_of
+from quadriga.agents.controller.tilt_error import update_tilt_error, without_tilt_error
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.robot.spec import N_GEOMETRY, Geometry
@@ -40,20 +51,26 @@ class SensingLayout(NamedTuple):
     Attributes:
         trust_ramp: share of stance in which trust in a foot ramps up and down.
         least_force: below which a foot is not trusted, N.
+        tilt_time: time constant of the error of roll and pitch, s; 0: none is assumed.
         load_time: time constant of the load's filter, s; 0: no load is estimated.
         noise: `FilterNoise`.
         rule: `ContactRule`.
         geometry: `Geometry`.
         imu: where the accelerometer is, (3,), m, trunk frame.
+        foot_load: `FootLoadRule`.
+        links: `link_table`, (13, 13).
     """
 
     trust_ramp: int
     least_force: int
     load_time: int
+    tilt_time: int
     noise: slice
     rule: slice
     geometry: slice
     imu: slice
+    foot_load: slice
+    links: slice
 
 
 _CONSTANTS: Final = SensingLayout(
@@ -61,10 +78,13 @@ _CONSTANTS: Final = SensingLayout(
         trust_ramp=1,
         least_force=1,
         load_time=1,
+        tilt_time=1,
         noise=N_NOISE,
         rule=N_CONTACT_RULE,
         geometry=N_GEOMETRY,
         imu=3,
+        foot_load=N_FOOT_LOAD_RULE,
+        links=N_LINKS * LINK_SIZE,
     )
 )
 
@@ -72,12 +92,30 @@ _CONSTANTS: Final = SensingLayout(
 _MASS: Final = _CONSTANTS.geometry.start + Geometry._fields.index("mass")
 
 
-def sensing_constants(config: Config) -> Array:
-    """What `sense` needs of the configuration and its robot, see `SensingLayout`."""
+def sensing_constants(config: Config, links: Array) -> Array:
+    """What `sense` needs of the configuration and its robot, see `SensingLayout`.
+
+    Args:
+        config: of the team.
+        links: `link_table` of the bare robot.
+    """
     estimator, robot = config.estimator, config.robot
-    ahead = [estimator.trust_ramp, estimator.contact_force, config.controller.load_time]
+    ahead = [
+        estimator.trust_ramp,
+        estimator.contact_force,
+        config.controller.load_time,
+        estimator.tilt_time,
+    ]
     return np.concatenate(
-        [ahead, filter_noise(estimator), contact_rule(config), robot.geometry, robot.imu]
+        [
+            ahead,
+            filter_noise(estimator),
+            contact_rule(config),
+            robot.geometry,
+            robot.imu,
+            foot_load_rule(config),
+            links.ravel(),
+        ]
     )
 
 
@@ -102,19 +140,49 @@ def sense(
         memory: the new `Memory.flat`, filled.
         sensed: `Sensed.flat`, filled.
     """
-    readings = readings_of(state)
+    measured, tilt_error = readings_of(state), memory0[MEMORY.tilt_error].copy()
+    measured = with_attitude(measured, without_tilt_error(measured.quat_wxyz, tilt_error[:2]))
+    geometry = Geometry(*numbers(constants[_CONSTANTS.geometry], N_GEOMETRY))
+    body = FilterBody(geometry, constants[_CONSTANTS.imu])
+    loads = memory0[MEMORY.foot_load].copy()
+    load = update_foot_load(
+        loads,
+        _leg_motion(measured, body.imu),
+        measured.foot_force,
+        rotation_matrix(measured.quat_wxyz),
+        constants[_CONSTANTS.links].reshape(N_LINKS, LINK_SIZE),
+        geometry,
+        FootLoadRule(*numbers(constants[_CONSTANTS.foot_load], N_FOOT_LOAD_RULE)),
+        dt,
+    )
     trust = foot_trust(
         schedule[SCHEDULE.stance],
         schedule[SCHEDULE.progress],
-        readings.foot_force,
+        load.force,
         constants[_CONSTANTS.trust_ramp],
         constants[_CONSTANTS.least_force],
     )
     noise = FilterNoise(*numbers(constants[_CONSTANTS.noise], N_NOISE))
-    geometry = Geometry(*numbers(constants[_CONSTANTS.geometry], N_GEOMETRY))
-    body = FilterBody(geometry, constants[_CONSTANTS.imu])
-    filtered, estimate = filter_step(filter_state_of(memory0), readings, trust, noise, body, dt)
-    place(memory0, filtered, estimate, schedule, dt, constants, memory, sensed)
+    before = filter_state_of(memory0)
+    filtered, estimate, correction = filter_step(
+        before, measured, load.force, trust, noise, body, dt
+    )
+    place(memory0, filtered, estimate, load.loaded, schedule, dt, constants, memory, sensed)
+    memory[MEMORY.foot_load] = loads
+    update_tilt_error(tilt_error, correction, estimate.R, constants[_CONSTANTS.tilt_time], dt)
+    memory[MEMORY.tilt_error] = tilt_error
+
+
+@compiled
+def _leg_motion(measured: Readings, imu: Array) -> LegMotion:
+    """What the legs do by the sensors."""
+    return LegMotion(
+        measured.q_joint,
+        measured.v_joint,
+        measured.tau_joint,
+        measured.gyro,
+        specific_force_at_origin(measured.accel, measured.gyro, imu),
+    )
 
 
 @compiled
@@ -122,13 +190,17 @@ def place(
     memory0: Array,
     filtered: FilterState,
     estimate: Estimate,
+    loaded: Flags,
     schedule: Array,
     dt: float,
     constants: Array,
     memory: Array,
     sensed: Array,
 ) -> None:
-    """The same once the estimate is known; `filtered` is the estimator's new memory."""
+    """The same once the estimate and the loaded feet are known.
+
+    `filtered` is the filter's new memory; that of loads and attitude stays as it is.
+    """
     ground_height0 = memory0[MEMORY.ground_height]
     switched = schedule[SCHEDULE.half_cycle] != memory0[MEMORY.half_cycle]
     _fill(sensed, estimate, ground_height0, switched)
@@ -141,7 +213,7 @@ def place(
         feet_memory_of(memory),
         ground_height0,
         phase_of(schedule, switched),
-        estimate.foot_force,
+        loaded,
         estimate.p_foot[:, 2],
         ContactRule(*numbers(constants[_CONSTANTS.rule], N_CONTACT_RULE)),
         dt,
@@ -150,7 +222,7 @@ def place(
     if load_time > 0.0:
         rate = dt / (load_time + dt)
         memory[MEMORY.load] = estimate_load(
-            memory0[MEMORY.load], estimate.foot_force, constants[_MASS], rate
+            memory0[MEMORY.load], estimate.foot_load, constants[_MASS], rate
         )
 
 
@@ -170,7 +242,7 @@ def _fill(sensed: Array, estimate: Estimate, ground_height: float, switched: boo
     trunk_of(sensed).R[:] = R
     feet_of(sensed)[:] = estimate.p_foot
     sensed[SENSED.velocity] = velocity
-    sensed[SENSED.foot_force] = estimate.foot_force
+    sensed[SENSED.foot_load] = estimate.foot_load
     sensed[SENSED.outputs] = outputs_at(
         estimate.position, velocity, R, estimate.omega, ground_height
     )

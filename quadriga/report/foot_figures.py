@@ -97,7 +97,8 @@ def four_strides(run: Run) -> tuple[float, float]:
 
 
 def _force_legend(run: Run) -> list[tuple[str, str]]:
-    source = "ground reaction (truth)" if run.has_truth else "measured by the foot sensor"
+    unit = "N" if run.traces.config.controller.foot_load == "sensor" else "counts"
+    source = "ground reaction (truth)" if run.has_truth else f"by the foot sensor, {unit}"
     return [("true", source), ("planned", "planned, as applied")]
 
 

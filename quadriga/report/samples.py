@@ -13,6 +13,7 @@ from quadriga.agents.controller.maths.leg_kinematics import leg_kinematics
 from quadriga.agents.gait import scheduled_stance
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import Ticks, stack, ticks_of
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import N_FORCES, N_LEGS, Array, robot_names
@@ -23,6 +24,7 @@ from quadriga.shared.wire.topics import MEASUREMENT, SAMPLE_MS, STATE, topic_of
 
 _STALE_MS: Final = 100  # a stance reported longer ago than this is not that of now
 _LOADED: Final = 10.0  # N of true force that is a contact
+_RANGE: Final = (5.0, 95.0)  # percentiles of a foot sensor's counts: without load and with
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +34,7 @@ class Samples:
     Attributes:
         tick: shape (M,), ms.
         tilt: angle of the trunk's z axis to the vertical by its IMU, shape (M,), rad.
-        foot_force: by the foot sensors, shape (M, 4), N.
+        foot_force: by the foot sensors, shape (M, 4), counts; N where they measure that.
         foot_speed: horizontal speed of the point of each foot that would touch the ground, shape
             (M, 4), m/s; NaN where the trunk's velocity is not known.
         torque: greatest share of the torque limit among the joints, shape (M,).
@@ -84,7 +86,7 @@ def _build_samples(
         stack(measured, "stance", N_LEGS) > 0.5,
         scheduled_stance(traces.config, index, tick - SAMPLE_MS),
     )
-    contact = force > traces.config.controller.contact_force
+    contact = _contact_by_sensors(force, traces.config)
     truth, robot = traces.truth, traces.config.robot
     if len(truth.tick):
         contact = _look_up(tick, truth.tick, truth.grf[:, index, :, 2] > _LOADED, contact)
@@ -100,6 +102,19 @@ def _build_samples(
         stance=stance,
         contact=contact,
     )
+
+
+def _contact_by_sensors(force: Array, config: Config) -> Any:
+    """Which feet bear load by their sensors alone, shape (M, 4), bool.
+
+    Counts have no known scale: above the middle of what a sensor gave, its foot counts as loaded.
+    """
+    if config.controller.foot_load == "sensor":
+        return force > config.controller.contact_force
+    if not len(force):
+        return np.zeros_like(force, dtype=bool)
+    least, most = np.percentile(force, _RANGE, axis=0)
+    return force > 0.5 * (least + most)
 
 
 def _find_velocity(traces: Traces, index: int, tick: Ticks) -> Array:

@@ -34,6 +34,22 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "motors.delay_ms": 0,
         "motors.hard_stops": False,
         "motors.heat_time": 0.0,
+        "sensors.preset": "ideal",
+        "sensors.joint_offset": 0.0,
+        "sensors.orientation_bias": 0.0,
+        "sensors.yaw_drift": 0.0,
+        "sensors.foot_sensor": "newtons",
+        "sensors.foot_scale": 1.5,
+        "sensors.foot_scale_spread": 0.5,
+        "sensors.foot_bias": 30.0,
+        "sensors.foot_drift": 3.0,
+        "sensors.foot_dropout_rate": 0.05,
+        "sensors.foot_dropout_ms": 200.0,
+        "estimator.tilt_time": 0.0,
+        "controller.foot_load": "sensor",
+        "controller.contact_torque_force": 12.0,
+        "controller.reaction_filter_ms": 3.0,
+        "controller.calibration_time": 3.0,
     }
 )
 

@@ -25,6 +25,14 @@ class EstimatorConfig:
     trust_ramp: float = key(
         0.3, "1", "share of stance over which trust rises and falls", low=0.0, high=0.5
     )
+    tilt_time: float = key(
+        5.0,
+        "s",
+        "time constant with which an error of the IMU's roll and pitch is found, by the "
+        "accelerometer and the legs; 0: none is assumed",
+        low=0.0,
+        high=1e4,
+    )
     contact_force: float = key(
         10.0, "N", "a foot with less load is not trusted", low=0.0, high=200.0
     )
@@ -116,7 +124,33 @@ class ControllerConfig:
     kp_swing: float = key(400.0, "1/s²", "swing foot", low=0.0, high=1e4)
     kd_swing: float = key(40.0, "1/s", "swing foot rate", low=0.0, high=1e3)
     contact_detection: bool = key(True, "-", "early touchdown becomes stance, a lost foot descends")
-    contact_force: float = key(4.0, "N", "foot force that counts as contact", low=0.5, high=100.0)
+    foot_load: str = key(
+        "fused",
+        "-",
+        "what feet bear. fused: by the joints' torques, and by foot sensors as far as they agree "
+        "with those; sensor: by foot sensors alone, which must measure N",
+        choices=("fused", "sensor"),
+    )
+    contact_force: float = key(
+        4.0, "N", "load by a foot sensor that counts as contact", low=0.5, high=100.0
+    )
+    contact_torque_force: float = key(
+        12.0, "N", "load by the joints' torques that counts as contact", low=0.5, high=200.0
+    )
+    reaction_filter_ms: float = key(
+        3.0,
+        "ms",
+        "time constant of both filters of the load by the joints' torques",
+        low=0.5,
+        high=100.0,
+    )
+    calibration_time: float = key(
+        3.0,
+        "s",
+        "how long foot sensors are compared with the joints' torques; what is older is forgotten",
+        low=0.1,
+        high=1e4,
+    )
     lost_contact_ms: int = key(5, "ms", "stance without force until it descends", low=1, high=100)
     descent_speed: float = key(0.8, "m/s", "speed of a descending stance foot", low=0.0, high=3.0)
     reject_side_contacts: bool = key(

@@ -63,6 +63,13 @@ _IDEAL_MOTORS: Final = MappingProxyType(
     }
 )  # fmt: skip
 
+# Sensors that only make noise, and feet that measure N: for comparison with what is older.
+_IDEAL: Final = MappingProxyType(
+    {
+        "joint_offset": 0.0, "orientation_bias": 0.0, "yaw_drift": 0.0, "foot_sensor": "newtons",
+    }
+)  # fmt: skip
+
 _USUAL: Final = MappingProxyType[str, Any]({})
 PRESETS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = MappingProxyType(
     {
@@ -70,6 +77,7 @@ PRESETS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = MappingProxyType
         "motors": MappingProxyType({"realistic": _USUAL, "ideal": _IDEAL_MOTORS}),
         "planner": MappingProxyType({"usual": _USUAL, "fast": _FAST, "paper": _PAPER_PLANNER}),
         "identification": MappingProxyType({"usual": _USUAL, "paper": _PAPER_FIT}),
+        "sensors": MappingProxyType({"realistic": _USUAL, "ideal": _IDEAL}),
     }
 )
 

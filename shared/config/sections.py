@@ -9,6 +9,7 @@ from quadriga.shared.config.low_level import ControllerConfig, EstimatorConfig, 
 from quadriga.shared.config.motors import MotorsConfig
 from quadriga.shared.config.planner import PlannerConfig
 from quadriga.shared.config.reference import ReferenceConfig
+from quadriga.shared.config.sensors import SensorsConfig
 from quadriga.shared.config.team import (
     SIMULATED,
     BusConfig,
@@ -16,7 +17,7 @@ from quadriga.shared.config.team import (
     RuntimeConfig,
     TeamConfig,
 )
-from quadriga.shared.config.world import SensorsConfig, WorldConfig
+from quadriga.shared.config.world import WorldConfig
 from quadriga.shared.robot.robots import ROBOTS
 from quadriga.shared.robot.spec import RobotSpec
 

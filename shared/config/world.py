@@ -1,4 +1,4 @@
-"""Sections of the simulated world and its sensors."""
+"""The section of the simulated world."""
 
 from __future__ import annotations
 
@@ -122,18 +122,3 @@ class WorldConfig:
     def ground(self) -> str:
         """What the ground is, in words."""
         return TERRAINS[self.terrain].text.format_map(asdict(self))
-
-
-@dataclass(frozen=True, slots=True)
-class SensorsConfig:
-    """Noise and bias of the simulated sensors (standard deviations)."""
-
-    joint_position: float = key(5e-4, "rad", "encoder noise", low=0.0, high=0.1)
-    joint_velocity: float = key(0.05, "rad/s", "encoder rate noise", low=0.0, high=5.0)
-    joint_torque: float = key(0.1, "N·m", "torque noise", low=0.0, high=10.0)
-    gyro: float = key(0.01, "rad/s", "gyro noise", low=0.0, high=1.0)
-    gyro_bias: float = key(0.002, "rad/s", "gyro bias, drawn once per run", low=0.0, high=1.0)
-    accel: float = key(0.1, "m/s²", "accelerometer noise", low=0.0, high=10.0)
-    accel_bias: float = key(0.02, "m/s²", "accelerometer bias, drawn once", low=0.0, high=5.0)
-    orientation: float = key(1e-3, "rad", "IMU attitude noise", low=0.0, high=0.2)
-    foot_force: float = key(1.0, "N", "foot force noise", low=0.0, high=50.0)

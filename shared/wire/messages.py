@@ -124,7 +124,7 @@ class State(Flat):
     imu_quat_wxyz: Array = array(4, entries=WXYZ, unit="1", frame="trunk to world")
     imu_gyro: Array = array(3, entries=XYZ, unit="rad/s", frame="trunk")
     imu_accel: Array = array(3, entries=XYZ, unit="m/s²", frame="trunk (specific force)")
-    foot_force: Array = array(4, entries=LEGS, unit="N", frame="ground normal")
+    foot_force: Array = array(4, entries=LEGS, unit="counts", frame="ground normal, uncalibrated")
 
 
 @flat_record

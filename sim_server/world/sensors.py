@@ -1,4 +1,4 @@
-"""A robot's sensors: the ground truth with noise and bias, of quantities a real robot measures."""
+"""A robot's sensors: the ground truth with noise and errors, as a real robot would measure it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from quadriga.shared.config.sections import SensorsConfig
 from quadriga.shared.robot.conventions import N_JOINTS, N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import State
+from quadriga.sim_server.world.foot_sensors import MEASURES, READS_ZERO, Faults, FootSensors
 from quadriga.sim_server.world.layout import (
     ATTITUDE,
     FOOT_FORCES,
@@ -21,6 +22,7 @@ from quadriga.sim_server.world.layout import (
 )
 
 _STREAM: Final = 2  # of the seed: the terrain draws from another one
+_ERRORS: Final = 1  # of that stream, for all errors but noise and the IMU's biases
 # Columns of a robot's noise: joints, gyro, accelerometer and feet in the order of the fields of
 # `State`, then the attitude, whose noise is a rotation and is not added.
 _Q = slice(0, N_JOINTS)
@@ -42,6 +44,10 @@ _STATE_ACCEL: Final = State.CUTS["imu_accel"]
 _STATE_FOOT: Final = State.CUTS["foot_force"]
 _ROW: Final = _STATE_FOOT.stop  # numbers of a `State`
 _BLOCK: Final = 64  # ticks of noise drawn at once, because many small draws cost more
+_NEWTONS, _COUNTS, _NONE = 0, 1, 2  # what foot sensors measure, as compiled code is told
+_FOOT_SENSORS: Final = {"newtons": _NEWTONS, "counts": _COUNTS, "none": _NONE}
+_INT16: Final = np.iinfo(np.int16)
+_MOST, _LEAST = float(_INT16.max), float(_INT16.min)
 
 # Q(p) with q ⊗ p = Q(p) q is _SIGN[a, b] · p[_INDEX[a, b]], quaternions wxyz.
 _INDEX: Final = np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
@@ -51,7 +57,8 @@ _SIGN: Final = np.array([[1, -1, -1, -1], [1, 1, 1, -1], [1, -1, 1, 1], [1, 1, -
 class Sensors:
     """The sensors of all robots; each robot's noise has its own stream of (seed, robot index).
 
-    So a robot's noise depends neither on the number of robots nor on what the others do.
+    So a robot's noise depends neither on the number of robots nor on what the others do. The
+    errors of encoders, attitude and feet have another stream each, so that they change no noise.
     """
 
     def __init__(
@@ -77,12 +84,21 @@ class Sensors:
         ):
             self._sigma[channel] = sigma
         self._bias = np.zeros((len(names), _SUMS))
-        for row, stream in zip(self._bias, self._streams, strict=True):
-            row[_GYRO] = config.gyro_bias * stream.standard_normal(3)
-            row[_ACCEL] = config.accel_bias * stream.standard_normal(3)
+        self._tilt, self._yaw_rate = np.zeros((len(names), 3)), np.zeros(len(names))
+        others = [np.random.default_rng((seed, _STREAM, i, _ERRORS)) for i in indices]
+        for i, (stream, other) in enumerate(zip(self._streams, others, strict=True)):
+            self._bias[i, _GYRO] = config.gyro_bias * stream.standard_normal(3)
+            self._bias[i, _ACCEL] = config.accel_bias * stream.standard_normal(3)
+            self._bias[i, _Q] = config.joint_offset * other.standard_normal(N_JOINTS)
+            self._tilt[i, :2] = config.orientation_bias * other.standard_normal(2)
+            self._yaw_rate[i] = config.yaw_drift * other.standard_normal()
+        self._kind = _FOOT_SENSORS[config.foot_sensor]
+        self._feet = FootSensors(config, others)
+        self._last = np.zeros((len(names), N_LEGS))  # what the feet's sensors read last
 
         self._next = _BLOCK  # row of the block that the next measurement takes
-        self._block, self._turns = np.empty(0), np.empty(0)
+        self._block, self._turns, self._unloaded = np.empty(0), np.empty(0), np.empty(0)
+        self._faults: Faults = np.empty(0, dtype=np.int8)
 
     def measure(self, tick: int, q: Array, v: Array, tau: Array, sensed: Array) -> dict[str, State]:
         """The messages of one tick; every call draws fresh noise.
@@ -97,8 +113,12 @@ class Sensors:
         """
         if self._next == _BLOCK:
             self._draw()
-        rows = np.empty((len(q), _ROW))
-        _observe(q, v, tau, sensed, self._block[self._next], self._turns[self._next], rows)
+        rows, now = np.empty((len(q), _ROW)), self._next
+        _observe(q, v, tau, sensed, self._block[now], self._turns[now], rows)
+        _turn_about_vertical(self._yaw_rate * (1e-3 * tick), rows)
+        _convert_foot_forces(
+            self._kind, self._feet.scale, self._unloaded[now], self._faults[now], self._last, rows
+        )
         self._next += 1
         stamp_ns = tick * 1_000_000
         return {name: State.from_row(tick, stamp_ns, rows[i]) for i, name in enumerate(self._names)}
@@ -108,7 +128,8 @@ class Sensors:
         draws = [stream.standard_normal((_BLOCK, _TURN.stop)) for stream in self._streams]
         noise = np.stack(draws, axis=1) * self._sigma
         self._block = noise[:, :, :_SUMS] + self._bias
-        self._turns = turn_matrices(noise[:, :, _TURN])
+        self._turns = turn_matrices(noise[:, :, _TURN] + self._tilt)
+        self._unloaded, self._faults = self._feet.draw(_BLOCK)
         self._next = 0
 
 
@@ -131,8 +152,46 @@ def _observe(
         row[_STATE_ACCEL] = extra[_ACCEL] + sensed[i, SPECIFIC_FORCE]
         feet, normal, noise_of_feet = row[_STATE_FOOT], sensed[i, FOOT_FORCES], extra[_FOOT]
         for foot in range(N_LEGS):
-            # A foot sensor cannot pull.
-            feet[foot] = max(0.0, noise_of_feet[foot] + normal[foot])
+            feet[foot] = noise_of_feet[foot] + normal[foot]
+
+
+@compiled
+def _turn_about_vertical(angles: Array, rows: Array) -> None:
+    """Turn the attitudes in the states' rows by these angles, (n,), rad, about the world's z."""
+    for i in range(len(rows)):
+        quat, c, s = rows[i, _STATE_QUAT], np.cos(0.5 * angles[i]), np.sin(0.5 * angles[i])
+        w, x, y, z = quat[0], quat[1], quat[2], quat[3]
+        quat[0], quat[1] = c * w - s * z, c * x - s * y
+        quat[2], quat[3] = c * y + s * x, c * z + s * w
+
+
+@compiled
+def _convert_foot_forces(
+    kind: int, scale: Array, unloaded: Array, faults: Faults, last: Array, rows: Array
+) -> None:
+    """Make of the noisy normal forces in the states' rows what the sensors say of them.
+
+    Args:
+        kind: what they measure.
+        scale: counts per N, (n, 4).
+        unloaded: counts without load, (n, 4).
+        faults: what each sensor does now, (n, 4).
+        last: what each read last, (n, 4); changed in place.
+        rows: of the states; the feet's forces change.
+    """
+    for i in range(len(rows)):
+        feet = rows[i, _STATE_FOOT]
+        for foot in range(N_LEGS):
+            if kind == _NONE:
+                feet[foot] = 0.0
+            elif kind == _NEWTONS:
+                feet[foot] = max(0.0, feet[foot])  # such a sensor cannot pull
+            else:
+                fault = faults[i, foot]
+                if fault == MEASURES:
+                    counts = np.rint(scale[i, foot] * feet[foot] + unloaded[i, foot])
+                    last[i, foot] = min(_MOST, max(_LEAST, counts))
+                feet[foot] = 0.0 if fault == READS_ZERO else last[i, foot]
 
 
 def turn_matrices(rotation: Array) -> Array:

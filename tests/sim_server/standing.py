@@ -16,7 +16,13 @@ from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.world.world import World
 from tests.a1 import q_stand
 
-SILENT = SensorsConfig(**{item.name: 0.0 for item in fields(SensorsConfig)})
+# The names of the sensors' noise and biases: what is left of sensors that measure N.
+NOISE = [
+    item.name
+    for item in fields(SensorsConfig)
+    if (item.type == "float" and not item.name.startswith("foot_")) or item.name == "foot_force"
+]
+SILENT = SensorsConfig(preset="ideal", foot_sensor="newtons", **dict.fromkeys(NOISE, 0.0))
 # Motors that give at once what is commanded.
 IDEAL_MOTORS = MotorsConfig(preset="ideal", **PRESETS["motors"]["ideal"])
 

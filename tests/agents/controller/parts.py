@@ -36,8 +36,11 @@ from tests.a1 import BODY
 def estimate_trunk(
     previous: FilterState, state: State, trust: Array, noise: FilterNoise, dt: float
 ) -> tuple[FilterState, Estimate]:
-    """One step of the estimator."""
-    return filter_step(previous, readings_of(state.row), trust, noise, BODY, dt)
+    """One step of the estimator of a robot whose foot sensors measure N."""
+    readings = readings_of(state.row)
+    load = readings.foot_force
+    filtered, estimate, _ = filter_step(previous, readings, load, trust, noise, BODY, dt)
+    return filtered, estimate
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,7 @@ def step_contact(
         feet,
         previous.ground_height,
         phase_of(schedule.row, schedule.half_cycle != previous.half_cycle),
-        foot_force,
+        foot_force >= config.contact_force,
         foot_z,
         contact_rule(replace(Config(), controller=config)),
         dt,

@@ -48,7 +48,7 @@ def step(
     load: Array | None = None,
 ) -> ControllerOutputs:
     """One tick of a robot that knows its pose."""
-    estimate = pose.estimate._replace(foot_force=np.full(4, 30.0) if load is None else load)
+    estimate = pose.estimate._replace(foot_load=np.full(4, 30.0) if load is None else load)
     sensed = controller.place(memory, estimate, schedule, 1e-3)
     return controller.act(sensed, schedule, task, 1e-3)
 
@@ -217,7 +217,7 @@ def test_a_sample_of_forces_is_their_mean_over_its_ticks() -> None:
     walking, memory, applied = Schedule(TROT, 0.3, 0), None, []
     for tick in range(25):
         task = replace(REST, deviation=random.normal(size=12))
-        estimate = pose.estimate._replace(foot_force=30.0 * TROT)
+        estimate = pose.estimate._replace(foot_load=30.0 * TROT)
         sensed = controller.place(memory, estimate, walking, 1e-3)
         memory = controller.act(sensed, walking, task, 1e-3, new_sample=tick == 15).memory
         applied.append(nominal_forces(TROT > 0.5) + task.deviation * np.repeat(TROT, 3))
@@ -249,7 +249,7 @@ def test_the_memory_handed_in_is_left_as_it_was() -> None:
 
 def test_the_tick_in_one_piece_is_its_parts_one_by_one() -> None:
     """Estimator, contacts, references and QP on their own come to what the compiled tick does."""
-    controller, config = controller_of(), Config()
+    controller, config = controller_of(foot_load="sensor"), Config()
     noise, walking = filter_noise(config.estimator), Schedule(TROT, 0.3, 0)
     state, ramp = standing(0), config.estimator.trust_ramp
     task = Task(0.3, 0.1, 0.2, STAND_HEIGHT + 0.01, np.arange(12.0), feedforward=True)

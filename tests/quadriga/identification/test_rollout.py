@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -10,15 +10,15 @@ import pytest
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.load import load
-from quadriga.shared.config.sections import Config, SensorsConfig
+from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Message, Reference
 from tests.a1 import STAND_HEIGHT
 from tests.agents.duet import simple_predictor
+from tests.sim_server.standing import SILENT
 
 SPEED = 0.5
-NOISELESS = SensorsConfig(**{item.name: 0.0 for item in fields(SensorsConfig)})
 
 
 def reference(tick: int) -> Reference | None:
@@ -64,7 +64,7 @@ def test_one_robot_walks_as_fast_as_it_is_asked_to() -> None:
 
 
 def test_without_noise_the_estimated_velocity_is_the_true_one() -> None:
-    config = replace(load(None, {"team.robots": 1}), sensors=NOISELESS)
+    config = replace(load(None, {"team.robots": 1}), sensors=SILENT)
     found = walk(config, 1500)
     error = found.estimated - found.velocity
     assert np.sqrt((error[300:, 0] ** 2).mean(axis=0)).max() < 0.02

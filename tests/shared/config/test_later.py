@@ -8,7 +8,7 @@ import pytest
 
 from quadriga.shared.config import later
 from quadriga.shared.config.later import LATER_KEYS, hashed_sections, with_older_values
-from quadriga.shared.config.load import load
+from quadriga.shared.config.load import build, load
 from quadriga.shared.config.renamed import with_first_names
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
@@ -58,3 +58,18 @@ def test_what_an_earlier_version_wrote_down_says_nothing_of_later_keys() -> None
     assert read["motors"] == asdict(load(None, {"motors.preset": "ideal"}))["motors"]
     assert read["bus"] == 5
     assert written["world"] == {"seed": 3}
+
+
+def test_what_was_written_before_a_key_came_has_its_first_value() -> None:
+    """Whole sections may have come later too; what is written wins, and no section stays none."""
+    older = with_older_values({"sensors": {"gyro": 0.5, "yaw_drift": 0.1}, "world": 5})
+    config = build({name: keys for name, keys in older.items() if isinstance(keys, dict)})
+    assert (config.sensors.gyro, config.sensors.yaw_drift) == (0.5, 0.1)
+    assert config.sensors.foot_sensor == LATER_KEYS["sensors.foot_sensor"]
+    assert config.controller.foot_load == LATER_KEYS["controller.foot_load"]
+    assert older["world"] == 5
+
+
+def test_what_was_written_in_full_is_read_as_it_is() -> None:
+    config = load(None, {"sensors.preset": "realistic", "controller.foot_load": "fused"})
+    assert build(with_older_values(asdict(config))) == config

@@ -1,4 +1,4 @@
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pinocchio as pin
@@ -6,13 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import SensorsConfig
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import State
 from quadriga.sim_server.world.sensors import Sensors, turn_matrices
 from tests.sim_server.standing import SILENT
 
-CONFIG = SensorsConfig()
+CONFIG = load(None, {"sensors.preset": "ideal"}).sensors
+REAL = SensorsConfig()
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 ARRAYS = [item.name for item in fields(State) if "shape" in item.metadata]
 
@@ -62,7 +64,7 @@ def test_noise_has_the_configured_spread_and_no_memory() -> None:
 
 
 def test_bias_is_drawn_once_per_run_and_robot() -> None:
-    config = SensorsConfig(gyro=0.0, accel=0.0, gyro_bias=0.5, accel_bias=2.0)
+    config = replace(CONFIG, gyro=0.0, accel=0.0, gyro_bias=0.5, accel_bias=2.0)
     runs = [record(config, 70, seed=seed) for seed in range(60)]
     for name, sigma in (("imu_gyro", 0.5), ("imu_accel", 2.0)):
         for run in runs:
@@ -98,12 +100,103 @@ def test_without_noise_the_truth_passes_through() -> None:
         np.testing.assert_allclose(state.imu_quat_wxyz, quat[i], atol=1e-15)
 
 
-def test_foot_force_is_never_negative() -> None:
-    sensors = Sensors(SensorsConfig(foot_force=20.0), 0, ("r1",))
+def test_a_force_in_newtons_is_never_negative() -> None:
+    sensors = Sensors(replace(CONFIG, foot_force=20.0), 0, ("r1",))
     zero, level = np.zeros((1, N_CHANNELS)), LEVEL[None]
     forces = np.array([measure(sensors, t, zero, level)["r1"].foot_force for t in range(200)])
     assert forces.min() == 0.0
     assert forces.max() > 20.0
+
+
+def counts_under(config: SensorsConfig, forces: Array, seed: int = 0) -> Array:
+    """What a robot's feet read in ticks of these forces, (ticks, 4)."""
+    sensors, channels = Sensors(config, seed, ("r1",)), np.zeros((1, N_CHANNELS))
+    read = []
+    for tick, force in enumerate(forces):
+        channels[0, -4:] = force
+        read.append(measure(sensors, tick, channels, LEVEL[None])["r1"].foot_force)
+    return np.array(read)
+
+
+def test_counts_are_whole_numbers_of_16_bits_and_may_be_negative() -> None:
+    forces = np.random.default_rng(0).uniform(0.0, 200.0, (2000, 4))
+    counts = counts_under(replace(REAL, foot_dropout_rate=0.0), forces)
+    np.testing.assert_array_equal(counts, np.rint(counts))
+    assert counts.min() < 0.0
+    wild = counts_under(replace(REAL, foot_dropout_rate=0.0), np.array([[1e9, -1e9, 0.0, 0.0]]))
+    assert wild.min() == -(2.0**15)
+    assert wild.max() == 2.0**15 - 1
+
+
+def test_every_foot_has_a_scale_and_a_bias_of_its_own() -> None:
+    """A straight line fits what a foot reads; over many robots its numbers spread as configured."""
+    config = replace(REAL, foot_drift=0.0, foot_dropout_rate=0.0, foot_force=0.0)
+    forces = np.repeat([0.0, 1000.0], 2)[:, None] * np.ones(4)
+    read = np.array([counts_under(config, forces, seed) for seed in range(150)])
+    bias, scale = read[:, 0].ravel(), ((read[:, -1] - read[:, 0]) / 1000.0).ravel()
+    assert np.median(scale) == pytest.approx(REAL.foot_scale, rel=0.1)
+    assert np.log(scale).std() == pytest.approx(REAL.foot_scale_spread, rel=0.1)
+    assert bias.std() == pytest.approx(REAL.foot_bias, rel=0.1)
+    assert abs(bias.mean()) < 4.0 * REAL.foot_bias / bias.size**0.5
+
+
+def test_the_bias_walks_at_random() -> None:
+    """Its variance grows in proportion to time."""
+    config = replace(REAL, foot_force=0.0, foot_dropout_rate=0.0, foot_drift=30.0)
+    quiet = np.zeros((1024, 4))
+    walks = np.array([counts_under(config, quiet, seed) for seed in range(100)])
+    for ticks in (256, 1023):
+        spread = (walks[:, ticks] - walks[:, 0]).std()
+        assert spread == pytest.approx(30.0 * (ticks / 1000.0) ** 0.5, rel=0.15)
+
+
+def test_a_sensor_that_fails_reads_0_or_repeats_its_last_value() -> None:
+    config = replace(REAL, foot_dropout_rate=0.5, foot_dropout_ms=100.0, foot_force=5.0)
+    counts = counts_under(config, np.full((40_000, 4), 500.0))
+    zero = counts == 0.0
+    repeats = np.zeros_like(zero)
+    repeats[8:] = (
+        np.all([counts[8:] == counts[8 - k : -k] for k in range(1, 9)], axis=0) & ~zero[8:]
+    )
+    # A failure in 2 s of 0.1 s each: a twentieth of the time; half of it reads 0.
+    for share in (zero.mean(), repeats.mean()):
+        assert 0.01 < share < 0.045
+
+
+def test_an_absent_foot_sensor_reads_0() -> None:
+    counts = counts_under(replace(REAL, foot_sensor="none"), np.full((100, 4), 80.0))
+    np.testing.assert_array_equal(counts, np.zeros((100, 4)))
+
+
+def test_encoders_and_attitude_have_errors_that_stay() -> None:
+    quiet = replace(REAL, joint_position=0.0, orientation=0.0)
+    runs = [record(quiet, 3, seed=seed) for seed in range(80)]
+    offsets = np.array([run["q_joint"] for run in runs])
+    np.testing.assert_array_equal(offsets[:, 0], offsets[:, -1])
+    assert offsets.std() == pytest.approx(REAL.joint_offset, rel=0.1)
+    tilts = 2.0 * np.array([run["imu_quat_wxyz"][0, 1:] for run in runs])
+    assert tilts[:, :2].std() == pytest.approx(REAL.orientation_bias, rel=0.2)
+    np.testing.assert_allclose(tilts[:, 2], 0.0, atol=1e-12)  # of a yaw that has not drifted yet
+
+
+def test_yaw_drifts_about_the_vertical_whatever_the_attitude() -> None:
+    quiet = replace(SILENT, yaw_drift=0.1)
+    random = np.random.default_rng(3)
+    quat = random.standard_normal(4)
+    quat /= np.linalg.norm(quat)
+    measured = measure(Sensors(quiet, 0, ("r1",)), 2000, np.zeros((1, N_CHANNELS)), quat[None])
+    R = pin.Quaternion(*quat).toRotationMatrix()
+    turned = pin.Quaternion(*measured["r1"].imu_quat_wxyz).toRotationMatrix()
+    turn = pin.log3(turned @ R.T)
+    np.testing.assert_allclose(turn[:2], 0.0, atol=1e-12)
+    assert abs(turn[2]) > 0.01
+
+
+def test_errors_of_sensors_change_no_noise() -> None:
+    """A robot's gyro and torques are the same numbers with ideal and with realistic sensors."""
+    ideal, real = record(CONFIG, 70), record(REAL, 70)
+    for name in ("v_joint", "tau_joint", "imu_gyro", "imu_accel"):
+        np.testing.assert_array_equal(ideal[name], real[name])
 
 
 def test_messages_keep_their_values_when_later_ones_are_made() -> None:

@@ -42,7 +42,7 @@ def test_every_number_of_a_row_has_one_name(layout: NamedTuple) -> None:
 
 def test_rows_are_as_long_as_their_last_part_says() -> None:
     assert row_size(MEMORY) == MEMORY_SIZE == MEMORY.load + 1
-    assert row_size(SENSED) == SENSED_SIZE == SENSED.foot_force.stop
+    assert row_size(SENSED) == SENSED_SIZE == SENSED.foot_load.stop
 
 
 def test_a_row_becomes_a_tuple_within_compiled_code() -> None:

@@ -1,0 +1,174 @@
+"""What feet bear, by the torques of a robot whose ground pushes as told, and by its sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from quadriga.agents.controller.foot_load import (
+    FOOT_LOAD_SIZE,
+    FootLoad,
+    FootLoadRule,
+    foot_load_rule,
+    update_foot_load,
+)
+from quadriga.agents.controller.maths.leg_reaction import LegMotion
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
+from tests.a1 import GEOMETRY, q_stand
+from tests.agents.controller.maths.test_leg_reaction import contact_torques
+from tests.agents.controller.poses import BODY, standing_pose
+
+DT = 1e-3
+RULE = foot_load_rule(Config())
+LOAD = 60.0  # N, on a foot that stands
+HALF_CYCLE = 200  # ticks
+SCALES = np.array([0.5, 1.0, 2.0, 4.0])  # counts per N
+BIASES = np.array([-80.0, 0.5, 30.0, 200.0])
+
+Sensor = Callable[[int, Array, Array], Array]  # of tick, noise and load: counts
+LEVEL = np.array([0.0, 0.0, GRAVITY])
+POSE = standing_pose()
+
+
+def pressed(load: float) -> Array:
+    """Torques of legs that stand still and bear a load each, (12,), N·m."""
+    force = np.zeros((N_LEGS, 3))
+    force[:, 2] = load
+    return contact_torques(POSE.q, POSE.v, np.zeros(18), force)
+
+
+AIR, GROUND = pressed(0.0), pressed(LOAD)
+
+
+@dataclass
+class Trot:
+    """Legs that bear load in turn, diagonal pairs together, their joints held still."""
+
+    sensor: Sensor
+    rule: FootLoadRule = RULE
+    friction: float = 0.0  # N·m, by which all torques are off
+    memory: Array = field(default_factory=lambda: np.zeros(FOOT_LOAD_SIZE))
+    random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
+    tick: int = 0
+
+    def step(self) -> tuple[Array, FootLoad]:
+        """True and told loads of the next tick."""
+        pair = self.tick // HALF_CYCLE % 2
+        stands = np.array([pair == 0, pair == 1, pair == 1, pair == 0])
+        tau = np.where(np.repeat(stands, 3), GROUND, AIR) + self.friction
+        tau += 0.1 * self.random.standard_normal(12)
+        load = np.where(stands, LOAD, 0.0)
+        counts = self.sensor(self.tick, self.random.standard_normal(N_LEGS), load)
+        rates = 0.05 * self.random.standard_normal(12)
+        motion = LegMotion(q_stand(), rates, tau, np.zeros(3), LEVEL)
+        told = update_foot_load(
+            self.memory, motion, counts, np.eye(3), BODY.links, GEOMETRY, self.rule, DT
+        )
+        self.tick += 1
+        return load, told
+
+    def run(self, ticks: int) -> tuple[Array, Array, Array]:
+        """Of the next ticks: true loads, told loads and loaded feet, (ticks, 4)."""
+        steps = [self.step() for _ in range(ticks)]
+        return (
+            np.array([load for load, _ in steps]),
+            np.array([told.force for _, told in steps]),
+            np.array([told.loaded for _, told in steps]),
+        )
+
+
+def raw(_: int, noise: Array, load: Array) -> Array:
+    """Each sensor has a scale and a bias of its own."""
+    return np.rint(SCALES * (load + noise) + BIASES)
+
+
+def absent(_: int, noise: Array, load: Array) -> Array:
+    return np.zeros(N_LEGS)
+
+
+def dead(_: int, noise: Array, load: Array) -> Array:
+    return np.rint(50.0 + noise)
+
+
+def settled(ticks: int) -> Array:
+    """Ticks at which no load has just begun or ended."""
+    phase = np.arange(ticks) % HALF_CYCLE
+    return (phase > 25) & (phase < HALF_CYCLE - 1)
+
+
+@pytest.mark.parametrize("sensor", [raw, absent, dead])
+def test_loads_are_told_whatever_the_sensors_give(sensor: Sensor) -> None:
+    load, told, loaded = Trot(sensor).run(1600)
+    calm = settled(1600)
+    np.testing.assert_array_equal(loaded[calm], load[calm] > 0.0)
+    assert np.abs(told[calm] - load[calm]).max() < 8.0
+    assert np.abs(told[calm] - load[calm]).mean() < 2.0
+
+
+@pytest.mark.parametrize("sensor", [raw, absent, dead])
+def test_a_load_is_seen_within_some_milliseconds_of_its_beginning_and_end(sensor: Sensor) -> None:
+    load, _, loaded = Trot(sensor).run(1600)
+    late = (load > 0.0) != loaded
+    for begin in range(800, 1600, HALF_CYCLE):
+        half_cycle = slice(begin, begin + HALF_CYCLE)
+        begins = load[begin] > 0.0
+        assert late[half_cycle, begins].sum(axis=0).max() <= 4
+        assert late[half_cycle, ~begins].sum(axis=0).max() <= 18
+
+
+def test_a_compared_sensor_shows_a_load_at_once() -> None:
+    trot = Trot(raw)
+    trot.run(800)
+    load, _, loaded = trot.run(1)
+    begun = load[0] > 0.0
+    assert begun.sum() == 2
+    assert loaded[0][begun].all()
+
+
+def test_friction_in_the_joints_makes_no_contact_of_a_foot_in_the_air() -> None:
+    for friction in (-0.5, 0.5):
+        load, _, loaded = Trot(absent, friction=friction).run(800)
+        assert not loaded[settled(800)][load[settled(800)] == 0.0].any()
+
+
+def test_a_sensor_that_fails_is_no_longer_believed() -> None:
+    """It repeats what it read under load, while its foot swings."""
+    last = raw(0, np.zeros(N_LEGS), np.full(N_LEGS, LOAD))
+
+    def fails(tick: int, noise: Array, load: Array) -> Array:
+        return raw(tick, noise, load) if tick < 1400 else last
+
+    trot = Trot(fails)
+    trot.run(1400)
+    load, _, loaded = trot.run(400)
+    calm = settled(400)
+    np.testing.assert_array_equal(loaded[calm], load[calm] > 0.0)
+
+
+def test_a_sensor_is_believed_again_once_it_has_drifted() -> None:
+    drift = 30.0  # counts
+
+    def drifts(tick: int, noise: Array, load: Array) -> Array:
+        return raw(tick, noise, load) + drift * min(1.0, tick / 10_000)
+
+    trot = Trot(drifts, RULE._replace(memory_time=1.0))
+    trot.run(10_000)
+    load, told, _ = trot.run(400)
+    calm = settled(400)
+    # The drift of one second is not known yet, of the least sensitive one 6 N; the rest is noise.
+    assert np.abs(told[calm] - load[calm]).max() < 6.0 + 5.0
+
+
+def test_sensors_alone_are_believed_where_they_are_to_be() -> None:
+    config = Config()
+    rule = foot_load_rule(
+        replace(config, controller=replace(config.controller, foot_load="sensor"))
+    )
+    trot = Trot(lambda tick, noise, load: np.array([3.9, 4.0, 0.0, 80.0]), rule)
+    _, told, loaded = trot.run(5)
+    np.testing.assert_array_equal(told, np.tile([3.9, 4.0, 0.0, 80.0], (5, 1)))
+    np.testing.assert_array_equal(loaded, np.tile([False, True, False, True], (5, 1)))
