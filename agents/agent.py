@@ -11,6 +11,7 @@ import numpy as np
 
 from quadriga.agents.controller.controller import Controller, ControllerOutputs
 from quadriga.agents.controller.estimator import trunk_from_truth
+from quadriga.agents.controller.foot_load import foot_load_rule
 from quadriga.agents.controller.memory import Memory
 from quadriga.agents.controller.schedule import Schedule
 from quadriga.agents.controller.sensed import Sensed
@@ -262,7 +263,7 @@ class Agent:
                 self.robot,
                 inputs.state,
                 self.config.robot.geometry,
-                by_sensor=self.config.controller.foot_load == "sensor",
+                foot_load_rule(self.config),
             )
             return self._controller.place(state.low_level, estimate, schedule, dt)
         return self._controller.sense(state.low_level, inputs.state, schedule, dt)

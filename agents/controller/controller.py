@@ -103,7 +103,6 @@ class Controller:
         self.body = RigidBody(robot, rotors=config.motors.rotor_inertia)
         self.weights = qp_weights(config.controller)
         self._sensing = sensing_constants(config, self.body.links)
-        self._least_force = config.controller.contact_force
         self._robot, self._motors = robot, motor_limits(config)
         self._acting = acting_constants(config, self.body, self.weights)
 
@@ -130,8 +129,8 @@ class Controller:
         """The same for a robot that knows where it is; its filter goes on from there."""
         before = initial_memory() if memory is None else memory.flat
         new, sensed = np.empty(MEMORY_SIZE), np.empty(SENSED_SIZE)
-        filtered, loaded = filter_at(estimate), estimate.foot_load >= self._least_force
-        place(before, filtered, estimate, loaded, schedule.row, dt, self._sensing, new, sensed)
+        filtered = filter_at(estimate)
+        place(before, filtered, estimate, schedule.row, dt, self._sensing, new, sensed)
         return _begin(new, sensed) if memory is None else Sensed(Memory(new), sensed)
 
     def act(

@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from quadriga.agents.controller.foot_load import FootLoad, FootLoadRule
 from quadriga.agents.controller.maths.leg_kinematics import leg_kinematics
 from quadriga.agents.controller.maths.rotation import cross, rotation_matrix
 from quadriga.agents.controller.memory import FilterState
@@ -37,7 +38,7 @@ class Estimate(NamedTuple):
         p_foot: foot centres, (4, 3), m.
         q_joint: joint angles, (12,), rad.
         v_joint: joint rates, (12,), rad/s.
-        foot_load: vertical forces of the ground on the feet, (4,), N.
+        foot_load: what each foot bears.
         quat_wxyz: attitude that the IMU measures, (4,), of any positive norm.
     """
 
@@ -48,7 +49,7 @@ class Estimate(NamedTuple):
     p_foot: Array
     q_joint: Array
     v_joint: Array
-    foot_load: Array
+    foot_load: FootLoad
     quat_wxyz: Array
 
 
@@ -206,7 +207,7 @@ def specific_force_at_origin(accel: Array, gyro: Array, imu: Array) -> Array:
 def filter_step(
     before: FilterState,
     readings: Readings,
-    foot_load: Array,
+    foot_load: FootLoad,
     trust: Array,
     noise: FilterNoise,
     body: FilterBody,
@@ -217,7 +218,7 @@ def filter_step(
     Args:
         before: the filter at the last tick.
         readings: of the sensors.
-        foot_load: what each foot bears, (4,), N.
+        foot_load: what each foot bears.
         trust: in each foot as an anchor, (4,), 0 (swing, unloaded) to 1.
         noise: the filter's.
         body: what it knows of the robot.
@@ -266,7 +267,7 @@ def filter_step(
 
 
 def trunk_from_truth(
-    truth: Truth, robot: str, state: State, geometry: Geometry, *, by_sensor: bool
+    truth: Truth, robot: str, state: State, geometry: Geometry, rule: FootLoadRule
 ) -> Estimate:
     """The estimate the simulator's truth gives, for comparison with the filter's.
 
@@ -275,12 +276,13 @@ def trunk_from_truth(
         robot: its name.
         state: what it measures.
         geometry: of its legs.
-        by_sensor: whether foot sensors measure what feet bear, N; else the truth tells that too.
+        rule: how loads are told: by foot sensors that measure N, or by the truth too.
     """
     index = truth.robots.index(robot)
     R = rotation_matrix(truth.base_quat_wxyz[index])
     position, velocity = truth.base_pos[index], truth.base_vel[index]
     p_leg, _, _ = leg_kinematics(state.q_joint, state.v_joint, geometry)
+    force = state.foot_force if rule.fused < 0.5 else truth.grf[index, :, 2].copy()
     return Estimate(
         position.copy(),
         velocity.copy(),
@@ -289,6 +291,6 @@ def trunk_from_truth(
         position + p_leg @ R.T,
         state.q_joint,
         state.v_joint,
-        state.foot_force if by_sensor else truth.grf[index, :, 2].copy(),
+        FootLoad(force, force >= rule.least_force),
         state.imu_quat_wxyz,
     )

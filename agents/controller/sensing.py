@@ -24,7 +24,6 @@ from quadriga.agents.controller.estimator import (
 )
 from quadriga.agents.controller.foot_load import (
     N_FOOT_LOAD_RULE,
-    Flags,
     FootLoadRule,
     foot_load_rule,
     update_foot_load,
@@ -164,10 +163,8 @@ def sense(
     )
     noise = FilterNoise(*numbers(constants[_CONSTANTS.noise], N_NOISE))
     before = filter_state_of(memory0)
-    filtered, estimate, correction = filter_step(
-        before, measured, load.force, trust, noise, body, dt
-    )
-    place(memory0, filtered, estimate, load.loaded, schedule, dt, constants, memory, sensed)
+    filtered, estimate, correction = filter_step(before, measured, load, trust, noise, body, dt)
+    place(memory0, filtered, estimate, schedule, dt, constants, memory, sensed)
     memory[MEMORY.foot_load] = loads
     update_tilt_error(tilt_error, correction, estimate.R, constants[_CONSTANTS.tilt_time], dt)
     memory[MEMORY.tilt_error] = tilt_error
@@ -190,14 +187,13 @@ def place(
     memory0: Array,
     filtered: FilterState,
     estimate: Estimate,
-    loaded: Flags,
     schedule: Array,
     dt: float,
     constants: Array,
     memory: Array,
     sensed: Array,
 ) -> None:
-    """The same once the estimate and the loaded feet are known.
+    """The same once the estimate is known.
 
     `filtered` is the filter's new memory; that of loads and attitude stays as it is.
     """
@@ -213,7 +209,7 @@ def place(
         feet_memory_of(memory),
         ground_height0,
         phase_of(schedule, switched),
-        loaded,
+        estimate.foot_load.loaded,
         estimate.p_foot[:, 2],
         ContactRule(*numbers(constants[_CONSTANTS.rule], N_CONTACT_RULE)),
         dt,
@@ -222,7 +218,7 @@ def place(
     if load_time > 0.0:
         rate = dt / (load_time + dt)
         memory[MEMORY.load] = estimate_load(
-            memory0[MEMORY.load], estimate.foot_load, constants[_MASS], rate
+            memory0[MEMORY.load], estimate.foot_load.force, constants[_MASS], rate
         )
 
 
@@ -242,7 +238,7 @@ def _fill(sensed: Array, estimate: Estimate, ground_height: float, switched: boo
     trunk_of(sensed).R[:] = R
     feet_of(sensed)[:] = estimate.p_foot
     sensed[SENSED.velocity] = velocity
-    sensed[SENSED.foot_load] = estimate.foot_load
+    sensed[SENSED.foot_load] = estimate.foot_load.force
     sensed[SENSED.outputs] = outputs_at(
         estimate.position, velocity, R, estimate.omega, ground_height
     )

@@ -9,6 +9,7 @@ import numpy as np
 from quadriga.agents.controller.contact import contact_rule, update_contacts
 from quadriga.agents.controller.controller import Task
 from quadriga.agents.controller.estimator import Estimate, FilterNoise, filter_step
+from quadriga.agents.controller.foot_load import FootLoad, foot_load_rule
 from quadriga.agents.controller.memory import (
     FeetMemory,
     FilterState,
@@ -32,13 +33,16 @@ from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import State
 from tests.a1 import BODY
 
+RULE = foot_load_rule(Config())
+
 
 def estimate_trunk(
     previous: FilterState, state: State, trust: Array, noise: FilterNoise, dt: float
 ) -> tuple[FilterState, Estimate]:
     """One step of the estimator of a robot whose foot sensors measure N."""
     readings = readings_of(state.row)
-    load = readings.foot_force
+    force = readings.foot_force
+    load = FootLoad(force, force >= RULE.least_force)
     filtered, estimate, _ = filter_step(previous, readings, load, trust, noise, BODY, dt)
     return filtered, estimate
 

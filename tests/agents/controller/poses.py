@@ -8,8 +8,10 @@ import numpy as np
 import pinocchio as pin
 
 from quadriga.agents.controller.estimator import Estimate
+from quadriga.agents.controller.foot_load import FootLoad
 from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms
 from quadriga.agents.controller.model import RigidBody
+from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import A1
 from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, Array
 from tests.a1 import STAND_HEIGHT, build_pinocchio_model, q_stand
@@ -32,6 +34,11 @@ class Pose:
         return BODY.terms(self.q, self.v)
 
 
+def loaded_with(force: Array) -> FootLoad:
+    """Feet that bear these forces, (4,), N."""
+    return FootLoad(force, force >= Config().controller.contact_force)
+
+
 def pose_of(q: Array, v: Array, foot_force: float = 30.0) -> Pose:
     """The pose of Pinocchio's coordinates (velocity of the trunk in the trunk's frame)."""
     data = MODEL.createData()
@@ -47,7 +54,7 @@ def pose_of(q: Array, v: Array, foot_force: float = 30.0) -> Pose:
         p_foot,
         q[7:].copy(),
         v[6:].copy(),
-        np.full(4, foot_force),
+        loaded_with(np.full(4, foot_force)),
         np.array([q[6], q[3], q[4], q[5]]),
     )
     return Pose(q, v, estimate)

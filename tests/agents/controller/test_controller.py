@@ -27,7 +27,7 @@ from tests.agents.controller.parts import (
     step_contact,
     trunk_acceleration,
 )
-from tests.agents.controller.poses import FEET, MODEL, Pose, random_pose, standing_pose
+from tests.agents.controller.poses import FEET, MODEL, Pose, loaded_with, random_pose, standing_pose
 
 REST_INTEGRATORS = initial_integrators(0.0)
 STANDING = Schedule(np.ones(4), 0.5, -1)
@@ -48,7 +48,8 @@ def step(
     load: Array | None = None,
 ) -> ControllerOutputs:
     """One tick of a robot that knows its pose."""
-    estimate = pose.estimate._replace(foot_load=np.full(4, 30.0) if load is None else load)
+    bears = loaded_with(np.full(4, 30.0) if load is None else load)
+    estimate = pose.estimate._replace(foot_load=bears)
     sensed = controller.place(memory, estimate, schedule, 1e-3)
     return controller.act(sensed, schedule, task, 1e-3)
 
@@ -217,7 +218,7 @@ def test_a_sample_of_forces_is_their_mean_over_its_ticks() -> None:
     walking, memory, applied = Schedule(TROT, 0.3, 0), None, []
     for tick in range(25):
         task = replace(REST, deviation=random.normal(size=12))
-        estimate = pose.estimate._replace(foot_load=30.0 * TROT)
+        estimate = pose.estimate._replace(foot_load=loaded_with(30.0 * TROT))
         sensed = controller.place(memory, estimate, walking, 1e-3)
         memory = controller.act(sensed, walking, task, 1e-3, new_sample=tick == 15).memory
         applied.append(nominal_forces(TROT > 0.5) + task.deviation * np.repeat(TROT, 3))

@@ -22,7 +22,7 @@ from quadriga.shared.config.sections import EstimatorConfig
 from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS, Array
 from quadriga.shared.wire.messages import State, Truth
 from tests.a1 import FOOT_RADIUS, GEOMETRY, STAND_HEIGHT, q_stand, standing_filter
-from tests.agents.controller.parts import estimate_trunk
+from tests.agents.controller.parts import RULE, estimate_trunk
 from tests.agents.controller.poses import FEET, MODEL, pose_of
 
 NOISE = filter_noise(EstimatorConfig())
@@ -227,7 +227,7 @@ def moving(seed: int) -> tuple[Truth, State, Estimate]:
 @pytest.mark.parametrize("seed", range(3))
 def test_the_truth_is_taken_over_as_it_is(seed: int) -> None:
     truth, state, expected = moving(seed)
-    estimate = trunk_from_truth(truth, "r2", state, GEOMETRY, by_sensor=False)
+    estimate = trunk_from_truth(truth, "r2", state, GEOMETRY, RULE)
     for name in ("position", "velocity", "R", "omega", "p_foot", "q_joint", "v_joint"):
         np.testing.assert_allclose(getattr(estimate, name), getattr(expected, name), atol=1e-12)
 
@@ -238,7 +238,7 @@ def test_a_robot_is_found_in_the_truth_by_its_name() -> None:
     turned = replace(
         truth, robots=("r2", "r1"), **{name: getattr(truth, name)[::-1] for name in rows}
     )
-    estimate = trunk_from_truth(turned, "r2", state, GEOMETRY, by_sensor=False)
+    estimate = trunk_from_truth(turned, "r2", state, GEOMETRY, RULE)
     np.testing.assert_allclose(estimate.position, expected.position, atol=1e-12)
     np.testing.assert_allclose(estimate.omega, expected.omega, atol=1e-12)
 

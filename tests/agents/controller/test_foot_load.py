@@ -10,6 +10,7 @@ import pytest
 
 from quadriga.agents.controller.foot_load import (
     FOOT_LOAD_SIZE,
+    Flags,
     FootLoad,
     FootLoadRule,
     foot_load_rule,
@@ -83,7 +84,8 @@ class Trot:
 
 def raw(_: int, noise: Array, load: Array) -> Array:
     """Each sensor has a scale and a bias of its own."""
-    return np.rint(SCALES * (load + noise) + BIASES)
+    counts: Array = np.rint(SCALES * (load + noise) + BIASES)
+    return counts
 
 
 def absent(_: int, noise: Array, load: Array) -> Array:
@@ -94,7 +96,7 @@ def dead(_: int, noise: Array, load: Array) -> Array:
     return np.rint(50.0 + noise)
 
 
-def settled(ticks: int) -> Array:
+def settled(ticks: int) -> Flags:
     """Ticks at which no load has just begun or ended."""
     phase = np.arange(ticks) % HALF_CYCLE
     return (phase > 25) & (phase < HALF_CYCLE - 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -116,7 +117,7 @@ def test_a_robot_that_does_what_it_is_told_is_left_alone() -> None:
     ],
 )
 def test_feedback_opposes_every_error(
-    change: dict[str, Array], component: int, expected: float
+    change: dict[str, Any], component: int, expected: float
 ) -> None:
     found = trunk(standing_pose().estimate._replace(**change))
     assert found[component] == pytest.approx(expected, rel=0.01)
