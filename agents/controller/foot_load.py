@@ -29,6 +29,7 @@ _AGREES = (20.0, 0.4)  # N and share of the load by which a sensor may differ fr
 _PATIENCE = 0.008  # s for which it may differ by more: it shows a touchdown before torques do
 _OUTLIER = 0.1  # weight in the regression of what differs by more
 _SURE = 2.0  # times a sensor's error by which it must exceed the least load of a contact
+_MOST = 32768.0  # counts, of 16 bits
 _RELEASE = 0.5  # of the load by torques that begins a contact: with less, it ends
 
 Flags = NDArray[np.bool_]
@@ -160,6 +161,10 @@ def update_foot_load(
     if rule.fused < 0.5:
         return FootLoad(counts, counts >= rule.least_force)
     force = _force_by_torques(memory, motion, R, links, geometry, rule.filter_time, dt)
+    if not np.isfinite(np.sum(force)):
+        memory[:] = 0.0  # absurd readings would stay in the filters: all begins anew
+        return FootLoad(np.zeros(4), np.zeros(4, dtype=np.bool_))
+    counts = np.minimum(_MOST, np.maximum(-_MOST, counts))
     _smooth(memory, counts, dt / (rule.filter_time + dt))
     load, loaded = np.empty(4), np.empty(4, dtype=np.bool_)
     for leg in range(4):
