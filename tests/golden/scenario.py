@@ -34,11 +34,13 @@ PREDICTOR: Final = FOLDER / "predictor.npz"
 REASONS: Final = FOLDER / "REASONS.md"
 
 # Short, and with a short horizon, so that recording and predictor stay small; a push, a turn and
-# a short stand, so that most of the agent has something to do all the same.
+# a short stand, so that most of the agent has something to do all the same. So little data need not
+# tell what robots do to each other.
 KEYS: Final = {
     "team.robots": 2, "world.seed": 5, "world.seconds": 0.6, "world.push": "r2:150:90:0.3:0.1",
     "gait.stand_ms": 100, "reference.vx": 0.4, "reference.wz": 0.3, "reference.ramp": 0.2,
     "planner.N": 8, "planner.T_ini": 4, "identification.block_weight": 20.0,
+    "identification.max_peers_harm": 1000.0,
 }  # fmt: skip
 # What the predictor is fitted for; a standing time of its own would ask for walks of its own.
 FITTED_FOR: Final = {
