@@ -28,7 +28,7 @@ from quadriga.plant.commands import CommandBox
 from quadriga.sim_server.world.world import World
 config = Config(team=TeamConfig(robots=1))
 WHAT
-first = flat_layout._read.signatures + motors.drive.signatures
+first = flat_layout._read.signatures + motors._drive.signatures
 print(len(first))
 """
 
