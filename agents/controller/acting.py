@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.agents.controller.acting_constants import unpack_constants
+from quadriga.agents.controller.foot_load import FOOT_LOAD
 from quadriga.agents.controller.foot_targets import (
     desired_accelerations,
     desired_forces,
@@ -137,7 +138,12 @@ def act(
     if fixed.free_fall:
         fall_freely(push, contact)
 
-    feet = FeetState(p_foot, foot_velocities(terms.J, v, p_foot), sensed[SENSED.foot_load])
+    feet = FeetState(
+        p_foot,
+        foot_velocities(terms.J, v, p_foot),
+        sensed[SENSED.foot_load],
+        memory0[MEMORY.foot_load][FOOT_LOAD.force].reshape(4, 3),
+    )
     memory[MEMORY.mu_reduction] = update_mu_reduction(
         memory0[MEMORY.mu_reduction], contact, phase, feet, fixed.friction, dt
     )

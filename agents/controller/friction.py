@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from quadriga.agents.controller.schedule import GaitPhase
 from quadriga.agents.controller.sensed import FeetState
 from quadriga.shared.config.sections import ControllerConfig
@@ -12,6 +14,7 @@ from quadriga.shared.runtime.jit import compiled
 
 _SETTLED = 0.2  # of a half cycle: before this a foot may still be landing
 _LOSS = 15.0  # 1/s, of the coefficient counted on while a foot slides
+_WARY = 0.1  # of the recovery, while less is counted on than a slip alone explains
 
 
 class FrictionRule(NamedTuple):
@@ -22,7 +25,8 @@ class FrictionRule(NamedTuple):
         slip_load: force from which on it matters, N: a foot that hardly bears load is easily
             dragged along, and shows nothing of the ground.
         mu: coefficient counted on where nothing slides.
-        mu_min: coefficient that is always counted on.
+        mu_min: coefficient that is counted on while feet slide.
+        mu_slippery: coefficient that is counted on even where sliding feet feel less.
         recovery: by which what is taken off falls, 1/s.
     """
 
@@ -30,6 +34,7 @@ class FrictionRule(NamedTuple):
     slip_load: float
     mu: float
     mu_min: float
+    mu_slippery: float
     recovery: float
 
 
@@ -43,6 +48,7 @@ def friction_rule(config: ControllerConfig) -> FrictionRule:
         slip_load=config.slip_load,
         mu=config.mu,
         mu_min=config.mu_min,
+        mu_slippery=min(config.mu_min, config.mu_slippery),
         recovery=config.mu_recovery,
     )
 
@@ -60,8 +66,12 @@ def update_mu_reduction(
 
     A foot in contact slides where it moves along the ground faster than rolling would make it. A
     foot that slides gives less than the QP asks of it, and not in the direction asked; friction
-    that is not there is then not counted on: ċ = 15/s while one slides, ċ = −`recovery` else, and
-    0 ≤ c ≤ `mu` − `mu_min`.
+    that is not there is then not counted on: ċ = 15/s while one slides, up to `mu` − `mu_min`.
+
+    Feet slide on good ground too, where a push drags them along. But a sliding foot feels |f_t| =
+    μ f_n: where that μ is less than `mu_min`, c goes on to `mu` − μ, and no farther than `mu` −
+    `mu_slippery`. While no foot slides ċ = −`recovery`, and a tenth of that below `mu_min`: ground
+    that was so slippery is so at the next step too.
 
     Args:
         mu_reduction0: c at the last tick.
@@ -73,10 +83,31 @@ def update_mu_reduction(
     """
     if rule.slip_speed <= 0.0:
         return 0.0
-    slides, stance, v, force = False, phase.stance, feet.velocity, feet.force
+    slides, seen = False, rule.mu_min
+    stance, v, force = phase.stance, feet.velocity, feet.force
     if phase.progress >= _SETTLED:
         for leg in range(4):
-            if contact[leg] > 0.5 and stance[leg] > 0.5 and force[leg] >= rule.slip_load:
-                slides = slides or v[leg, 0] ** 2 + v[leg, 1] ** 2 > rule.slip_speed**2
-    rate = _LOSS if slides else -rule.recovery
-    return min(max(0.0, rule.mu - rule.mu_min), max(0.0, mu_reduction0 + rate * dt))
+            stands = contact[leg] > 0.5 and stance[leg] > 0.5 and force[leg] >= rule.slip_load
+            if stands and v[leg, 0] ** 2 + v[leg, 1] ** 2 > rule.slip_speed**2:
+                slides = True
+                seen = min(seen, _friction_felt(feet.reaction[leg], rule))
+    if slides:
+        most = max(0.0, rule.mu - seen)
+        return max(mu_reduction0, min(most, mu_reduction0 + _LOSS * dt))
+    wary = rule.mu - mu_reduction0 < rule.mu_min - 1e-9
+    return max(0.0, mu_reduction0 - (_WARY if wary else 1.0) * rule.recovery * dt)
+
+
+@compiled
+def _friction_felt(reaction: Array, rule: FrictionRule) -> float:
+    """Friction coefficient that a sliding foot feels, within `mu_slippery` and `mu_min`.
+
+    Args:
+        reaction: force of the ground on it by the joints' torques, (3,), N; zero if unknown.
+        rule: how much friction to count on.
+    """
+    normal = reaction[2]
+    if normal < rule.slip_load:
+        return rule.mu_min
+    along = np.sqrt(reaction[0] ** 2 + reaction[1] ** 2)
+    return min(rule.mu_min, max(rule.mu_slippery, along / normal))

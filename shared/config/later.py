@@ -46,6 +46,7 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "sensors.foot_dropout_rate": 0.05,
         "sensors.foot_dropout_ms": 200.0,
         "estimator.tilt_time": 0.0,
+        "controller.mu_slippery": 2.0,
         "controller.foot_load": "sensor",
         "controller.contact_torque_force": 12.0,
         "controller.reaction_filter_ms": 3.0,
@@ -68,23 +69,6 @@ def hashed_sections(sections: Mapping[str, Any]) -> dict[str, Any]:
     return with_first_names(
         {section: keys for section, keys in left.items() if keys != {} or not sections[section]}
     )
-
-
-def with_older_values(sections: Mapping[str, Any]) -> dict[str, Any]:
-    """What another version wrote down in full, with the keys that it did not know yet.
-
-    They have the value that all that is older was made with, not today's default.
-
-    Args:
-        sections: values by section and key under today's names.
-    """
-    filled = dict(sections)
-    for name, value in LATER_KEYS.items():
-        section, _, key = name.partition(".")
-        keys = filled.get(section, {})
-        if isinstance(keys, dict):
-            filled[section] = {key: value, **keys}
-    return filled
 
 
 def _leave_out(section: str, keys: Any) -> Any:

@@ -82,10 +82,17 @@ class ControllerConfig:
         low=0.05,
         high=2.0,
     )
+    mu_slippery: float = key(
+        0.12,
+        "1",
+        "likewise, where the forces of sliding feet show that there is less than mu_min",
+        low=0.02,
+        high=2.0,
+    )
     mu_recovery: float = key(
         2.0,
         "1/s",
-        "rate at which the friction coefficient recovers after feet slid",
+        "rate at which the friction coefficient recovers after feet slid; below mu_min a tenth",
         low=0.0,
         high=10.0,
     )

@@ -31,6 +31,6 @@ GO1: Final = RobotSpec(
     lower=4 * (-0.863, -0.686, -2.818),
     upper=4 * (0.863, 4.501, -0.888),
     stand_height=0.28,
-    reach=0.396,
+    reach=0.38,
     defaults={"reference.height": 0.28},
 )

@@ -62,7 +62,7 @@ class RobotSpec:
         rotor_inertia: of their rotors, as the joints feel it behind the gears, (3,), kg·m².
         lower, upper: limits of the joint angles, in the order of `JOINT_NAMES`, (12,), rad.
         stand_height: of the trunk's origin above the ground when it stands, m.
-        reach: how far under the hip a foot may be lowered, m.
+        reach: how far under the hip a foot may be lowered, m; the knee's stop allows little more.
         defaults: values by `section.key` that this robot has where the configuration says nothing.
     """
 

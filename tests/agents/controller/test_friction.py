@@ -11,7 +11,7 @@ from quadriga.agents.controller.sensed import FeetState
 from quadriga.shared.robot.conventions import Array
 
 CONTACT, STANCE = np.array([1.0, 0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0, 1.0])
-MU, LEAST, SPEED, LOAD, RECOVERY, DT = 0.6, 0.25, 0.25, 20.0, 0.02, 1e-3
+MU, LEAST, SLIPPERY, SPEED, LOAD, RECOVERY, DT = 0.6, 0.25, 0.12, 0.25, 20.0, 0.02, 1e-3
 
 
 def after(
@@ -22,9 +22,18 @@ def after(
     speed: float = SPEED,
     contact: Array = CONTACT,
     force: float = LOAD,
+    felt: float | None = None,
 ) -> float:
-    feet = FeetState(np.zeros((4, 3)), v_foot, np.full(4, force))
-    phase, rule = GaitPhase(STANCE, progress, False), FrictionRule(speed, LOAD, MU, LEAST, RECOVERY)
+    """What is taken off; `felt` is the friction coefficient that torques show, None if they do not.
+
+    The foot is dragged along x, against a force along −x.
+    """
+    reaction = np.zeros((4, 3))
+    if felt is not None:
+        reaction[:] = [-60.0 * felt, 0.0, 60.0]
+    feet = FeetState(np.zeros((4, 3)), v_foot, np.full(4, force), reaction)
+    phase = GaitPhase(STANCE, progress, False)
+    rule = FrictionRule(speed, LOAD, MU, LEAST, SLIPPERY, RECOVERY)
     for _ in range(ticks):
         before = update_mu_reduction(before, contact, phase, feet, rule, DT)
     return before
@@ -63,3 +72,28 @@ def test_swing_feet_landing_feet_and_the_plain_setting_do_not_count() -> None:
 
 def test_a_foot_that_hardly_bears_load_may_slide() -> None:
     assert after(100, moving(0, 2.0), force=0.99 * LOAD) == 0.0
+
+
+@pytest.mark.parametrize(("felt", "counted_on"), [(0.8, LEAST), (0.2, 0.2), (0.05, SLIPPERY)])
+def test_friction_below_the_least_is_believed_where_sliding_feet_feel_it(
+    felt: float, counted_on: float
+) -> None:
+    assert after(500, moving(0, 2.0), felt=felt) == pytest.approx(MU - counted_on)
+
+
+def test_a_foot_that_stands_shows_nothing_of_how_slippery_it_is() -> None:
+    assert after(500, np.zeros((4, 3)), before=0.1, felt=0.05) == pytest.approx(
+        0.1 - 0.5 * RECOVERY
+    )
+
+
+def test_slippery_ground_is_forgotten_ten_times_as_slowly_but_it_is_forgotten() -> None:
+    believed = MU - 0.2
+    assert after(1000, np.zeros((4, 3)), before=believed) == pytest.approx(
+        believed - 0.1 * RECOVERY
+    )
+    assert after(200_000, np.zeros((4, 3)), before=believed) == 0.0
+
+
+def test_a_slip_on_better_ground_does_not_raise_what_is_counted_on() -> None:
+    assert after(100, moving(0, 2.0), before=MU - 0.15, felt=0.8) == pytest.approx(MU - 0.15)

@@ -173,3 +173,10 @@ def test_a_missing_robot_description_is_one_clear_error(monkeypatch: pytest.Monk
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
     with pytest.raises(ConfigError, match="make install"):
         A1.urdf_path()
+
+
+@pytest.mark.parametrize("kind", ROBOTS)
+def test_a_foot_is_lowered_no_farther_than_the_knees_stop_allows(kind: str) -> None:
+    robot = ROBOTS[kind]
+    stretched = 2.0 * robot.geometry.link * np.cos(0.5 * robot.upper[2])
+    assert stretched - 0.01 < robot.reach < stretched
