@@ -109,5 +109,5 @@ def _friction_felt(reaction: Array, rule: FrictionRule) -> float:
     normal = reaction[2]
     if normal < rule.slip_load:
         return rule.mu_min
-    along = np.sqrt(reaction[0] ** 2 + reaction[1] ** 2)
-    return min(rule.mu_min, max(rule.mu_slippery, along / normal))
+    felt: float = np.sqrt(reaction[0] ** 2 + reaction[1] ** 2) / normal
+    return min(rule.mu_min, max(rule.mu_slippery, felt))
