@@ -71,6 +71,23 @@ def hashed_sections(sections: Mapping[str, Any]) -> dict[str, Any]:
     )
 
 
+def with_older_values(sections: Mapping[str, Any]) -> dict[str, Any]:
+    """What another version wrote down in full, with the keys that it did not know yet.
+
+    They have the value that all that is older was made with, not today's default.
+
+    Args:
+        sections: values by section and key under today's names.
+    """
+    filled = dict(sections)
+    for name, value in LATER_KEYS.items():
+        section, _, key = name.partition(".")
+        keys = filled.get(section, {})
+        if isinstance(keys, dict):
+            filled[section] = {key: value, **keys}
+    return filled
+
+
 def _leave_out(section: str, keys: Any) -> Any:
     if not isinstance(keys, dict):
         return keys
