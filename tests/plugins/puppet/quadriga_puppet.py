@@ -1,4 +1,4 @@
-"""Robots on a stand: their joints go where they are told, and nothing else moves."""
+"""Robots on a stand: joints with a stiffness go where they are told, and nothing else moves."""
 
 from collections.abc import Mapping
 
@@ -28,7 +28,9 @@ class Puppets(Plant):
 
     def step(self, commands: Mapping[str, Command]) -> tuple[Event, ...]:
         for name in self.names:
-            goal = commands[name].q_des if name in commands else self.q[name]
+            goal = self.q[name]
+            if name in commands:
+                goal = np.where(commands[name].kp > 0.0, commands[name].q_des, goal)
             self.v[name] = 1000.0 * (goal - self.q[name]) / LAG
             self.q[name] = self.q[name] + 0.001 * self.v[name]
         self.tick += 1
