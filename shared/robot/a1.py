@@ -2,8 +2,8 @@
 
 Torques, speeds and angles are the URDF's. Unitree publishes a torque-speed curve of the Go2's motor
 alone, see `go2`; the corner speed is the same share of the speed limit. Rotor inertia: MuJoCo
-Menagerie, `unitree_a1`. Continuous torque: chosen so that a walk with 3 kg overheats a knee after
-5 to 7 minutes, as Qian et al. found on an A1 (arXiv:2603.01631).
+Menagerie, `unitree_a1`. Continuous torque: assumed, so that an A1 that carries 3 kg
+overheats after minutes as in arXiv:2603.01631; no walk has been held against that.
 """
 
 from __future__ import annotations
