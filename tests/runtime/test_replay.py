@@ -46,9 +46,7 @@ from tests.runtime.frozen import PATIENCE, await_event, await_tick, freeze
 pytestmark = pytest.mark.usefixtures("_compiled")
 
 Disturb = Callable[[Launch, str], None]
-SWING = (
-    301  # the first tick at which a swing foot is off its reference: it leaves the ground at 300
-)
+SWING = 300  # the tick at which the first feet leave the ground
 
 
 def walked(folder: Path, disturb: Disturb | None = None, **keys: Any) -> Path:
@@ -145,10 +143,10 @@ def test_a_planted_bit_in_a_peer_s_measurement_is_found_in_the_next_plan(
     np.testing.assert_allclose(qp.solve(), qp.x, atol=1e-5)
 
 
-def test_a_changed_gain_is_found_at_the_first_tick_it_acts(lockstep: Path, tmp_path: Path) -> None:
+def test_a_changed_key_is_found_at_the_first_tick_it_acts(lockstep: Path, tmp_path: Path) -> None:
     run = tmp_path / "run.mcap"
     shutil.copy(lockstep.parent / "predictor.npz", tmp_path)
-    rewritten(lockstep, run, config={"controller.kp_swing": 401.0})
+    rewritten(lockstep, run, config={"controller.swing_height": 0.1})
     for outcome in replayed(run):
         first = outcome.verdict.first
         assert first is not None
