@@ -47,7 +47,7 @@ class Role:
     needed: str = ALWAYS
     per_robot: bool = False
     predicts: bool = False
-    grace: float = 5.0
+    grace: float = 12.0  # closing a session may take Zenoh ten seconds
 
 
 # In the order in which they are started. The last is stopped when all others have left: it then
