@@ -67,14 +67,14 @@ def puppets(site: Path, make_team: Make, monkeypatch: pytest.MonkeyPatch) -> Mak
 
 
 def check_walked_to_the_end(recording: Recording, *, lockstep: bool) -> None:
-    """Both robots were measured and commanded until 1 s was over, by the same clock."""
+    """Both robots were measured and commanded; the walk ended when 1 s of its clock was over."""
     for robot in ("r1", "r2"):
         states = [message.tick for message in recording.messages(State, robot)]
         commands = [message.tick for message in recording.messages(Command, robot)]
         if lockstep:
             assert states == commands == list(range(1000))
-        else:  # a busy machine may lose some
-            assert states[-1] >= 500
+        else:  # a world that gets too little of a busy machine slows down, and states are lost
+            assert len(states) > 100
             assert len(commands) > 100
     assert {m.tick for m in recording.messages(Reference)} >= set(range(0, 1000, 100))
     events = list(recording.messages(Event))
