@@ -145,5 +145,9 @@ def _median(values: Iterable[float | None]) -> float | None:
 
 
 def _round(value: float | None) -> float | None:
-    """To six digits: the last bits of a quotient must not decide on a digit that is shown."""
-    return None if value is None else float(f"{value:.6g}")
+    """To twelve digits: the last bits of a quotient must not decide on a digit that is shown.
+
+    Far more digits than are shown, so that a value is not rounded twice: a table tells what its
+    trials tell.
+    """
+    return None if value is None else float(f"{value:.12g}")

@@ -107,6 +107,17 @@ def test_the_tables_say_what_was_counted() -> None:
     assert cells(tracking, 1)["RMSE z [mm]"] == "5.0"
 
 
+def test_a_figure_is_rounded_once_whatever_its_last_bits() -> None:
+    found = [row("none", s, error=1.0) for s in range(10)]
+    found += [row("damped", s, error=0.70049951) for s in range(10)]
+    ratios = cells(build_ratios_table(summarise(found), ERRORS))
+    assert ratios["RMSE roll"] == "0.700 [0.700, 0.700]", "0.7005 first would become 0.701"
+    thirds = [row("none", s, error=3.0) for s in range(10)]
+    thirds += [row("damped", s, error=3.0 * (0.7685 + (s - 5) * 1e-16)) for s in range(10)]
+    ratios = cells(build_ratios_table(summarise(thirds), ERRORS))
+    assert ratios["RMSE roll"] == "0.768 [0.768, 0.768]", "as of 0.7685 itself"
+
+
 def test_swept_values_stand_beside_each_other_and_are_pooled() -> None:
     every = [
         row(variant, seed, swept=(load,), fell=1.0 if (variant, load) == ("none", "10") else None)
