@@ -32,13 +32,13 @@ class _LocalCost(NamedTuple):
 def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
     """The linear map from all agents' present plans to their next, without inequality constraints.
 
-    U_i ← −H_ii⁻¹ G_iiᵀ Q̄ Σ_{j≠i} G_ij U_j over the stance legs of planning step `step`, with
-    the G of its phase. H_ii is that of the QP that is solved; slacks of soft bounds are left out,
-    since they are zero where no bound is active.
+    U_i ← −(1 − d) H_ii⁻¹ G_iiᵀ Q̄ Σ_{j≠i} G_ij U_j + d U_i over the stance legs of planning step
+    `step`, with the G of its phase and the damping d. H_ii is that of the QP that is solved; slacks
+    of soft bounds are left out, since they are zero where no bound is active.
     Shape (s, s), s being the number of stance forces of the team (150 per robot at N = 25).
     """
     n, phase = predictor.meta.robots, phase_of(config, step, predictor.phases)
-    costs = _local_costs(config, predictor, step)
+    costs, kept = _local_costs(config, predictor, step), config.planner.damping
     rows = []
     for i, cost in enumerate(costs):
         coupling = [
@@ -49,7 +49,8 @@ def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
         ]
         factor = linalg.cho_factor(cost.H)
         rows.append(-linalg.cho_solve(factor, np.concatenate(coupling, axis=1)))
-    return np.concatenate(rows)
+    best: Array = np.concatenate(rows)
+    return best if kept == 0.0 else (1.0 - kept) * best + kept * np.eye(len(best))
 
 
 def best_response_radius(config: Config, predictor: Predictor) -> float:
@@ -86,13 +87,14 @@ def probe_costs(config: Config, predictor: Predictor) -> tuple[float, ...]:
 
     p and q are fixed, so that any key that changes a cost changes them, whatever it is called.
     Two numbers for each distinct planning step; () for a single robot. Of cooperative agents they
-    are pᵀ H p of the team, after a negative number that tells them apart and has the damping.
+    are pᵀ H p of the team, after a number below −1 that tells them apart and has the damping. Of
+    damped best responses the first number is −damping.
     """
     if predictor.meta.robots == 1:
         return ()
     if is_cooperative(config):
         return _probe_team(config, predictor)
-    probes: list[float] = []
+    probes = [-config.planner.damping] if config.planner.damping else []
     for step in distinct_steps(config, predictor.phases):
         random = np.random.default_rng(0)
         hessian = gradient = 0.0

@@ -116,7 +116,8 @@ class GateReport:
                 f"below {self.radius_limit:g}",
                 "the agents' plans would diverge; "
                 + (
-                    "raise identification.block_weight, or plan with planner.cost = 'team'"
+                    "damp them by planner.damping, plan with planner.cost = 'team', or, of a ridge "
+                    "fit, raise identification.block_weight"
                     if self.cost == "own"
                     else "leave planner.damping at 0, which chooses it"
                 ),

@@ -11,9 +11,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import integrate, optimize
+from scipy import integrate, linalg, optimize
 
-from quadriga.agents.planner.best_response import best_response_map, best_response_radius
+from quadriga.agents.planner.best_response import (
+    are_same_costs,
+    best_response_map,
+    best_response_radius,
+    probe_costs,
+)
 from quadriga.agents.planner.gates import height_gains, held_out_error, physical_height, run_gates
 from quadriga.agents.predictor.episode import Y_SCALE
 from quadriga.agents.predictor.fits import fit_ridge
@@ -193,6 +198,17 @@ def test_the_best_response_is_the_planners_own(plant: Config) -> None:
     best = -np.linalg.solve(G.T @ Q @ G + R, G.T @ Q @ predictor.future_block(0, 1) @ du)
     answer = best_response_map(plant, predictor, step) @ U
     np.testing.assert_allclose(answer[:first], best, atol=1e-9)
+
+
+def test_damping_mixes_the_best_response_with_the_last_plan(plant: Config) -> None:
+    """Eigenvalues λ become (1 − d) λ + d, and the figures of other plans are not taken for them."""
+    predictor = coupled(plant, seed=2, strength=1.0)
+    damped = replace(plant, planner=replace(plant.planner, damping=0.25))
+    values = linalg.eigvals(best_response_map(plant, predictor, 20))
+    expected = np.abs(0.75 * values + 0.25).max()
+    found = np.abs(linalg.eigvals(best_response_map(damped, predictor, 20))).max()
+    assert found == pytest.approx(expected)
+    assert not are_same_costs(probe_costs(plant, predictor), probe_costs(damped, predictor))
 
 
 @settings(max_examples=12, deadline=None)
