@@ -51,7 +51,7 @@ def scale_episodes(
         dy = episode.deviations()[1] / Y_SCALE
         base = (episode.y_base / Y_SCALE)[..., list(_COMMANDED)]
         angle = phase_angles(meta, episode.first_tick, episode.samples)
-        starts = np.arange(_first_change(episode, hold), episode.samples, hold)
+        starts = _draws(episode, hold)
         walked.append(Walked(wrenches(episode, meta), dy, base, angle, starts))
     return tuple(walked), hold
 
@@ -126,6 +126,9 @@ def _held_samples(episodes: Sequence[Episode]) -> int:
     return max(1, held)
 
 
-def _first_change(episode: Episode, hold: int) -> int:
+def _draws(episode: Episode, hold: int) -> NDArray[np.int64]:
+    """Samples with which a draw of the noise begins; none in an episode without noise."""
     changes = _changes(episode)
-    return int(changes[0]) % hold if len(changes) else 0
+    if not len(changes):
+        return changes
+    return np.arange(int(changes[0]) % hold, episode.samples, hold)

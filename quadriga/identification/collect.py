@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,10 +11,17 @@ import numpy as np
 from quadriga.agents.gait import nominal_forces
 from quadriga.agents.modes import DAMPING
 from quadriga.agents.predictor.episode import SIGNALS, Episode, output_base
-from quadriga.agents.predictor.hankel import required_samples
+from quadriga.identification.collection_plan import (
+    PlannedEpisode,
+    collection_config,
+    held_out_number,
+    plan_episodes,
+    spread,
+    training_seconds,
+)
 from quadriga.identification.dataset import Dataset
 from quadriga.identification.rollout import Rollout
-from quadriga.shared.config.sections import Config, WorldConfig
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import N_FORCES, Array, robot_names
 from quadriga.shared.wire.messages import Reference
@@ -23,9 +29,6 @@ from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 from quadriga.shared.wire.topics import SAMPLE_MS
 from quadriga.workers import run_each
 
-_LEAST = 2000  # samples, however few the rule asks for
-_LEAST_WRENCHES = (20_000, 60_000)  # the same for net wrenches of one robot, of several
-_MARGIN = 2  # times what the rule asks for: data far in excess average the noise out
 _LEAST_EPISODE_S = 3.0  # a walk that ended in a fall earlier is not worth keeping
 _BEFORE_FALL = 50  # samples cut off before a fall
 _CLIP = 2.5  # standard deviations of the force noise
@@ -33,33 +36,6 @@ N_COMPONENTS = 5  # of a net wrench that two feet on a diagonal can exert
 _RAMP_MS = 500  # from one random speed to the next: jumps would drown what the forces do
 
 Progress = Callable[[int, int], None]
-
-
-def training_seconds(config: Config) -> float:
-    """World time to collect for the fit: as configured, or what the team's size asks for."""
-    if config.identification.seconds > 0.0:
-        return config.identification.seconds
-    n = config.team.robots
-    rule = required_samples(
-        N_FORCES * n,
-        config.planner.T_ini,
-        config.planner.N,
-        config.identification.order_per_robot * n,
-    )
-    least = _LEAST
-    if any(config.identification.wrench_noise):
-        # What peers do is a fraction of what a robot does itself, and is to be told from noise.
-        least = _LEAST_WRENCHES[n > 1]
-    return 1e-3 * SAMPLE_MS * max(least, _MARGIN * rule)
-
-
-def collection_config(config: Config, seed: int) -> Config:
-    """The same team on flat, empty ground as it is by default, without a planner.
-
-    So what is learnt does not depend on the world that is walked in later, which nobody knows.
-    """
-    planner = replace(config.planner, kind="none")
-    return replace(config, world=WorldConfig(seed=seed), planner=planner)
 
 
 def collect(config: Config, jobs: int, progress: Progress) -> Dataset:
@@ -74,34 +50,31 @@ def collect(config: Config, jobs: int, progress: Progress) -> Dataset:
         PredictorError: so many walks ended in a fall that too little is left.
         ProcessError: a worker died.
     """
-    wanted = training_seconds(config)
-    count = max(2, round(wanted / config.identification.episode))
-    plan = [(k, wanted / count) for k in range(count)]
-    plan.append((count, config.identification.held_out))
+    plan = plan_episodes(config)
     episodes: dict[int, Episode | None] = {}
     progress(0, len(plan))
-    with closing(run_each(partial(_collect_planned, config), plan, jobs)) as results:
-        for (k, _), episode in results:
-            episodes[k] = episode
+    with closing(run_each(partial(collect_episode, config), plan, jobs)) as results:
+        for planned, episode in results:
+            episodes[planned.number] = episode
             progress(len(episodes), len(plan))
-    return build_dataset(config, episodes, wanted)
+    return build_dataset(config, episodes)
 
 
-def build_dataset(config: Config, episodes: Mapping[int, Episode | None], wanted: float) -> Dataset:
-    """The data set of all episodes that were not lost; the last is the one held out.
+def build_dataset(config: Config, episodes: Mapping[int, Episode | None]) -> Dataset:
+    """The data set of all episodes that were not lost.
 
     Args:
         config: the team's configuration.
         episodes: by number, None for a walk that was lost to a fall.
-        wanted: seconds for the fit.
 
     Raises:
-        PredictorError: too little is left.
+        PredictorError: too little with force noise is left.
     """
-    count = max(episodes)
-    training = {k: e for k, e in sorted(episodes.items()) if k < count and e is not None}
-    held_out = episodes[count]
-    samples = sum(episode.samples for episode in training.values())
+    wanted, last = training_seconds(config), held_out_number(config)
+    kept = {number: episode for number, episode in episodes.items() if episode is not None}
+    training = {number: kept[number] for number in spread([*kept], last)}
+    held_out = kept.get(last)
+    samples = sum(episode.samples for number, episode in training.items() if number < last)
     if held_out is None or samples < 0.5 * wanted / (1e-3 * SAMPLE_MS):
         raise PredictorError(
             "data collection",
@@ -113,15 +86,12 @@ def build_dataset(config: Config, episodes: Mapping[int, Episode | None], wanted
     return Dataset(tuple(training.values()), (held_out,), seeds)
 
 
-def _collect_planned(config: Config, planned: tuple[int, float]) -> Episode | None:
-    return collect_episode(config, *planned)
-
-
-def collect_episode(config: Config, number: int, seconds: float) -> Episode | None:
-    """One walk of `seconds`; None if the team fell too early for it to be of use."""
-    seed = config.identification.seed + number
-    walk = _RandomWalk(config, seed, round(1e3 * seconds) + config.gait.stand_ms)
-    rollout = Rollout(collection_config(config, seed), None, walk.reference, walk.excitation)
+def collect_episode(config: Config, planned: PlannedEpisode) -> Episode | None:
+    """One walk; None if the team fell too early for it to be of use."""
+    config = collection_config(config, planned)
+    seconds = planned.seconds
+    walk = _RandomWalk(config, config.world.seed, round(1e3 * seconds) + config.gait.stand_ms)
+    rollout = Rollout(config, None, walk.reference, walk.excitation)
     names = robot_names(config.team.robots)
     u, u_nominal, y, y_base = [], [], [], []
     weight = config.robot.weight

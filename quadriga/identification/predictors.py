@@ -15,7 +15,8 @@ from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, read, save, versions
 from quadriga.identification.cache import data_path, predictor_path
-from quadriga.identification.collect import collect, training_seconds
+from quadriga.identification.collect import collect
+from quadriga.identification.collection_plan import collection_seconds
 from quadriga.identification.dataset import Dataset, check_excitation, read_data, write_data
 from quadriga.identification.fit_report import refusal
 from quadriga.progress import build_progress
@@ -75,8 +76,7 @@ def ensure_data(config: Config, console: Console) -> Dataset:
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=path.parent):
         pass  # a folder that cannot be written is better known before minutes of walking
-    seconds = training_seconds(config) + config.identification.held_out
-    label = f"collecting {seconds:.0f} s of walking, {config.team.robots} robots"
+    label = f"collecting {collection_seconds(config):.0f} s of walking, {config.team.robots} robots"
     count = "{task.completed}/{task.total} episodes"
     with build_progress(console, count, elapsed=True, hidden=False) as progress:
         task = progress.add_task(label, total=None)

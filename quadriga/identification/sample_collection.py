@@ -9,6 +9,7 @@ import numpy as np
 
 from quadriga.agents.predictor.episode import SIGNALS
 from quadriga.identification.collect import collect_episode
+from quadriga.identification.collection_plan import PlannedEpisode
 from quadriga.shared.config.load import load
 from quadriga.shared.robot.conventions import Array
 
@@ -24,7 +25,7 @@ _WALKS: Final[tuple[dict[str, Any], ...]] = (
 def samples() -> Iterator[Array]:
     """The episodes of a second's walks, each with another low level."""
     for keys in _WALKS:
-        episode = collect_episode(load(None, _WALK | keys), 0, _SECONDS)
+        episode = collect_episode(load(None, _WALK | keys), PlannedEpisode(0, _SECONDS))
         yield np.array(episode is not None)
         if episode is not None:
             yield from (getattr(episode, name) for name in SIGNALS)

@@ -25,13 +25,21 @@ class IdentificationConfig:
         low=0.0,
         high=3600.0,
     )
+    disturbed: float = key(
+        0.25,
+        "1",
+        "share of this time that is collected in addition without force noise, on boxes and under "
+        "pushes",
+        low=0.0,
+        high=10.0,
+    )
     held_out: float = key(8.0, "s", "world time held out of the fit", low=2.0, high=600.0)
     episode: float = key(10.5, "s", "length of one episode", low=3.0, high=600.0)
     noise: tuple[float, ...] = key(
-        (15.0, 15.0, 35.0), "N", "force noise (std) fx, fy, fz of each foot for itself", low=0.0
+        (3.0, 3.0, 5.0), "N", "force noise (std) fx, fy, fz of each foot for itself", low=0.0
     )
     wrench_noise: tuple[float, ...] = key(
-        (0.0, 0.0, 0.0, 0.0, 0.0),
+        (16.0, 16.0, 8.0, 14.0, 8.0),
         "N",
         "force noise of a robot's feet together, of either sign, at each stance foot: along x, y, "
         "z, vertical couple, horizontal couple",
@@ -44,7 +52,7 @@ class IdentificationConfig:
     hold: float = key(1.5, "s", "how long a random speed is held", low=0.1, high=60.0)
     seed: int = key(1000, "-", "seed of the collection", low=0, high=2**31)
     predictor: str = key(
-        "ridge",
+        "periodic",
         "-",
         "the fit of G; pinv: the paper's; ridge: regularised, block-weighted; gamma: LQ "
         "factorisation; causal: no force acts on outputs before it; arx: one-step model rolled "
@@ -79,7 +87,7 @@ class IdentificationConfig:
         high=100,
     )
     max_radius: float = key(
-        0.5, "1", "gate: spectral radius of the best-response map", low=0.01, high=10.0
+        1.0, "1", "gate: spectral radius of the best-response map", low=0.01, high=10.0
     )
     max_peers_harm: float = key(
         0.02,

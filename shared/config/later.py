@@ -20,6 +20,7 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "planner.tracked": "speeds",
         "identification.preset": "usual",
         "identification.wrench_noise": (0.0, 0.0, 0.0, 0.0, 0.0),
+        "identification.disturbed": 0.0,
         "identification.max_peers_harm": 1000.0,
         "world.stairs_rise": 0.06,
         "world.stairs_run": 0.3,

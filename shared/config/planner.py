@@ -42,7 +42,7 @@ class PlannerConfig:
         choices=("own", "team"),
     )
     compensation: bool = key(
-        False, "-", "distributed: bring peers' windows and plans forward by their age"
+        True, "-", "distributed: bring peers' windows and plans forward by their age"
     )
     damping: float = key(
         0.0,

@@ -30,30 +30,34 @@ _SOFT: Final = MappingProxyType(
 )  # fmt: skip
 
 # Replans every 10 ms, and weighs more what feed-forward can still correct on a stiff low level.
-# Peers' plans are held, and what was learned is kept, as long as with the usual rate.
+# Peers' plans are held, and what was learned is kept, as long as with the usual rate. With these
+# weights best responses of three robots would not converge without damping.
 _FAST: Final = MappingProxyType(
     {
         "applied": 1, "latency_ms": 1, "Q": (1.2e7, 1e5, 6e5, 2.4e6, 2e6, 3e3),
-        "max_peer_age": 12, "hold_steps": 20, "forgetting": 0.99875,
+        "max_peer_age": 12, "hold_steps": 20, "forgetting": 0.99875, "damping": 0.2,
     }
 )  # fmt: skip
 
-# The planner as the paper writes it: its Q and R, forces and all planned outputs handed on to the
-# whole-body QP, plans in effect at once; no bound on forces but the friction cone, no fading. The
-# bound and the range stand for none: no plan reaches them.
+# The planner as the paper writes it: its Q and R, peers' plans not brought forward, forces and all
+# planned outputs handed on to the whole-body QP, plans in effect at once; no bound on forces but
+# the friction cone, no fading. The bound and the range stand for none: no plan reaches them.
 _PAPER_PLANNER: Final = MappingProxyType(
     {
-        "interface": "force", "tracked": "outputs", "latency_ms": 0,
+        "interface": "force", "tracked": "outputs", "latency_ms": 0, "compensation": False,
         "Q": (1e6, 1e5, 1e5, 2e5, 1e5, 1e4), "R": (0.05, 0.05, 0.5),
         "deviation_max": (1e4, 1e4, 1e4), "fade": (1e6, 1e6, 1e6, 1e6),
     }
 )  # fmt: skip
 
-# The pseudo-inverse, and no gate on its best responses nor on its effects of peers: the paper has
-# none.
+# The pseudo-inverse of few data, all with noise on each foot's force for itself, and no gate on its
+# best responses nor on its effects of peers: the paper has none.
 _PAPER_FIT: Final = MappingProxyType(
-    {"predictor": "pinv", "max_radius": 10.0, "max_peers_harm": 1000.0}
-)
+    {
+        "predictor": "pinv", "noise": (15.0, 15.0, 35.0), "wrench_noise": (0.0,) * 5,
+        "disturbed": 0.0, "max_radius": 10.0, "max_peers_harm": 1000.0,
+    }
+)  # fmt: skip
 
 # What a motor would do without friction, inertia, delay or heat.
 _IDEAL_MOTORS: Final = MappingProxyType(

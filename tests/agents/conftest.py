@@ -21,11 +21,12 @@ from quadriga.shared.robot.conventions import Array
 from tests.a1 import TOTAL_MASS, nominal_forces
 
 FEET = np.array([[0.18, 0.13], [0.18, -0.13], [-0.18, 0.13], [-0.18, -0.13]])
+# Peers' windows and plans are those of the step before, as eq. 11 has them.
 SMALL = Config()
 SMALL = replace(
     SMALL,
     team=replace(SMALL.team, robots=2),
-    planner=replace(SMALL.planner, N=8, T_ini=4, applied=4),
+    planner=replace(SMALL.planner, N=8, T_ini=4, applied=4, compensation=False),
 )
 
 

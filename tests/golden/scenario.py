@@ -40,7 +40,10 @@ KEYS: Final = {
     "team.robots": 2, "world.seed": 5, "world.seconds": 0.6, "world.push": "r2:150:90:0.3:0.1",
     "gait.stand_ms": 100, "reference.vx": 0.4, "reference.wz": 0.3, "reference.ramp": 0.2,
     "planner.N": 8, "planner.T_ini": 4, "identification.block_weight": 20.0,
-    "identification.max_peers_harm": 1000.0,
+    "identification.max_peers_harm": 1000.0, "identification.predictor": "ridge",
+    "planner.compensation": False, "identification.disturbed": 0.0,
+    "identification.noise": (15.0, 15.0, 35.0),
+    "identification.wrench_noise": (0.0, 0.0, 0.0, 0.0, 0.0),
 }  # fmt: skip
 # What the predictor is fitted for; a standing time of its own would ask for walks of its own.
 FITTED_FOR: Final = {

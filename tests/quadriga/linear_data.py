@@ -16,6 +16,7 @@ from tests.agents.conftest import LinearTeam
 # Short horizons, so that fits are cheap; the linear team's low level has no height integrator.
 OPTIONS: dict[str, Any] = {
     "team.robots": 2, "planner.N": 8, "planner.T_ini": 4, "controller.ki_z": 0.0,
+    "identification.predictor": "ridge",
     "identification.order_per_robot": 9, "identification.max_radius": 10.0,
     "identification.max_peers_harm": 1000.0, "identification.gain_range": [0.1, 3.0],
     "identification.ridge": 1e-6, "identification.phases": 2, "reference.ramp": 0.0,

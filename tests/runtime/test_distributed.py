@@ -21,6 +21,7 @@ from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Plan
 from tests.a1 import nominal_forces
+from tests.runtime.conftest import DATA
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
@@ -31,7 +32,7 @@ STEP_MS = 40
 @pytest.fixture(scope="module")
 def walks(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Run folders of one scenario walked twice, as a user would."""
-    config = load(None, {"team.robots": ROBOTS})
+    config = load(None, {"team.robots": ROBOTS, **DATA})
     ensure_predictor(config, Console(stderr=True))
     folders = [tmp_path_factory.mktemp("walk") / "run" for _ in range(2)]
     for folder in folders:
@@ -47,6 +48,7 @@ def walks(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
             "--seed",
             "3",
             "--no-render",
+            *(f"--set={key}={value}" for key, value in DATA.items()),
             "--out",
             str(folder),
         ]
@@ -108,7 +110,7 @@ def test_every_plan_used_its_peer_s_plan_of_the_step_before(walks: list[Path]) -
 
 
 def test_every_plan_is_within_the_friction_cone(walks: list[Path]) -> None:
-    config: Config = load(None, {"team.robots": ROBOTS})
+    config: Config = load(None, {"team.robots": ROBOTS, **DATA})
     cone = config.planner.mu / np.sqrt(2.0)
     for index, of_robot in enumerate(plans(walks[0]).values()):
         assert {plan.status for plan in of_robot} == {"solved"}

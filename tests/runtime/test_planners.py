@@ -25,6 +25,7 @@ from quadriga.shared.wire.messages import Command, Measurement, Plan
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.team.operator import reference_at
+from tests.runtime.conftest import DATA
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
@@ -44,6 +45,7 @@ def config_of(kind: str) -> Config:
         "world.seconds": SECONDS,
         "world.seed": 4,
         "bus.endpoint": free_endpoint(),
+        **DATA,
         **KINDS[kind],
     }
     return load(None, given)

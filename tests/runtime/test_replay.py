@@ -40,7 +40,7 @@ from quadriga.shared.wire.messages import (
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
-from tests.runtime.conftest import WAIT
+from tests.runtime.conftest import DATA, WAIT
 from tests.runtime.frozen import PATIENCE, await_event, await_tick, freeze
 
 pytestmark = pytest.mark.usefixtures("_compiled")
@@ -51,7 +51,7 @@ SWING = 300  # the tick at which the first feet leave the ground
 
 def walked(folder: Path, disturb: Disturb | None = None, **keys: Any) -> Path:
     """The recording of a walk of two robots with all processes."""
-    given = {"team.robots": 2, "bus.endpoint": free_endpoint(), "world.seed": 5}
+    given = {**DATA, "team.robots": 2, "bus.endpoint": free_endpoint(), "world.seed": 5}
     given |= {name.replace("__", "."): value for name, value in keys.items()}
     config = load(None, given)
     predictor = ensure_predictor(config, Console(stderr=True))

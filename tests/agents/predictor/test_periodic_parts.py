@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -98,6 +100,11 @@ def test_how_long_forces_are_held_is_found_in_the_data(hold: int, begin: int) ->
     assert found == hold
     assert walk.starts[0] == begin % hold
     assert (np.diff(walk.starts) == hold).all()
+    quiet = replace(episode, u=episode.u_nominal)
+    (walk, other), found = scale_episodes([episode, quiet], META)
+    assert found == hold
+    assert len(walk.starts) > 0
+    assert len(other.starts) == 0, "no force, no draw of it"
 
 
 @settings(max_examples=10, deadline=None)

@@ -7,15 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.hankel import required_samples
 from quadriga.identification import collect as module
-from quadriga.identification.collect import (
-    build_dataset,
-    collect,
-    collect_episode,
+from quadriga.identification.collect import build_dataset, collect, collect_episode
+from quadriga.identification.collection_plan import (
+    PlannedEpisode,
     collection_config,
+    collection_seconds,
+    plan_episodes,
+    spread,
     training_seconds,
 )
 from quadriga.identification.rollout import Rollout, Tick
@@ -39,7 +43,7 @@ def config_of(robots: int = 1, **keys: Any) -> Config:
 @pytest.fixture(scope="module")
 def episode() -> Episode:
     """One and a half seconds of two robots."""
-    found = collect_episode(config_of(2), 0, 1.5)
+    found = collect_episode(config_of(2), PlannedEpisode(0, 1.5))
     assert found is not None
     return found
 
@@ -78,7 +82,7 @@ def test_a_robots_feet_push_together() -> None:
     """Draws of net forces and couples alone: each is of the size asked for, of either sign."""
     keys: dict[str, Any] = {"noise": (0.0, 0.0, 0.0), "wrench_noise": TOGETHER}
     config = config_of(2, **{f"identification__{name}": value for name, value in keys.items()})
-    episode = collect_episode(config, 0, 1.0)
+    episode = collect_episode(config, PlannedEpisode(0, 1.0))
     assert episode is not None
     stance = episode.u_nominal[:, :, 2::3] > 0.0
     noise = episode.deviations()[0].reshape(100, 2, 4, 3)
@@ -122,7 +126,7 @@ def test_outputs_are_counted_from_what_was_asked(episode: Episode) -> None:
 
 
 def test_with_the_interface_force_outputs_are_counted_from_standing_still() -> None:
-    found = collect_episode(config_of(planner__interface="force"), 3, 1.0)
+    found = collect_episode(config_of(planner__interface="force"), PlannedEpisode(3, 1.0))
     assert found is not None
     expected = np.broadcast_to([0.26, 0.0, 0.0, 0.0, 0.0, 0.0], (100, 1, 6))
     np.testing.assert_array_equal(found.y_base, expected)
@@ -130,7 +134,9 @@ def test_with_the_interface_force_outputs_are_counted_from_standing_still() -> N
 
 def test_an_episode_is_repeated_by_its_number_and_by_no_other() -> None:
     config = config_of()
-    first, again, other = (collect_episode(config, number, 0.5) for number in (1, 1, 2))
+    first, again, other = (
+        collect_episode(config, PlannedEpisode(number, 0.5)) for number in (1, 1, 2)
+    )
     assert first is not None
     assert again is not None
     assert other is not None
@@ -138,7 +144,7 @@ def test_an_episode_is_repeated_by_its_number_and_by_no_other() -> None:
     assert first.y.tobytes() == again.y.tobytes()
     assert not np.allclose(first.u, other.u)
     shifted = replace(config, identification=replace(config.identification, seed=1001))
-    same = collect_episode(shifted, 0, 0.5)
+    same = collect_episode(shifted, PlannedEpisode(0, 0.5))
     assert same is not None
     assert same.y.tobytes() == first.y.tobytes()
 
@@ -151,8 +157,8 @@ def test_data_are_collected_on_flat_and_empty_ground_without_a_planner() -> None
         world__mode="realtime",
         world__friction=0.7,
     )
-    found = collection_config(config, 17)
-    assert found.world == WorldConfig(seed=17)
+    found = collection_config(config, PlannedEpisode(7, 1.0))
+    assert found.world == WorldConfig(seed=1007)
     assert (found.world.terrain, found.world.payload, found.world.push) == ("flat", 0.0, "")
     assert (found.world.mode, found.planner.kind) == ("lockstep", "none")
     assert found.controller == config.controller
@@ -173,7 +179,7 @@ class Tripped(Rollout):
 def test_an_episode_that_ends_in_a_fall_is_cut_before_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "Rollout", Tripped)
     monkeypatch.setattr(Tripped, "at", 300 + 3600)
-    found = collect_episode(config_of(), 0, 4.5)
+    found = collect_episode(config_of(), PlannedEpisode(0, 4.5))
     assert found is not None
     assert 300 <= found.samples <= 400
     y = found.y[:, 0]
@@ -186,20 +192,48 @@ def test_an_episode_that_ends_in_an_early_fall_is_of_no_use(
 ) -> None:
     monkeypatch.setattr(module, "Rollout", Tripped)
     monkeypatch.setattr(Tripped, "at", 500)
-    assert collect_episode(config_of(), 0, 4.0) is None
+    assert collect_episode(config_of(), PlannedEpisode(0, 4.0)) is None
 
 
 def test_the_seeds_are_those_of_the_episodes_that_were_kept(episode: Episode) -> None:
     """Walk 1 of three was lost, walk 3 is held out."""
     config = config_of(2, identification__seed=1000)
-    found = build_dataset(config, {0: episode, 1: None, 2: episode, 3: episode}, 4.5)
+    short = replace(config.identification, seconds=4.5, episode=1.5)
+    config = replace(config, identification=short)
+    found = build_dataset(config, {0: episode, 1: None, 2: episode, 3: episode})
     assert found.seeds == (1000, 1002)
     assert found.training == (episode, episode)
     assert found.held_out == (episode,)
     with pytest.raises(PredictorError, match="150 samples, held-out episode kept"):
-        build_dataset(config, {0: None, 1: None, 2: episode, 3: episode}, 4.5)
+        build_dataset(config, {0: None, 1: None, 2: episode, 3: episode})
     with pytest.raises(PredictorError, match="300 samples, held-out episode lost"):
-        build_dataset(config, {0: episode, 1: None, 2: episode, 3: None}, 4.5)
+        build_dataset(config, {0: episode, 1: None, 2: episode, 3: None})
+
+
+def test_a_share_of_the_walks_is_disturbed_instead_of_excited() -> None:
+    config = config_of(1, identification__seconds=42.0, identification__disturbed=0.75)
+    noisy, last, disturbed = (plan := plan_episodes(config))[:4], plan[4], plan[5:]
+    assert [episode.number for episode in plan] == list(range(8))
+    assert all(episode.disturbance is None for episode in (*noisy, last))
+    assert {episode.seconds for episode in (*noisy, *disturbed)} == {10.5}
+    assert collection_seconds(config) == 42.0 + 8.0 + 31.5
+    worlds = [collection_config(config, episode).world for episode in disturbed]
+    assert [(w.terrain, w.push_force > 0.0) for w in worlds] == [
+        ("boxes", False), ("flat", True), ("boxes", True)
+    ]  # fmt: skip
+    found = collect_episode(config, replace(disturbed[0], seconds=0.5))
+    assert found is not None
+    np.testing.assert_allclose(found.u, found.u_nominal, atol=1e-9)
+
+
+@given(noisy=st.integers(1, 60), disturbed=st.integers(0, 60))
+def test_disturbed_walks_lie_evenly_between_the_others(noisy: int, disturbed: int) -> None:
+    """Of the first m walks the share that is disturbed is the same as of all, but for one walk."""
+    order = spread([*range(noisy), *range(noisy + 1, noisy + 1 + disturbed)], noisy)
+    assert sorted(order) == [k for k in range(noisy + 1 + disturbed) if k != noisy]
+    for m in range(len(order) + 1):
+        so_far = sum(number > noisy for number in order[:m])
+        assert abs(so_far - m * disturbed / (noisy + disturbed)) <= 1.0
 
 
 def test_what_is_collected_follows_from_the_rule_unless_it_is_given() -> None:

@@ -25,10 +25,11 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from tests.agents.conftest import SMALL, LinearTeam
 
-# One robot with a short horizon: 13 · (10 + 4 + 12) − 1 = 337 samples are enough.
+# One robot with a short horizon: 13 · (10 + 4 + 12) − 1 = 337 samples are enough for a ridge fit.
 TINY = load(
     None,
     {
+        "identification.predictor": "ridge",
         "team.robots": 1,
         "planner.N": 10,
         "planner.T_ini": 4,
@@ -169,6 +170,7 @@ def team() -> Dataset:
 def permissive(**changes: Any) -> Config:
     """The linear team's low level has no height integrator; its order is 9 per robot."""
     wide: dict[str, Any] = {
+        "predictor": "ridge",
         "gain_range": (0.1, 3.0),
         "ridge": 1e-8,
         "block_weight": 1.0,

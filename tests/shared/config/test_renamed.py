@@ -37,6 +37,15 @@ PLAIN_SHA256 = "584344a32dda3626a6d289e099c7c8324647bcaeb6e9b47d533ac656565439a5
 # The hash of all defaults under the names and with the values that keys had before any was renamed.
 FIRST_NAMES_SHA256 = "1ef0cbe238d0ab9e18d4bba4d9a55d45aabc813083288aed69ec7899b1eb43d7"
 
+# The values that all keys had then which have others today.
+FIRST_VALUES = {
+    **LATER_KEYS,
+    "identification.predictor": "ridge",
+    "identification.noise": (15.0, 15.0, 35.0),
+    "identification.max_radius": 0.5,
+    "planner.compensation": False,
+}
+
 
 @PAIRS
 def test_a_new_name_is_a_key_and_an_old_one_is_none(old: str, new: str) -> None:
@@ -107,7 +116,7 @@ def test_a_value_of_an_earlier_version_is_read_wherever_it_stands(tmp_path: Path
     first = with_first_names(asdict(plain))
     assert first["controller"]["preset"] == "paper"
     assert recorded_config(cast(Recording, Metadata(first))) == plain
-    as_first = load(None, {**LATER_KEYS, "controller.preset": "plain"})
+    as_first = load(None, {**FIRST_VALUES, "controller.preset": "plain"})
     assert config_sha256(as_first) == PLAIN_SHA256
     planner = load(None, {"planner.preset": "paper"}).planner
     assert planner.preset == "paper", "another key's value of the same name"
@@ -127,7 +136,7 @@ def test_a_recorded_key_that_no_version_had_is_refused() -> None:
 
 def test_a_new_name_changes_no_hash() -> None:
     """Of the configuration that does what the first one did, whatever is the default today."""
-    config = load(None, LATER_KEYS)
+    config = load(None, FIRST_VALUES)
     body = {name: keys for name, keys in hashed_sections(asdict(config)).items() if name != "bus"}
     text = json.dumps(body, sort_keys=True, separators=(",", ":"))
     assert config_sha256(config) == hashlib.sha256(text.encode()).hexdigest() == FIRST_NAMES_SHA256

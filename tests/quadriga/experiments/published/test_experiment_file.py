@@ -171,7 +171,7 @@ def test_what_is_promised_can_be_walked_and_is_not_published() -> None:
 
 
 def test_from_the_paper_to_the_default_one_thing_changes_at_a_time() -> None:
-    """A key, or a preset with what it sets; the default is among the steps, but for the fit."""
+    """A key, or a preset with what it sets; the default is among the steps, but for the gate."""
     experiment = read_experiment(FOLDER / "as-written.toml")
     configs = {v.name: build(layers(None, dict(v.keys))) for v in experiment.variants}
     assert next(iter(configs)) == experiment.baseline == "as-written"
@@ -179,11 +179,13 @@ def test_from_the_paper_to_the_default_one_thing_changes_at_a_time() -> None:
         changed = {key for key, *_ in departures(after, before)}
         sections = {key.partition(".")[0] for key in changed}
         if len(changed - {"planner.preset"}) > 1:
+            weights = {"planner.Q", "planner.R"}
             cooperative = {"planner.cost", "planner.exchanges"}
-            assert changed in ({"planner.Q", "planner.R"}, cooperative) or sections == {
-                "controller"
-            }
-    left = {key for key, *_ in departures(configs["robust"], build({}))}
+            of_the_data = ("predictor", "noise", "wrench_noise", "disturbed")
+            with_its_data = {f"identification.{key}" for key in of_the_data}
+            together = changed in (weights, cooperative, with_its_data)
+            assert together or sections == {"controller"}
+    left = {key for key, *_ in departures(configs["compensated"], build({}))}
     assert {key.partition(".")[0] for key in left} <= {"identification", "world"}
 
 
