@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from quadriga.agents.predictor.episode import Y_SCALE, Episode
+from quadriga.agents.predictor.measured_response import fit_measured_response, read_pulse_responses
 from quadriga.agents.predictor.periodic_basis import N_WRENCH, phase_angles, wrench_map
 from quadriga.agents.predictor.periodic_data import Walked, scale_episodes
 from quadriga.agents.predictor.periodic_free import fit_free
@@ -27,14 +29,19 @@ _LEAST_FOLDS = 3
 def fit_periodic(episodes: Sequence[Episode], meta: PredictorMeta) -> PeriodicPredictor:
     """Responses to wrenches by local projections, shrunk, then what follows from the past.
 
-    See `periodic_response`, `periodic_shrinkage` and `periodic_free`.
+    See `periodic_response`, `periodic_shrinkage` and `periodic_free`. If there is a file of
+    measured responses, these stand for the projections.
 
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
+        PredictorFileError: the file of measured responses cannot be read, or is another team's.
     """
     check_episodes(episodes, meta)
     walks, hold = scale_episodes(episodes, meta)
-    h = estimate_response(walks, hold, meta)
+    if meta.response:
+        h = fit_measured_response(read_pulse_responses(Path(meta.response)), meta)
+    else:
+        h = estimate_response(walks, hold, meta)
     n = meta.robots
     peers = np.array([[j in members_of(meta, i) for j in range(n)] for i in range(n)])
     free = fit_free(walks, h, meta.T_ini, peers)

@@ -47,6 +47,7 @@ class PredictorMeta:
     neighbours: str
     stand_ms: int  # where the gait's period, and with it phase 0, begins
     robot: str = _FIRST_ROBOT
+    response: str = ""  # of 'periodic': the file of measured responses that stands for fitted ones
 
     @classmethod
     def of(cls, config: Config) -> PredictorMeta:
@@ -70,16 +71,19 @@ class PredictorMeta:
             neighbours=ident.neighbours,
             stand_ms=config.gait.stand_ms,
             robot=config.team.robot,
+            response=config.response_file,
         )
 
     def to_dict(self) -> dict[str, Any]:
         """A dictionary that can be written as JSON, with the controller's keys as first named.
 
-        The robot is left out if it is the one that all predictors were of once. So neither a new
-        name nor that key changes a predictor's file or its digest.
+        The robot is left out if it is the one that all predictors were of once, the file of
+        responses if there is none. So neither a new name nor these keys change the file or the
+        digest of a predictor without them.
         """
         body = asdict(self) | with_first_names({"controller": dict(self.controller)})
-        return {k: v for k, v in body.items() if (k, v) != ("robot", _FIRST_ROBOT)}
+        usual = (("robot", _FIRST_ROBOT), ("response", ""))
+        return {k: v for k, v in body.items() if (k, v) not in usual}
 
     @classmethod
     def from_dict(cls, body: dict[str, Any]) -> PredictorMeta:

@@ -22,7 +22,7 @@ _LIBRARIES: Final = ("mujoco", "pin", "numpy", "numba", "daqp", "example-robot-d
 # Keys of the identification that the walks do not depend on, only what is made of them.
 _FITTED: Final = (
     "preset", "predictor", "neighbours", "phases", "phase_ridge", "ridge", "block_weight",
-    "max_radius", "max_peers_harm", "gain_range",
+    "max_radius", "max_peers_harm", "gain_range", "response",
 )  # fmt: skip
 
 
@@ -49,9 +49,11 @@ def data_key(config: Config) -> str:
 
 def predictor_key(config: Config) -> str:
     """Key of the fitted predictor: its data, the fit's settings and the fit's code."""
-    planner = asdict(config.planner)
+    planner, ident = asdict(config.planner), asdict(config.identification)
+    if config.response_file:
+        ident["response"] = _file_digest(Path(config.response_file))
     sections: dict[str, Any] = {
-        "identification": asdict(config.identification),
+        "identification": ident,
         "planner": {k: planner[k] for k in ("N", "T_ini", "applied", "Q", "R", "interface")},
     }
     code = behaviour("quadriga.identification.sample_fits")
@@ -85,6 +87,12 @@ def await_predictor(path: Path, timeout: float) -> None:
                 "or kind of machine it has another name",
             )
         sleep(_LOOK)
+
+
+def _file_digest(path: Path) -> str:
+    """Digest of what is in a file of responses; of nothing if it is not there yet."""
+    content = path.read_bytes() if path.is_file() else b""  # whoever fits complains
+    return hashlib.sha256(content).hexdigest()
 
 
 def _digest(parts: list[Any]) -> str:

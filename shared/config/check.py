@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
+from quadriga.shared.config.friction import friction_of_robots
 from quadriga.shared.config.payload import carriers
 from quadriga.shared.config.sections import (
     SIMULATED,
@@ -41,6 +42,7 @@ def check(config: Config) -> None:
     _check_planner(config.planner, config.world)
     _check_plants(config)
     _check_pairs(config)
+    _check_response(config)
 
 
 def _check_team_name(name: str) -> None:
@@ -63,6 +65,7 @@ def _check_gait(gait: GaitConfig) -> None:
 
 def _check_world(world: WorldConfig, names: tuple[str, ...]) -> None:
     carriers(world.payload_on, names)
+    friction_of_robots(world.friction_of, world.friction, names)
     for push in filter(None, world.push.split(",")):
         robot = push.partition(":")[0].strip()
         if robot not in ("all", *names):
@@ -160,3 +163,14 @@ def _check_pairs(config: Config) -> None:
         first, last = getattr(getattr(config, section), key)
         if first > last:
             raise ConfigError(pair, f"[{first}, {last}]", "[least, greatest]")
+
+
+def _check_response(config: Config) -> None:
+    ident = config.identification
+    if ident.response and ident.predictor != "periodic":
+        raise ConfigError(
+            "identification.response",
+            f"{ident.response!r} with the predictor {ident.predictor!r}",
+            "identification.predictor = 'periodic'",
+            "no other is made of responses to single forces",
+        )

@@ -60,6 +60,13 @@ class IdentificationConfig:
         "phase, causal, with peers' forces by their net wrench",
         choices=("ridge", "pinv", "gamma", "causal", "arx", "phase", "periodic"),
     )
+    response: str = key(
+        "",
+        "-",
+        "predictor 'periodic': the file responses.npz of a probe, whose measured responses stand "
+        "for those fitted to data: only in simulation, for comparison; {robots} in it is how many "
+        "there are",
+    )
     neighbours: str = key(
         "all",
         "-",

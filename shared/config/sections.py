@@ -62,3 +62,8 @@ class Config:
     def robot(self) -> RobotSpec:
         """The kind of robot that the team is made of."""
         return ROBOTS[self.team.robot]
+
+    @property
+    def response_file(self) -> str:
+        """The file of measured responses for a team of this size; empty if none is configured."""
+        return self.identification.response.replace("{robots}", str(self.team.robots))

@@ -43,6 +43,12 @@ class WorldConfig:
     stairs_run: float = key(0.3, "m", "terrain stairs: depth of a tread", low=0.1, high=2.0)
     stairs_count: int = key(8, "1", "terrain stairs: steps up, and down again", low=1, high=50)
     friction: float = key(0.8, "1", "friction coefficient of feet on ground", low=0.05, high=2.0)
+    friction_of: str = key(
+        "",
+        "-",
+        "robots whose feet find another friction, as on a slippery strip: 'r2:0.3', or several "
+        "separated by commas",
+    )
     leg_collisions: bool = key(
         True,
         "-",

@@ -9,6 +9,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
+from quadriga.shared.config.friction import friction_of_robots
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robot.conventions import FOOT_FRAMES, GRAVITY, Array, robot_names
@@ -108,12 +109,13 @@ def build_team_model(
     _set_physics(spec)
     _set_visuals(spec)
     terrain.add_to(spec)
+    friction = friction_of_robots(config.world.friction_of, config.world.friction, team)
     robot = config.robot
     body = RobotBody(robot, config.motors, leg_collisions=config.world.leg_collisions)
     for name, i in robots.items():
         colour = _TRUNK_RGBA[i % len(_TRUNK_RGBA)]
         place = (*places[i], robot.stand_height)
-        trunk = body.add_to(spec, f"{name}/", place, config.world.friction, colour)
+        trunk = body.add_to(spec, f"{name}/", place, friction[i], colour)
         if name == next(iter(robots)):
             _add_sun(trunk)
         trunk.add_site(name=f"{name}/yoke", pos=robot.yoke, group=4)

@@ -9,6 +9,7 @@ from typing import Final
 
 from rich.console import Console
 
+from quadriga.agents.predictor.measured_response import PulseResponses, write_pulse_responses
 from quadriga.experiments.probe.cache import ensure_responses
 from quadriga.experiments.probe.outcome import ProbeOutcome, build_outcome
 from quadriga.experiments.probe.probe_figure import draw_probe
@@ -20,6 +21,7 @@ from quadriga.shared.runtime.atomic import write_text
 
 FIGURES: Final = "probe.json"
 PAGE: Final = "probe.md"
+RESPONSES: Final = "responses.npz"  # what `identification.response` names
 _PICTURE: Final = "probe.png"
 
 
@@ -45,8 +47,11 @@ def probe(
 
 
 def write_outcome(outcome: ProbeOutcome, folder: Path) -> None:
-    """Write a probe's figures as JSON, its tables as Markdown and its picture."""
+    """Write a probe's figures as JSON, its tables as Markdown, its picture and the responses."""
     write_json(folder / FIGURES, outcome.to_dict())
+    measured = outcome.responses
+    truth = PulseResponses(measured.ticks, measured.u, measured.y)
+    write_pulse_responses(folder / RESPONSES, truth)
     draw_probe(outcome, folder / _PICTURE)
     sheets = [build_overall(outcome), *build_details(outcome)]
     parts = ["# Probe\n", *(sheet.to_markdown() for sheet in sheets)]

@@ -273,6 +273,16 @@ def test_feet_have_the_configured_friction_on_every_terrain(terrain: str) -> Non
     np.testing.assert_allclose(world.physics.contact.solref, [[0.01, 1.0]] * world.physics.ncon)
 
 
+def test_one_robot_alone_may_stand_on_slippery_ground() -> None:
+    world = World(configured(3, friction_of="r2:0.3"))
+    stand(world, 100)
+    model, contact = world.team.model, world.physics.contact
+    roots = model.body_rootid[model.geom_bodyid[contact.geom]].max(axis=1)
+    slippery = roots == world.team.trunks[1]
+    assert 0 < slippery.sum() < len(slippery)
+    np.testing.assert_allclose(contact.friction[:, 0], np.where(slippery, 0.3, 0.8))
+
+
 def test_a_series_of_pushes_moves_who_it_is_said_to_push() -> None:
     config = configured(
         3, yokes="chain", push_force=60.0, push_every=0.1, push_duration=0.02, seconds=0.2

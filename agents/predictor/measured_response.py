@@ -1,0 +1,109 @@
+"""The team's true response to wrenches, as a probe has measured it, in the terms of a periodic G.
+
+With it a planner knows the coupling as well as anybody can: what a simulator alone can give.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadriga.agents.predictor.episode import Y_SCALE
+from quadriga.agents.predictor.periodic_basis import N_WRENCH, polynomials, wrench_map
+from quadriga.agents.predictor.periodic_response import DEGREE, spread_over_samples
+from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.shared.errors import PredictorFileError
+from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.runtime.atomic import atomic_write
+from quadriga.shared.wire.topics import SAMPLE_MS
+
+_RANK: Final = 1e-6  # two stance feet have no moment about their own line: no response to that
+
+
+@dataclass(frozen=True, slots=True)
+class PulseResponses:
+    """Responses to pulses, means over worlds.
+
+    Attributes:
+        ticks: at which the pulses begin, one for each of P phases of the gait, shape (P,), ms.
+        u: force deviation that the pulse is, by phase, pulsed robot, direction and sample of the
+            horizon, shape (P, n, D, N, 12), N, yaw frame.
+        y: what the pulse changes, by phase, pulsed robot, direction, sample and responding robot,
+            shape (P, n, D, N, n, 6), m, m/s, m/s, rad, rad, rad/s.
+    """
+
+    ticks: NDArray[np.int64]
+    u: Array
+    y: Array
+
+
+def write_pulse_responses(path: Path, responses: PulseResponses) -> None:
+    """Keep responses; a file half written never has the name `path`."""
+    with atomic_write(path) as partial, partial.open("wb") as file:
+        np.savez_compressed(file, ticks=responses.ticks, u=responses.u, y=responses.y)
+
+
+def read_pulse_responses(path: Path) -> PulseResponses:
+    """Responses from a file.
+
+    Raises:
+        PredictorFileError: no such file, or not one of responses.
+    """
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            return PulseResponses(archive["ticks"], archive["u"], archive["y"])
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise PredictorFileError(
+            f"identification.response {path}",
+            "no such file" if isinstance(error, FileNotFoundError) else type(error).__name__,
+            "responses that `quadriga probe --out DIR` wrote",
+            "measure them with the same team",
+        ) from None
+
+
+def fit_measured_response(responses: PulseResponses, meta: PredictorMeta) -> Array:
+    """Coefficients of the response to a sample's wrench, scaled; see `PeriodicFactors.response`.
+
+    The response to a pulse of S samples is a polynomial of the phase in each half of the gait's
+    period, by least squares over phases and directions; then that to a single sample follows, see
+    `spread_over_samples`.
+
+    Args:
+        responses: of the team.
+        meta: of the predictor.
+
+    Returns:
+        Shape (2 DEGREE + 2, N, n pushing, 6, n responding, 6).
+
+    Raises:
+        PredictorFileError: the responses are those of another team or horizon.
+    """
+    n, N, phases = meta.robots, meta.N, len(responses.ticks)
+    expected = (phases, n, responses.y.shape[2], N, n, N_OUTPUTS)
+    if responses.y.shape != expected or responses.u.shape != (*expected[:4], N_FORCES):
+        raise PredictorFileError(
+            "identification.response",
+            f"responses of shape {responses.y.shape}",
+            f"{expected}",
+            "measured with another team or horizon?",
+        )
+    period = 2 * meta.stance_ms
+    values = polynomials(
+        2.0 * np.pi * ((responses.ticks - meta.stand_ms) % period) / period, DEGREE
+    )
+    wrenches = responses.u @ wrench_map(meta.robot).T  # (P, n, D, N, 6)
+    hold = int(np.flatnonzero(np.abs(wrenches).max(axis=(0, 1, 2, 4)))[-1]) + 1
+    g = np.empty((values.shape[1], N, n, N_WRENCH, n, N_OUTPUTS))
+    for j in range(n):
+        rows = np.einsum("pk,pdw->pdkw", values, wrenches[:, j, :, 0])
+        answers = responses.y[:, j] / Y_SCALE  # (P, D, N, n, 6)
+        count = rows.shape[0] * rows.shape[1]
+        found = np.linalg.lstsq(rows.reshape(count, -1), answers.reshape(count, -1), rcond=_RANK)[0]
+        by_lag = found.reshape(values.shape[1], N_WRENCH, N, n, N_OUTPUTS)
+        g[:, :, j] = by_lag.swapaxes(1, 2)
+    return spread_over_samples(g, hold, 2.0 * np.pi * SAMPLE_MS / period)

@@ -1,0 +1,82 @@
+"""Measured responses as a predictor: of a team whose response at every phase is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quadriga.agents.predictor.measured_response import (
+    PulseResponses,
+    read_pulse_responses,
+    write_pulse_responses,
+)
+from quadriga.agents.predictor.periodic import fit_periodic
+from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.store import predictor_sha256
+from quadriga.experiments.probe.pulses import pulse_forces
+from quadriga.shared.errors import PredictorFileError
+from tests.agents.predictor.test_periodic import (
+    CONFIG,
+    N,
+    Trotters,
+    found_block,
+    meta_of,
+    true_block,
+)
+
+HOLD = 2  # samples that a pulse lasts
+
+
+def responses_of(team: Trotters, meta: PredictorMeta) -> PulseResponses:
+    """What a probe of the team measures: pulses at ten phases, in every direction."""
+    ticks = CONFIG.gait.stand_ms + 40 * np.arange(10)
+    us, ys = [], []
+    for tick in ticks.tolist():
+        for robot in range(team.robots):
+            for force in pulse_forces(CONFIG, robot, tick):
+                du = np.zeros((N, team.robots, 12))
+                du[:HOLD, robot] = force
+                us.append(du[:, robot])
+                ys.append(team.respond(meta, du, tick + 10))
+    shape = (len(ticks), team.robots, -1)
+    u, y = np.array(us), np.array(ys)
+    return PulseResponses(ticks, u.reshape(*shape, *u.shape[1:]), y.reshape(*shape, *y.shape[1:]))
+
+
+def test_measured_responses_are_the_true_ones(tmp_path: Path) -> None:
+    team, file = Trotters(2, ((0, 1), (1, 0))), tmp_path / "responses.npz"
+    write_pulse_responses(file, responses_of(team, meta_of(2)))
+    meta = meta_of(2, response=str(file))
+    predictor = fit_periodic([team.episode(1, 1000)], meta)
+    assert predictor.meta.response == str(file)
+    for i in range(2):
+        for j in range(2):
+            for phase in (0, 13, 20):
+                truth = true_block(team, meta, i, j, phase)
+                off = found_block(predictor, i, j, phase) - truth
+                assert np.linalg.norm(off) < 0.03 * np.linalg.norm(truth)
+    fitted = fit_periodic([team.episode(1, 1000)], meta_of(2))
+    assert predictor_sha256(fitted) != predictor_sha256(predictor)
+
+
+def test_responses_come_back_from_their_file(tmp_path: Path) -> None:
+    written = responses_of(Trotters(1, ()), meta_of(1))
+    write_pulse_responses(tmp_path / "responses.npz", written)
+    read = read_pulse_responses(tmp_path / "responses.npz")
+    for name in ("ticks", "u", "y"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(written, name))
+
+
+def test_a_wrong_file_is_one_clear_error(tmp_path: Path) -> None:
+    file, team = tmp_path / "responses.npz", Trotters(2, ((0, 1), (1, 0)))
+    episodes, meta = [team.episode(1, 1000)], meta_of(2, response=str(file))
+    with pytest.raises(PredictorFileError, match="no such file, expected responses that"):
+        fit_periodic(episodes, meta)
+    file.write_bytes(b"PK\x03\x04 cut off")
+    with pytest.raises(PredictorFileError, match=r"identification\.response .*responses\.npz"):
+        fit_periodic(episodes, meta)
+    write_pulse_responses(file, responses_of(Trotters(1, ()), meta_of(1)))
+    with pytest.raises(PredictorFileError, match="measured with another team or horizon"):
+        fit_periodic(episodes, meta)
