@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from quadriga.experiments.statistics import Pairs
@@ -117,6 +117,7 @@ class Results:
         lines: of every world and variant that has a trial, then of all worlds together.
         seeds: of the trials there are.
         versions: of code and libraries that they were walked with.
+        lines_against: the same lines beside another variant than the baseline, by its name.
     """
 
     baseline: str
@@ -126,6 +127,7 @@ class Results:
     lines: tuple[Line, ...] = ()
     seeds: tuple[int, ...] = ()
     versions: tuple[str, ...] = ()
+    lines_against: Mapping[str, tuple[Line, ...]] = field(default_factory=dict)
 
     @property
     def others(self) -> list[str]:
@@ -137,6 +139,7 @@ class Results:
         """What all trials took, s of one core."""
         return sum(line.wall_s for line in self.lines if line.world != POOLED)
 
-    def find(self, world: World, variant: str) -> Line | None:
-        """The line of a variant in a world."""
-        return next((ln for ln in self.lines if (ln.world, ln.variant) == (world, variant)), None)
+    def find(self, world: World, variant: str, against: str = "") -> Line | None:
+        """The line of a variant in a world, beside the baseline or another variant."""
+        lines = self.lines_against[against] if against else self.lines
+        return next((ln for ln in lines if (ln.world, ln.variant) == (world, variant)), None)

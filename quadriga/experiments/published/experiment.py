@@ -63,6 +63,8 @@ class Requirement:
         each: whether it is asked for in each world alone.
         pooled: whether it is asked for of all worlds together.
         moonshot: whether it is hoped for rather than required.
+        against: the variant that a paired measure compares with; empty for the baseline.
+        at_least: in how many worlds it must be met; 0 for all.
     """
 
     measure: str
@@ -74,6 +76,8 @@ class Requirement:
     each: bool = True
     pooled: bool = False
     moonshot: bool = False
+    against: str = ""
+    at_least: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,7 +47,9 @@ _KEYS: Final = (
     "requirements",
 )
 _TABLES: Final = ("outcome", "falls", "ratios", "figures")
-_ASKED: Final = ("measure", *SENSES, "bound", "variants", "scenarios", "over", "moonshot")
+_ASKED: Final = (
+    "measure", *SENSES, "bound", "variants", "scenarios", "over", "moonshot", "against", "at_least",
+)  # fmt: skip
 _OVER: Final = ("each", "all")
 _OUTCOME: Final = ("trials", "success", "falls", "transport", "cost", "p50", "p99")
 _RATIOS: Final = (COST, *ERRORS)
@@ -236,9 +238,11 @@ def _requirements(
     measures = table.texts("measure", (), MEASURES)
     if not measures or not over:
         raise ConfigError(f"{table.where}: measure and over", "nothing", "at least one of each")
+    against = table.text("against", baseline)
+    table.check_one("against", against, variants)
     others = tuple(variant for variant in variants if variant != baseline)
     chosen = table.texts("variants", (), variants) or others or (baseline,)
-    _check_measures(table, measures, bound, paired=baseline not in chosen)
+    _check_measures(table, measures, bound, paired=against not in chosen)
     if "all" in over and not poolable:
         raise ConfigError(
             f"{table.where}: over",
@@ -257,6 +261,8 @@ def _requirements(
             each="each" in over,
             pooled="all" in over,
             moonshot=table.yes("moonshot", False),
+            against="" if against == baseline else against,
+            at_least=int(table.number("at_least")) if table.has("at_least") else 0,
         )
         for measure in measures
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from quadriga.experiments.campaign.manifest import Manifest
 from quadriga.experiments.plan import Group
@@ -31,23 +32,26 @@ def summarise_experiment(experiment: Experiment, campaigns: Sequence[CampaignTri
         ]
     worlds = tuple(experiment.worlds())
     sweeps = any(part.sweep for part in experiment.parts)
+    build = partial(
+        build_lines,
+        rows,
+        dict.fromkeys(experiment.groups(), len(seeds)),
+        pooled=len(worlds) > 1 and not sweeps,
+        radii={
+            entry.group: entry.radius
+            for manifest, _ in campaigns
+            for entry in manifest.groups
+            if entry.radius is not None
+        },
+    )
+    others = {requirement.against for requirement in experiment.requirements} - {""}
     return Results(
         baseline=experiment.baseline,
         variants=tuple(keys),
         worlds=worlds,
         swept=("swept",) if sweeps else (),
-        lines=build_lines(
-            rows,
-            dict.fromkeys(experiment.groups(), len(seeds)),
-            experiment.baseline,
-            pooled=len(worlds) > 1 and not sweeps,
-            radii={
-                entry.group: entry.radius
-                for manifest, _ in campaigns
-                for entry in manifest.groups
-                if entry.radius is not None
-            },
-        ),
+        lines=build(experiment.baseline),
+        lines_against={other: build(other) for other in sorted(others)},
         seeds=tuple(sorted({row.seed for row in rows})),
         versions=tuple(
             dict.fromkeys(manifest.versions for manifest, _ in campaigns) if rows else ()

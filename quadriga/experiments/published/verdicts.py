@@ -47,8 +47,16 @@ class RequirementVerdict:
 
     @property
     def word(self) -> Word:
-        """Missed if it is missed anywhere, open if that is open anywhere."""
+        """Missed if it is missed anywhere, open if that is open anywhere.
+
+        One that is asked for in some of the worlds is met once it is met in enough of them.
+        """
         words = {finding.word for finding in self.findings}
+        if enough := self.requirement.at_least:
+            met, open_still = (
+                sum(finding.word == word for finding in self.findings) for word in ("met", "open")
+            )
+            return "met" if met >= enough else "open" if met + open_still >= enough else "missed"
         return "missed" if "missed" in words else "open" if "open" in words or not words else "met"
 
     @property
@@ -70,7 +78,7 @@ def judge_requirements(experiment: Experiment, results: Results) -> list[Require
             requirement,
             variant,
             tuple(
-                _judge(requirement, world, results.find(world, variant))
+                _judge(requirement, world, results.find(world, variant, requirement.against))
                 for world in _worlds(experiment, requirement)
             ),
         )
@@ -93,9 +101,10 @@ def describe_requirement(requirement: Requirement, baseline: str) -> str:
     """The requirement in words."""
     measure = MEASURES[requirement.measure]
     unit = f" {measure.unit}" if measure.unit else ""
+    often = f" in at least {requirement.at_least} worlds" if requirement.at_least else ""
     return (
-        f"{measure.text.format(baseline)}{_BOUND[requirement.bound]} "
-        f"{_SENSE[requirement.sense]} {requirement.limit:g}{unit}"
+        f"{measure.text.format(requirement.against or baseline)}{_BOUND[requirement.bound]} "
+        f"{_SENSE[requirement.sense]} {requirement.limit:g}{unit}{often}"
     )
 
 

@@ -198,3 +198,35 @@ def test_a_requirement_is_said_in_words() -> None:
     assert (
         RequirementVerdict(asked, "mine", (RequirementResult(("steps",), "open"),)).word == "open"
     )
+
+
+@pytest.mark.parametrize(
+    ("words", "verdict"),
+    [
+        (("met", "met", "missed"), "met"),
+        (("met", "missed", "missed"), "missed"),
+        (("met", "open", "missed"), "open"),
+        (("missed", "open", "missed"), "missed"),
+    ],
+)
+def test_some_worlds_may_be_enough(words: tuple[Any, ...], verdict: str) -> None:
+    asked = Requirement("fall-ratio", "below", 1.0, variants=("mine",), at_least=2)
+    findings = tuple(RequirementResult((f"w{k}",), word) for k, word in enumerate(words))
+    assert RequirementVerdict(asked, "mine", findings).word == verdict
+    assert (
+        describe_requirement(asked, "none") == "falls over those of none < 1 in at least 2 worlds"
+    )
+
+
+def test_a_measure_of_pairs_may_be_against_another_variant_than_the_baseline() -> None:
+    asked = Requirement("ratio-roll", "most", 1.03, variants=("mine",), against="best")
+    beside_baseline = line(ratio=Ratio(9, 0.9, 0.8, 1.0))
+    beside_best = line(ratio=Ratio(9, 1.1, 1.0, 1.2))
+    results = Results(
+        "none", ("none", "best", "mine"), (("steps",),), lines=(beside_baseline,),
+        lines_against={"best": (beside_best,)},
+    )  # fmt: skip
+    (verdict,) = judge_requirements(experiment_of("steps", requirements=(asked,)), results)
+    assert verdict.word == "missed"
+    assert verdict.findings[0].estimate == Interval(1.1, 1.0, 1.2)
+    assert "over that of best" in describe_requirement(asked, "none")
