@@ -28,7 +28,9 @@ PROMISED = {
     "payload-heavy-2": 2, "payload-heavy-4": 4, "asymmetric-5": 5, "chain-5": 5, "ring-5": 5,
     "ten": 10, "slope": 3, "low-friction": 3, "one-soft-leg": 3, "turn": 3,
     "flat": 3, "hard-blocks": 3, "hard-payload": 3, "hard-friction": 3, "hard-push": 3,
-    "hard-motor": 3, "stairs": 3,
+    "hard-motor": 3, "stairs": 3, "edge-blocks": 3, "edge-payload": 3, "edge-friction": 3,
+    "edge-push": 3, "edge-motor": 3, "distribution-pushed": 3, "distribution-loaded": 3,
+    "distribution-slipping": 3,
 }  # fmt: skip
 
 

@@ -77,6 +77,15 @@ def test_a_file_is_a_whole_experiment(tmp_path: Path) -> None:
     assert found.published.figures == ("success",)
 
 
+def test_a_requirement_names_whom_it_compares_with_and_in_how_many_worlds(tmp_path: Path) -> None:
+    more = '[[requirements]]\nmeasure = "fall-ratio"\nvariants = "none"\nagainst = "soft"\n'
+    path = written(tmp_path, SMALL + more + "below = 1\nat_least = 1\n")
+    found = read_experiment(path).requirements
+    assert [(one.against, one.at_least) for one in found] == [("", 0)] * 3 + [("soft", 1)]
+    with pytest.raises(ConfigError, match="against: got 'hard', expected one of none, soft"):
+        read_experiment(written(tmp_path, SMALL + more.replace('"soft"', '"hard"') + "below = 1\n"))
+
+
 def test_what_is_swept_makes_a_campaign_of_each_scenario(tmp_path: Path) -> None:
     text = SMALL.partition("[[requirements]]")[0] + (
         '[sweep.flat]\nkeys = "world.payload=0,5"\naxis = "load [kg]"\n'
@@ -194,9 +203,12 @@ def test_all_that_are_promised_are_there_in_order() -> None:
         "paper",
         "as-written",
         "hard",
-        "low-level",
-        "ideas",
+        "edge",
+        "distribution",
         "central",
+        "low-level",
+        "realism",
+        "ideas",
         "beyond",
         "ten",
         "sweeps",
