@@ -30,7 +30,7 @@ walk: $(STAMP)
 # What several tests need is compiled, collected and fitted once, before they run side by side.
 # Whoever tests is not started again after a test that hung, which would hang again.
 test: $(TOOLS)
-	$(BIN)/quadriga prepare --robots 2
+	$(BIN)/quadriga prepare --robots 2 --set identification.seconds=60
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --max-worker-restart 0 $(ARGS)
 
 lint: $(TOOLS)

@@ -144,9 +144,9 @@ def act(
     memory[MEMORY.mu_reduction] = update_mu_reduction(
         memory0[MEMORY.mu_reduction], contact, phase, feet, fixed.friction, dt
     )
-    ahead = task[TASK.ahead]
+    ahead, ratio = task[TASK.ahead], body.mass / fixed.body.mass
     v_expected = trunk.velocity if np.isnan(ahead[0]) else from_yaw_frame(ahead, trunk.R)
-    motion = MotionReference(v_expected, v_des, task[TASK.wz])
+    motion = MotionReference(v_expected, v_des, task[TASK.wz], ratio * fixed.feet.foothold_inwards)
     update_anchors(memory, phase, trunk, p_foot, fixed.feet, dt)
     swing = desired_accelerations(memory, phase, trunk, feet, motion, fixed.feet)
     goal = Goal(contact, push, swing, desired_forces(contact, deviation, trunk.R, body.mass))

@@ -14,6 +14,7 @@ from quadriga.agents.controller.swing import (
     MotionReference,
     foothold,
     limit_foothold,
+    limit_inwards,
     swing_reference,
 )
 from quadriga.shared.config.sections import Config
@@ -31,6 +32,7 @@ class FeetGains(NamedTuple):
     Attributes:
         stance_time: duration of the half cycle, s.
         raibert_gain: k of the foothold, s.
+        foothold_inwards: greatest `MotionReference.inwards` without a load, m.
         swing_height: of a foot over the highest ground, m.
         descent_speed: at which a stance foot without ground is lowered, m/s.
         kp: of the feedback on a swing foot's position, 1/s².
@@ -48,6 +50,7 @@ class FeetGains(NamedTuple):
 
     stance_time: float
     raibert_gain: float
+    foothold_inwards: float
     swing_height: float
     descent_speed: float
     kp: float
@@ -72,6 +75,7 @@ def feet_gains(config: Config) -> FeetGains:
     return FeetGains(
         stance_time=1e-3 * config.gait.stance_ms,
         raibert_gain=controller.raibert_gain,
+        foothold_inwards=controller.foothold_inwards,
         swing_height=controller.swing_height,
         descent_speed=controller.descent_speed,
         kp=controller.kp_swing,
@@ -264,6 +268,7 @@ def _swing(
     outwards = 1.0 if leg % 2 == 0 else -1.0
     under_hip = forwards * gains.under_hip_x, outwards * gains.under_hip_y
     target = foothold(under_hip, trunk.position, trunk.R, motion, remaining, stance_time, k)
+    limit_inwards(target, under_hip[1], trunk.position, trunk.R, motion.inwards)
     expected, highest = ground
     share = 1.0 - lift
     apex = highest + gains.swing_height

@@ -21,11 +21,13 @@ class MotionReference(NamedTuple):
         v_expected: velocity to be expected until the foot has stood, (3,), m/s, odometry frame.
         v_des: desired velocity, (3,), m/s, odometry frame.
         wz: desired yaw rate, rad/s.
+        inwards: how far from under its hip a foothold may lie towards the trunk's middle line, m.
     """
 
     v_expected: Array
     v_des: Array
     wz: float
+    inwards: float
 
 
 @compiled
@@ -55,13 +57,35 @@ def foothold(
     c, s = heading(R)
     rx, ry = c * x - s * y, s * x + c * y
     ahead = remaining + 0.5 * stance_time
-    velocity, v_des, wz = motion
+    velocity, v_des, wz, _ = motion
     out = np.empty(2)
     out[0] = position[0] + rx + (velocity[0] - wz * ry) * ahead
     out[1] = position[1] + ry + (velocity[1] + wz * rx) * ahead
     out[0] += gain * (velocity[0] - v_des[0])
     out[1] += gain * (velocity[1] - v_des[1])
     return out
+
+
+@compiled
+def limit_inwards(target: Array, y: float, position: Array, R: Array, inwards: float) -> None:
+    """Move a foothold `target`, (2,), m, outwards, unless it is near enough to under its hip.
+
+    A trunk that is thrown aside asks for footholds beyond its other feet, where legs cross.
+
+    Args:
+        target: odometry frame; it changes.
+        y: of the point under the hip, m, trunk frame.
+        position: of the trunk's origin, (3,), m, odometry frame.
+        R: trunk to odometry frame, (3, 3).
+        inwards: how far it may be towards the trunk's middle line from under its hip, m.
+    """
+    c, s = heading(R)
+    outwards = 1.0 if y > 0.0 else -1.0
+    aside = c * (target[1] - position[1]) - s * (target[0] - position[0]) - y
+    beyond = -inwards - outwards * aside
+    if beyond > 0.0:
+        target[0] -= s * outwards * beyond
+        target[1] += c * outwards * beyond
 
 
 @compiled

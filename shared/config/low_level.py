@@ -211,6 +211,14 @@ class ControllerConfig:
         0.09, "m", "apex above the highest foothold (paper: above the ground)", low=0.01, high=0.2
     )
     raibert_gain: float = key(0.03, "s", "foothold per velocity error", low=0.0, high=0.5)
+    foothold_inwards: float = key(
+        0.1,
+        "m",
+        "how far a foothold may lie from under its hip towards the trunk's middle line; times "
+        "1 + load / mass with a load that is felt",
+        low=0.0,
+        high=10.0,
+    )
     damping: float = key(
         2.0, "N·m·s/rad", "of joints in mode damping, and while QPs fail", low=0.1, high=10.0
     )

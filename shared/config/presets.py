@@ -16,7 +16,7 @@ _PLAIN: Final = MappingProxyType(
         "load_time": 0.0, "reject_side_contacts": False, "liftoff_hold_ms": 0, "reflex_ms": 0,
         "swing_delay": 0.0,
         "track_sinking_trunk": False, "flight": False, "slip_speed": 0.0,
-        "swing_acceleration": 1e4, "contact_force": 8.0, "force_min": 2.0,
+        "swing_acceleration": 1e4, "foothold_inwards": 10.0, "contact_force": 8.0, "force_min": 2.0,
         "descent_speed": 0.5, "tilt_length": 1.0, "swing_weight": 1.0,
     }
 )  # fmt: skip

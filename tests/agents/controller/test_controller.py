@@ -13,7 +13,12 @@ from quadriga.agents.controller.controller import Controller, ControllerOutputs,
 from quadriga.agents.controller.estimator import filter_noise, foot_trust
 from quadriga.agents.controller.memory import Memory
 from quadriga.agents.controller.schedule import Schedule
-from quadriga.agents.controller.swing import MotionReference, foothold, swing_reference
+from quadriga.agents.controller.swing import (
+    MotionReference,
+    foothold,
+    limit_inwards,
+    swing_reference,
+)
 from quadriga.agents.controller.trunk_feedback import trunk_gains
 from quadriga.agents.controller.whole_body.solution import solve_goal
 from quadriga.shared.config.sections import Config
@@ -119,11 +124,13 @@ def test_swing_feet_follow_their_reference(seed: int, ahead: np.ndarray | None) 
             (float(x), float(y)),
             estimate.position,
             estimate.R,
-            MotionReference(velocity, v_des, 0.3),
+            MotionReference(velocity, v_des, 0.3, config.foothold_inwards),
             0.6 * 0.2,
             0.2,
             config.raibert_gain,
         )
+        inwards = config.foothold_inwards * (1.0 + outputs.memory.load / TOTAL_MASS)
+        limit_inwards(target, float(y), estimate.position, estimate.R, inwards)
         x, v, a = swing_reference(
             before.estimate.p_foot[leg],
             target,

@@ -13,6 +13,7 @@ from quadriga.agents.controller.swing import (
     MotionReference,
     foothold,
     limit_foothold,
+    limit_inwards,
     swing_reference,
 )
 from quadriga.shared.robot.a1 import A1
@@ -120,6 +121,27 @@ def test_a_foothold_within_reach_asks_for_no_more_acceleration(
     np.testing.assert_allclose(found * np.linalg.norm(way), way * np.linalg.norm(found), atol=1e-9)
 
 
+@given(
+    st.integers(0, 3),
+    st.floats(-3.0, 3.0),
+    st.floats(-0.5, 0.5),
+    st.floats(-0.5, 0.5),
+    st.floats(0.0, 0.5),
+)
+@settings(deadline=None, max_examples=100)
+def test_a_foothold_lies_no_farther_inwards_than_the_limit(
+    leg: int, yaw: float, forwards: float, outwards: float, limit: float
+) -> None:
+    """Seen from under the hip in the yaw frame, only the part inwards beyond the limit goes."""
+    turn, (x, y) = pin.utils.rotate("z", yaw)[:2, :2], A1.feet_under_hips[leg]
+    position, side = np.array([0.3, -0.2, 0.28]), np.sign(y)
+    target = position[:2] + turn @ np.array([x + forwards, y + side * outwards])
+    R = pin.rpy.rpyToMatrix(0.2, -0.1, yaw)
+    limit_inwards(target, float(y), position, R, limit)
+    found = turn.T @ (target - position[:2]) - np.array([x, y])
+    np.testing.assert_allclose(found, [forwards, side * max(outwards, -limit)], atol=1e-12)
+
+
 @given(st.integers(0, 3), st.integers(0, 2**31))
 @settings(deadline=None, max_examples=50)
 def test_the_foothold_is_raiberts(leg: int, seed: int) -> None:
@@ -134,6 +156,6 @@ def test_the_foothold_is_raiberts(leg: int, seed: int) -> None:
     hip_velocity = velocity + np.cross([0.0, 0.0, wz], arm)
     expected = position + arm + hip_velocity * (remaining + stance_time / 2)
     expected += gain * (velocity - v_des)
-    motion = MotionReference(velocity, v_des, wz)
+    motion = MotionReference(velocity, v_des, wz, 0.1)
     found = foothold(under_hip, position, R, motion, remaining, stance_time, gain)
     np.testing.assert_allclose(found, expected[:2], atol=1e-12)
