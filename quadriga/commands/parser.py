@@ -34,6 +34,7 @@ from quadriga.commands import (
     router,
     scenarios,
     sim,
+    tune,
     version,
     walk,
 )
@@ -51,7 +52,7 @@ _COMMANDS: Final = (
     walk.add, scenarios.add, sim.add, agent.add, plan.add, record.add, report.add, play.add,
     resim.add, export.add, info.add, recover.add, check.add, echo.add, hz.add, replay.add,
     router.add, prepare.add, operate.add, collect.add, fit.add, probe.add, campaign.add,
-    experiments.add, estop.add, config.add, version.add,
+    experiments.add, tune.add, estop.add, config.add, version.add,
 )  # fmt: skip
 
 

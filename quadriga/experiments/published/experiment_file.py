@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from quadriga.experiments.measures import MEASURES
 from quadriga.experiments.published.experiment import (
@@ -21,6 +21,7 @@ from quadriga.experiments.results import COST
 from quadriga.experiments.seeds import parse_seeds
 from quadriga.experiments.sweep import parse_sweep
 from quadriga.experiments.tables import COLUMNS
+from quadriga.experiments.toml_table import TomlTable
 from quadriga.experiments.variants import (
     Variant,
     combine_with_predictors,
@@ -29,7 +30,7 @@ from quadriga.experiments.variants import (
 )
 from quadriga.recordings.traces import ERRORS
 from quadriga.shared.config.load import flatten, read_toml
-from quadriga.shared.errors import ConfigError, did_you_mean
+from quadriga.shared.errors import ConfigError
 from quadriga.team import scenarios
 
 _KEYS: Final = (
@@ -61,7 +62,7 @@ def read_experiment(path: Path) -> Experiment:
     Raises:
         ConfigError: the file cannot be read, or says something that is none.
     """
-    table = _TomlTable(str(path), read_toml(path), _KEYS)
+    table = TomlTable(str(path), read_toml(path), _KEYS)
     variants = _variants(table)
     known = [variant.name for variant in variants]
     baseline = table.text("baseline", "none" if "none" in known else known[0])
@@ -88,76 +89,7 @@ def read_experiment(path: Path) -> Experiment:
     )
 
 
-class _TomlTable:
-    """A table of a file, whose keys are all known."""
-
-    def __init__(self, where: str, body: Any, known: Collection[str]) -> None:
-        self.where, self._body = where, body
-        if not isinstance(body, dict):
-            raise ConfigError(where, repr(body), "a table")
-        for name in body:
-            self.check_one("a key", name, known)
-
-    def check_one(self, what: str, got: Any, known: Collection[str]) -> None:
-        """Refuse what is not among the known ones."""
-        if got not in known:
-            one_of, hint = f"one of {', '.join(known)}", did_you_mean(got, known)
-            raise ConfigError(f"{self.where}: {what}", repr(got), one_of, hint)
-
-    def has(self, name: str) -> bool:
-        return name in self._body
-
-    def text(self, name: str, default: str | None = None) -> str:
-        return str(
-            self._get(name, default, lambda v: isinstance(v, str) and bool(v.strip()), "text")
-        )
-
-    def yes(self, name: str, default: bool) -> bool:
-        return bool(self._get(name, default, lambda v: isinstance(v, bool), "true or false"))
-
-    def number(self, name: str) -> float:
-        return float(self._get(name, None, lambda v: type(v) in (int, float), "a number"))
-
-    def texts(
-        self, name: str, default: tuple[str, ...], known: Collection[str] = ()
-    ) -> tuple[str, ...]:
-        """Several texts, each once, or one of them alone."""
-        value = self._body.get(name, default)
-        values = [value] if isinstance(value, str) else value
-        if not isinstance(values, (list, tuple)) or not all(isinstance(v, str) for v in values):
-            raise ConfigError(f"{self.where}: {name}", repr(value), "a list of texts")
-        for one in values if known else ():
-            self.check_one(name, one, known)
-        if len(set(values)) < len(values):
-            raise ConfigError(f"{self.where}: {name}", repr(value), "each once")
-        return tuple(values)
-
-    def table(self, name: str, known: Collection[str]) -> _TomlTable:
-        return _TomlTable(f"{self.where}: {name}", self._body.get(name, {}), known)
-
-    def tables(self, name: str, known: Collection[str]) -> list[_TomlTable]:
-        value = self._body.get(name, [])
-        if not isinstance(value, list):
-            raise ConfigError(f"{self.where}: {name}", "no list", f"tables headed [[{name}]]")
-        return [
-            _TomlTable(f"{self.where}: {name}, the {k}.", v, known) for k, v in enumerate(value, 1)
-        ]
-
-    def mapping(self, name: str) -> Mapping[str, Any]:
-        return dict(
-            self._get(name, {}, lambda v: isinstance(v, dict), f"a table, written [{name}]")
-        )
-
-    def _get(self, name: str, default: Any, right: Callable[[Any], bool], what: str) -> Any:
-        value = self._body.get(name, default)
-        if value is None or not right(value):
-            raise ConfigError(
-                f"{self.where}: {name}", "nothing" if value is None else repr(value), what
-            )
-        return value
-
-
-def _variants(table: _TomlTable) -> tuple[Variant, ...]:
+def _variants(table: TomlTable) -> tuple[Variant, ...]:
     """Planners by name, then the tables; each on top of what all have in common."""
     common = flatten(table.mapping("common"))
     planners = table.texts("planners", ())
@@ -178,7 +110,7 @@ def _variants(table: _TomlTable) -> tuple[Variant, ...]:
 
 
 @contextmanager
-def _name_file_in_errors(table: _TomlTable, name: str) -> Iterator[None]:
+def _name_file_in_errors(table: TomlTable, name: str) -> Iterator[None]:
     """Have what reads the command line name the file instead."""
     try:
         yield
@@ -188,7 +120,7 @@ def _name_file_in_errors(table: _TomlTable, name: str) -> Iterator[None]:
         ) from None
 
 
-def _scenarios(table: _TomlTable) -> tuple[str, ...]:
+def _scenarios(table: TomlTable) -> tuple[str, ...]:
     names = table.texts("scenarios", ())
     if not names:
         raise ConfigError(f"{table.where}: scenarios", "none", "a list of names or TOML files")
@@ -198,7 +130,7 @@ def _scenarios(table: _TomlTable) -> tuple[str, ...]:
     return names
 
 
-def _parts(table: _TomlTable, names: tuple[str, ...]) -> tuple[Part, ...]:
+def _parts(table: TomlTable, names: tuple[str, ...]) -> tuple[Part, ...]:
     """One campaign; with something swept one for each scenario, which has its own."""
     if not table.has("sweep"):
         return (Part("", names),)
@@ -214,7 +146,7 @@ def _parts(table: _TomlTable, names: tuple[str, ...]) -> tuple[Part, ...]:
     return tuple(parts)
 
 
-def _read_published(table: _TomlTable, *, compared: bool) -> Published:
+def _read_published(table: TomlTable, *, compared: bool) -> Published:
     return Published(
         outcome=table.texts("outcome", _OUTCOME, COLUMNS),
         falls=table.yes("falls", compared),
@@ -224,7 +156,7 @@ def _read_published(table: _TomlTable, *, compared: bool) -> Published:
 
 
 def _requirements(
-    table: _TomlTable, variants: list[str], baseline: str, labels: list[str], *, poolable: bool
+    table: TomlTable, variants: list[str], baseline: str, labels: list[str], *, poolable: bool
 ) -> list[Requirement]:
     """Those of a table: one for each of its measures."""
     senses = [sense for sense in SENSES if table.has(sense)]
@@ -269,7 +201,7 @@ def _requirements(
 
 
 def _check_measures(
-    table: _TomlTable, measures: tuple[str, ...], bound: str, *, paired: bool
+    table: TomlTable, measures: tuple[str, ...], bound: str, *, paired: bool
 ) -> None:
     """Refuse what no trial could ever answer."""
     for name in measures:
