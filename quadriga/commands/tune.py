@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     workers = read_workers(arguments, "FILE")
     search(tuning, out, workers=workers, typed=arguments.typed, console=console)
     report = write_report(out / JUDGED, baseline=START, record_worst=0, console=console)
-    tables = [report.build_table(section) for section in ("success", "falls", "ratios")]
+    tables = [report.build_table(section) for section in ("success", "falls", "errors")]
     print_tables(table for table in tables if table is not None)
     print(out / VARIANTS)
     return 0

@@ -48,13 +48,17 @@ def data_key(config: Config) -> str:
 
 
 def predictor_key(config: Config) -> str:
-    """Key of the fitted predictor: its data, the fit's settings and the fit's code."""
+    """Key of the fitted predictor: its data, the fit's settings and the fit's code.
+
+    The planner's weights are not in it: they change no fit, and a radius of other weights than
+    those that a predictor was kept with is computed when it is loaded.
+    """
     planner, ident = asdict(config.planner), asdict(config.identification)
     if config.response_file:
         ident["response"] = _file_digest(Path(config.response_file))
     sections: dict[str, Any] = {
         "identification": ident,
-        "planner": {k: planner[k] for k in ("N", "T_ini", "applied", "Q", "R", "interface")},
+        "planner": {k: planner[k] for k in ("N", "T_ini", "interface")},
     }
     code = behaviour("quadriga.identification.sample_fits")
     return _digest([data_key(config), hashed_sections(sections), code])

@@ -46,11 +46,12 @@ FITTED = {
         "max_radius",
         "max_peers_harm",
         "gain_range",
+        "response",
     )
 }
 WALKED -= FITTED
 # What the fit and its gates depend on besides the data.
-FITTED |= {f"planner.{key}" for key in ("N", "T_ini", "applied", "Q", "R", "interface")}
+FITTED |= {f"planner.{key}" for key in ("N", "T_ini", "interface")}
 
 
 def another(value: Any, choices: tuple[str, ...]) -> Any:
