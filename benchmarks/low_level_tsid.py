@@ -25,8 +25,9 @@ from quadriga.agents.controller.maths.rows import numbers
 from quadriga.agents.controller.model import RigidBody
 from quadriga.agents.controller.schedule import Schedule
 from quadriga.agents.controller.sensed import Sensed, coordinates_of, feet_of, trunk_of
-from quadriga.agents.controller.whole_body.problem import N_WEIGHTS, SOLUTION_SIZE, Goal, Weights
-from quadriga.agents.controller.whole_body.solution import solve_closed_form, solve_goal
+from quadriga.agents.controller.whole_body.limited import LIMITED, LIMITED_SIZE
+from quadriga.agents.controller.whole_body.problem import N_WEIGHTS, Goal, Weights
+from quadriga.agents.controller.whole_body.solution import finish, solve_closed_form
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.a1 import A1
@@ -103,13 +104,12 @@ class _Ours:
 
     def __init__(self, weights: Weights) -> None:
         self._body, self._weights, self._row = RigidBody(A1), weights, np.array(weights)
-        self._x = np.zeros(SOLUTION_SIZE)
+        self._solved = np.zeros(LIMITED_SIZE)
 
     def solve(self, case: TsidCase) -> None:
         """One tick's torques."""
         goal = case.goal
-        self._x = np.zeros(SOLUTION_SIZE)
-        if not _whole_body(
+        free = _whole_body(
             case.sensed,
             self._body.links,
             goal.contact,
@@ -117,15 +117,13 @@ class _Ours:
             goal.swing,
             goal.force,
             self._row,
-            self._x,
-        ):
-            terms = self._body.terms(case.q, case.v)
-            R, p_foot = trunk_of(case.sensed).R, feet_of(case.sensed)
-            self._x = solve_goal(terms, R, p_foot, goal, self._weights, A1.torque_bounds).x
+            self._solved,
+        )
+        finish(free, self._solved, goal.contact)
 
     def torques(self) -> Array:
         """Of the last tick, (12,), N·m."""
-        return self._x[:12]
+        return self._solved[LIMITED.x][:12]
 
 
 @compiled
@@ -137,8 +135,8 @@ def _whole_body(
     swing: Array,
     force: Array,
     weights: Array,
-    x: Array,
-) -> int:
+    row: Array,
+) -> bool:
     """Terms and `solve_closed_form`: arrays are cheaper to pass than tuples."""
     q, v = coordinates_of(sensed)
     return solve_closed_form(
@@ -148,7 +146,7 @@ def _whole_body(
         Goal(contact, trunk, swing, force),
         Weights(*numbers(weights, N_WEIGHTS)),
         _TORQUE_LIMIT,
-        x,
+        row,
     )
 
 

@@ -104,8 +104,8 @@ def act(
     constants: Array,
     memory: Array,
     goal_row: Array,
-    x: Array,
-) -> int:
+    limited: Array,
+) -> bool:
     """Ask the whole-body QP for torques and solve it where no limit is active.
 
     Args:
@@ -116,10 +116,10 @@ def act(
         constants: `acting_constants`.
         memory: the new `Memory.flat`, filled.
         goal_row: see `GoalLayout`, filled.
-        x: see `WholeBodySolution`, filled.
+        limited: see `solve_closed_form`, filled.
 
     Returns:
-        What `solve_closed_form` does.
+        Whether no limit is active.
     """
     memory[:] = memory0
     load, dt = memory0[MEMORY.load], task[TASK.dt]
@@ -153,9 +153,8 @@ def act(
     _note_goal(goal, goal_row)
 
     weights = with_mu(fixed.weights, fixed.weights.mu - memory[MEMORY.mu_reduction])
-    x[:] = 0.0
     bounds = torque_bounds(sensed[SENSED.v_joint], fixed.motors)
-    return solve_closed_form(terms, trunk.R, p_foot, goal, weights, bounds, x)
+    return solve_closed_form(terms, trunk.R, p_foot, goal, weights, bounds, limited)
 
 
 @compiled

@@ -24,15 +24,14 @@ from quadriga.agents.controller.sensed import SENSED, SENSED_SIZE, Sensed
 from quadriga.agents.controller.sensing import place, sense, sensing_constants
 from quadriga.agents.controller.torque_bounds import motor_limits, torque_bounds
 from quadriga.agents.controller.whole_body.assembly import build
+from quadriga.agents.controller.whole_body.limited import LIMITED_SIZE
 from quadriga.agents.controller.whole_body.problem import (
-    SOLUTION_SIZE,
-    UNCONSTRAINED,
     Goal,
     WholeBodyProblem,
     WholeBodySolution,
     qp_weights,
 )
-from quadriga.agents.controller.whole_body.solution import solve, unpack
+from quadriga.agents.controller.whole_body.solution import finish
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.record import record
@@ -138,8 +137,8 @@ class Controller:
     ) -> ControllerOutputs:
         """Torques for what the robot is asked to do.
 
-        Where no limit of the QP is active, as at most ticks, this is one compiled call; a singular
-        problem, whose numbers are NaN, is no solution.
+        Where no limit of the QP is active, as at most ticks, this is one compiled call; else the
+        solver follows. A singular problem, whose numbers are NaN, is no solution.
 
         Args:
             sensed: what `sense` gave for this tick.
@@ -148,18 +147,11 @@ class Controller:
             dt: time since the last tick, s.
             new_sample: whether a sample of forces begins with this tick.
         """
-        flat, goal_row, x = np.empty(MEMORY_SIZE), np.empty(GOAL_SIZE), np.empty(SOLUTION_SIZE)
-        row = _row_of(task, dt, new_sample)
-        rows = act(
-            sensed.memory.flat, sensed.flat, schedule.row, row, self._acting, flat, goal_row, x
-        )
+        before, constants, row = sensed.memory.flat, self._acting, _row_of(task, dt, new_sample)
+        flat, goal_row, limited = np.empty(MEMORY_SIZE), np.empty(GOAL_SIZE), np.empty(LIMITED_SIZE)
+        free = act(before, sensed.flat, schedule.row, row, constants, flat, goal_row, limited)
         memory = Memory(flat)
-        if rows:
-            solution = WholeBodySolution(x, UNCONSTRAINED, rows)
-            return ControllerOutputs(memory, goal_row, solution)
-        goal = goal_of(goal_row, memory.contact)
-        problem = self.problem(sensed, memory, goal)
-        solution = unpack(problem, goal.contact, *solve(problem))
+        solution = finish(free, limited, memory.contact)
         return ControllerOutputs(memory, goal_row, solution)
 
     def problem(self, sensed: Sensed, memory: Memory, goal: Goal) -> WholeBodyProblem:

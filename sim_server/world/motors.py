@@ -106,7 +106,7 @@ class Motors:
 
     def send(self, rows: list[Array]) -> Array:
         """Send rows of `Command`s, one of each robot; those that arrive now, (n, 60)."""
-        self._on_the_way.append(np.stack(rows))
+        self._on_the_way.append(np.array(rows))  # a quarter of the time of np.stack
         return self._on_the_way.popleft()
 
     def drive(self, arrived: Array, q: Array, v: Array, strength: Array) -> None:

@@ -16,6 +16,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from quadriga.shared.config.sections import ControllerConfig
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.jit import compiled
@@ -125,12 +127,12 @@ class WholeBodySolution:
         x: torques (12), forces (12), defect (6 + 3 for each foot not in contact), the rest zero.
         status: "unconstrained" (closed form), "constrained" (active set) or, with no torques and
             the rest of no use, "infeasible:<solver's flag>" or "infeasible:singular".
-        rows: length of the defect.
+        contact: 1 for the feet in contact, (4,).
     """
 
     x: Array
     status: str
-    rows: int = 18
+    contact: Array
 
     @property
     def tau(self) -> Array:
@@ -145,7 +147,7 @@ class WholeBodySolution:
     @property
     def defect(self) -> Array:
         """What the accelerations miss of the desired ones: δ."""
-        return self.x[24 : 24 + self.rows]
+        return self.x[24 : 42 - 3 * int(np.count_nonzero(self.contact > 0.5))]
 
     @property
     def solved(self) -> bool:
