@@ -211,18 +211,20 @@ class Neighbours:
             return np.ones(T_ini, dtype=np.bool_), *_deviations(measured.values(), weight)
         known = np.zeros(T_ini, dtype=np.bool_)
         du, y = np.zeros((T_ini, N_FORCES)), np.zeros((T_ini, N_OUTPUTS))
-        ticks = sample_starts(first_tick - SAMPLE_MS, T_ini)
-        nominal = nominal_forces(scheduled_stance(self._config, index, ticks), weight)
-        for plan in plans:  # ascending, so that a newer plan overwrites older ones
-            ahead = (ticks - plan.tick) // SAMPLE_MS
-            covered = (ahead >= 0) & (ahead < len(plan.u))
-            known |= covered
-            du[covered] = plan.u[ahead[covered]] - nominal[covered]
-            y[covered] = plan.y[ahead[covered]]
         if measured:
             places = list(measured)
             known[places] = True
             du[places], y[places] = _deviations(measured.values(), weight)
+        missing = np.flatnonzero(~known)
+        ticks = sample_starts(first_tick - SAMPLE_MS, T_ini)[missing]
+        nominal = nominal_forces(scheduled_stance(self._config, index, ticks), weight)
+        for k, (place, tick) in enumerate(zip(missing.tolist(), ticks.tolist(), strict=True)):
+            for plan in reversed(plans):  # the newest that reaches there
+                ahead = (tick - plan.tick) // SAMPLE_MS
+                if 0 <= ahead < len(plan.u):
+                    known[place] = True
+                    du[place], y[place] = plan.u[ahead] - nominal[k], plan.y[ahead]
+                    break
         return known, du, y
 
 
