@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from quadriga.agents.planner.cooperation import cooperative_radius, is_cooperative, team_hessian
+from quadriga.agents.planner.damping import kept_share
 from quadriga.agents.planner.planner_qp import build_problem
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import distinct_steps, horizon_stance, phase_of
@@ -38,7 +39,7 @@ def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
     Shape (s, s), s being the number of stance forces of the team (150 per robot at N = 25).
     """
     n, phase = predictor.meta.robots, phase_of(config, step, predictor.phases)
-    costs, kept = _local_costs(config, predictor, step), config.planner.damping
+    costs, kept = _local_costs(config, predictor, step), kept_share(config)
     rows = []
     for i, cost in enumerate(costs):
         coupling = [
@@ -94,7 +95,8 @@ def probe_costs(config: Config, predictor: Predictor) -> tuple[float, ...]:
         return ()
     if is_cooperative(config):
         return _probe_team(config, predictor)
-    probes = [-config.planner.damping] if config.planner.damping else []
+    kept = kept_share(config)
+    probes = [-kept] if kept else []
     for step in distinct_steps(config, predictor.phases):
         random = np.random.default_rng(0)
         hessian = gradient = 0.0
@@ -107,7 +109,7 @@ def probe_costs(config: Config, predictor: Predictor) -> tuple[float, ...]:
 
 
 def _probe_team(config: Config, predictor: Predictor) -> tuple[float, ...]:
-    probes = [-1.0 - config.planner.damping]
+    probes = [-1.0 - max(0.0, config.planner.damping)]
     for step in distinct_steps(config, predictor.phases):
         H, _ = team_hessian(config, predictor, step)
         p = np.random.default_rng(0).uniform(0.5, 1.5, len(H))

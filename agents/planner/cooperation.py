@@ -201,7 +201,7 @@ def stay_near_last(problem: PlannerProblem, f: Array, w: float, last: Array, new
 
 
 def new_plan_share(config: Config, predictor: Predictor) -> float:
-    """w, the share of û_i in an agent's plan: 1 less `planner.damping`, unless that is 0.
+    """w, the share of û_i in an agent's plan: 1 less `planner.damping`, unless that is 0 or -1.
 
     Then it is the one with which the iteration of the plans contracts fastest where no bound is
     active, and at most 1: its eigenvalues are 1 − w λ, the largest of them in size least at
@@ -253,6 +253,6 @@ def _compute_ranges(config: Config, same: _Same) -> tuple[tuple[float, float], .
 
 
 def _choose_share(config: Config, ranges: Sequence[tuple[float, float]]) -> float:
-    if config.planner.damping:
+    if config.planner.damping > 0.0:
         return 1.0 - config.planner.damping
     return min(1.0, *(2.0 / (least + most) for least, most in ranges))

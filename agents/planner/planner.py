@@ -15,6 +15,7 @@ from quadriga.agents.planner.cooperation import (
     new_plan_share,
     stay_near_last,
 )
+from quadriga.agents.planner.damping import kept_share
 from quadriga.agents.planner.free_step import FreeStep, OwnWindow
 from quadriga.agents.planner.neighbours import PeerSelection
 from quadriga.agents.planner.peer_terms import Peers, PeerTerms
@@ -142,6 +143,7 @@ class Planner:
         self._config, self._index, self._predictor = config, index, predictor
         self._cycle, self._peers = walking_steps(config), Peers(config, index, predictor)
         self._cooperative = is_cooperative(config)
+        self._kept = kept_share(config)
         self._new_share = new_plan_share(config, predictor) if self._cooperative else 1.0
         # Memo of the set-ups, one for each step of the gait's cycle; it changes no result.
         self._setups: dict[int, _Setup] = {}
@@ -207,7 +209,7 @@ class Planner:
         else:
             solution, solves = self._solve(setup, state, inputs, peers, y_free).solution, 1
         x, status = solution.x, solution.status
-        if self._config.planner.damping and status == SOLVED and not self._cooperative:
+        if self._kept and status == SOLVED and not self._cooperative:
             x = self._mix_with_last(problem, x, state, inputs.step)
         du, dy = unpack(problem, x, y_free)
         y, y_nominal = inputs.y_base + dy, inputs.y_base + y_free.reshape(dy.shape)
@@ -262,7 +264,7 @@ class Planner:
 
         Both satisfy the constraints on forces; these are convex, so the mixture satisfies them too.
         """
-        share, nv = self._config.planner.damping, len(problem.columns)
+        share, nv = self._kept, len(problem.columns)
         mixed = x.copy()
         mixed[:nv] = (1.0 - share) * x[:nv] + share * self._last(problem, state, step)
         return mixed
@@ -313,7 +315,7 @@ class Planner:
             )
         solver = SOLVERS[self._config.planner.solver](problem)
         nominal = nominal_forces(stance, weight)
-        plain = not self._cooperative and not self._config.planner.damping
+        plain = not self._cooperative and not self._kept
         closed = solver.closed_form if plain else None
         free = None if closed is None else FreeStep(problem, closed, nominal, nominal_table(weight))
         return _Setup(problem, solver, nominal, free)

@@ -45,11 +45,12 @@ class PlannerConfig:
         True, "-", "distributed: bring peers' windows and plans forward by their age"
     )
     damping: float = key(
-        0.0,
+        -1.0,
         "1",
-        "share of an agent's own last plan that its new one keeps; 0: none, or, with the cost "
-        "'team', the share with which the plans converge fastest",
-        low=0.0,
+        "share of an agent's own last plan that its new one keeps; 0: none; -1: none with up to "
+        "three robots (two with another preset than usual), else (n - 2)/(n + 2) with n. With the "
+        "cost 'team' both are the share with which the plans converge fastest",
+        low=-1.0,
         high=0.95,
     )
     exchanges: int = key(

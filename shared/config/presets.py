@@ -31,11 +31,11 @@ _SOFT: Final = MappingProxyType(
 
 # Replans every 10 ms, and weighs more what feed-forward can still correct on a stiff low level.
 # Peers' plans are held, and what was learned is kept, as long as with the usual rate. With these
-# weights best responses of three robots would not converge without damping.
+# weights best responses of three robots would not converge undamped.
 _FAST: Final = MappingProxyType(
     {
         "applied": 1, "latency_ms": 1, "Q": (1.2e7, 1e5, 6e5, 2.4e6, 2e6, 3e3),
-        "max_peer_age": 12, "hold_steps": 20, "forgetting": 0.99875, "damping": 0.2,
+        "max_peer_age": 12, "hold_steps": 20, "forgetting": 0.99875,
     }
 )  # fmt: skip
 
@@ -45,6 +45,7 @@ _FAST: Final = MappingProxyType(
 _PAPER_PLANNER: Final = MappingProxyType(
     {
         "interface": "force", "tracked": "outputs", "latency_ms": 0, "compensation": False,
+        "damping": 0.0,
         "Q": (1e6, 1e5, 1e5, 2e5, 1e5, 1e4), "R": (0.05, 0.05, 0.5),
         "deviation_max": (1e4, 1e4, 1e4), "fade": (1e6, 1e6, 1e6, 1e6),
     }

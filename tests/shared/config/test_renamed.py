@@ -44,6 +44,7 @@ FIRST_VALUES = {
     "identification.noise": (15.0, 15.0, 35.0),
     "identification.max_radius": 0.5,
     "planner.compensation": False,
+    "planner.damping": 0.0,
 }
 
 

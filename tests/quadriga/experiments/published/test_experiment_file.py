@@ -194,7 +194,7 @@ def test_from_the_paper_to_the_default_one_thing_changes_at_a_time() -> None:
             with_its_data = {f"identification.{key}" for key in of_the_data}
             together = changed in (weights, cooperative, with_its_data)
             assert together or sections == {"controller"}
-    left = {key for key, *_ in departures(configs["compensated"], build({}))}
+    left = {key for key, *_ in departures(configs["damped"], build({}))}
     assert {key.partition(".")[0] for key in left} <= {"identification", "world"}
 
 
