@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
-from quadriga.agents.controller import acting, controller
-from quadriga.agents.controller.whole_body.problem import WholeBodyProblem
+from quadriga.agents.controller import controller
+from quadriga.agents.controller.whole_body.limited import LIMITED
+from quadriga.agents.controller.whole_body.problem import WholeBodySolution
 from quadriga.agents.telemetry import Telemetry
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import decode, encode
@@ -80,16 +80,10 @@ def test_an_orientation_that_is_no_number_damps_the_joints_at_once() -> None:
 
 
 def fail(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_solution(problem: WholeBodyProblem) -> tuple[Array, str]:
-        return np.zeros(12), "infeasible:-1"
+    def no_solution(_free: bool, row: Array, contact: Array) -> WholeBodySolution:
+        return WholeBodySolution(np.zeros_like(row[LIMITED.x]), "infeasible:-1", contact)
 
-    def limits_matter(*arguments: Any) -> int:
-        act(*arguments)
-        return 0
-
-    act = acting.act
-    monkeypatch.setattr(controller, "act", limits_matter)
-    monkeypatch.setattr(controller, "solve", no_solution)
+    monkeypatch.setattr(controller, "finish", no_solution)
 
 
 def test_without_a_solution_the_last_torques_hold_and_then_the_joints_are_damped(
