@@ -131,7 +131,7 @@ def with_usual_costs(config: Config, Q: tuple[float, ...], R: tuple[float, ...])
         R: weights of the forces.
     """
     sizes = {name: getattr(config.planner, name) for name in _SIZES}
-    return replace(config, planner=replace(PlannerConfig(), **sizes, Q=Q, R=R))
+    return replace(config, planner=replace(PlannerConfig(), **sizes, Q=Q, R=R, damping=0.0))
 
 
 def _local_costs(config: Config, predictor: Predictor, step: int) -> list[_LocalCost]:

@@ -100,6 +100,8 @@ def _check_planner(planner: PlannerConfig, world: WorldConfig) -> None:
         )
     if not kind.publishes:
         return
+    if -1.0 < planner.damping < 0.0:
+        raise ConfigError("planner.damping", f"{planner.damping:g}", "-1, or 0 … 0.95")
     if planner.cost == "team" and kind.needs_peers:
         _check_cooperation(planner)
     latency = max(1, planner.latency_ms) if kind.central else planner.latency_ms

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from quadriga.agents.planner.damping import kept_share
 from quadriga.shared.config.load import load
+from quadriga.shared.errors import ConfigError
 
 
 def share(robots: int, **planner: object) -> float:
@@ -43,3 +44,8 @@ def test_a_share_that_is_given_is_kept() -> None:
     assert share(10, damping=0.0) == 0.0
     assert share(2, damping=0.3) == 0.3
     assert share(10, preset="paper") == 0.0
+
+
+def test_a_share_between_none_and_by_size_is_a_mistake() -> None:
+    with pytest.raises(ConfigError, match=r"planner.damping: got -0.5, expected -1, or 0 … 0.95"):
+        share(5, damping=-0.5)
