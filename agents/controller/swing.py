@@ -70,7 +70,7 @@ def foothold(
 def limit_inwards(target: Array, y: float, position: Array, R: Array, inwards: float) -> None:
     """Move a foothold `target`, (2,), m, outwards, unless it is near enough to under its hip.
 
-    A trunk that is thrown aside asks for footholds beyond its other feet, where legs cross.
+    A trunk that is thrown aside asks for footholds across its middle line, where other legs are.
 
     Args:
         target: odometry frame; it changes.
