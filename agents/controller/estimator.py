@@ -39,7 +39,7 @@ class Estimate(NamedTuple):
         q_joint: joint angles, (12,), rad.
         v_joint: joint rates, (12,), rad/s.
         foot_load: what each foot bears.
-        quat_wxyz: attitude that the IMU measures, (4,), of any positive norm.
+        quat_wxyz: attitude that R belongs to, (4,), of any positive norm.
     """
 
     position: Array
@@ -292,5 +292,5 @@ def trunk_from_truth(
         state.q_joint,
         state.v_joint,
         FootLoad(force, force >= rule.least_force),
-        state.imu_quat_wxyz,
+        truth.base_quat_wxyz[index].copy(),
     )

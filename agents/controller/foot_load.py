@@ -24,6 +24,7 @@ from quadriga.shared.robot.spec import Geometry
 from quadriga.shared.runtime.jit import compiled
 
 _LEAST_SPREAD = 8.0  # N, standard deviation of the load from which on it shows a sensor's scale
+_LEAST_COVARIANCE = 1e-6  # N · count; that of a sensor stuck at one count decays to nothing
 _CORRELATED = (0.6, 0.9)  # squared correlation from which on a sensor counts, and counts fully
 _AGREES = (20.0, 0.4)  # N and share of the load by which a sensor may differ from the torques
 _PATIENCE = 0.008  # s for which it may differ by more: it shows a touchdown before torques do
@@ -256,7 +257,7 @@ def _by_sensor(
     """
     var_force, var_counts = memory[FOOT_LOAD.var_force][leg], memory[FOOT_LOAD.var_counts][leg]
     covariance, differs = memory[FOOT_LOAD.covariance][leg], memory[FOOT_LOAD.differs]
-    if var_force < _LEAST_SPREAD**2 or covariance <= 0.0:
+    if var_force < _LEAST_SPREAD**2 or covariance < _LEAST_COVARIANCE:
         return 0.0, 0.0, 0.0
     correlation = covariance * covariance / (var_force * var_counts)
     least, full = _CORRELATED

@@ -193,9 +193,10 @@ def place(
     memory: Array,
     sensed: Array,
 ) -> None:
-    """The same once the estimate is known.
+    """Fill `memory` and `sensed` from a known estimate.
 
-    `filtered` is the filter's new memory; that of loads and attitude stays as it is.
+    `filtered` is the filter's new memory. That of foot loads begins anew, as after a gap in what is
+    measured; the error of the attitude stays.
     """
     ground_height0 = memory0[MEMORY.ground_height]
     switched = schedule[SCHEDULE.half_cycle] != memory0[MEMORY.half_cycle]
@@ -203,6 +204,7 @@ def place(
 
     memory[:] = memory0
     memory[MEMORY.half_cycle] = schedule[SCHEDULE.half_cycle]
+    memory[MEMORY.foot_load] = 0.0
     new = filter_state_of(memory)
     new.mean[:], new.covariance[:] = filtered
     memory[MEMORY.ground_height] = update_contacts(

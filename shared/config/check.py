@@ -11,6 +11,7 @@ from quadriga.shared.config.sections import (
     SIMULATED,
     Config,
     GaitConfig,
+    MotorsConfig,
     PlannerConfig,
     WorldConfig,
 )
@@ -39,6 +40,8 @@ def check(config: Config) -> None:
     _check_team_name(config.team.name)
     _check_gait(config.gait)
     _check_world(config.world, robot_names(config.team.robots))
+    _check_motors(config.motors)
+    _check_foot_sensors(config)
     _check_planner(config.planner, config.world)
     _check_plants(config)
     _check_pairs(config)
@@ -87,6 +90,30 @@ def _check_world(world: WorldConfig, names: tuple[str, ...]) -> None:
             f"{height:g}",
             f"at least {terrain.least_height:g} m for terrain {terrain.name!r}",
             "terrain 'flat' has no height",
+        )
+
+
+def _check_motors(motors: MotorsConfig) -> None:
+    friction = max(motors.friction, motors.viscous_friction)
+    if friction > 0.0 and not motors.rotor_inertia:
+        raise ConfigError(
+            "motors.rotor_inertia",
+            f"false with joint friction of {friction:g}",
+            "true, or motors.friction = 0 and motors.viscous_friction = 0",
+            "friction of light joints turns their rates around at every tick",
+        )
+
+
+def _check_foot_sensors(config: Config) -> None:
+    """A robot that is simulated says what its feet measure."""
+    if config.team.plant != SIMULATED or config.sensors.foot_sensor == "newtons":
+        return
+    if config.controller.foot_load == "sensor":
+        raise ConfigError(
+            "controller.foot_load",
+            f"'sensor' with sensors.foot_sensor = {config.sensors.foot_sensor!r}",
+            "'fused', or sensors.foot_sensor = 'newtons'",
+            "counts of unknown scale and bias would be taken for N",
         )
 
 

@@ -24,7 +24,11 @@ class MotorsConfig:
         "a motor's torque falls with the joint's speed, to zero at the joint's speed limit",
     )
     friction: float = key(
-        0.4, "N·m", "dry friction of each joint, motor and gear", low=0.0, high=5.0
+        0.4,
+        "N·m",
+        "dry friction of each joint, motor and gear; with friction rotor_inertia must be true",
+        low=0.0,
+        high=0.8,
     )
     viscous_friction: float = key(
         0.04, "N·m·s/rad", "friction of each joint that grows with its rate", low=0.0, high=1.0

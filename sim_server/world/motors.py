@@ -152,8 +152,11 @@ def _drive(
             limit = data.peak[k]
             if data.heating > 0.0:
                 limit = derated(limit, data.continuous[k], heat[i, k])
-            driving = available_torque(limit, rates[k], data.corner[k], data.top[k])
+            # Heat limits the current, speed the voltage: the lower limit holds.
+            driving = available_torque(data.peak[k], rates[k], data.corner[k], data.top[k])
+            driving = min(limit, driving)
             upper, lower = (driving, -limit) if rates[k] > 0.0 else (limit, -driving)
+            wanted = min(max(wanted, lower), upper)
             if data.follow < 1.0:
                 wanted = sound[i, k] + data.follow * (wanted - sound[i, k])
             sound[i, k] = min(max(wanted, lower), upper)

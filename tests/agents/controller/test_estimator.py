@@ -18,6 +18,7 @@ from quadriga.agents.controller.estimator import (
     foot_trust,
     trunk_from_truth,
 )
+from quadriga.agents.controller.maths.rotation import rotation_matrix
 from quadriga.shared.config.sections import EstimatorConfig
 from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS, Array
 from quadriga.shared.wire.messages import State, Truth
@@ -230,6 +231,13 @@ def test_the_truth_is_taken_over_as_it_is(seed: int) -> None:
     estimate = trunk_from_truth(truth, "r2", state, GEOMETRY, RULE)
     for name in ("position", "velocity", "R", "omega", "p_foot", "q_joint", "v_joint"):
         np.testing.assert_allclose(getattr(estimate, name), getattr(expected, name), atol=1e-12)
+
+
+def test_the_true_attitude_is_taken_whatever_the_imu_says() -> None:
+    truth, state, _ = moving(4)
+    tilted = state.imu_quat_wxyz + np.array([0.0, 0.05, -0.02, 0.1])
+    estimate = trunk_from_truth(truth, "r2", replace(state, imu_quat_wxyz=tilted), GEOMETRY, RULE)
+    np.testing.assert_allclose(rotation_matrix(estimate.quat_wxyz), estimate.R, atol=1e-12)
 
 
 def test_a_robot_is_found_in_the_truth_by_its_name() -> None:

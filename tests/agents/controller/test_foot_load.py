@@ -174,3 +174,13 @@ def test_sensors_alone_are_believed_where_they_are_to_be() -> None:
     _, told, loaded = trot.run(5)
     np.testing.assert_array_equal(told, np.tile([3.9, 4.0, 0.0, 80.0], (5, 1)))
     np.testing.assert_array_equal(loaded, np.tile([False, True, False, True], (5, 1)))
+
+
+def test_a_sensor_that_worked_and_then_stays_at_zero_is_forgotten_without_harm() -> None:
+    """Its counts' variance decays to nothing; no correlation may be computed from that."""
+    trot = Trot(lambda tick, noise, load: SCALES * load if tick < 1000 else np.zeros(N_LEGS))
+    trot.rule = trot.rule._replace(memory_time=0.02)
+    trot.run(20_000)
+    truth, told, _ = trot.run(400)
+    assert np.isfinite(told).all()
+    assert np.abs(told - truth)[50:200].max() < 20.0

@@ -135,3 +135,22 @@ def test_equal_worlds_with_real_motors_give_equal_bytes() -> None:
             world.step({"r1": STAND, "r2": STAND})
     assert one.physics.qpos.tobytes() == other.physics.qpos.tobytes()
     np.testing.assert_array_equal(one.motors.heat, other.motors.heat)
+
+
+def test_heat_takes_nothing_from_the_torque_that_speed_leaves() -> None:
+    """Heat limits the current and speed the voltage: of the two limits the lower one holds."""
+    of = motors(torque_speed=True, heat_time=300.0)
+    of.heat[:] = 1.2
+    fast = A1.corner_speed[0] + 0.9 * (A1.speed[0] - A1.corner_speed[0])
+    by_speed = available_torque(A1.torque_limit[0], fast, A1.corner_speed[0], A1.speed[0])
+    assert by_speed < A1.continuous_torque[0]
+    assert drive(of, command(tau=40.0), v=fast)[0] == by_speed
+    assert drive(of, command(tau=40.0))[0] == A1.continuous_torque[0]
+
+
+def test_a_command_beyond_the_limit_is_not_faster_than_the_limit() -> None:
+    limit, beyond = motors(bandwidth=50.0), motors(bandwidth=50.0)
+    for _ in range(5):
+        np.testing.assert_array_equal(
+            drive(limit, command(tau=33.5)), drive(beyond, command(tau=335.0))
+        )
