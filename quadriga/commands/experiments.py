@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from quadriga.commands.campaign import add_workers, read_workers
+from quadriga.commands.campaign import add_workers, read_workers, refuse_configuration
 from quadriga.commands.command import AddCommand, Given, say
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
@@ -107,7 +107,7 @@ def _publish(
     from quadriga.experiments.published.catalogue import CHECKOUT
     from quadriga.experiments.published.publish import PAGE, publish
     from quadriga.experiments.published.requirement_table import build_requirement_table
-    from quadriga.experiments.published.walk_experiment import unpack_published
+    from quadriga.experiments.published.walk_experiment import config_digests, unpack_published
 
     into, runs = arguments.into or CHECKOUT, arguments.out
     chosen = [experiment for experiment in every if experiment.name in asked]
@@ -116,7 +116,8 @@ def _publish(
     if arguments.only_publish and not arguments.names:
         renewed = [one.name for one in every if _is_of_this_code(one, runs)]
     # That all can be read and written is better known before hours of walking.
-    entries = publish(every, runs, into, renewed, say)
+    digests = {experiment.name: config_digests(experiment) for experiment in every}
+    entries = publish(every, runs, into, renewed, digests, say)
     if arguments.from_published:
         for experiment, plans in todo:
             count = unpack_published(
@@ -125,7 +126,7 @@ def _publish(
             say(f"{experiment.name}: {count:,} published trials taken up")
     for experiment, plans in todo:
         _walk(arguments, experiment, plans, runs)
-        entries = publish(every, runs, into, renewed, say)
+        entries = publish(every, runs, into, renewed, digests, say)
     shown = [(one.experiment, one.results) for one in entries if one.experiment.name in asked]
     for experiment, results in shown:
         _show(experiment, [build_requirement_table(experiment, results)])
@@ -134,11 +135,11 @@ def _publish(
 
 
 def _meets(experiment: Experiment, results: Results) -> bool:
-    """Whether everything that is required, but for moonshots, is met."""
+    """Whether everything that is required, but for moonshots, is met and walked to the last."""
     from quadriga.experiments.published.verdicts import judge_requirements
 
     return all(
-        verdict.word == "met" or verdict.requirement.moonshot
+        (verdict.word == "met" and verdict.whole) or verdict.requirement.moonshot
         for verdict in judge_requirements(experiment, results)
     )
 
@@ -206,12 +207,7 @@ def _show(experiment: Experiment, tables: Iterable[Table]) -> None:
 
 def _check_options(arguments: argparse.Namespace) -> None:
     read_workers(arguments, "names")
-    given = {**arguments.overrides, "--config": arguments.config, "--scenario": arguments.scenario}
-    for name, value in given.items():
-        if value is not None:
-            raise ConfigError(
-                name, str(value), "no key", "those of an experiment stand in its file"
-            )
+    refuse_configuration(arguments, "those of an experiment stand in its file")
     if arguments.only_publish and arguments.seeds:
         raise ConfigError("--seeds", repr(arguments.seeds), "none", "--only-publish walks nothing")
     if arguments.from_published and (arguments.only_publish or arguments.seeds):

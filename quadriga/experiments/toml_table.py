@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
@@ -36,7 +37,10 @@ class TomlTable:
         return bool(self._get(name, default, lambda v: isinstance(v, bool), "true or false"))
 
     def number(self, name: str) -> float:
-        return float(self._get(name, None, lambda v: type(v) in (int, float), "a number"))
+        def right(value: Any) -> bool:
+            return type(value) in (int, float) and math.isfinite(value)
+
+        return float(self._get(name, None, right, "a finite number"))
 
     def texts(
         self, name: str, default: tuple[str, ...], known: Collection[str] = ()

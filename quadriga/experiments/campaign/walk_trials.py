@@ -129,7 +129,7 @@ def build_manifest(plan: CampaignPlan, fitted: Mapping[Config, Fitted], typed: s
                 group.scenario,
                 group.variant,
                 group.swept,
-                _digest(config),
+                config_digest(config),
                 fitted[config].sha256,
                 tuple(sorted(plan.seeds)),
                 plugin_origin(config.planner.kind),
@@ -141,7 +141,7 @@ def build_manifest(plan: CampaignPlan, fitted: Mapping[Config, Fitted], typed: s
     )
 
 
-def _digest(config: Config) -> str:
+def config_digest(config: Config) -> str:
     """Of the configuration, and of the trace that it names."""
     trace = trace_sha256(config)
     mine = config_sha256(config)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -172,9 +173,11 @@ def _requirements(
         raise ConfigError(f"{table.where}: measure and over", "nothing", "at least one of each")
     against = table.text("against", baseline)
     table.check_one("against", against, variants)
-    others = tuple(variant for variant in variants if variant != baseline)
+    others = tuple(variant for variant in variants if variant not in (baseline, against))
     chosen = table.texts("variants", (), variants) or others or (baseline,)
-    _check_measures(table, measures, bound, paired=against not in chosen)
+    if table.has("against") and not all(MEASURES[name].paired for name in measures):
+        raise ConfigError(f"{table.where}: against", repr(against), "none", "no pairs are measured")
+    _check_measures(table, measures, bound, against=against, chosen=chosen)
     if "all" in over and not poolable:
         raise ConfigError(
             f"{table.where}: over",
@@ -182,6 +185,10 @@ def _requirements(
             "each",
             "pooled are several scenarios, of which none sweeps",
         )
+    places = table.texts("scenarios", (), labels)
+    at_least = 0
+    if table.has("at_least"):
+        at_least = _read_at_least(table, len(places or labels) if poolable else None, over)
     return [
         Requirement(
             measure=measure,
@@ -189,28 +196,46 @@ def _requirements(
             limit=table.number(senses[0]),
             bound=next(known for known in BOUNDS if known == bound),
             variants=chosen,
-            scenarios=table.texts("scenarios", (), labels),
+            scenarios=places,
             each="each" in over,
             pooled="all" in over,
             moonshot=table.yes("moonshot", False),
             against="" if against == baseline else against,
-            at_least=int(table.number("at_least")) if table.has("at_least") else 0,
+            at_least=at_least,
         )
         for measure in measures
     ]
 
 
+def _read_at_least(table: TomlTable, worlds: int | None, over: tuple[str, ...]) -> int:
+    """In how many worlds it must be met; `worlds` there are, unless a sweep makes more."""
+    number, most = table.number("at_least"), math.inf if worlds is None else worlds
+    if "all" in over:
+        raise ConfigError(
+            f"{table.where}: at_least", f"{number:g} with over {list(over)}", 'over = "each"'
+        )
+    if not 1 <= number <= most or number != int(number):
+        expected = "a whole number ≥ 1" + (f" and ≤ {worlds}, its worlds" if worlds else "")
+        raise ConfigError(f"{table.where}: at_least", f"{number:g}", expected)
+    return int(number)
+
+
 def _check_measures(
-    table: TomlTable, measures: tuple[str, ...], bound: str, *, paired: bool
+    table: TomlTable,
+    measures: tuple[str, ...],
+    bound: str,
+    *,
+    against: str,
+    chosen: tuple[str, ...],
 ) -> None:
     """Refuse what no trial could ever answer."""
     for name in measures:
-        if MEASURES[name].paired and not paired:
+        if MEASURES[name].paired and against in chosen:
             raise ConfigError(
                 f"{table.where}: measure",
                 repr(name),
                 "one of a variant alone",
-                "it compares with the baseline, of which it is asked",
+                f"it compares with {against}, of which it is asked",
             )
         if bound != "value" and not MEASURES[name].interval:
             raise ConfigError(

@@ -57,7 +57,9 @@ def _limits(experiment: Experiment) -> Callable[[str, str, World], Iterator[floa
 
     def find(variant: str, measure: str, world: World) -> Iterator[float]:
         for asked in experiment.requirements:
-            if asked.measure == measure and variant in asked.variants and not asked.moonshot:
+            # A figure shows what is compared with the baseline, and each world for itself.
+            shown = not (asked.moonshot or asked.against or asked.at_least)
+            if asked.measure == measure and variant in asked.variants and shown:
                 there = asked.each and world[0] in (asked.scenarios or (world[0],))
                 if asked.pooled if world == POOLED else there:
                     yield asked.limit

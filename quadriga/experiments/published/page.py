@@ -50,15 +50,27 @@ how far the figure, or that bound, is from the limit. What an experiment was wal
 versions and by a digest of what the code does; code that does something else may come to other
 figures.
 """
+_OUTDATED: Final = (
+    "**earlier defaults**: keys that this experiment does not set had other values when it was "
+    "walked; the command walks with those of today"
+)
 
 
 @dataclass(frozen=True, slots=True)
 class PageEntry:
-    """An experiment, what came of it, and the figures there are, as paths from the page."""
+    """An experiment and what came of it.
+
+    Attributes:
+        experiment: what was asked.
+        results: what was found.
+        figures: those there are, as paths from the page.
+        outdated: whether it was walked with other defaults or scenarios than it has today.
+    """
 
     experiment: Experiment
     results: Results
     figures: Sequence[str] = ()
+    outdated: bool = False
 
 
 def build_page(entries: Sequence[PageEntry]) -> str:
@@ -98,8 +110,9 @@ def build_overview(entries: Sequence[PageEntry], link: str) -> str:
 
 
 def build_readme_table(entries: Sequence[PageEntry]) -> str:
-    """What stands between the markers of the README."""
-    return f"{BEGIN}\n{build_overview(entries, 'docs/results.md#')}\n{END}"
+    """What stands between the markers of the README: nothing that today is walked otherwise."""
+    current = [entry for entry in entries if not entry.outdated]
+    return f"{BEGIN}\n{build_overview(current, 'docs/results.md#')}\n{END}"
 
 
 def format_table(table: Table, left: int = 1) -> str:
@@ -149,6 +162,8 @@ def _facts(entry: PageEntry) -> str:
         f"- baseline: {experiment.baseline}",
     ]
     lines += [f"- code and libraries: {versions}" for versions in results.versions]
+    if entry.outdated:
+        lines.append(f"- {_OUTDATED}")
     return "\n".join(lines)
 
 

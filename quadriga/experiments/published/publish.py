@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
 from quadriga.experiments.campaign.ledger import explain_write_errors, read_manifest, read_rows
 from quadriga.experiments.campaign.manifest import FILE
+from quadriga.experiments.plan import Group
 from quadriga.experiments.published.experiment import Experiment, Part
 from quadriga.experiments.published.figures import draw_figure
 from quadriga.experiments.published.page import (
@@ -19,6 +20,7 @@ from quadriga.experiments.published.page import (
     replace_results,
 )
 from quadriga.experiments.published.published_trials import (
+    Campaigns,
     has_more_published,
     pack_trials,
     read_published_trials,
@@ -32,10 +34,16 @@ README: Final = "README.md"
 PAGE: Final = Path("docs/results.md")
 FIGURES: Final = Path("docs/figures")
 Say = Callable[[str], None]
+Digests = Mapping[str, Mapping[Group, str]]
 
 
 def publish(
-    experiments: Sequence[Experiment], runs: Path, into: Path, renewed: Container[str], say: Say
+    experiments: Sequence[Experiment],
+    runs: Path,
+    into: Path,
+    renewed: Container[str],
+    digests: Digests,
+    say: Say,
 ) -> list[PageEntry]:
     """Write everything that is published of these experiments.
 
@@ -44,6 +52,7 @@ def publish(
         runs: where their campaigns' folders are, if they are.
         into: the checkout whose README and docs are written.
         renewed: names of the experiments whose runs win over what is published of them.
+        digests: of each experiment's configurations, as they are today, by its name.
         say: takes what a user should know.
 
     Raises:
@@ -59,7 +68,8 @@ def publish(
             published = read_published_trials(experiment, into)
             results = summarise_experiment(experiment, list(published.values()))
             figures = _draw_figures(experiment, results, into)
-            entries.append(PageEntry(experiment, results, figures))
+            outdated = _is_outdated(published, digests[experiment.name])
+            entries.append(PageEntry(experiment, results, figures, outdated))
         write_text(into / PAGE, build_page(entries))
         write_text(into / README, replace_results(readme, build_readme_table(entries)) or readme)
     return entries
@@ -109,6 +119,12 @@ def read_campaigns(experiment: Experiment, runs: Path) -> dict[Part, CampaignTri
             manifest = read_manifest(folder)
             campaigns[part] = (manifest, read_rows(folder, manifest))
     return campaigns
+
+
+def _is_outdated(campaigns: Campaigns, digests: Mapping[Group, str]) -> bool:
+    """Whether a configuration that trials were walked with is another one today."""
+    walked = [entry for manifest, _ in campaigns.values() for entry in manifest.groups]
+    return any(entry.config_sha256 != digests.get(entry.group) for entry in walked)
 
 
 def _draw_figures(experiment: Experiment, results: Results, into: Path) -> list[str]:

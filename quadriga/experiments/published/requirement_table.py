@@ -46,9 +46,13 @@ def format_requirement(verdict: RequirementVerdict, experiment: Experiment) -> s
 def format_word(verdict: RequirementVerdict) -> str:
     """Met, missed (and where) or open."""
     text = _MARK[verdict.word]
-    missed = sum(finding.word == "missed" for finding in verdict.findings)
-    if missed and len(verdict.findings) > 1:
-        text += f" in {missed} of {len(verdict.findings)}"
+    asked = len(verdict.findings)
+    if verdict.requirement.at_least:
+        met = sum(finding.word == "met" for finding in verdict.findings)
+        text += f", met in {met} of {asked}" if verdict.word != "open" else ""
+    elif asked > 1:
+        missed = sum(finding.word == "missed" for finding in verdict.findings)
+        text += f" in {missed} of {asked}" if missed else ""
     return text if verdict.whole or verdict.word == "open" else f"{text} so far"
 
 

@@ -78,7 +78,7 @@ def judge_requirements(experiment: Experiment, results: Results) -> list[Require
             requirement,
             variant,
             tuple(
-                _judge(requirement, world, results.find(world, variant, requirement.against))
+                _judge(requirement, world, variant, results)
                 for world in _worlds(experiment, requirement)
             ),
         )
@@ -115,11 +115,14 @@ def _worlds(experiment: Experiment, requirement: Requirement) -> Sequence[World]
 
 
 def _judge(
-    requirement: Requirement, world: tuple[str, ...], line: Line | None
+    requirement: Requirement, world: World, variant: str, results: Results
 ) -> RequirementResult:
+    line = results.find(world, variant, requirement.against)
     if line is None:
         return RequirementResult(world, "open")
-    whole = line.done >= line.wanted
+    whole = _is_whole(line)
+    if MEASURES[requirement.measure].paired:
+        whole &= _is_whole(results.find(world, requirement.against or results.baseline))
     if line.tally.refused:
         return RequirementResult(world, "missed", whole=whole, refused=line.tally.refused)
     estimate = MEASURES[requirement.measure].of(line)
@@ -128,3 +131,7 @@ def _judge(
         return RequirementResult(world, "open", estimate, whole=whole)
     met = margin > 0.0 if requirement.sense == "below" else margin >= 0.0
     return RequirementResult(world, "met" if met else "missed", estimate, margin, whole)
+
+
+def _is_whole(line: Line | None) -> bool:
+    return line is not None and line.done >= line.wanted

@@ -9,9 +9,14 @@ from rich.console import Console
 
 from quadriga.experiments.campaign.ledger import read_manifest
 from quadriga.experiments.campaign.manifest import FILE
-from quadriga.experiments.campaign.walk_trials import Workers, build_manifest, walk_campaign
+from quadriga.experiments.campaign.walk_trials import (
+    Workers,
+    build_manifest,
+    config_digest,
+    walk_campaign,
+)
 from quadriga.experiments.campaign.write_report import write_report
-from quadriga.experiments.plan import CampaignPlan, build_plan
+from quadriga.experiments.plan import CampaignPlan, Group, build_plan
 from quadriga.experiments.predictors import prepare_predictors
 from quadriga.experiments.published.experiment import Experiment, Part
 from quadriga.experiments.published.published_trials import read_published_manifest, unpack_trials
@@ -42,6 +47,19 @@ def build_plans(experiment: Experiment) -> list[PartPlan]:
         )
         for part in experiment.parts
     ]
+
+
+def config_digests(experiment: Experiment) -> dict[Group, str]:
+    """The digest of each group's configuration, as it is today.
+
+    Raises:
+        ConfigError: as `build_plans`.
+    """
+    return {
+        group: config_digest(config)
+        for _, plan in build_plans(experiment)
+        for group, config in plan.configs.items()
+    }
 
 
 def check_folders(experiment: Experiment, runs: Path) -> None:

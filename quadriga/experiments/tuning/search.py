@@ -16,7 +16,7 @@ from quadriga.experiments.campaign.walk_trials import Workers, walk_campaign
 from quadriga.experiments.plan import CampaignPlan, build_plan
 from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.experiments.tuning.loss import by_world, loss
-from quadriga.experiments.tuning.tuning_file import Tuning
+from quadriga.experiments.tuning.tuning_file import Tuning, look_up
 from quadriga.experiments.variants import Variant
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
@@ -96,14 +96,26 @@ def search(tuning: Tuning, out: Path, *, workers: Workers, typed: str, console: 
 
 
 def _start(tuning: Tuning) -> Config:
-    """The configuration that the search starts from; it must be the same in all scenarios."""
+    """The configuration that the search starts from.
+
+    Raises:
+        ConfigError: a tuned key, or the length of a walk, is not the same in all scenarios.
+    """
     plan = build_plan(
         tuning.scenarios, (Variant(START, tuning.fixed),), (), tuning.seeds, START, None, {}
     )
-    starts = [tuning.start_values(config) for config in plan.configs.values()]
-    if any(values != starts[0] for values in starts):
-        raise ConfigError("scenarios", "different starts", "none that sets a tuned key")
-    return next(iter(plan.configs.values()))
+    first, *others = plan.configs.values()
+    tuning.start_values(first)
+    for key in dict.fromkeys((*(tuned.key for tuned in tuning.keys), "world.seconds")):
+        found = {look_up(config, key) for config in (first, *others)}
+        if len(found) > 1:
+            raise ConfigError(
+                "scenarios",
+                f"{key} of {' and '.join(map(str, sorted(found)))}",
+                "equal values in all scenarios",
+                f"[fixed] sets {key} for all",
+            )
+    return first
 
 
 def _strategy(tuning: Tuning, start: Config) -> Any:

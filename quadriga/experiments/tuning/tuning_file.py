@@ -21,6 +21,7 @@ _KEYS: Final = (
 )  # fmt: skip
 _DIGITS: Final = 3  # of a tuned value: more would say nothing, and be longer to read
 _LEAST_POPULATION: Final = 4
+_LARGEST_SEED: Final = 2**32 - 1  # of NumPy's generators
 _ELEMENT: Final = re.compile(r"(?P<key>[^\[\]]+)(\[(?P<place>\d+)\])?")
 
 
@@ -119,7 +120,7 @@ class Tuning:
             if key.place is None:
                 found[key.key] = values[key.name]
             else:
-                elements = list(found.get(key.key, _look_up(start, key.key)))
+                elements = list(found.get(key.key, look_up(start, key.key)))
                 elements[key.place] = values[key.name]
                 found[key.key] = elements
         return found
@@ -149,7 +150,7 @@ def read_tuning(path: Path) -> Tuning:
         population=_count(table, "population", _LEAST_POPULATION),
         generations=_count(table, "generations", 1),
         step=table.number("step"),
-        seed=_count(table, "seed", 0),
+        seed=_count(table, "seed", 0, _LARGEST_SEED),
         fixed=flatten(table.mapping("fixed")),
         keys=_read_keys(table),
     )
@@ -197,10 +198,13 @@ def _read_keys(table: TomlTable) -> tuple[TunedKey, ...]:
     return tuple(keys)
 
 
-def _count(table: TomlTable, name: str, least: int) -> int:
+def _count(table: TomlTable, name: str, least: int, most: int | None = None) -> int:
     number = table.number(name)
-    if number < least or number != int(number):
-        raise ConfigError(f"{table.where}: {name}", f"{number:g}", f"a whole number ≥ {least}")
+    if number < least or number != int(number) or (most is not None and number > most):
+        upper = "" if most is None else f" and ≤ {most}"
+        raise ConfigError(
+            f"{table.where}: {name}", f"{number:g}", f"a whole number ≥ {least}{upper}"
+        )
     return int(number)
 
 
@@ -210,7 +214,12 @@ def _match(name: str) -> re.Match[str]:
     return match
 
 
-def _look_up(config: Config, name: str) -> Any:
+def look_up(config: Config, name: str) -> Any:
+    """The value of `section.key`.
+
+    Raises:
+        ConfigError: there is no such key.
+    """
     section, _, key = name.partition(".")
     try:
         return getattr(getattr(config, section), key)
@@ -219,7 +228,7 @@ def _look_up(config: Config, name: str) -> Any:
 
 
 def _number(config: Config, key: TunedKey) -> float:
-    value = _look_up(config, key.key)
+    value = look_up(config, key.key)
     if key.place is not None:
         if not isinstance(value, tuple) or key.place >= len(value):
             raise ConfigError(f"tuned: {key.name}", repr(value), "an element of a list")

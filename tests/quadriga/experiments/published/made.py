@@ -17,6 +17,7 @@ from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.experiments.variants import Variant
 from tests.quadriga.experiments.rows import row
 
+DIGEST = "ab" * 32
 Fate = Callable[[Group, int], dict[str, Any]]  # changes of the row of a trial
 
 README = "# Here\n\n<!-- results:begin -->\nold\n<!-- results:end -->\n\nAfter.\n"
@@ -68,7 +69,7 @@ def manifest_of(experiment: Experiment, part: int = 0, **changes: Any) -> Manife
         "variants": {variant.name: dict(variant.keys) for variant in experiment.variants},
         "sweeps": sweeps, "versions": "code 1",
         "groups": tuple(
-            GroupEntry(g.scenario, g.variant, g.swept, "ab" * 32, "", experiment.seeds)
+            GroupEntry(g.scenario, g.variant, g.swept, DIGEST, "", experiment.seeds)
             for g in experiment.groups() if g.world in worlds
         ),
     }  # fmt: skip
@@ -92,10 +93,19 @@ def upright(_group: Group, _seed: int) -> dict[str, Any]:
     return {}
 
 
-def publish_all(experiments: Iterable[Experiment], runs: Path, into: Path) -> list[PageEntry]:
-    """Publish experiments, the runs of each if it has any."""
+def publish_all(
+    experiments: Iterable[Experiment], runs: Path, into: Path, today: str = DIGEST
+) -> list[PageEntry]:
+    """Publish experiments, the runs of each if it has any; `today` are all digests of today."""
     every = list(experiments)
-    return publish(every, runs, into, [one.name for one in every], print)
+    return publish(
+        every,
+        runs,
+        into,
+        [one.name for one in every],
+        {one.name: dict.fromkeys(one.groups(), today) for one in every},
+        print,
+    )
 
 
 def files(folder: Path) -> dict[str, bytes]:

@@ -86,6 +86,32 @@ def test_a_requirement_names_whom_it_compares_with_and_in_how_many_worlds(tmp_pa
         read_experiment(written(tmp_path, SMALL + more.replace('"soft"', '"hard"') + "below = 1\n"))
 
 
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ("at_least = 0", "at_least: got 0, expected a whole number ≥ 1 and ≤ 2, its worlds"),
+        ("at_least = 3", "at_least: got 3, expected"),
+        ("at_least = 1.5", "at_least: got 1.5, expected"),
+        ("at_least = inf", "at_least: got inf, expected a finite number"),
+        ('scenarios = "flat"\nat_least = 2', "at_least: got 2, .* ≤ 1"),
+        ('over = ["each", "all"]\nat_least = 1', "at_least: got 1 with over"),
+        ('variants = "soft"\nagainst = "soft"', "it compares with soft, of which it is asked"),
+    ],
+)
+def test_a_requirement_that_nothing_can_meet_is_refused(
+    tmp_path: Path, more: str, message: str
+) -> None:
+    asked = f'[[requirements]]\nmeasure = "fall-ratio"\nbelow = 1\n{more}\n'
+    with pytest.raises(ConfigError, match=message):
+        read_experiment(written(tmp_path, SMALL + asked))
+
+
+def test_only_pairs_are_held_against_another_variant(tmp_path: Path) -> None:
+    asked = '[[requirements]]\nmeasure = "success"\nleast = 9\nagainst = "soft"\n'
+    with pytest.raises(ConfigError, match="against: got 'soft', expected none"):
+        read_experiment(written(tmp_path, SMALL + asked))
+
+
 def test_what_is_swept_makes_a_campaign_of_each_scenario(tmp_path: Path) -> None:
     text = SMALL.partition("[[requirements]]")[0] + (
         '[sweep.flat]\nkeys = "world.payload=0,5"\naxis = "load [kg]"\n'
@@ -140,7 +166,7 @@ def test_what_is_swept_makes_a_campaign_of_each_scenario(tmp_path: Path) -> None
         ('["flat", "turn"]', '["turn"]', "the 1.: over: got all, expected each"),
         ("most = 0.8", "", "requirements, the 1.: got no limit, expected one of least"),
         ("most = 0.8", "most = 0.8\nleast = 0.1", "the 1.: got least, most"),
-        ("most = 0.8", 'most = "0.8"', "most: got '0.8', expected a number"),
+        ("most = 0.8", 'most = "0.8"', "most: got '0.8', expected a finite number"),
         ("most = 0.8", 'most = 0.8\nbound = "uper"', "did you mean 'upper'"),
         ("ratio-z", "ratio-q", "the 1.: measure: got 'ratio-q'"),
         ('["ratio-z", "ratio-vy"]', "[]", "measure and over: got nothing"),

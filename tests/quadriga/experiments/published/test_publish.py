@@ -16,6 +16,7 @@ from quadriga.experiments.published.page import BEGIN, END, build_overview, repl
 from quadriga.experiments.published.publish import PAGE
 from quadriga.shared.errors import ConfigError
 from tests.quadriga.experiments.published.made import (
+    DIGEST,
     checkout,
     experiment_of,
     files,
@@ -188,3 +189,18 @@ def test_a_refused_variant_is_a_row_and_says_why(tmp_path: Path) -> None:
         "| ice | mine | refused | – |\n\nmine was refused: radius 0.9, not at most 0.5.\n" in page
     )
     assert "| **missed** | **missed**: refused, radius 0.9, not at most 0.5 |" in page
+
+
+def test_what_was_walked_with_earlier_defaults_says_so_and_leaves_the_readme(
+    tmp_path: Path,
+) -> None:
+    into, runs = checkout(tmp_path / "here"), tmp_path / "runs"
+    experiment = experiment_of("steps")
+    write_runs(experiment, runs, range(10), upright)
+    for digest, current in ((DIGEST, True), ("cd" * 32, False)):
+        publish_all([experiment], runs, into, digest)
+        readme = (into / "README.md").read_text(encoding="utf-8")
+        assert ("results.md#small" in readme) is current
+        page = (into / PAGE).read_text(encoding="utf-8")
+        assert ("**earlier defaults**" in page) is not current
+        assert "20\xa0of\xa020" in page

@@ -15,6 +15,7 @@ from quadriga.experiments.published.summarise_experiment import summarise_experi
 from quadriga.experiments.sweep import parse_sweep
 from quadriga.shared.errors import ConfigError
 from tests.quadriga.experiments.published.made import (
+    DIGEST,
     checkout,
     experiment_of,
     files,
@@ -61,7 +62,8 @@ def test_what_nobody_asks_for_stays_as_published(tmp_path: Path) -> None:
     publish_all([experiment], runs, into)
     first = files(into)
     write_runs(experiment, tmp_path / "more", range(10), upright)
-    publish([experiment], tmp_path / "more", into, ["another"], print)
+    digests = {experiment.name: dict.fromkeys(experiment.groups(), DIGEST)}
+    publish([experiment], tmp_path / "more", into, ["another"], digests, print)
     assert files(into) == first
 
 

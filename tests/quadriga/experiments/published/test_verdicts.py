@@ -176,6 +176,17 @@ def test_what_is_not_walked_to_its_end_is_met_so_far_at_most() -> None:
     assert format_word(verdict) == "**missed** so far"
 
 
+def test_pairs_whose_other_half_is_not_walked_are_met_so_far() -> None:
+    asked = Requirement("ratio-roll", "most", 1.0, variants=("mine",), scenarios=("steps",))
+    mine = line(9, ratio=Ratio(9, 0.9, 0.8, 1.0))
+    for done, said in ((9, "met"), (3, "met so far")):
+        other = line(done, variant="none", wanted=9)
+        (verdict,) = judge(asked, mine, other)
+        assert format_word(verdict) == said
+    (verdict,) = judge(asked, mine)
+    assert format_word(verdict) == "met so far"
+
+
 def test_a_refused_variant_misses_everything() -> None:
     asked = Requirement("falls", "most", 1.0, variants=("mine",), scenarios=("steps",))
     refused = line(tally=tally_trials([row(refused="radius 0.9, not at most 0.5", success=False)]))
@@ -212,7 +223,10 @@ def test_a_requirement_is_said_in_words() -> None:
 def test_some_worlds_may_be_enough(words: tuple[Any, ...], verdict: str) -> None:
     asked = Requirement("fall-ratio", "below", 1.0, variants=("mine",), at_least=2)
     findings = tuple(RequirementResult((f"w{k}",), word) for k, word in enumerate(words))
-    assert RequirementVerdict(asked, "mine", findings).word == verdict
+    of_mine = RequirementVerdict(asked, "mine", findings)
+    assert of_mine.word == verdict
+    count = "" if verdict == "open" else f", met in {words.count('met')} of 3 so far"
+    assert format_word(of_mine).replace("*", "") == verdict + count
     assert (
         describe_requirement(asked, "none") == "falls over those of none < 1 in at least 2 worlds"
     )

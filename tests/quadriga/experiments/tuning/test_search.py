@@ -69,3 +69,15 @@ def test_a_mistake_costs_one_line(tmp_path: Path, capsys: Said) -> None:
     said = capsys.readouterr().err
     assert "flatt" in said
     assert "Traceback" not in said
+    assert main(["tune", str(file), "--set", "controller.kp_z=100"]) == 2
+    assert "controller.kp_z: got 100" in capsys.readouterr().err
+
+
+def test_scenarios_of_several_lengths_are_refused(tmp_path: Path, capsys: Said) -> None:
+    file = tmp_path / "gains.toml"
+    short, long = tmp_path / "short.toml", tmp_path / "long.toml"
+    short.write_text(SCENARIO, encoding="utf-8")
+    long.write_text(SCENARIO.replace("seconds = 0.5", "seconds = 0.8"), encoding="utf-8")
+    file.write_text(TUNING.replace("SCENARIO", f'{short}", "{long}'), encoding="utf-8")
+    assert main(["tune", str(file), "--out", str(tmp_path / "out")]) == 2
+    assert "world.seconds of 0.5 and 0.8" in capsys.readouterr().err
