@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+PROBES := runs/probe/3/responses.npz runs/probe/5/responses.npz
 TOOLS := $(VENV)/.tools
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
@@ -47,12 +48,16 @@ docs: $(STAMP)
 	$(BIN)/quadriga config --markdown > docs/configuration.md
 	$(BIN)/python -m quadriga.shared.wire.markdown > docs/messages.md
 
-# Every figure and table of results in README and docs, and the clip; two cores walk 15 times a
+# Every figure and table of results in README and docs, and the clip; two cores walk 30 times a
 # minute. It goes on where it ended. With ARGS the clip is left alone: ARGS=--only-publish walks
 # nothing, ARGS='hard --seeds 0:2' only looks.
-figures: $(STAMP)
+figures: $(STAMP) $(if $(ARGS),,$(PROBES))
 	$(BIN)/quadriga experiments $(ARGS)
 	$(if $(ARGS),,$(MAKE) clip)
+
+# The true responses that the experiment `distribution` plans with, for comparison.
+runs/probe/%/responses.npz: | $(STAMP)
+	$(BIN)/quadriga probe --robots $* --repetitions 8 --out runs/probe/$*
 
 # The clip of the README.
 clip: $(STAMP)

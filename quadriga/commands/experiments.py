@@ -148,11 +148,16 @@ def _build_plans(
     chosen: Iterable[Experiment], runs: Path
 ) -> list[tuple[Experiment, list[PartPlan]]]:
     """Campaigns of experiments that can be walked, or gone on with."""
-    from quadriga.experiments.published.walk_experiment import build_plans, check_folders
+    from quadriga.experiments.published.walk_experiment import (
+        build_plans,
+        check_folders,
+        check_responses,
+    )
 
     plans = [(experiment, build_plans(experiment)) for experiment in chosen]
-    for experiment, _ in plans:
+    for experiment, mine in plans:
         check_folders(experiment, runs)
+        check_responses(experiment, mine)
     return plans
 
 

@@ -62,6 +62,24 @@ def config_digests(experiment: Experiment) -> dict[Group, str]:
     }
 
 
+def check_responses(experiment: Experiment, plans: Sequence[PartPlan]) -> None:
+    """Refuse to begin without the measured responses that a variant plans with.
+
+    Raises:
+        ConfigError: there is no such file.
+    """
+    for _, plan in plans:
+        for config in plan.configs.values():
+            path = Path(config.response_file)
+            if config.response_file and not path.is_file():
+                raise ConfigError(
+                    f"{experiment.name}: identification.response",
+                    f"no file {path}",
+                    "measured responses",
+                    f"`quadriga probe --robots {config.team.robots} --out {path.parent}` first",
+                )
+
+
 def check_folders(experiment: Experiment, runs: Path) -> None:
     """Refuse to go on with trials of other code, before anything is walked.
 
