@@ -97,7 +97,7 @@ def four_strides(run: Run) -> tuple[float, float]:
 
 
 def _force_legend(run: Run) -> list[tuple[str, str]]:
-    unit = "N" if run.traces.config.controller.foot_load == "sensor" else "counts"
+    unit = "N" if run.traces.config.feet_measure_newtons else "counts"
     source = "ground reaction (truth)" if run.has_truth else f"by the foot sensor, {unit}"
     return [("true", source), ("planned", "planned, as applied")]
 

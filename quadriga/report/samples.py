@@ -86,7 +86,7 @@ def _build_samples(
         stack(measured, "stance", N_LEGS) > 0.5,
         scheduled_stance(traces.config, index, tick - SAMPLE_MS),
     )
-    contact = _contact_by_sensors(force, traces.config)
+    contact = contact_by_sensors(force, traces.config)
     truth, robot = traces.truth, traces.config.robot
     if len(truth.tick):
         contact = _look_up(tick, truth.tick, truth.grf[:, index, :, 2] > _LOADED, contact)
@@ -104,12 +104,12 @@ def _build_samples(
     )
 
 
-def _contact_by_sensors(force: Array, config: Config) -> Any:
+def contact_by_sensors(force: Array, config: Config) -> Any:
     """Which feet bear load by their sensors alone, shape (M, 4), bool.
 
     Counts have no known scale: above the middle of what a sensor gave, its foot counts as loaded.
     """
-    if config.controller.foot_load == "sensor":
+    if config.feet_measure_newtons:
         return force > config.controller.contact_force
     if not len(force):
         return np.zeros_like(force, dtype=bool)

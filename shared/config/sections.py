@@ -64,6 +64,12 @@ class Config:
         return ROBOTS[self.team.robot]
 
     @property
+    def feet_measure_newtons(self) -> bool:
+        """Whether foot forces of messages are N, and not counts of unknown scale and bias."""
+        simulated = self.team.plant == SIMULATED and self.sensors.foot_sensor == "newtons"
+        return simulated or self.controller.foot_load == "sensor"
+
+    @property
     def response_file(self) -> str:
         """The file of measured responses for a team of this size; empty if none is configured."""
         return self.identification.response.replace("{robots}", str(self.team.robots))
