@@ -14,7 +14,7 @@ from quadriga.shared.runtime.jit import compiled
 
 _SETTLED = 0.2  # of a half cycle: before this a foot may still be landing
 _LOSS = 15.0  # 1/s, of the coefficient counted on while a foot slides
-_WARY = 0.1  # of the recovery, while less is counted on than a slip alone explains
+_WARY = 0.1  # of the recovery, while the QP counts on less than `mu_min`
 
 
 class FrictionRule(NamedTuple):

@@ -57,7 +57,7 @@ class SensingLayout(NamedTuple):
         geometry: `Geometry`.
         imu: where the accelerometer is, (3,), m, trunk frame.
         foot_load: `FootLoadRule`.
-        links: `link_table`, (13, 13).
+        links: `link_table`, (13, 14).
     """
 
     trust_ramp: int

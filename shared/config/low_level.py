@@ -214,7 +214,7 @@ class ControllerConfig:
     foothold_inwards: float = key(
         0.1,
         "m",
-        "how far a foothold may lie from under its hip towards the trunk's middle line; times "
+        "how far a foothold may lie from under where its hip is now towards the middle line; times "
         "1 + load / mass with a load that is felt",
         low=0.0,
         high=10.0,

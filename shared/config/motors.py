@@ -9,7 +9,7 @@ from quadriga.shared.config.key import key
 
 @dataclass(frozen=True, slots=True)
 class MotorsConfig:
-    """The simulated motors and joints: between what is commanded and what acts on a joint."""
+    """Motors and joints: what the world simulates, and what of it the low level's model has."""
 
     preset: str = key(
         "realistic",

@@ -53,7 +53,7 @@ class WorldConfig:
         True,
         "-",
         "hips, thighs and calves collide with the ground, thighs, calves, feet and trunks with "
-        "those of others; false: feet and trunks collide, and with the ground alone",
+        "those of other legs and robots; false: feet and trunks collide, and with the ground alone",
     )
     payload: float = key(0.0, "kg", "load unknown to the agents", low=0.0, high=60.0)
     payload_on: str = key(

@@ -107,7 +107,7 @@ class Sensors:
             tick: the messages' tick, ms.
             q: true coordinates of each robot, trunk position and attitude first, (n, 19).
             v: true velocities, (n, 18): of the trunk, its rate in its own frame, of the joints.
-            tau: true joint torques, (n, 12), N·m.
+            tau: true torques of the motors, before friction, (n, 12), N·m.
             sensed: true specific force and normal foot forces, units and frames as in `State`, in
                 its columns 3 … 9; shape (n, ≥ 10).
         """

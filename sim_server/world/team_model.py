@@ -97,8 +97,8 @@ def build_team_model(
         names: the robots that are in this world, at their places in the team; by default all.
 
     Raises:
-        ConfigError: the payload names no robot, the reference's trace is no trace, or the robot's
-            URDF is missing.
+        ConfigError: the payload or `world.friction_of` names no robot, the reference's trace is no
+            trace, or the robot's URDF is missing.
     """
     team = robot_names(config.team.robots)
     robots = {name: i for i, name in enumerate(team) if not names or name in names}

@@ -55,8 +55,8 @@ class World:
             all of the team.
 
     Raises:
-        ConfigError: the payload, a push or a weak motor names no robot or does not parse, the
-            reference's trace is no trace, or the robot's URDF is missing.
+        ConfigError: the payload, a push, a weak motor or `world.friction_of` names no robot or does
+            not parse, the reference's trace is no trace, or the robot's URDF is missing.
     """
 
     def __init__(self, config: Config, names: Sequence[str] = ()) -> None:
