@@ -100,14 +100,18 @@ def test_a_stance_foot_that_lost_contact_is_lowered_at_the_descent_speed() -> No
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("ahead", [None, np.array([0.7, -0.2])])
-def test_swing_feet_follow_their_reference(seed: int, ahead: np.ndarray | None) -> None:
+@pytest.mark.parametrize("borne", [30.0, 90.0])
+def test_swing_feet_follow_their_reference(
+    seed: int, ahead: np.ndarray | None, borne: float
+) -> None:
     """ẍ = ẍ_ref + Kp (x_ref − x) + Kd (ẋ_ref − ẋ), start at the switch, goal at the foothold."""
     random = np.random.default_rng(seed)
     controller, config = controller_of(), Config().controller
     before, pose = standing_pose(), random_pose(random)
-    load = 30.0 * TROT
+    load = borne * TROT
     memory = step(controller, None, before, STANDING).memory
     memory = step(controller, memory, before, Schedule(TROT, 0.0, 0), load=load).memory
+    assert (memory.load > 0.0) == (2.0 * borne > GRAVITY * TOTAL_MASS)
     task = Task(0.4, 0.1, 0.3, STAND_HEIGHT, np.zeros(12), feedforward=False, ahead=ahead)
     outputs = step(controller, memory, pose, Schedule(TROT, 0.4, 0), task, load)
     estimate, ground = pose.estimate, outputs.memory.ground

@@ -151,6 +151,34 @@ def test_a_sensor_that_fails_is_no_longer_believed() -> None:
     np.testing.assert_array_equal(loaded[calm], load[calm] > 0.0)
 
 
+def test_a_sensor_that_drops_to_zero_under_load_is_not_believed_for_a_tick() -> None:
+    """Its 0 is no lift-off: the load stays that of the torques."""
+    end = 1400 + HALF_CYCLE // 2
+
+    def fails(tick: int, noise: Array, load: Array) -> Array:
+        return raw(tick, noise, load) if tick < end else np.zeros(N_LEGS)
+
+    trot = Trot(fails)
+    trot.run(end)
+    load, told, loaded = trot.run(HALF_CYCLE // 2 - 1)
+    np.testing.assert_array_equal(loaded, load > 0.0)
+    assert np.abs(told - load).max() < 8.0
+
+
+def test_a_contact_by_torques_ends_at_half_the_load_that_begins_it() -> None:
+    memory, found = np.zeros(FOOT_LOAD_SIZE), []
+    for load in (0.0, 0.75, 2.0, 0.75, 0.25):  # of the load that begins a contact
+        motion = LegMotion(
+            q_stand(), np.zeros(12), pressed(load * RULE.least_torque_force), np.zeros(3), LEVEL
+        )
+        for _ in range(100):
+            told = update_foot_load(
+                memory, motion, np.zeros(4), np.eye(3), BODY.links, GEOMETRY, RULE, DT
+            )
+        found.append(told.loaded.tolist())
+    assert found == [[carries] * N_LEGS for carries in (False, False, True, True, False)]
+
+
 def test_a_sensor_is_believed_again_once_it_has_drifted() -> None:
     drift = 30.0  # counts
 

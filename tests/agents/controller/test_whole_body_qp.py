@@ -82,6 +82,21 @@ def test_the_reduced_problem_is_the_full_one(contact: Array, size: float, weight
         check_limits(solution, goal)
 
 
+def test_torques_keep_to_bounds_that_differ_up_and_down() -> None:
+    """As those of a motor that turns: less torque drives it on than brakes it."""
+    random, active = np.random.default_rng(5), 0
+    for _ in range(60):
+        bounds = np.array([-random.uniform(4.0, 33.0, 12), random.uniform(4.0, 33.0, 12)])
+        pose, goal = standing_pose(0.7), random_goal(random, TROT, 20.0)
+        solution = solve_goal(
+            pose.terms(), pose.estimate.R, pose.estimate.p_foot, goal, WEIGHTS, bounds
+        )
+        assert (solution.tau >= bounds[0] - 1e-6).all()
+        assert (solution.tau <= bounds[1] + 1e-6).all()
+        active += int((np.abs(solution.tau - bounds) < 1e-6).any())
+    assert active > 10, "most of these goals ask for more than a motor has"
+
+
 @pytest.mark.parametrize(
     ("trunk", "contact", "active"),
     [
