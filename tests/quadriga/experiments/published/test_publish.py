@@ -13,7 +13,8 @@ from quadriga.experiments.measures import MEASURES
 from quadriga.experiments.published.catalogue import CHECKOUT, load_experiments
 from quadriga.experiments.published.experiment import Experiment, Requirement
 from quadriga.experiments.published.page import BEGIN, END, build_overview, replace_results
-from quadriga.experiments.published.publish import PAGE
+from quadriga.experiments.published.publish import PAGE, publish
+from quadriga.experiments.published.walk_experiment import config_digests
 from quadriga.shared.errors import ConfigError
 from tests.quadriga.experiments.published.made import (
     DIGEST,
@@ -155,7 +156,9 @@ def test_what_the_project_publishes_is_what_its_files_give(tmp_path: Path) -> No
     into = tmp_path / "clone"
     shutil.copytree(CHECKOUT / "docs", into / "docs")
     shutil.copy(CHECKOUT / "README.md", into / "README.md")
-    entries = publish_all(every, tmp_path / "nowhere", into)
+    today = {one.name: config_digests(one) for one in every}
+    names = [one.name for one in every]
+    entries = publish(every, tmp_path / "nowhere", into, names, today, print)
     for name in (Path("README.md"), PAGE):
         same = (into / name).read_bytes() == (CHECKOUT / name).read_bytes()
         assert same, f"{name}: make figures ARGS=--only-publish"
