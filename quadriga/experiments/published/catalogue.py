@@ -15,8 +15,8 @@ CHECKOUT: Final = SOURCE
 FOLDER: Final = CHECKOUT / "deploy" / "experiments"
 # In this order on the page: what was promised, then what explains it, then how far it goes.
 _ORDER: Final = (
-    "paper", "as-written", "hard", "edge", "distribution", "central", "low-level", "realism",
-    "ideas", "beyond", "ten", "sweeps",
+    "paper", "as-written", "hard", "edge", "distribution", "low-level", "realism", "ideas",
+    "beyond", "ten", "sweeps",
 )  # fmt: skip
 _SUFFIX: Final = ".toml"
 

@@ -231,7 +231,6 @@ def test_all_that_are_promised_are_there_in_order() -> None:
         "hard",
         "edge",
         "distribution",
-        "central",
         "low-level",
         "realism",
         "ideas",
