@@ -273,6 +273,19 @@ def test_other_planners_have_other_rules(tmp_path: Path) -> None:
     )
     assert passes(chain, ("r1", bare(20, 0, {"r2": 19})))
     assert not passes(chain, ("r1", bare(20, 0, {"r2": 19, "r3": 19})))
+    cooperative = Config(
+        team=TeamConfig(robots=4, yokes="chain"),
+        planner=PlannerConfig(cost="team", exchanges=8),
+        identification=IdentificationConfig(neighbours="yoked"),
+    )
+    ahead = [(f"r{k}", bare(19, 0, {})) for k in (2, 3, 4)]
+
+    def follows(*peers: str) -> bool:
+        return passes(cooperative, *ahead, ("r1", bare(20, 0, dict.fromkeys(peers, 19))))
+
+    assert follows("r2", "r3"), "its neighbour, and the one that counts in the neighbour's cost"
+    assert not follows("r2")
+    assert not follows("r2", "r3", "r4")
     late = Config(team=TeamConfig(robots=2), world=WorldConfig(mode="realtime"))
     before = [("r2", bare(step, 0, {})) for step in range(10, 25)]
     assert passes(late, *before, ("r1", bare(20, 0, {"r2": 17})))
