@@ -221,7 +221,8 @@ def test_from_the_paper_to_the_default_one_thing_changes_at_a_time() -> None:
             together = changed in (weights, cooperative, with_its_data)
             assert together or sections == {"controller"}
     left = {key for key, *_ in departures(configs["damped"], build({}))}
-    assert {key.partition(".")[0] for key in left} <= {"identification", "world"}
+    gate = {"identification.max_radius", "identification.max_peers_harm"}
+    assert left == {"world.seconds", *gate}
 
 
 def test_all_that_are_promised_are_there_in_order() -> None:
