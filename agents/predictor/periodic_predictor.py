@@ -72,6 +72,10 @@ class PeriodicPredictor(Predictor):
         for name, value in (("meta", meta), ("factors", factors), ("condition", condition)):
             object.__setattr__(self, name, value)
 
+    def __reduce__(self) -> tuple[type[PeriodicPredictor], tuple[object, ...]]:
+        """Pickled by what it is made of: a data class would pickle G too, and could not set it."""
+        return PeriodicPredictor, (self.meta, self.factors, self.condition)
+
     @property
     def G(self) -> Array:
         """All blocks at once, (P, n, n, 6 N, W): large; meant for small teams and for tests."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -223,6 +224,12 @@ def test_what_is_saved_is_read(
     assert isinstance(again, PeriodicPredictor)
     assert predictor_sha256(again) == digest
     np.testing.assert_array_equal(again.block(1, 2, 17), fitted.block(1, 2, 17))
+
+
+def test_another_process_gets_the_same(fitted: PeriodicPredictor) -> None:
+    again = pickle.loads(pickle.dumps(fitted))
+    assert predictor_sha256(again) == predictor_sha256(fitted)
+    assert again.condition == fitted.condition
 
 
 def test_factors_of_another_team_are_refused(fitted: PeriodicPredictor) -> None:
