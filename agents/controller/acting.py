@@ -138,9 +138,9 @@ def act(
     if fixed.free_fall:
         fall_freely(push, contact)
 
-    reaction = memory0[MEMORY.foot_load][FOOT_LOAD.force].reshape(4, 3)
+    ground_force = memory0[MEMORY.foot_load][FOOT_LOAD.force].reshape(4, 3)
     v_foot = foot_velocities(terms.J, v, p_foot)
-    feet = FeetState(p_foot, v_foot, sensed[SENSED.foot_load], reaction)
+    feet = FeetState(p_foot, v_foot, sensed[SENSED.foot_load], ground_force)
     memory[MEMORY.mu_reduction] = update_mu_reduction(
         memory0[MEMORY.mu_reduction], contact, phase, feet, fixed.friction, dt
     )

@@ -90,7 +90,7 @@ def update_mu_reduction(
             stands = contact[leg] > 0.5 and stance[leg] > 0.5 and force[leg] >= rule.slip_load
             if stands and v[leg, 0] ** 2 + v[leg, 1] ** 2 > rule.slip_speed**2:
                 slides = True
-                seen = min(seen, _friction_felt(feet.reaction[leg], rule))
+                seen = min(seen, _friction_felt(feet.ground_force[leg], rule))
     if slides:
         most = max(0.0, rule.mu - seen)
         return max(mu_reduction0, min(most, mu_reduction0 + _LOSS * dt))
@@ -99,15 +99,15 @@ def update_mu_reduction(
 
 
 @compiled
-def _friction_felt(reaction: Array, rule: FrictionRule) -> float:
+def _friction_felt(force: Array, rule: FrictionRule) -> float:
     """Friction coefficient that a sliding foot feels, within `mu_slippery` and `mu_min`.
 
     Args:
-        reaction: force of the ground on it by the joints' torques, (3,), N; zero if unknown.
+        force: of the ground on it by the joints' torques, (3,), N; zero if unknown.
         rule: how much friction to count on.
     """
-    normal = reaction[2]
+    normal = force[2]
     if normal < rule.slip_load:
         return rule.mu_min
-    felt: float = np.sqrt(reaction[0] ** 2 + reaction[1] ** 2) / normal
+    felt: float = np.sqrt(force[0] ** 2 + force[1] ** 2) / normal
     return min(rule.mu_min, max(rule.mu_slippery, felt))

@@ -229,7 +229,7 @@ class Memory:
         return self.flat[MEMORY.tilt_error][:2]
 
     @property
-    def reaction_force(self) -> Array:
+    def ground_force(self) -> Array:
         """Force of the ground on each foot by the joints' torques, (4, 3), N, odometry frame."""
         return self.flat[MEMORY.foot_load][FOOT_LOAD.force].reshape(4, 3)
 

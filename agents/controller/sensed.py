@@ -88,14 +88,14 @@ class FeetState(NamedTuple):
         position: of their centres, (4, 3), m, odometry frame.
         velocity: of their centres, (4, 3), m/s, odometry frame.
         force: vertical forces of the ground on them, (4,), N.
-        reaction: forces of the ground on them by the joints' torques, (4, 3), N, odometry frame;
+        ground_force: forces of the ground by the joints' torques, (4, 3), N, odometry frame;
             zero where only foot sensors tell what feet bear.
     """
 
     position: Array
     velocity: Array
     force: Array
-    reaction: Array
+    ground_force: Array
 
 
 @compiled

@@ -5,10 +5,11 @@ With it a planner knows the coupling as well as anybody can: what a simulator al
 
 from __future__ import annotations
 
+import json
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,11 @@ from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.shared.wire.topics import SAMPLE_MS
 
+# What a true response depends on, as far as a predictor's meta says it.
+_TEAM: Final = (
+    "robots", "robot", "yokes", "alternate_phase", "stance_ms", "stand_ms", "interface",
+    "controller",
+)  # fmt: skip
 _RANK: Final = 1e-6  # two stance feet have no moment about their own line: no response to that
 
 
@@ -35,17 +41,32 @@ class PulseResponses:
             horizon, shape (P, n, D, N, 12), N, yaw frame.
         y: what the pulse changes, by phase, pulsed robot, direction, sample and responding robot,
             shape (P, n, D, N, n, 6), m, m/s, m/s, rad, rad, rad/s.
+        team: that was measured, see `team_of`.
     """
 
     ticks: NDArray[np.int64]
     u: Array
     y: Array
+    team: dict[str, Any]
+
+
+def team_of(meta: PredictorMeta) -> dict[str, Any]:
+    """What a team's true response depends on, of what a predictor's meta knows, as JSON has it."""
+    body = meta.to_dict() | {"robot": meta.robot}
+    known: dict[str, Any] = json.loads(json.dumps({name: body[name] for name in _TEAM}))
+    return known
 
 
 def write_pulse_responses(path: Path, responses: PulseResponses) -> None:
     """Keep responses; a file half written never has the name `path`."""
     with atomic_write(path) as partial, partial.open("wb") as file:
-        np.savez_compressed(file, ticks=responses.ticks, u=responses.u, y=responses.y)
+        np.savez_compressed(
+            file,
+            ticks=responses.ticks,
+            u=responses.u,
+            y=responses.y,
+            team=json.dumps(responses.team),
+        )
 
 
 def read_pulse_responses(path: Path) -> PulseResponses:
@@ -56,7 +77,8 @@ def read_pulse_responses(path: Path) -> PulseResponses:
     """
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            return PulseResponses(archive["ticks"], archive["u"], archive["y"])
+            team = json.loads(str(archive["team"]))
+            return PulseResponses(archive["ticks"], archive["u"], archive["y"], team)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise PredictorFileError(
             f"identification.response {path}",
@@ -64,6 +86,26 @@ def read_pulse_responses(path: Path) -> PulseResponses:
             "responses that `quadriga probe --out DIR` wrote",
             "measure them with the same team",
         ) from None
+
+
+def _check_team(measured: dict[str, Any], asked: dict[str, Any]) -> None:
+    """Refuse the responses of another team.
+
+    Raises:
+        PredictorFileError: something differs that responses depend on; it is named.
+    """
+    for name, expected in asked.items():
+        got = measured.get(name)
+        if isinstance(expected, dict) and isinstance(got, dict):
+            changed = [key for key in expected | got if expected.get(key) != got.get(key)]
+            got, expected = ({key: one.get(key) for key in changed} for one in (got, expected))
+        if got != expected:
+            raise PredictorFileError(
+                "identification.response",
+                f"responses of a team with {name} {got}",
+                f"{expected}",
+                "measure this team: `quadriga probe`",
+            )
 
 
 def fit_measured_response(responses: PulseResponses, meta: PredictorMeta) -> Array:
@@ -84,13 +126,14 @@ def fit_measured_response(responses: PulseResponses, meta: PredictorMeta) -> Arr
         PredictorFileError: the responses are those of another team or horizon.
     """
     n, N, phases = meta.robots, meta.N, len(responses.ticks)
+    _check_team(responses.team, team_of(meta))
     expected = (phases, n, responses.y.shape[2], N, n, N_OUTPUTS)
     if responses.y.shape != expected or responses.u.shape != (*expected[:4], N_FORCES):
         raise PredictorFileError(
             "identification.response",
             f"responses of shape {responses.y.shape}",
             f"{expected}",
-            "measured with another team or horizon?",
+            "measured with another horizon?",
         )
     period = 2 * meta.stance_ms
     values = polynomials(

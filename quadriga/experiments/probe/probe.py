@@ -9,7 +9,12 @@ from typing import Final
 
 from rich.console import Console
 
-from quadriga.agents.predictor.measured_response import PulseResponses, write_pulse_responses
+from quadriga.agents.predictor.measured_response import (
+    PulseResponses,
+    team_of,
+    write_pulse_responses,
+)
+from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.experiments.probe.cache import ensure_responses
 from quadriga.experiments.probe.outcome import ProbeOutcome, build_outcome
 from quadriga.experiments.probe.probe_figure import draw_probe
@@ -50,7 +55,8 @@ def write_outcome(outcome: ProbeOutcome, folder: Path) -> None:
     """Write a probe's figures as JSON, its tables as Markdown, its picture and the responses."""
     write_json(folder / FIGURES, outcome.to_dict())
     measured = outcome.responses
-    truth = PulseResponses(measured.ticks, measured.u, measured.y)
+    team = team_of(PredictorMeta.of(outcome.config))
+    truth = PulseResponses(measured.ticks, measured.u, measured.y, team)
     write_pulse_responses(folder / RESPONSES, truth)
     draw_probe(outcome, folder / _PICTURE)
     sheets = [build_overall(outcome), *build_details(outcome)]

@@ -28,10 +28,10 @@ def after(
 
     The foot is dragged along x, against a force along −x.
     """
-    reaction = np.zeros((4, 3))
+    ground_force = np.zeros((4, 3))
     if felt is not None:
-        reaction[:] = [-60.0 * felt, 0.0, 60.0]
-    feet = FeetState(np.zeros((4, 3)), v_foot, np.full(4, force), reaction)
+        ground_force[:] = [-60.0 * felt, 0.0, 60.0]
+    feet = FeetState(np.zeros((4, 3)), v_foot, np.full(4, force), ground_force)
     phase = GaitPhase(STANCE, progress, False)
     rule = FrictionRule(speed, LOAD, MU, LEAST, SLIPPERY, RECOVERY)
     for _ in range(ticks):

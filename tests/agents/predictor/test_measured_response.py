@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from quadriga.agents.predictor.measured_response import (
     PulseResponses,
     read_pulse_responses,
+    team_of,
     write_pulse_responses,
 )
 from quadriga.agents.predictor.periodic import fit_periodic
@@ -42,7 +45,8 @@ def responses_of(team: Trotters, meta: PredictorMeta) -> PulseResponses:
                 ys.append(team.respond(meta, du, tick + 10))
     shape = (len(ticks), team.robots, -1)
     u, y = np.array(us), np.array(ys)
-    return PulseResponses(ticks, u.reshape(*shape, *u.shape[1:]), y.reshape(*shape, *y.shape[1:]))
+    u, y = u.reshape(*shape, *u.shape[1:]), y.reshape(*shape, *y.shape[1:])
+    return PulseResponses(ticks, u, y, team_of(meta))
 
 
 def test_measured_responses_are_the_true_ones(tmp_path: Path) -> None:
@@ -67,6 +71,7 @@ def test_responses_come_back_from_their_file(tmp_path: Path) -> None:
     read = read_pulse_responses(tmp_path / "responses.npz")
     for name in ("ticks", "u", "y"):
         np.testing.assert_array_equal(getattr(read, name), getattr(written, name))
+    assert read.team == written.team == team_of(meta_of(1))
 
 
 def test_a_wrong_file_is_one_clear_error(tmp_path: Path) -> None:
@@ -78,5 +83,29 @@ def test_a_wrong_file_is_one_clear_error(tmp_path: Path) -> None:
     with pytest.raises(PredictorFileError, match=r"identification\.response .*responses\.npz"):
         fit_periodic(episodes, meta)
     write_pulse_responses(file, responses_of(Trotters(1, ()), meta_of(1)))
-    with pytest.raises(PredictorFileError, match="measured with another team or horizon"):
+    with pytest.raises(PredictorFileError, match="a team with robots 1, expected 2"):
         fit_periodic(episodes, meta)
+    measured = responses_of(team, meta)
+    write_pulse_responses(file, replace(measured, u=measured.u[:, :, :, :-1]))
+    with pytest.raises(PredictorFileError, match="measured with another horizon"):
+        fit_periodic(episodes, meta)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("robot", "go1", "robot go1, expected a1"),
+        ("yokes", "ring", "yokes ring, expected complete"),
+        ("kp_z", 1.0, r"controller {'kp_z': 1\.0}, expected {'kp_z': 400\.0}"),
+    ],
+)
+def test_responses_of_another_team_are_refused(
+    tmp_path: Path, key: str, value: Any, message: str
+) -> None:
+    file, team = tmp_path / "responses.npz", Trotters(2, ((0, 1), (1, 0)))
+    measured = responses_of(team, meta_of(2))
+    other = team_of(meta_of(2))
+    (other["controller"] if key in other["controller"] else other)[key] = value
+    write_pulse_responses(file, replace(measured, team=other))
+    with pytest.raises(PredictorFileError, match=message):
+        fit_periodic([team.episode(1, 1000)], meta_of(2, response=str(file)))
