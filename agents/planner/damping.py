@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from quadriga.shared.config.sections import Config
+from quadriga.shared.planner_kinds import find_kind
 
 _BY_SIZE: Final = -1.0  # value of planner.damping
 _FREE: Final = {"usual": 3}  # robots whose plans converge undamped, by planner.preset
@@ -23,3 +24,13 @@ def kept_share(config: Config) -> float:
     if planner.damping != _BY_SIZE:
         return planner.damping
     return 0.0 if n <= _FREE.get(planner.preset, _FREE_ELSE) else (n - 2) / (n + 2)
+
+
+def kept_by_agent(config: Config) -> float:
+    """`kept_share` of an agent of the configured kind.
+
+    One that plans as if it were alone answers nobody: no iteration is there to be damped, and the
+    size of the team is nothing to it.
+    """
+    answers = find_kind(config.planner.kind).needs_peers
+    return kept_share(config) if answers else max(0.0, config.planner.damping)

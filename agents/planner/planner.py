@@ -15,7 +15,7 @@ from quadriga.agents.planner.cooperation import (
     new_plan_share,
     stay_near_last,
 )
-from quadriga.agents.planner.damping import kept_share
+from quadriga.agents.planner.damping import kept_by_agent
 from quadriga.agents.planner.free_step import FreeStep, OwnWindow
 from quadriga.agents.planner.neighbours import PeerSelection
 from quadriga.agents.planner.peer_terms import Peers, PeerTerms
@@ -143,7 +143,7 @@ class Planner:
         self._config, self._index, self._predictor = config, index, predictor
         self._cycle, self._peers = walking_steps(config), Peers(config, index, predictor)
         self._cooperative = is_cooperative(config)
-        self._kept = kept_share(config)
+        self._kept = kept_by_agent(config)
         self._new_share = new_plan_share(config, predictor) if self._cooperative else 1.0
         # Memo of the set-ups, one for each step of the gait's cycle; it changes no result.
         self._setups: dict[int, _Setup] = {}
@@ -206,11 +206,12 @@ class Planner:
         y_free = _free_response(setup, inputs, peers)
         if peers.lost:
             solution, solves = no_solution(problem, PEER_LOST), 0
+            x = solution.x
         else:
-            solution, solves = self._solve(setup, state, inputs, peers, y_free).solution, 1
-        x, status = solution.x, solution.status
-        if self._kept and status == SOLVED and not self._cooperative:
-            x = self._mix_with_last(problem, x, state, inputs.step)
+            solved, solves = self._solve(setup, state, inputs, peers, y_free), 1
+            solution = solved.solution
+            x = self._mix_with_last(solved, state, inputs.step)
+        status = solution.status
         du, dy = unpack(problem, x, y_free)
         y, y_nominal = inputs.y_base + dy, inputs.y_base + y_free.reshape(dy.shape)
         if not (are_plausible_outputs(y) and are_plausible_outputs(y_nominal)):
@@ -257,16 +258,20 @@ class Planner:
             solution,
         )
 
-    def _mix_with_last(
-        self, problem: PlannerProblem, x: Array, state: PlannerState, step: int
-    ) -> Array:
-        """Mix a solution with a share of the last plan, which is nominal beyond its end.
+    def _mix_with_last(self, solved: SolvedQp, state: PlannerState, step: int) -> Array:
+        """Mix a best response with a share of the last plan, which is nominal beyond its end.
 
         Both satisfy the constraints on forces; these are convex, so the mixture satisfies them too.
+        A last plan that would break hard bounds on outputs by now is not kept.
         """
-        share, nv = self._kept, len(problem.columns)
+        problem, x = solved.problem, solved.solution.x
+        if not self._kept or self._cooperative or solved.solution.status != SOLVED:
+            return x
+        share, last = self._kept, self._last(problem, state, step)
+        if not problem.keeps_outputs(last, solved.lower, solved.upper):
+            return x
         mixed = x.copy()
-        mixed[:nv] = (1.0 - share) * x[:nv] + share * self._last(problem, state, step)
+        mixed[: len(last)] = (1.0 - share) * x[: len(last)] + share * last
         return mixed
 
     def _last(self, problem: PlannerProblem, state: PlannerState, step: int) -> Array:

@@ -107,6 +107,20 @@ class PlannerProblem:
         upper[-rows:] -= error[self.bounded]
         return lower, upper
 
+    def keeps_outputs(self, v: Array, lower: Array, upper: Array) -> bool:
+        """Whether forces v, shape (nv,), keep the hard bounds on outputs; true if there are none.
+
+        Args:
+            v: deviations of the forces of stance legs, N.
+            lower: of `bounds`, for the free response at hand.
+            upper: the same.
+        """
+        rows = len(self.bounded)
+        if not rows or len(self.H) > len(v):  # bounds with slacks are soft
+            return True
+        y = self.A[-rows:] @ v
+        return bool((lower[-rows:] <= y).all() and (y <= upper[-rows:]).all())
+
 
 def condense(
     config: PlannerConfig, G_past: Array, G_u: Array, stance: NDArray[np.bool_]

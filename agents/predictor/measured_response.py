@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import zipfile
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +18,7 @@ from quadriga.agents.predictor.episode import Y_SCALE
 from quadriga.agents.predictor.periodic_basis import N_WRENCH, polynomials, wrench_map
 from quadriga.agents.predictor.periodic_response import DEGREE, spread_over_samples
 from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorFileError
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.atomic import atomic_write
@@ -28,6 +29,7 @@ _TEAM: Final = (
     "robots", "robot", "yokes", "alternate_phase", "stance_ms", "stand_ms", "interface",
     "controller",
 )  # fmt: skip
+_PLANT: Final = ("motors", "sensors", "estimator")  # sections, what it says nothing of
 _RANK: Final = 1e-6  # two stance feet have no moment about their own line: no response to that
 
 
@@ -41,7 +43,7 @@ class PulseResponses:
             horizon, shape (P, n, D, N, 12), N, yaw frame.
         y: what the pulse changes, by phase, pulsed robot, direction, sample and responding robot,
             shape (P, n, D, N, n, 6), m, m/s, m/s, rad, rad, rad/s.
-        team: that was measured, see `team_of`.
+        team: that was measured, see `team_of` and `plant_of`.
     """
 
     ticks: NDArray[np.int64]
@@ -55,6 +57,23 @@ def team_of(meta: PredictorMeta) -> dict[str, Any]:
     body = meta.to_dict() | {"robot": meta.robot}
     known: dict[str, Any] = json.loads(json.dumps({name: body[name] for name in _TEAM}))
     return known
+
+
+def plant_of(config: Config) -> dict[str, Any]:
+    """What a team's true response depends on beside its `team_of`, as JSON has it."""
+    sections = {name: asdict(getattr(config, name)) for name in _PLANT}
+    known: dict[str, Any] = json.loads(json.dumps(sections))
+    return known
+
+
+def check_measured_plant(config: Config) -> None:
+    """Refuse configured responses of a team with other motors, sensors or another estimator.
+
+    Raises:
+        PredictorFileError: no such file, not one of responses, or of another plant.
+    """
+    if config.response_file:
+        _check_team(read_pulse_responses(Path(config.response_file)).team, plant_of(config))
 
 
 def write_pulse_responses(path: Path, responses: PulseResponses) -> None:

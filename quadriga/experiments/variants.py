@@ -38,13 +38,15 @@ def _planner(
     }
 
 
+_BY_TEAM: Final = -1.0  # damping that the size of the team chooses
 PLANNERS: Final[Mapping[str, Keys]] = {
     "none": _planner("none"),
     "decentralised": _planner("decentralised"),
-    "distributed": _planner("distributed"),
-    "compensated": _planner("distributed", compensation=True),
-    "damped": _planner("distributed", damping=0.5),
-    "exchanged": _planner("distributed", exchanges=2),
+    "distributed": _planner("distributed", True, _BY_TEAM),  # as by default
+    "uncompensated": _planner("distributed", False, _BY_TEAM),
+    "undamped": _planner("distributed", True),
+    "damped": _planner("distributed", True, 0.5),
+    "exchanged": _planner("distributed", True, _BY_TEAM, exchanges=2),
     "cooperative": {**_planner("distributed", exchanges=8), "planner.cost": "team"},
     "centralised": _planner("centralised"),
     "deepc": _planner("deepc"),

@@ -12,6 +12,7 @@ from quadriga.agents.planner.checked_predictor import gates_in_force, load_check
 from quadriga.agents.planner.gates import run_gates
 from quadriga.agents.predictor.fits import fit as fit_predictor
 from quadriga.agents.predictor.gate_report import GateReport
+from quadriga.agents.predictor.measured_response import check_measured_plant
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, read, save, versions
 from quadriga.identification.cache import data_path, predictor_path
@@ -57,7 +58,7 @@ def fit_or_read(config: Config, console: Console) -> tuple[Predictor, GateReport
     use_one_blas_thread()
     check_excitation(config, dataset.training)
     with console.status(f"fitting the predictor {config.identification.predictor}"):
-        predictor = fit_predictor(dataset.training, PredictorMeta.of(config))
+        predictor = _fit_to(dataset, config)
         gates = run_gates(config, predictor, dataset.held_out)
     if refusal(gates, config.planner.kind) is None:
         save(path, predictor, build_provenance(config, dataset, gates))
@@ -101,12 +102,17 @@ def fit(config: Config, dataset: Dataset, path: Path, console: Console) -> tuple
     use_one_blas_thread()
     check_excitation(config, dataset.training)
     with console.status("fitting the predictor"):
-        predictor = fit_predictor(dataset.training, PredictorMeta.of(config))
+        predictor = _fit_to(dataset, config)
         report = run_gates(config, predictor, dataset.held_out)
     if report.peers is not None and (found := report.peers.describe()):
         console.print(f"effect of peers as predicted: {found}; see `quadriga fit`", highlight=False)
     report.check(config.planner.kind)
     return save(path, predictor, build_provenance(config, dataset, report)), report
+
+
+def _fit_to(dataset: Dataset, config: Config) -> Predictor:
+    check_measured_plant(config)
+    return fit_predictor(dataset.training, PredictorMeta.of(config))
 
 
 def build_provenance(config: Config, dataset: Dataset, report: GateReport) -> Provenance:

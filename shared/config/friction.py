@@ -21,7 +21,8 @@ def friction_of_robots(text: str, usual: float, names: tuple[str, ...]) -> tuple
         names: of the team's robots.
 
     Raises:
-        ConfigError: the text does not follow the grammar, or names a robot not in `names`.
+        ConfigError: the text does not follow the grammar, names a robot twice, or one not in
+            `names`; or a coefficient is not within the bounds of `world.friction`.
     """
     found: dict[str, float] = {}
     for part in text.split(",") if text else ():

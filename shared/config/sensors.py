@@ -17,7 +17,8 @@ class SensorsConfig:
     preset: str = key(
         "realistic",
         "-",
-        "realistic, or ideal (noise alone, forces in N): replaces the defaults below",
+        "realistic, or ideal (noise and the biases of gyro and accelerometer alone; forces in N): "
+        "replaces the defaults below",
         choices=("realistic", "ideal"),
     )
     joint_position: float = key(5e-4, "rad", "encoder noise", low=0.0, high=0.1)

@@ -12,6 +12,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import gait_phase
 from quadriga.experiments.probe.pulses import DIRECTIONS
 from quadriga.experiments.probe.responses import Responses
+from quadriga.shared.config.sections import GaitConfig
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, OUTPUTS, Array
 
 ByOutput = Mapping[str, float | None]  # None where there is nothing to divide by
@@ -69,10 +70,15 @@ def compare(true: Array, predicted: Array) -> ResponseComparison:
     )
 
 
-def predict_responses(responses: Responses, predictor: Predictor) -> Array:
+def predict_responses(responses: Responses, predictor: Predictor, gait: GaitConfig) -> Array:
     """What a predictor says the pulses do, as `Responses.y`.
 
     The past is the same with and without the pulse, so only the forces of the horizon count.
+
+    Args:
+        responses: which pulses.
+        predictor: of this team.
+        gait: of the walks that were pulsed; the predictor's data may have stood longer.
     """
     meta = predictor.meta
     phases, n, directions, N, _ = responses.u.shape
@@ -81,7 +87,7 @@ def predict_responses(responses: Responses, predictor: Predictor) -> Array:
         z = np.zeros((n, meta.width, n, directions))
         for j in range(n):
             z[j, meta.past :, j] = responses.u[p, j].reshape(directions, N * N_FORCES).T
-        phase = gait_phase(tick, meta.stand_ms, meta.stance_ms, predictor.phases)
+        phase = gait_phase(tick, gait.stand_ms, gait.stance_ms, predictor.phases)
         y = predictor.predict(z.reshape(n, meta.width, -1), phase)
         y = y.reshape(n, N, N_OUTPUTS, n, directions)
         predicted[p] = y.transpose(3, 4, 1, 0, 2)

@@ -46,14 +46,15 @@ class PulsedWalk:
         self._rollout = Rollout(config, None, references_of(config), self._excitation)
         self._pulse: _Pulse | None = None
         self._samples: dict[int, Array] = {}  # by tick: forces and outputs of each robot, (n, 18)
-        self._down = False
+        self._down_from: int | None = None  # tick of the first fall
 
     def walk_to(self, tick: int) -> None:
         """Walk until the world is at `tick`; not farther than to the first fall."""
-        while not self._down and self._rollout.world.tick < tick:
+        while self._down_from is None and self._rollout.world.tick < tick:
             now = self._rollout.step()
             gave_up = any(out.mode == DAMPING for out in now.outputs.values())
-            self._down = gave_up or bool(self._rollout.world.fallen())
+            if gave_up or self._rollout.world.fallen():
+                self._down_from = now.tick
             measured = [now.outputs[name].measurement for name in self._names]
             samples = [sample for sample in measured if sample is not None]
             if samples:
@@ -70,8 +71,9 @@ class PulsedWalk:
             Forces and outputs, shape (N, n, 18); NaN if a robot fell in it or before.
         """
         ticks = start + SAMPLE_MS * np.arange(1, self._horizon + 1)
-        self.walk_to(int(ticks[-1]) + 1)
-        if self._down:
+        last = int(ticks[-1])
+        self.walk_to(last + 1)
+        if self._down_from is not None and self._down_from <= last:
             return np.full((self._horizon, len(self._names), N_FORCES + N_OUTPUTS), np.nan)
         return np.array([self._samples[tick] for tick in ticks.tolist()])
 

@@ -18,7 +18,7 @@ from quadriga.experiments.probe.comparison import (
 from quadriga.experiments.probe.probed import Probed
 from quadriga.experiments.probe.pulses import DIRECTIONS, DIRECTIONS_TEXT, FORCE, PULSE_MS
 from quadriga.experiments.probe.responses import Responses
-from quadriga.shared.config.sections import Config
+from quadriga.shared.config.sections import Config, GaitConfig
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.wire.topics import SAMPLE_MS
@@ -118,11 +118,11 @@ def build_outcome(config: Config, responses: Responses, probed: list[Probed]) ->
         responses=responses,
         truth=truth_figures(responses),
         phase_ms=tuple(((responses.ticks - stand) % period).tolist()),
-        predictors=tuple(_hold_against(responses, each) for each in probed),
+        predictors=tuple(_hold_against(config.gait, responses, each) for each in probed),
     )
 
 
-def _hold_against(responses: Responses, probed: Probed) -> PredictorOutcome:
-    predicted = predict_responses(responses, probed.predictor)
+def _hold_against(gait: GaitConfig, responses: Responses, probed: Probed) -> PredictorOutcome:
+    predicted = predict_responses(responses, probed.predictor, gait)
     comparison = compare(responses.y, predicted)
     return PredictorOutcome(probed.name, probed.sha256, probed.refused, comparison, predicted)

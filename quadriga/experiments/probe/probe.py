@@ -11,6 +11,7 @@ from rich.console import Console
 
 from quadriga.agents.predictor.measured_response import (
     PulseResponses,
+    plant_of,
     team_of,
     write_pulse_responses,
 )
@@ -55,7 +56,7 @@ def write_outcome(outcome: ProbeOutcome, folder: Path) -> None:
     """Write a probe's figures as JSON, its tables as Markdown, its picture and the responses."""
     write_json(folder / FIGURES, outcome.to_dict())
     measured = outcome.responses
-    team = team_of(PredictorMeta.of(outcome.config))
+    team = team_of(PredictorMeta.of(outcome.config)) | plant_of(outcome.config)
     truth = PulseResponses(measured.ticks, measured.u, measured.y, team)
     write_pulse_responses(folder / RESPONSES, truth)
     draw_probe(outcome, folder / _PICTURE)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import check_fitted_for
+from quadriga.agents.planner.checked_predictor import check_fitted_for, gates_in_force
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256, read
 from quadriga.experiments.variants import PREDICTORS
@@ -80,7 +80,8 @@ def predictor_of_file(path: Path, config: Config) -> Probed:
     """
     predictor, provenance = read(path)
     check_fitted_for(config, path, predictor)
-    refused = reason(refusal(provenance.gates, config.planner.kind))
+    gates = gates_in_force(provenance.gates, config, predictor)
+    refused = reason(refusal(gates, config.planner.kind))
     return Probed(path.stem, predictor, predictor_sha256(predictor), refused)
 
 

@@ -186,6 +186,13 @@ def _requirements(
             "pooled are several scenarios, of which none sweeps",
         )
     places = table.texts("scenarios", (), labels)
+    if "all" in over and places:
+        raise ConfigError(
+            f"{table.where}: scenarios",
+            f"{', '.join(places)} with over {list(over)}",
+            'over = "each"',
+            "all worlds together are those of every scenario",
+        )
     at_least = 0
     if table.has("at_least"):
         at_least = _read_at_least(table, len(places or labels) if poolable else None, over)

@@ -25,7 +25,8 @@ def by_world(rows: Iterable[TrialOutcome]) -> dict[World, TrialOutcome]:
 def loss(walks: Walks, start: Walks, seconds: float) -> float:
     """Mean cost of early ends, and mean log ratio of the errors to those of the start.
 
-    A walk to the end costs nothing, one that ends at t of T costs 2 − t/T. Errors count over the
+    A walk to the end costs nothing, one that ends at t of T costs 2 − t/T; so does a team that gave
+    up and hangs in its yokes until the time is over, which costs 1. Errors count over the
     pairs of which both walked to the end: ten percent more of every error cost as much as a tenth
     of the walks that fall at the very end.
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.agents.planner.damping import kept_share
+from quadriga.agents.planner.damping import kept_by_agent, kept_share
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ConfigError
 
@@ -44,6 +44,14 @@ def test_a_share_that_is_given_is_kept() -> None:
     assert share(10, damping=0.0) == 0.0
     assert share(2, damping=0.3) == 0.3
     assert share(10, preset="paper") == 0.0
+
+
+def test_who_answers_nobody_is_damped_only_if_it_is_asked_to() -> None:
+    kinds = ("distributed", "decentralised")
+    teams = [load(overrides={"team.robots": 5, "planner.kind": kind}) for kind in kinds]
+    assert [kept_by_agent(team) for team in teams] == [pytest.approx(3 / 7), 0.0]
+    asked = load(overrides={"planner.kind": "decentralised", "planner.damping": 0.4})
+    assert kept_by_agent(asked) == 0.4
 
 
 def test_a_share_between_none_and_by_size_is_a_mistake() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.agents.planner.planner import Planner, PlannerState
+from quadriga.agents.planner.planner import Planner, PlannerState, PlanResult
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
@@ -203,6 +203,26 @@ def test_damping_mixes_in_the_last_plan_brought_forward(
     np.testing.assert_allclose(again.du, free.du, atol=1e-9)
     effect = predictor.future_block(0, 0) @ (mixed.du - free.du).ravel()
     np.testing.assert_allclose(mixed.y - free.y, effect.reshape(8, 6), atol=1e-9)
+
+
+def test_a_last_plan_that_breaks_hard_bounds_is_not_kept(
+    small: Config, predictor: Predictor
+) -> None:
+    last: Array = 8.0 * np.repeat(horizon_stance(small, 0, STEP), 3, axis=1).astype(float)
+    state, inputs = PlannerState(STEP, last, solves=1), inputs_of(small)
+    damped = replace(small.planner, damping=0.5, deviation_max=(1e3,) * 3)
+    far, near = 10.0, 1e-3
+
+    def plan_within(kind: str, limit: float) -> PlanResult:
+        planner = replace(damped, output_bounds=kind, output_max=(limit,) * 6)
+        made = Planner(replace(small, planner=planner), 0, predictor).step(state, inputs, NOTHING)
+        assert made[1].status == "solved"
+        return made[1]
+
+    for kept in (plan_within("hard", far), plan_within("soft", near)):
+        np.testing.assert_allclose(kept.du, 0.5 * last, atol=1e-6)
+        assert np.abs(kept.y - inputs.y_des).max() > near
+    assert np.abs(plan_within("hard", near).y - inputs.y_des).max() <= near + 1e-9
 
 
 @pytest.mark.parametrize("kind", ["soft", "hard"])

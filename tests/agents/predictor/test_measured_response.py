@@ -11,6 +11,8 @@ import pytest
 
 from quadriga.agents.predictor.measured_response import (
     PulseResponses,
+    check_measured_plant,
+    plant_of,
     read_pulse_responses,
     team_of,
     write_pulse_responses,
@@ -19,6 +21,7 @@ from quadriga.agents.predictor.periodic import fit_periodic
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.experiments.probe.pulses import pulse_forces
+from quadriga.shared.config.load import load
 from quadriga.shared.errors import PredictorFileError
 from tests.agents.predictor.test_periodic import (
     CONFIG,
@@ -89,6 +92,19 @@ def test_a_wrong_file_is_one_clear_error(tmp_path: Path) -> None:
     write_pulse_responses(file, replace(measured, u=measured.u[:, :, :, :-1]))
     with pytest.raises(PredictorFileError, match="measured with another horizon"):
         fit_periodic(episodes, meta)
+
+
+def test_responses_of_other_motors_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "responses.npz"
+    walked = load(overrides={"team.robots": 2, "motors.friction": 0.1})
+    measured = responses_of(Trotters(2, ((0, 1), (1, 0))), meta_of(2))
+    write_pulse_responses(file, replace(measured, team=measured.team | plant_of(walked)))
+    keys = {"team.robots": 2, "identification.response": str(file)}
+    check_measured_plant(load(overrides=keys | {"motors.friction": 0.1}))
+    with pytest.raises(
+        PredictorFileError, match=r"motors {'friction': 0\.1}, expected {'friction'"
+    ):
+        check_measured_plant(load(overrides=keys))
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ def test_the_truth_itself_has_no_error(robots: int, phases: int) -> None:
     config = config_of(robots)
     predictor = predictor_of(config, phases)
     truth = truth_of(config, predictor)
-    figures = compare(truth.y, predict_responses(truth, predictor)).overall
+    figures = compare(truth.y, predict_responses(truth, predictor, config.gait)).overall
     for name in OUTPUTS:
         assert figures["own_error"][name] == pytest.approx(0.0, abs=1e-12)
         assert figures["own_size"][name] == pytest.approx(1.0)
@@ -71,12 +71,23 @@ def test_the_truth_itself_has_no_error(robots: int, phases: int) -> None:
             assert figures["peers_size"][name] == pytest.approx(1.0)
 
 
+def test_the_phase_is_that_of_the_walk_not_of_the_predictors_data() -> None:
+    config = config_of(2)
+    predictor = predictor_of(config, 5)
+    truth = truth_of(config, predictor)
+    stood = replace(predictor.meta, stand_ms=predictor.meta.stand_ms + 40)
+    figures = compare(
+        truth.y, predict_responses(truth, replace(predictor, meta=stood), config.gait)
+    ).overall
+    assert max(value or 0.0 for value in figures["own_error"].values()) < 1e-12
+
+
 def test_a_wrong_phase_is_an_error() -> None:
     config = config_of(2)
     truth = truth_of(config, predictor_of(config, 2))
     swapped = predictor_of(config, 2)
     swapped = replace(swapped, G=swapped.G[::-1].copy())
-    figures = compare(truth.y, predict_responses(truth, swapped)).overall
+    figures = compare(truth.y, predict_responses(truth, swapped, config.gait)).overall
     assert min(value or 0.0 for value in figures["own_error"].values()) > 1.0
 
 

@@ -82,6 +82,17 @@ def test_pulses_of_odd_seeds_are_negative_and_stored_as_positive_ones() -> None:
     assert np.linalg.norm(odd.y - even.y) < 0.3 * np.linalg.norm(even.y)
 
 
+def test_a_late_fall_leaves_what_was_measured_before() -> None:
+    keys = SHORT | {"team.robots": 1, "gait.stance_ms": 300}
+    config = probed_config(load(None, keys), 50900)
+    first, *_, last = pulse_starts(config).tolist()
+    early = PulsedWalk(config).horizon_after(first)
+    push = f"r1:2000:90:{(last + 10) / 1000}:0.3"
+    pushed = PulsedWalk(probed_config(load(None, keys | {"world.push": push}), 50900))
+    assert np.isnan(pushed.horizon_after(last)).all()
+    np.testing.assert_array_equal(pushed.horizon_after(first), early)
+
+
 def test_a_walk_that_ends_in_a_fall_measures_nothing() -> None:
     config = load(None, SHORT | {"team.robots": 1, "world.push": "r1:2000:90:0.5:0.3"})
     measured = measure_robot(config, 50900, 0)
