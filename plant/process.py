@@ -50,14 +50,19 @@ def run(
         for key in sorted({*time.keys, *(COMMAND.key(team, own) for own in plant.names)}):
             bus.subscribe(key)
         server = PlantServer(config, plant, bus, time, name)
-        if not (meet(bus, config, stopped) and start_together(bus, config, stopped)):
+        if not meet(bus, config, stopped):
             return
         end_collection()
         take_priority(config.runtime.priority)
-        loop = run_realtime if config.world.mode == "realtime" else run_lockstep
-        end = loop(server, stopped)
-        if time.drives:
-            server.announce(end.code, "", end.detail)
+        try:
+            if not (plant.prepare(stopped) and start_together(bus, config, stopped)):
+                return
+            loop = run_realtime if config.world.mode == "realtime" else run_lockstep
+            end = loop(server, stopped)
+            if time.drives:
+                server.announce(end.code, "", end.detail)
+        finally:
+            plant.finish()
     if time.end is not None and time.end.code == codes.PLANT_GONE:
         raise BusError(
             f"team {team!r}",

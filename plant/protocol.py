@@ -2,24 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-from quadriga.shared.wire.messages import Command, Event, State, Truth
+from quadriga.shared.wire.messages import Command, Event, State, Status, Truth
 
 
 class Plant(Protocol):
     """Robots that are measured and commanded once a tick of 1 ms.
 
-    A class that has it as its base need not define `truth` and `settle`.
+    A class that has it as its base need not define more than `states` and `step`.
 
     Attributes:
         names: of the robots, in the order of every stacked array.
         tick: world time that has passed, ms.
+        grades_commands: whether it sees to late commands itself; in real time it then gets every
+            robot's newest command, however old.
     """
 
     names: tuple[str, ...]
     tick: int
+    grades_commands: bool = False
+
+    def prepare(self, stopped: Callable[[], bool]) -> bool:
+        """Get the robots to stand, before the team walks; False if `stopped()` came first."""
+        return not stopped()
+
+    def finish(self) -> None:
+        """Bring the robots to rest, after the walk."""
+        return
+
+    def describe(self, status: Status) -> Status:
+        """The plant server's report on itself, with what this plant has to say."""
+        return status
 
     def states(self) -> Mapping[str, State]:
         """What each robot measures at this tick, by name."""
@@ -38,3 +53,4 @@ class Plant(Protocol):
 
     def settle(self) -> None:
         """Work that needs no command, while those of this tick are awaited."""
+        return

@@ -32,7 +32,8 @@ def run_realtime(server: PlantServer, stopped: Callable[[], bool]) -> End:
             _keep_time(server, rate)
         end = server.step(motors.commands())
         if server.plant.tick % PERIOD_MS == 0 or end is not None:
-            server.publish_status(motors.deadlines.status(server.plant.tick, rate.overruns))
+            status = motors.deadlines.status(server.plant.tick, rate.overruns)
+            server.publish_status(server.plant.describe(status))
     code, detail = end or TOLD_TO_STOP
     late = motors.deadlines.describe_late()
     return End(code, f"{detail}; late ticks: {late}; overruns of the world: {rate.overruns}")
@@ -63,6 +64,10 @@ class _Motors:
             age = tick - server.commands.tick_of(name)
             state = grade(age, server.config.world)
             self.deadlines.note_age(name, age)
+            if server.plant.grades_commands:
+                if command is not None:
+                    chosen[name] = command
+                continue
             if command is not None and state == FRESH:
                 chosen[name] = command
                 self._held.pop(name, None)

@@ -119,7 +119,7 @@ class PlantServer:
         return End(codes.TIME_OVER, "end of world.seconds")
 
     def _note_fall(self, event: Event) -> None:
-        if event.code == codes.FALL:
+        if event.code in codes.DOWN:
             self._fallen.add(event.robot)
             self._last_tick = min(self._last_tick, event.tick + FALL_LINGER_MS)
 

@@ -94,7 +94,7 @@ class LeadTime(TeamTime):
             return
         if event.robot not in self._reached:
             return
-        if event.code == codes.FALL:
+        if event.code in codes.DOWN:
             self.falls.append(event)
         elif event.code in (codes.SILENT, codes.GONE):
             self._silent.add(event.robot)

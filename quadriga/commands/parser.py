@@ -10,6 +10,7 @@ from typing import Final
 
 from quadriga.commands import (
     agent,
+    bridge,
     campaign,
     check,
     collect,
@@ -49,8 +50,8 @@ INTERRUPTED: Final = 130
 
 # In the order of `quadriga --help`.
 _COMMANDS: Final = (
-    walk.add, scenarios.add, sim.add, agent.add, plan.add, record.add, report.add, play.add,
-    resim.add, export.add, info.add, recover.add, check.add, echo.add, hz.add, replay.add,
+    walk.add, scenarios.add, sim.add, bridge.add, agent.add, plan.add, record.add, report.add,
+    play.add, resim.add, export.add, info.add, recover.add, check.add, echo.add, hz.add, replay.add,
     router.add, prepare.add, operate.add, collect.add, fit.add, probe.add, campaign.add,
     experiments.add, tune.add, estop.add, config.add, version.add,
 )  # fmt: skip

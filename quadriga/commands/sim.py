@@ -17,6 +17,13 @@ def add(add_command: AddCommand) -> None:
         metavar="NAME",
         help="the plant of this robot alone, where team.plants is 'each'",
     )
+    command.add_argument(
+        "--as",
+        dest="native",
+        default="",
+        choices=("a1", "go1"),
+        help="the simulated robots speak the protocol of this kind, for bridges, and lie at first",
+    )
 
 
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
@@ -25,10 +32,22 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     from quadriga.shared.robot.conventions import robot_names
     from quadriga.team.plants import plant_factory
 
+    if arguments.native:
+        return _run_native(arguments.native, config)
     robot, plants = arguments.robot, config.team.plants
     permitted = robot_names(config.team.robots) if plants == "each" else ("",)
     if robot not in permitted:
         expected = f"one of {', '.join(permitted)}" if plants == "each" else "nothing"
         raise ConfigError("--robot", repr(robot), expected, f"team.plants is {plants!r}")
     process.run(config, plant_factory(config), robot)
+    return 0
+
+
+def _run_native(kind: str, config: Config) -> int:
+    from quadriga.sim_server.native import process
+
+    if kind != config.team.robot:
+        cause = "team.robot says what the team is made of"
+        raise ConfigError("--as", repr(kind), repr(config.team.robot), cause)
+    process.run(config)
     return 0

@@ -8,12 +8,18 @@ from pathlib import Path
 
 from quadriga.commands.command import AddCommand, Given
 from quadriga.commands.options import add_no_render
-from quadriga.shared.config.sections import Config
+from quadriga.shared.config.sections import BRIDGED, Config
+from quadriga.shared.errors import ConfigError
 
 
 def add(add_command: AddCommand) -> None:
     command = add_command("walk", run, "start all processes, walk, and show what came of it")
     command.add_argument("--out", type=Path, metavar="DIR", help="run folder (runs/<date>-<time>)")
+    command.add_argument(
+        "--armed",
+        action="store_true",
+        help="bridges command their robots (team.plant 'robots'); without, nothing is ever sent",
+    )
     add_no_render(command)
 
 
@@ -29,4 +35,13 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     # Several walks on one machine are the rule; only who names an endpoint wants that one.
     if config.bus.mode == "peer" and "endpoint" not in given.get("bus", {}):
         config = replace(config, bus=replace(config.bus, endpoint=free_endpoint()))
-    return walk(config, arguments.out, pictures=not arguments.no_render, console=Console())
+    if arguments.armed and config.team.plant != BRIDGED:
+        plant = config.team.plant
+        raise ConfigError("--armed", f"with team.plant {plant!r}", f"team.plant {BRIDGED!r}")
+    return walk(
+        config,
+        arguments.out,
+        pictures=not arguments.no_render,
+        console=Console(),
+        armed=arguments.armed,
+    )

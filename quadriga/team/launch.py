@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Final, Self
 
 from quadriga.shared.bus.barrier import processes
-from quadriga.shared.config.sections import Config
+from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.members import LAST, LEADS, RECORDER, Member, has_lead
+from quadriga.shared.members import LAST, LEADS, RECORDER, SIM, Member, has_lead
 from quadriga.shared.runtime.clock import monotonic, sleep
 
 _ONE_THREAD: Final = (
@@ -45,7 +45,7 @@ class ProcessSpec:
 
 
 def process_table(
-    config: Config, run_dir: Path, predictor: Path | None, sha256: str
+    config: Config, run_dir: Path, predictor: Path | None, sha256: str, *, armed: bool = False
 ) -> tuple[ProcessSpec, ...]:
     """The processes of a walk, in the order in which they are started.
 
@@ -54,7 +54,9 @@ def process_table(
         run_dir: holds it as `config.toml`, and will hold the recording.
         predictor: the file that agents and planner read; None if they need none.
         sha256: the predictor's, for the recording.
+        armed: whether bridges may command their robots.
     """
+    bridged = config.team.plant == BRIDGED
 
     def build_row(member: Member) -> ProcessSpec:
         role, options = member.role, list[str]()
@@ -64,8 +66,11 @@ def process_table(
             options += ["--predictor", str(predictor)]
         if role.name == RECORDER:
             options += ["-o", str(run_dir / "run.mcap"), "--predictor-sha256", sha256]
+        if role.name == SIM and armed:
+            options.append("--armed")
         options += ["--config", str(run_dir / "config.toml")]
-        return ProcessSpec(member.name, (*QUADRIGA, role.command, *options), role.grace)
+        command = "bridge" if role.name == SIM and bridged else role.command
+        return ProcessSpec(member.name, (*QUADRIGA, command, *options), role.grace)
 
     return tuple(map(build_row, processes(config)))
 

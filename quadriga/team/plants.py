@@ -6,7 +6,7 @@ from importlib.metadata import entry_points
 from typing import Final
 
 from quadriga.plant.process import PlantFactory
-from quadriga.shared.config.sections import SIMULATED, Config
+from quadriga.shared.config.sections import BRIDGED, SIMULATED, Config
 from quadriga.shared.errors import ConfigError, did_you_mean
 
 GROUP: Final = "quadriga.plants"  # of the entry points; each is a `PlantFactory`
@@ -14,7 +14,8 @@ GROUP: Final = "quadriga.plants"  # of the entry points; each is a `PlantFactory
 
 def plant_kinds() -> tuple[str, ...]:
     """What `team.plant` may be, the simulated world first."""
-    return (SIMULATED, *sorted(entry_points(group=GROUP).names - {SIMULATED}))
+    own = (SIMULATED, BRIDGED)
+    return (*own, *sorted(entry_points(group=GROUP).names.difference(own)))
 
 
 def plant_factory(config: Config) -> PlantFactory:
@@ -28,6 +29,10 @@ def plant_factory(config: Config) -> PlantFactory:
         from quadriga.sim_server.world.world import World
 
         return World
+    if kind == BRIDGED:
+        from quadriga.bridges.bridge import build_bridge
+
+        return build_bridge
     found = entry_points(group=GROUP, name=kind)
     if not found:
         kinds = plant_kinds()

@@ -14,6 +14,7 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.members import LAUNCHER
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.codes import DOWN
 from quadriga.shared.wire.messages import Clock, Event, Truth
 from quadriga.shared.wire.topics import CLOCK, TRUTH, topics_for
 
@@ -54,7 +55,7 @@ class WalkProgress:
             self._show_time(clock.tick / 1000)
 
     def _show_event(self, event: Event) -> None:
-        if event.kind == "fall":
+        if event.code in DOWN:
             self.fallen.append(event.robot)
         if event.kind in ("fall", "fault", "push"):
             self._bar.console.print(

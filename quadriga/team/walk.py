@@ -31,7 +31,9 @@ FELL: Final = 1
 INTERRUPTED: Final = 130
 
 
-def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) -> int:
+def walk(
+    config: Config, out: Path | None, *, pictures: bool, console: Console, armed: bool = False
+) -> int:
     """Walk the team once; 0 if all walked to the end, 1 if one fell or stopped, 130 if interrupted.
 
     Args:
@@ -39,6 +41,7 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
         out: the run folder; by default `runs/<date>-<time>`.
         pictures: whether to render the walk.
         console: where to show it.
+        armed: whether bridges may command their robots.
 
     Raises:
         ProcessError: a process failed or left too early, or the walk did not come to its end.
@@ -55,7 +58,7 @@ def walk(config: Config, out: Path | None, *, pictures: bool, console: Console) 
         sha256 = predictor_sha256(load_checked(predictor, config)[0])
         copy_predictor(predictor, run_dir)
     (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
-    rows = process_table(config, run_dir, predictor, sha256)
+    rows = process_table(config, run_dir, predictor, sha256, armed=armed)
     with stop_flag() as stopped:
         fallen = watch_walk(config, rows, run_dir, stopped, console)
         if stopped():

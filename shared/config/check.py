@@ -8,6 +8,7 @@ from typing import Final
 from quadriga.shared.config.friction import friction_of_robots
 from quadriga.shared.config.payload import carriers
 from quadriga.shared.config.sections import (
+    BRIDGED,
     SIMULATED,
     Config,
     GaitConfig,
@@ -168,6 +169,8 @@ def _check_cooperation(planner: PlannerConfig) -> None:
 def _check_plants(config: Config) -> None:
     """What plants of a robot each cannot do: be yoked in simulation, or know the whole truth."""
     team = config.team
+    if team.plant == BRIDGED:
+        _check_bridged(config)
     if team.plants == "one":
         return
     if config.estimator.kind == "truth":
@@ -184,6 +187,16 @@ def _check_plants(config: Config) -> None:
             "team.yokes = 'none', or team.plants = 'one'",
             "robots that are simulated in worlds of their own cannot pull at each other",
         )
+
+
+def _check_bridged(config: Config) -> None:
+    """Robots have a bridge each, and their own time."""
+    for name, value, wanted, cause in (
+        ("team.plants", config.team.plants, "each", "every robot has a bridge of its own"),
+        ("world.mode", config.world.mode, "realtime", "robots do not wait for a command"),
+    ):
+        if value != wanted:
+            raise ConfigError(name, f"{value!r} with team.plant {BRIDGED!r}", repr(wanted), cause)
 
 
 def _check_pairs(config: Config) -> None:

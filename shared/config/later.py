@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from types import MappingProxyType
 from typing import Any, Final
 
+from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.renamed import with_first_names
 
 # By today's name, `section.key`: the value that all that is older was made with. While a key has
@@ -23,6 +25,7 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "identification.disturbed": 0.0,
         "identification.max_peers_harm": 1000.0,
         "identification.response": "",
+        "world.spawn": "standing",
         "world.stairs_rise": 0.06,
         "world.stairs_run": 0.3,
         "world.stairs_count": 8,
@@ -55,6 +58,7 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "controller.contact_torque_force": 12.0,
         "controller.reaction_filter_ms": 3.0,
         "controller.calibration_time": 3.0,
+        **{f"bridge.{item.name}": item.default for item in fields(BridgeConfig)},
     }
 )
 

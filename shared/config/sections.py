@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.identification import IdentificationConfig
 from quadriga.shared.config.low_level import ControllerConfig, EstimatorConfig, GaitConfig
 from quadriga.shared.config.motors import MotorsConfig
@@ -11,6 +12,7 @@ from quadriga.shared.config.planner import PlannerConfig
 from quadriga.shared.config.reference import ReferenceConfig
 from quadriga.shared.config.sensors import SensorsConfig
 from quadriga.shared.config.team import (
+    BRIDGED,
     SIMULATED,
     BusConfig,
     RecorderConfig,
@@ -22,7 +24,9 @@ from quadriga.shared.robot.robots import ROBOTS
 from quadriga.shared.robot.spec import RobotSpec
 
 __all__ = [
+    "BRIDGED",
     "SIMULATED",
+    "BridgeConfig",
     "BusConfig",
     "Config",
     "ControllerConfig",
@@ -57,6 +61,7 @@ class Config:
     reference: ReferenceConfig = field(default_factory=ReferenceConfig)
     recorder: RecorderConfig = field(default_factory=RecorderConfig)
     runtime: RuntimeConfig = field(default_factory=RuntimeConfig)
+    bridge: BridgeConfig = field(default_factory=BridgeConfig)
 
     @property
     def robot(self) -> RobotSpec:

@@ -9,6 +9,7 @@ from quadriga.shared.config.key import key
 from quadriga.shared.robot.robots import ROBOTS
 
 SIMULATED: Final = "mujoco"  # the kind of plant that is a simulated world
+BRIDGED: Final = "robots"  # the kind that is robots of their own, each behind a bridge
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +31,10 @@ class TeamConfig:
     spacing: float = key(0.9, "m", "distance between neighbours at the start", low=0.6, high=3.0)
     alternate_phase: bool = key(True, "-", "every second robot trots half a gait period later")
     plant: str = key(
-        SIMULATED, "-", "what the robots are: mujoco, or a kind that an installed package adds"
+        SIMULATED,
+        "-",
+        "what the robots are: mujoco; robots: real ones behind bridges; or a kind that an "
+        "installed package adds",
     )
     plants: str = key(
         "one",

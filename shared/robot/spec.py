@@ -14,6 +14,7 @@ import numpy as np
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
 
+_FOLDED: Final = (0.0, 1.3, -2.6)  # rad: hip, thigh and calf of a leg that is folded
 _PACKAGE: Final = "cmeel.prefix/share/example-robot-data/robots"
 
 
@@ -117,6 +118,19 @@ class RobotSpec:
         leg = self.geometry
         half_knee = float(np.arccos((self.stand_height - leg.foot_radius) / (2 * leg.link)))
         return _read_only(np.tile([0.0, half_knee, -2.0 * half_knee], N_LEGS))
+
+    @cached_property
+    def q_lying(self) -> Array:
+        """Joint angles of a robot that lies on its feet with folded legs. Shape (12,), rad."""
+        posture = np.tile(_FOLDED, N_LEGS)
+        return _read_only(np.clip(posture, np.add(self.lower, 0.05), np.array(self.upper)))
+
+    @property
+    def lying_height(self) -> float:
+        """Of the trunk's origin above the ground when it lies on its feet, m."""
+        _, thigh, calf = self.q_lying[:3]
+        leg = self.geometry
+        return float(leg.foot_radius + leg.link * (np.cos(thigh) + np.cos(thigh + calf)))
 
     @cached_property
     def feet_under_hips(self) -> Array:

@@ -20,7 +20,7 @@ from quadriga.shared.runtime.places import SOURCE, cache_dir
 
 F = TypeVar("F", bound=Callable[..., object])
 
-_PACKAGES: Final = ("agents", "shared", "sim_server")
+_PACKAGES: Final = ("agents", "bridges", "shared", "sim_server")
 _MARK: Final = "\n@compiled"
 
 

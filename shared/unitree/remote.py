@@ -10,9 +10,23 @@ from quadriga.shared.errors import ConfigError
 from quadriga.shared.unitree.packets import REMOTE_BYTES
 
 BUTTONS: Final = (
-    "R1", "L1", "start", "select", "R2", "L2", "F1", "F2", "A", "B", "X", "Y", "up", "right",
-    "down", "left",
-)  # fmt: skip
+    "R1",
+    "L1",
+    "start",
+    "select",
+    "R2",
+    "L2",
+    "F1",
+    "F2",
+    "A",
+    "B",
+    "X",
+    "Y",
+    "up",
+    "right",
+    "down",
+    "left",
+)
 _KEYS: Final = struct.Struct("<2xH")
 _STICKS: Final = struct.Struct("<5f")  # lx, rx, ry, L2, ly
 _STICKS_AT: Final = 4

@@ -33,6 +33,8 @@ TIME_OVER: Final = "time-over"
 FALLEN: Final = "fallen"
 SIGNAL: Final = "signal"
 PLANT_GONE: Final = "plant-gone"
+BRIDGE_MODE: Final = "bridge-mode"
+ROBOT_STOPPED: Final = "robot-stopped"
 
 EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
     {
@@ -46,12 +48,15 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         GONE: EventCode("fault", "a robot left the bus: the world waits no longer"),
         BACK: EventCode("fault", "a robot answers again: the world waits for it"),
         MALFORMED: EventCode("fault", "commands did not decode"),
+        BRIDGE_MODE: EventCode("bridge", "a bridge's robot begins to stand up, walk or lie down"),
+        ROBOT_STOPPED: EventCode("fault", "a bridge has stopped its robot: damped, then limp"),
         TIME_OVER: EventCode("stop", "the walk is over: world.seconds have passed"),
         FALLEN: EventCode("stop", "the walk is over: a robot fell"),
         SIGNAL: EventCode("stop", "the walk is over: the world was told to stop"),
         PLANT_GONE: EventCode("stop", "the walk is over: one of several plants left or is silent"),
     }
 )
+DOWN: Final = frozenset((FALL, ROBOT_STOPPED))  # a robot that walks no more: the walk ends
 # How details of events without a code end or begin (schema 1), by kind; the last one fits all.
 _WORDS: Final = {
     "fault": (("of its torque", WEAK_MOTOR), ("answers again", BACK), ("dropped", MALFORMED),

@@ -251,7 +251,7 @@ class Event(Message):
     """
 
     SCHEMA = 2
-    kind: str = plain(str, "push, payload, terrain, fault, fall, start or stop")
+    kind: str = plain(str, "push, payload, terrain, bridge, fault, fall, start or stop")
     robot: str = plain(str, "the robot concerned, or empty")
     detail: str = plain(str, "free text")
     code: str = plain(str, "what happened, one of quadriga.shared.wire.codes.EVENTS")

@@ -112,9 +112,11 @@ def build_team_model(
     friction = friction_of_robots(config.world.friction_of, config.world.friction, team)
     robot = config.robot
     body = RobotBody(robot, config.motors, leg_collisions=config.world.leg_collisions)
+    lying = config.world.spawn == "lying"
+    height = robot.lying_height if lying else robot.stand_height
     for name, i in robots.items():
         colour = _TRUNK_RGBA[i % len(_TRUNK_RGBA)]
-        place = (*places[i], robot.stand_height)
+        place = (*places[i], height)
         trunk = body.add_to(spec, f"{name}/", place, friction[i], colour)
         if name == next(iter(robots)):
             _add_sun(trunk)
@@ -130,7 +132,9 @@ def build_team_model(
         dress(spec)
     model = spec.compile()
     q_spawn = model.qpos0.copy()
-    q_spawn[: len(robots) * NQ].reshape(len(robots), NQ)[:, JOINT_POSITIONS] = robot.q_stand
+    q_spawn[: len(robots) * NQ].reshape(len(robots), NQ)[:, JOINT_POSITIONS] = (
+        robot.q_lying if lying else robot.q_stand
+    )
     return TeamModel(
         model=model,
         robots=robots,

@@ -9,6 +9,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
+from quadriga.plant.protocol import Plant
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, N_LEGS, Array
 from quadriga.shared.wire.codes import FALL
@@ -35,7 +36,7 @@ _DAMPED: Final = Command(
 )
 
 
-class World:
+class World(Plant):
     """One MuJoCo world with the whole team; equal configurations and commands give equal bytes.
 
     A tick is split at the point where commands enter: `mj_step2` takes the commands of tick t to

@@ -9,6 +9,7 @@ import msgpack
 import numpy as np
 import pytest
 
+from quadriga.plant.protocol import Plant
 from quadriga.plant.server import FALL_LINGER_MS, PlantServer
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.wire import codes
@@ -77,7 +78,7 @@ def test_in_real_time_nothing_but_the_end_waits_for_who_does_not_listen(mode: st
     ]
 
 
-class BlindPlant:
+class BlindPlant(Plant):
     """One robot that stands, or falls at the first tick; nobody knows where it is."""
 
     names: tuple[str, ...] = ("r1",)

@@ -33,7 +33,7 @@ def test_the_usual_plant_is_the_simulated_world() -> None:
 
 @pytest.mark.usefixtures("installed")
 def test_an_installed_package_adds_a_kind() -> None:
-    assert plant_kinds() == ("mujoco", "cat", "dog")
+    assert plant_kinds() == ("mujoco", "robots", "cat", "dog")
     assert plant_factory(load(None, {"team.plant": "dog"})).__name__ == "Dog"
 
 
@@ -41,8 +41,8 @@ def test_an_installed_package_adds_a_kind() -> None:
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        ("dgo", "got 'dgo', expected one of mujoco, cat, dog (did you mean 'dog'?)"),
-        ("go2", "one of mujoco, cat, dog (is the package that adds it installed here?)"),
+        ("dgo", "got 'dgo', expected one of mujoco, robots, cat, dog (did you mean 'dog'?)"),
+        ("go2", "one of mujoco, robots, cat, dog (is the package that adds it installed here?)"),
         ("cat", "got 'cat': No module named 'no', expected what no:Cat names"),
     ],
 )

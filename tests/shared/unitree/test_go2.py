@@ -16,15 +16,39 @@ from tests.shared.unitree.packets_of import any_report, any_targets
 
 # Offsets in C of Unitree's headers, as a compiler gave them.
 COMMAND_AT = {
-    "head": 0, "level": 2, "frame_reserve": 3, "serial": 4, "version": 12, "bandwidth": 20,
-    "motor": 24, "battery_off": 744, "remote": 748, "led": 788, "fan": 800, "gpio": 802,
-    "reserve": 804, "crc": 808,
-}  # fmt: skip
+    "head": 0,
+    "level": 2,
+    "frame_reserve": 3,
+    "serial": 4,
+    "version": 12,
+    "bandwidth": 20,
+    "motor": 24,
+    "battery_off": 744,
+    "remote": 748,
+    "led": 788,
+    "fan": 800,
+    "gpio": 802,
+    "reserve": 804,
+    "crc": 808,
+}
 REPORT_AT = {
-    "imu": 24, "motor": 80, "battery": 1040, "foot": 1084, "foot_estimate": 1092, "tick": 1100,
-    "remote": 1104, "bit_flag": 1144, "adc_reel": 1148, "ntc1": 1152, "ntc2": 1153,
-    "power_v": 1156, "power_a": 1160, "fan_frequency": 1164, "reserve": 1172, "crc": 1176,
-}  # fmt: skip
+    "imu": 24,
+    "motor": 80,
+    "battery": 1040,
+    "foot": 1084,
+    "foot_estimate": 1092,
+    "tick": 1100,
+    "remote": 1104,
+    "bit_flag": 1144,
+    "adc_reel": 1148,
+    "ntc1": 1152,
+    "ntc2": 1153,
+    "power_v": 1156,
+    "power_a": 1160,
+    "fan_frequency": 1164,
+    "reserve": 1172,
+    "crc": 1176,
+}
 
 
 def test_the_layouts_are_those_of_c() -> None:

@@ -12,7 +12,7 @@ from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Event
 
-KINDS = {"start", "terrain", "payload", "push", "fall", "fault", "stop"}
+KINDS = {"start", "terrain", "payload", "push", "bridge", "fall", "fault", "stop"}
 
 
 def test_every_code_has_a_kind_and_a_meaning() -> None:

@@ -1,0 +1,1 @@
+"""Bridges: the plant of one real robot, which speaks the robot's own protocol."""

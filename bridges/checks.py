@@ -1,0 +1,235 @@
+"""What must be true of a robot before a bridge commands it: the first second of its reports."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+import pinocchio
+
+from quadriga.bridges.supervisor import tilt_of
+from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.errors import QuadrigaError
+from quadriga.shared.robot.conventions import FOOT_FRAMES, GRAVITY, JOINT_NAMES, Array
+from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
+from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.unitree.packets import PROTECTED, RobotReport
+
+_LEAST_SHARE: Final = 0.8  # of the reports that a second should have
+_FLAT: Final = 0.6  # rad, tilt at which a robot still lies as it should
+_GRAVITY_OFF: Final = 1.5  # m/s²
+_VERTICAL_OFF: Final = 0.25  # rad between the accelerometer's vertical and the attitude's
+_STILL_GYRO, _STILL_JOINT = 0.3, 0.5  # rad/s
+_FEET_OFF: Final = 0.12  # m between the highest and the lowest foot of a robot on level ground
+_BEYOND: Final = 0.1  # rad by which a joint may be read beyond its limits
+
+
+class CheckError(QuadrigaError):
+    """A robot is not as it must be before it is commanded."""
+
+
+class Finding(NamedTuple):
+    """What one check came to.
+
+    Attributes:
+        name: of the check.
+        got: what was found.
+        expected: what would have been right.
+        ok: whether it is.
+        cause: the likely cause if it is not.
+    """
+
+    name: str
+    got: str
+    expected: str
+    ok: bool
+    cause: str = ""
+
+
+def check_reports(
+    reports: Sequence[RobotReport],
+    seconds: float,
+    period_ms: int,
+    config: BridgeConfig,
+    robot: RobotSpec,
+) -> list[Finding]:
+    """Everything that the first reports of a robot that lies still can tell.
+
+    Args:
+        reports: all that came, in their order.
+        seconds: for how long they were gathered.
+        period_ms: between two reports of a robot that is well.
+        config: the limits.
+        robot: that it should be.
+    """
+    wanted = 1000.0 * seconds / period_ms
+    findings = [
+        Finding(
+            "reports",
+            f"{len(reports)} in {seconds:g} s",
+            f"at least {_LEAST_SHARE * wanted:.0f}",
+            len(reports) >= _LEAST_SHARE * wanted,
+            "cable, address, port or interface; is the robot on?",
+        )
+    ]
+    if not reports:
+        return findings
+    last = reports[-1]
+    numbers = np.array([[*r.q, *r.dq, *r.quat_wxyz, *r.gyro, *r.accel] for r in reports])
+    finite = bool(np.isfinite(numbers).all())
+    findings.append(
+        Finding("numbers", "all finite" if finite else "not all finite", "all finite", finite)
+    )
+    if not finite:
+        return findings
+    findings += [_check_ticks(reports), _check_battery(last, config), *_check_motors(last, config)]
+    findings += [_check_angles(reports, robot), *_check_still(reports), *_check_gravity(reports)]
+    findings.append(_check_feet(last, robot))
+    return findings
+
+
+def refuse_failed(name: str, findings: Sequence[Finding]) -> None:
+    """Name the first check that failed.
+
+    Raises:
+        CheckError: one did.
+    """
+    for finding in findings:
+        if not finding.ok:
+            raise CheckError(
+                f"robot {name}: {finding.name}", finding.got, finding.expected, finding.cause
+            )
+
+
+def _check_ticks(reports: Sequence[RobotReport]) -> Finding:
+    ticks = [report.tick for report in reports]
+    rising = len(set(ticks)) > 0.9 * len(ticks)
+    return Finding(
+        "its counter",
+        f"{len(set(ticks))} values in {len(ticks)} reports",
+        "one that goes on",
+        rising,
+        "the robot repeats itself: its controller hangs",
+    )
+
+
+def _check_battery(report: RobotReport, config: BridgeConfig) -> Finding:
+    battery = report.battery
+    charge = "unknown" if battery is None else f"{battery.charge} %"
+    enough = battery is None or battery.charge >= config.battery_min
+    return Finding("battery", charge, f"at least {config.battery_min} %", enough, "charge it")
+
+
+def _check_motors(report: RobotReport, config: BridgeConfig) -> list[Finding]:
+    off = [JOINT_NAMES[k] for k in np.flatnonzero(report.mode == PROTECTED)]
+    hottest = int(np.argmax(report.temperature))
+    heat = float(report.temperature[hottest])
+    return [
+        Finding(
+            "motors in protection mode",
+            ", ".join(off) or "none",
+            "none",
+            not off,
+            "switch the robot off and on again, let it cool",
+        ),
+        Finding(
+            "temperature",
+            f"{JOINT_NAMES[hottest]} {heat:.0f} °C",
+            f"at most {config.temperature_max:g} °C",
+            heat <= config.temperature_max,
+            "let it cool",
+        ),
+    ]
+
+
+def _check_angles(reports: Sequence[RobotReport], robot: RobotSpec) -> Finding:
+    """Thighs and calves have ranges of their own, so that another order or sign is seen here."""
+    q = np.array([report.q for report in reports])
+    low, high = np.array(robot.lower) - _BEYOND, np.array(robot.upper) + _BEYOND
+    outside = np.flatnonzero(((q < low) | (q > high)).any(axis=0))
+    found = ", ".join(f"{JOINT_NAMES[k]} {q[-1, k]:.2f} rad" for k in outside) or "all within"
+    return Finding(
+        "joint angles",
+        found,
+        f"the joints of the {robot.title}",
+        not len(outside),
+        "another kind of robot, or a joint whose zero is wrong: calibrate it",
+    )
+
+
+def _check_still(reports: Sequence[RobotReport]) -> list[Finding]:
+    gyro = max(float(np.linalg.norm(report.gyro)) for report in reports)
+    rates = np.array([np.abs(report.dq) for report in reports]).mean(axis=0)
+    fastest = int(np.argmax(rates))
+    return [
+        Finding(
+            "gyro",
+            f"{gyro:.2f} rad/s",
+            f"at most {_STILL_GYRO:g} rad/s",
+            gyro <= _STILL_GYRO,
+            "let it lie still",
+        ),
+        Finding(
+            "joint rates",
+            f"{JOINT_NAMES[fastest]} {rates[fastest]:.2f} rad/s",
+            f"at most {_STILL_JOINT:g} rad/s",
+            float(rates[fastest]) <= _STILL_JOINT,
+            "its own controller still moves it, or it is being moved",
+        ),
+    ]
+
+
+def _check_gravity(reports: Sequence[RobotReport]) -> list[Finding]:
+    """It lies on its feet; specific force is g, upwards by the attitude too."""
+    accel = np.mean([report.accel for report in reports], axis=0)
+    size = float(np.linalg.norm(accel))
+    attitude = reports[-1].quat_wxyz
+    tilt = tilt_of(attitude)
+    cosine = float(_up_in_trunk(attitude) @ accel) / max(size, 1e-9)
+    off = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return [
+        Finding(
+            "posture",
+            f"tilted by {tilt:.2f} rad",
+            f"at most {_FLAT:g} rad",
+            tilt <= _FLAT,
+            "lay it on its feet on level ground",
+        ),
+        Finding(
+            "accelerometer",
+            f"{size:.1f} m/s²",
+            f"{GRAVITY:.1f} ± {_GRAVITY_OFF:g} m/s²",
+            abs(size - GRAVITY) <= _GRAVITY_OFF,
+            "is it being moved?",
+        ),
+        Finding(
+            "attitude",
+            f"{off:.2f} rad off the accelerometer's vertical",
+            f"at most {_VERTICAL_OFF:g} rad",
+            off <= _VERTICAL_OFF,
+            "the order of the quaternion, or the axes of the IMU",
+        ),
+    ]
+
+
+def _up_in_trunk(quat_wxyz: Array) -> Array:
+    w, x, y, z = quat_wxyz / max(float(np.linalg.norm(quat_wxyz)), 1e-9)
+    return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+
+
+def _check_feet(report: RobotReport, robot: RobotSpec) -> Finding:
+    """On level ground all feet are about as high, by the angles, the model and the attitude."""
+    model = build_pinocchio_model(robot)
+    data = model.createData()
+    w, x, y, z = report.quat_wxyz
+    pinocchio.framesForwardKinematics(model, data, np.array([0, 0, 0, x, y, z, w, *report.q]))
+    heights = [data.oMf[model.getFrameId(foot)].translation[2] for foot in FOOT_FRAMES]
+    spread = float(max(heights) - min(heights))
+    return Finding(
+        "legs",
+        f"feet {spread:.2f} m apart in height",
+        f"at most {_FEET_OFF:g} m",
+        spread <= _FEET_OFF,
+        "legs in another order, or it does not lie on all four feet",
+    )

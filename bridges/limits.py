@@ -1,0 +1,138 @@
+"""What a bridge lets through to the motors, whatever it is asked for."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.robot.conventions import N_JOINTS, Array
+from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.unitree.packets import MotorTargets
+
+MOST_KP: Final = 500.0  # N·m/rad
+MOST_KD: Final = 30.0  # N·m·s/rad
+LIMITS: Final = ("finite", "gain", "position", "speed", "torque", "rate", "end-stop", "power")
+"""Names of the limits, in the order in which they are applied."""
+_FINITE, _GAIN, _POSITION, _SPEED, _TORQUE, _RATE, _END_STOP, _POWER = range(len(LIMITS))
+
+
+class JointReading(NamedTuple):
+    """Measured angles and rates of the joints, (12,), rad and rad/s."""
+
+    q: Array
+    dq: Array
+
+
+class JointLimits(NamedTuple):
+    """Limits as compiled code takes them; arrays (12,)."""
+
+    lower: Array
+    upper: Array
+    speed: Array
+    torque: Array
+    torque_rate: float
+    power: float
+
+
+class Limited(NamedTuple):
+    """A command within the limits.
+
+    Attributes:
+        targets: what may be sent.
+        torque: that the motors will give at the measured angles and rates, (12,), N·m.
+        cut: names of the limits that had to be applied, of `LIMITS`.
+    """
+
+    targets: MotorTargets
+    torque: Array
+    cut: tuple[str, ...]
+
+
+def joint_limits(config: BridgeConfig, robot: RobotSpec) -> JointLimits:
+    """The limits of a kind of robot."""
+    return JointLimits(
+        lower=np.array(robot.lower) + config.joint_margin,
+        upper=np.array(robot.upper) - config.joint_margin,
+        speed=np.tile(robot.speed, 4),
+        torque=config.torque_share * robot.torque_limit,
+        torque_rate=config.torque_rate,
+        power=config.power_max,
+    )
+
+
+def limit_targets(
+    targets: MotorTargets, measured: JointReading, before: Array, ms: int, limits: JointLimits
+) -> Limited:
+    """Bring a command within all limits.
+
+    The torque that counts is the one that the motor will give, tau + kp (q − q_measured) +
+    kd (dq − dq_measured); what must be taken off it is taken off the feed-forward torque. Gains,
+    angles and rates are limited first. Where a joint is at its end stop, no torque pushes it on.
+
+    Args:
+        targets: what is asked for; numbers that are none count as zero.
+        measured: the joints now.
+        before: the torque of the last command, (12,), N·m.
+        ms: since then.
+        limits: of this robot.
+    """
+    asked = np.array([targets.tau, targets.q, targets.dq, targets.kp, targets.kd])
+    torque, applied = np.empty(N_JOINTS), np.zeros(len(LIMITS), dtype=np.bool_)
+    _limit(asked, measured.q, measured.dq, before, float(ms), limits, torque, applied)
+    tau, q, dq, kp, kd = asked
+    cut = tuple(name for name, was in zip(LIMITS, applied.tolist(), strict=True) if was)
+    return Limited(MotorTargets(targets.mode, q, dq, tau, kp, kd), torque, cut)
+
+
+@compiled
+def _limit(
+    asked: Array,
+    q: Array,
+    dq: Array,
+    before: Array,
+    ms: float,
+    limits: JointLimits,
+    torque: Array,
+    applied: NDArray[np.bool_],
+) -> None:
+    """Limit the rows tau, q, dq, kp, kd of `asked` in place; fill `torque` and `applied`."""
+    power = 0.0
+    for k in range(N_JOINTS):
+        for row in range(5):
+            if not math.isfinite(asked[row, k]):
+                asked[row, k], applied[_FINITE] = 0.0, True
+        kp, kd = min(max(asked[3, k], 0.0), MOST_KP), min(max(asked[4, k], 0.0), MOST_KD)
+        applied[_GAIN] |= kp != asked[3, k] or kd != asked[4, k]
+        # Without a gain the angle or rate that is asked for means nothing.
+        angle, rate = q[k], 0.0
+        if kp > 0.0:
+            angle = min(max(asked[1, k], limits.lower[k]), limits.upper[k])
+            applied[_POSITION] |= angle != asked[1, k]
+        if kd > 0.0:
+            rate = min(max(asked[2, k], -limits.speed[k]), limits.speed[k])
+            applied[_SPEED] |= rate != asked[2, k]
+        spring = kp * (angle - q[k]) + kd * (rate - dq[k])
+        wanted = asked[0, k] + spring
+        given = min(max(wanted, -limits.torque[k]), limits.torque[k])
+        applied[_TORQUE] |= given != wanted
+        step = limits.torque_rate * ms
+        slow = min(max(given, before[k] - step), before[k] + step)
+        applied[_RATE] |= slow != given
+        if (q[k] >= limits.upper[k] and slow > 0.0) or (q[k] <= limits.lower[k] and slow < 0.0):
+            slow, applied[_END_STOP] = 0.0, True
+        torque[k] = slow
+        power += max(slow * dq[k], 0.0)
+        asked[0, k], asked[1, k], asked[2, k] = slow - spring, angle, rate
+        asked[3, k], asked[4, k] = kp, kd
+    if power > limits.power:
+        applied[_POWER] = True
+        for k in range(N_JOINTS):
+            if torque[k] * dq[k] > 0.0:
+                less = torque[k] * (limits.power / power)
+                asked[0, k] += less - torque[k]
+                torque[k] = less

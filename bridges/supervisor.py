@@ -1,0 +1,286 @@
+"""What a bridge lets its robot do: seven states, a command a millisecond, every reason to stop.
+
+The supervisor knows no agent, bus or socket. It is told what the robot last said, what the agent
+last asked for and how old both are, and it gives the command that may be sent.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from enum import StrEnum
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadriga.bridges.limits import JointReading, joint_limits, limit_targets
+from quadriga.bridges.postures import (
+    Motion,
+    damped,
+    lie_down,
+    passive,
+    posture_at,
+    stand_up,
+    towards,
+)
+from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
+from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.runtime.record import record
+from quadriga.shared.unitree.packets import PROTECTED, MotorTargets, RobotReport
+from quadriga.shared.unitree.remote import parse_buttons, read_remote
+from quadriga.shared.wire.codes import with_detail
+from quadriga.shared.wire.messages import Command
+
+_HOTTER: Final = 10.0  # °C above `temperature_max` that stop a robot
+
+
+class BridgeMode(StrEnum):
+    """The states of a bridge."""
+
+    DRY = "dry"  # nothing is ever sent
+    LIMP = "limp"  # motors off
+    STANDING_UP = "standing-up"
+    STANDING = "standing"
+    WALKING = "walking"  # the agent's commands, limited
+    LYING_DOWN = "lying-down"
+    STOPPED = "stopped"  # damped, then motors off, until the bridge is started again
+
+
+class Wish(StrEnum):
+    """What the team wants of the robot."""
+
+    REST = "rest"
+    STAND = "stand"
+    WALK = "walk"
+    LIE = "lie"
+
+
+@record
+class SupervisorState:
+    """What a supervisor remembers.
+
+    Attributes:
+        mode: which of the seven.
+        reason: why it is stopped; "" otherwise.
+        since: when the mode began, ms.
+        motion: of standing up or lying down.
+        held: angles at which the joints are held while the agent is late, (12,).
+        torque: of the last command, (12,), N·m.
+        sent: when it was, ms.
+    """
+
+    mode: BridgeMode
+    reason: str
+    since: int
+    motion: Motion | None
+    held: Array | None
+    torque: Array
+    sent: int
+
+
+@record
+class SupervisorInputs:
+    """What a supervisor is told, once a millisecond.
+
+    Attributes:
+        now: ms.
+        report: the robot's newest.
+        report_age: ms since it came.
+        command: the agent's newest; None before the first.
+        command_age: ms.
+        wish: of the team.
+        writers: how many others command the robot's motors.
+    """
+
+    now: int
+    report: RobotReport
+    report_age: int
+    command: Command | None = None
+    command_age: int = 0
+    wish: Wish = Wish.REST
+    writers: int = 0
+
+
+class Supervised(NamedTuple):
+    """What comes of a step.
+
+    Attributes:
+        targets: to send; None: nothing may be sent.
+        changes: modes that began, each with the reason, in their order.
+        cut: names of the limits that were applied.
+    """
+
+    targets: MotorTargets | None
+    changes: tuple[tuple[BridgeMode, str], ...]
+    cut: tuple[str, ...]
+
+
+class Supervisor:
+    """The rules for one robot; `step` depends on its arguments alone.
+
+    Args:
+        robot: of this kind.
+        config: the limits.
+        servo: the motors' mode in which they follow commands.
+
+    Raises:
+        ConfigError: `bridge.stop_buttons` names no buttons.
+    """
+
+    def __init__(self, robot: RobotSpec, config: BridgeConfig, servo: int) -> None:
+        self._robot, self._config, self._servo = robot, config, servo
+        self._stop_buttons = parse_buttons(config.stop_buttons, "bridge.stop_buttons")
+        self._limits = joint_limits(config, robot)
+        still = JointReading(np.zeros(N_JOINTS), np.zeros(N_JOINTS))
+        # Compiled, or loaded, now and not in the first millisecond.
+        limit_targets(passive(still.q), still, np.zeros(N_JOINTS), 1, self._limits)
+        self._fastest = config.speed_share * np.tile(robot.speed, 4)
+
+    def initial(self, now: int, *, armed: bool) -> SupervisorState:
+        """Dry, or limp if it may command the robot."""
+        mode = BridgeMode.LIMP if armed else BridgeMode.DRY
+        return SupervisorState(mode, "", now, None, None, np.zeros(N_JOINTS), now)
+
+    def step(
+        self, state: SupervisorState, inputs: SupervisorInputs
+    ) -> tuple[SupervisorState, Supervised]:
+        """Decide the mode, and the command of this millisecond."""
+        if state.mode is BridgeMode.DRY:
+            return state, Supervised(None, (), ())
+        before, state = state, self._change(state, inputs)
+        changes = () if state.mode is before.mode else ((state.mode, state.reason),)
+        state, targets = self._command(state, inputs)
+        measured = JointReading(inputs.report.q, inputs.report.dq)
+        limited = limit_targets(
+            targets, measured, state.torque, max(1, inputs.now - state.sent), self._limits
+        )
+        state = replace(state, torque=limited.torque, sent=inputs.now)
+        return state, Supervised(limited.targets, changes, limited.cut)
+
+    def _change(self, state: SupervisorState, inputs: SupervisorInputs) -> SupervisorState:
+        """The state with the mode of this millisecond."""
+        if state.mode is BridgeMode.STOPPED:
+            return state
+        if reason := self.reason_to_stop(state.mode, inputs):
+            return _begin(state, BridgeMode.STOPPED, inputs.now, reason)
+        mode, wish, q = state.mode, inputs.wish, inputs.report.q
+        if mode is BridgeMode.LIMP and wish is Wish.STAND:
+            motion = stand_up(q, self._robot, self._config)
+            return _begin(state, BridgeMode.STANDING_UP, inputs.now, motion=motion)
+        if mode is BridgeMode.STANDING_UP and self._is_over(state, inputs):
+            return _begin(state, BridgeMode.STANDING, inputs.now)
+        if mode is BridgeMode.STANDING and wish is Wish.WALK and self._is_fresh(inputs):
+            return _begin(state, BridgeMode.WALKING, inputs.now)
+        upright = (BridgeMode.STANDING_UP, BridgeMode.STANDING, BridgeMode.WALKING)
+        if mode in upright and wish is Wish.LIE:
+            motion = lie_down(q, self._robot, self._config)
+            return _begin(state, BridgeMode.LYING_DOWN, inputs.now, motion=motion)
+        if mode is BridgeMode.LYING_DOWN and self._is_over(state, inputs):
+            return _begin(state, BridgeMode.LIMP, inputs.now)
+        return state
+
+    def reason_to_stop(self, mode: BridgeMode, inputs: SupervisorInputs) -> str:
+        """Why the robot must stop now, "" if it need not."""
+        config, report = self._config, inputs.report
+        if self._stop_buttons <= read_remote(report.remote).pressed:
+            return with_detail("remote", config.stop_buttons)
+        if inputs.writers:
+            return with_detail("second-writer", f"{inputs.writers} others command the motors")
+        if mode is BridgeMode.LIMP:
+            return ""
+        if inputs.report_age > config.report_max_ms:
+            return with_detail("report-late", f"{inputs.report_age} ms")
+        if not np.isfinite([*report.q, *report.dq, *report.quat_wxyz]).all():
+            return "report-not-finite"
+        if mode is BridgeMode.WALKING and inputs.command_age > config.damp_ms:
+            return with_detail("command-late", f"{inputs.command_age} ms")
+        return self._reason_of_the_body(report)
+
+    def _reason_of_the_body(self, report: RobotReport) -> str:
+        config = self._config
+        if (tilt := tilt_of(report.quat_wxyz)) > config.tilt_max:
+            return with_detail("tilt", f"{tilt:.2f} rad")
+        if (joint := _first(report.mode == PROTECTED)) is not None:
+            return with_detail("motor-protected", JOINT_NAMES[joint])
+        if (joint := _first(report.temperature > config.temperature_max + _HOTTER)) is not None:
+            return with_detail(
+                "temperature", f"{JOINT_NAMES[joint]} {report.temperature[joint]:.0f} °C"
+            )
+        if (joint := _first(np.abs(report.dq) > self._fastest)) is not None:
+            return with_detail("speed", f"{JOINT_NAMES[joint]} {report.dq[joint]:.1f} rad/s")
+        battery = report.battery
+        if battery is not None and battery.charge < config.battery_min / 2:
+            return with_detail("battery", f"{battery.charge} %")
+        return ""
+
+    def _command(
+        self, state: SupervisorState, inputs: SupervisorInputs
+    ) -> tuple[SupervisorState, MotorTargets]:
+        """What the mode asks of the motors, before it is limited."""
+        mode, q = state.mode, inputs.report.q
+        if mode is BridgeMode.LIMP:
+            return state, passive(q)
+        if mode is BridgeMode.STOPPED:
+            off = inputs.now - state.since > 1000.0 * self._config.passive_s
+            return state, passive(q) if off else damped(q, self._servo)
+        if mode is BridgeMode.WALKING:
+            return self._follow(state, inputs)
+        if mode is BridgeMode.STANDING:
+            still = np.zeros(N_JOINTS)
+            return state, towards(self._robot.q_stand, still, self._servo, self._config)
+        if state.motion is None:
+            raise ValueError(f"no motion while {mode}")
+        posture = posture_at(state.motion, self._seconds(state, inputs))
+        return state, towards(*posture, self._servo, self._config)
+
+    def _follow(
+        self, state: SupervisorState, inputs: SupervisorInputs
+    ) -> tuple[SupervisorState, MotorTargets]:
+        """The agent's command, or the joints held where they were when it became late."""
+        command = inputs.command
+        if command is not None and self._is_fresh(inputs):
+            modes = np.full(N_JOINTS, self._servo, dtype=np.uint8)
+            targets = MotorTargets(
+                modes, command.q_des, command.v_des, command.tau, command.kp, command.kd
+            )
+            return (state if state.held is None else replace(state, held=None)), targets
+        if state.held is None:
+            state = replace(state, held=inputs.report.q.copy())
+        still = np.zeros(N_JOINTS)
+        return state, towards(np.asarray(state.held), still, self._servo, self._config)
+
+    def _is_fresh(self, inputs: SupervisorInputs) -> bool:
+        return inputs.command is not None and inputs.command_age <= self._config.hold_ms
+
+    def _seconds(self, state: SupervisorState, inputs: SupervisorInputs) -> float:
+        return (inputs.now - state.since) / 1000.0
+
+    def _is_over(self, state: SupervisorState, inputs: SupervisorInputs) -> bool:
+        return state.motion is not None and self._seconds(state, inputs) >= state.motion.seconds
+
+
+def _begin(
+    state: SupervisorState,
+    mode: BridgeMode,
+    now: int,
+    reason: str = "",
+    motion: Motion | None = None,
+) -> SupervisorState:
+    return replace(state, mode=mode, reason=reason, since=now, motion=motion, held=None)
+
+
+def tilt_of(quat_wxyz: Array) -> float:
+    """Angle between the trunk's z axis and the vertical, rad; of no attitude: π."""
+    norm = float(np.linalg.norm(quat_wxyz))
+    if not norm > 0.5:
+        return math.pi
+    x, y = quat_wxyz[1] / norm, quat_wxyz[2] / norm
+    return math.acos(min(1.0, max(-1.0, 1.0 - 2.0 * (x * x + y * y))))
+
+
+def _first(where: NDArray[np.bool_]) -> int | None:
+    """The first place that is true."""
+    places = np.flatnonzero(where)
+    return int(places[0]) if len(places) else None

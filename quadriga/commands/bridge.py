@@ -1,0 +1,39 @@
+"""`quadriga bridge`: the process that is the plant of one real robot."""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+
+from quadriga.commands.command import AddCommand, Given
+from quadriga.shared.config.sections import BRIDGED, Config
+from quadriga.shared.errors import ConfigError
+
+
+def add(add_command: AddCommand) -> None:
+    command = add_command("bridge", run, "the bridge to one real robot: a dry run, unless --armed")
+    command.add_argument("--robot", required=True, metavar="NAME", help="r1 … rn")
+    command.add_argument(
+        "--driver", choices=("a1", "go1"), help="kind of robot: must be that of the team"
+    )
+    command.add_argument(
+        "--armed", action="store_true", help="command the robot; without, nothing is ever sent"
+    )
+
+
+def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """Bridge the robot until the walk is over."""
+    from quadriga.bridges.bridge import build_bridge
+    from quadriga.plant import process
+    from quadriga.shared.robot.conventions import robot_names
+
+    team, names = config.team, robot_names(config.team.robots)
+    if arguments.robot not in names:
+        raise ConfigError("--robot", repr(arguments.robot), f"one of {', '.join(names)}")
+    if team.plant != BRIDGED:
+        raise ConfigError("team.plant", repr(team.plant), repr(BRIDGED), "whose robots are these?")
+    if arguments.driver not in (None, team.robot):
+        cause = "team.robot says what the team is made of"
+        raise ConfigError("--driver", repr(arguments.driver), repr(team.robot), cause)
+    process.run(config, partial(build_bridge, armed=arguments.armed), arguments.robot)
+    return 0

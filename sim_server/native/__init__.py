@@ -1,0 +1,1 @@
+"""The simulated team behind the robots' own protocols, for bridges."""

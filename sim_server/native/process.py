@@ -1,0 +1,100 @@
+"""SHELL of the simulated team that speaks the robots' own protocols, in real time."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.runtime.clock import Rate
+from quadriga.shared.runtime.collector import end_collection
+from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.signals import stop_on_signals
+from quadriga.shared.unitree.udp import A1, GO1
+from quadriga.shared.unitree.udp_port import Address, parse_address
+from quadriga.shared.wire.codes import FALL
+from quadriga.sim_server.native.udp_robot import UdpRobot
+from quadriga.sim_server.world.world import World
+
+_CODECS = {"a1": A1, "go1": GO1}
+_TICK = 1e-3  # s
+
+
+def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
+    """Be the robots until told to stop. They lie on the ground at first.
+
+    Args:
+        config: the team's configuration; `bridge.endpoint` and `bridge.listen` say where each robot
+            is, and where its reports go.
+        stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
+
+    Raises:
+        ConfigError: an address does not parse or is missing, or this kind has no protocol here.
+        BridgeError: a port is taken.
+    """
+    stopped = stopped or stop_on_signals()
+    world = World(replace(config, world=replace(config.world, spawn="lying")))
+    robots = open_robots(config)
+    try:
+        _serve(world, robots, config, stopped)
+    finally:
+        for robot in robots.values():
+            robot.close()
+
+
+def open_robots(config: Config) -> dict[str, UdpRobot]:
+    """The robots' boards by name.
+
+    Raises:
+        ConfigError, BridgeError: see `run`.
+    """
+    if config.team.robot not in _CODECS:
+        kinds = ", ".join(_CODECS)
+        raise ConfigError("team.robot", repr(config.team.robot), f"one of {kinds}")
+    codec = _CODECS[config.team.robot]
+    robots = {}
+    for number, name in enumerate(robot_names(config.team.robots), start=1):
+        here, listener = (
+            parse_address(
+                getattr(config.bridge, key).replace("{number}", str(number)),
+                f"bridge.{key}",
+                Address("", 0),
+            )
+            for key in ("endpoint", "listen")
+        )
+        if not here.port or not listener.port:
+            raise ConfigError(
+                "bridge.endpoint, bridge.listen",
+                "nothing",
+                "HOST:PORT",
+                "a simulated robot is not at the address of a real one: "
+                "deploy/desk.toml has addresses on this machine",
+            )
+        robots[name] = UdpRobot(codec, here, listener)
+    return robots
+
+
+def _serve(
+    world: World, robots: dict[str, UdpRobot], config: Config, stopped: Callable[[], bool]
+) -> None:
+    end_collection()
+    take_priority(config.runtime.priority)
+    rate = Rate(_TICK, slack=3.0)
+    print(
+        f"{len(robots)} simulated {config.robot.title} on the network", file=sys.stderr, flush=True
+    )
+    while not stopped():
+        states = world.states()
+        for k, (name, robot) in enumerate(robots.items()):
+            if world.tick % robot.period_ms == 0:
+                robot.report(states[name], world.motors.heat[k])
+        rate.wait()
+        commands = {name: robot.obey() for name, robot in robots.items()}
+        for event in world.step({n: c for n, c in commands.items() if c is not None}):
+            if event.code != FALL:  # robots that lie are no news here
+                text = f"{event.tick} ms: {event.kind} {event.robot} {event.detail}"
+                print(text, file=sys.stderr, flush=True)
+        world.settle()

@@ -1,0 +1,63 @@
+"""A robot that stands, as its reports tell it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.conventions import GRAVITY
+from quadriga.shared.unitree.packets import SERVO, Battery, MotorTargets, RobotReport
+from quadriga.shared.unitree.remote import RemoteReading, write_remote
+
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def config_of(robot: str = "a1", **bridge: Any) -> Config:
+    """The default limits for a robot of a kind, but for keys of the section `bridge`."""
+    return load(overrides={"team.robot": robot, **{f"bridge.{k}": v for k, v in bridge.items()}})
+
+
+def standing(config: Config, **fields: Any) -> RobotReport:
+    """The report of a robot that stands still, but for some fields."""
+    zero = np.zeros(12)
+    report = RobotReport(
+        tick=1,
+        quat_wxyz=LEVEL,
+        gyro=np.zeros(3),
+        accel=np.array([0.0, 0.0, GRAVITY]),
+        q=config.robot.q_stand.copy(),
+        dq=zero,
+        tau=zero,
+        mode=np.full(12, SERVO, np.uint8),
+        temperature=np.full(12, 40.0),
+        battery=Battery(80, -5.0, 24.0),
+    )
+    return replace(report, **fields)
+
+
+def tilted(angle: float) -> Any:
+    """An attitude rolled by an angle, rad."""
+    return np.array([np.cos(angle / 2), np.sin(angle / 2), 0.0, 0.0])
+
+
+def pressing(*buttons: str) -> bytes:
+    """What the remote control sends while these buttons are down."""
+    return write_remote(RemoteReading(True, frozenset(buttons)))
+
+
+def holding(config: Config, **fields: Any) -> MotorTargets:
+    """The command that holds the stand, but for some fields."""
+    zero = np.zeros(12)
+    targets = MotorTargets(
+        np.full(12, SERVO, np.uint8),
+        config.robot.q_stand.copy(),
+        zero,
+        zero,
+        np.full(12, 40.0),
+        np.full(12, 1.0),
+    )
+    return replace(targets, **fields)

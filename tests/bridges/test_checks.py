@@ -1,0 +1,66 @@
+"""Each check passes for a robot that lies as it should, and names what is not right."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from quadriga.bridges.checks import CheckError, Finding, check_reports, refuse_failed
+from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.unitree.packets import PROTECTED, Battery, RobotReport
+from tests.bridges.robots import config_of, standing, tilted
+
+
+def lying(kind: str = "a1", **fields: Any) -> list[RobotReport]:
+    """A second of reports of a robot that lies still."""
+    config = config_of(kind)
+    report = replace(standing(config, q=config.robot.q_lying), **fields)
+    return [replace(report, tick=tick) for tick in range(1000)]
+
+
+def check(reports: list[RobotReport], kind: str = "a1") -> dict[str, Finding]:
+    config = config_of(kind)
+    findings = check_reports(reports, 1.0, 1, config.bridge, config.robot)
+    return {finding.name: finding for finding in findings}
+
+
+@pytest.mark.parametrize("kind", list(ROBOTS))
+def test_a_robot_that_lies_still_passes(kind: str) -> None:
+    findings = check(lying(kind), kind)
+    refuse_failed("r1", list(findings.values()))
+    assert set(SICK) <= set(findings)
+
+
+CALF_AND_THIGH_SWAPPED = config_of().robot.q_lying.reshape(4, 3)[:, [0, 2, 1]].ravel()
+ONE_LEG_STRAIGHT = np.concatenate([[0.0, 0.0, -0.95], config_of().robot.q_lying[3:]])
+SICK: dict[str, dict[str, Any]] = {
+    "battery": {"battery": Battery(19, 0.0)},
+    "motors in protection mode": {"mode": np.array([PROTECTED] + [0] * 11, np.uint8)},
+    "temperature": {"temperature": np.full(12, 71.0)},
+    "joint angles": {"q": CALF_AND_THIGH_SWAPPED},
+    "legs": {"q": ONE_LEG_STRAIGHT},
+    "gyro": {"gyro": np.array([0.0, 0.4, 0.0])},
+    "joint rates": {"dq": np.full(12, 0.6)},
+    "posture": {"quat_wxyz": tilted(3.0), "accel": np.array([0.0, 0.0, -9.81])},
+    "accelerometer": {"accel": np.array([0.0, 0.0, 7.0])},
+    "attitude": {"quat_wxyz": tilted(0.4)},
+    "numbers": {"q": np.full(12, np.nan)},
+}
+
+
+@pytest.mark.parametrize("name", list(SICK))
+def test_what_is_not_right_is_named(name: str) -> None:
+    findings = check(lying(**SICK[name]))
+    assert not findings[name].ok
+    with pytest.raises(CheckError, match=r"robot r2: .*: got .*, expected "):
+        refuse_failed("r2", list(findings.values()))
+
+
+def test_too_few_reports_or_always_the_same_are_named() -> None:
+    assert not check([])["reports"].ok
+    assert not check(lying()[:700])["reports"].ok
+    hanging = [lying()[0]] * 1000
+    assert not check(hanging)["its counter"].ok

@@ -1,0 +1,167 @@
+"""The plant of one robot, on real sockets, with a board that answers by the millisecond."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from quadriga.bridges.bridge import open_driver
+from quadriga.bridges.checks import CheckError
+from quadriga.bridges.robot_plant import RobotPlant, to_state, yaw_of
+from quadriga.bridges.supervisor import BridgeMode
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.runtime.clock import sleep
+from quadriga.shared.unitree.packets import SERVO, MotorTargets, RobotReport
+from quadriga.shared.unitree.udp import A1
+from quadriga.shared.unitree.udp_port import Address, UdpPort
+from quadriga.shared.wire.messages import Command
+from tests.bridges.robots import config_of, standing, tilted
+from tests.bridges.test_udp_driver import HOST, free_port
+
+
+class Board:
+    """Sends one and the same posture a thousand times a second, and keeps what it gets."""
+
+    def __init__(self, report: RobotReport) -> None:
+        here, listen = Address(HOST, free_port()), Address(HOST, free_port())
+        self._port = UdpPort(here, listen)
+        self._report, self._over = report, threading.Event()
+        self.commands: list[bytes] = []
+        self.keys = {
+            "team.robots": 1,
+            "team.plant": "robots",
+            "team.plants": "each",
+            "world.mode": "realtime",
+            "bridge.endpoint": f"{HOST}:{here.port}",
+            "bridge.listen": f"{HOST}:{listen.port}",
+        }
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self) -> None:
+        tick = 0
+        while not self._over.is_set():
+            tick += 1
+            self._port.send(A1.encode_report(replace(self._report, tick=tick)))
+            self.commands += [packet for packet, _ in self._port.drain()]
+            sleep(0.0003)  # rather too many than too few
+
+    def close(self) -> None:
+        self._over.set()
+        self._thread.join()
+        self._port.close()
+
+
+@pytest.fixture
+def board() -> Iterator[Board]:
+    made = Board(standing(config_of(), q=config_of().robot.q_lying))
+    yield made
+    made.close()
+
+
+@contextmanager
+def bridge_to(board: Board, said: list[str], *, armed: bool = False) -> Iterator[RobotPlant]:
+    config = load(overrides=board.keys)
+    driver = open_driver(config, "r1")
+    plant = RobotPlant(config, "r1", driver, armed=armed, say=said.append)
+    try:
+        yield plant
+    finally:
+        plant.finish()
+
+
+def test_a_dry_run_sends_no_packet_whatever_the_agent_asks_for(board: Board) -> None:
+    said: list[str] = []
+    command = Command(0, 0, *np.full((5, 12), 3.0))
+    states = 0
+    with bridge_to(board, said) as plant:
+        assert plant.prepare(lambda: False)
+        for _ in range(200):
+            states += len(plant.states())
+            plant.step({"r1": command})
+            sleep(0.001)
+    assert board.commands == []
+    assert plant.mode is BridgeMode.DRY
+    assert states > 50
+    assert "r1: dry run, nothing is sent; --armed commands the robot" in said
+
+
+def test_a_robot_that_is_not_as_it_must_be_gets_no_packet() -> None:
+    """This one reports that it lies on its back."""
+    lying = standing(config_of(), quat_wxyz=tilted(3.1), accel=np.array([0.0, 0.0, -9.81]))
+    board = Board(lying)
+    try:
+        with (
+            bridge_to(board, [], armed=True) as plant,
+            pytest.raises(CheckError, match=r"robot r1: posture: got tilted by 3\.10 rad"),
+        ):
+            plant.prepare(lambda: False)
+    finally:
+        board.close()
+    assert board.commands == []
+
+
+class Script:
+    """A driver whose robot speaks at given milliseconds of the bridge."""
+
+    servo, period_ms = SERVO, 2
+
+    def __init__(self, speaks: Iterator[bool]) -> None:
+        self._speaks, self._tick = speaks, 0
+        self.counters: Counter[str] = Counter()
+
+    def receive(self) -> RobotReport | None:
+        self._tick += 1
+        return standing(config_of(), tick=self._tick) if next(self._speaks) else None
+
+    def send(self, targets: MotorTargets) -> None:
+        raise AssertionError("a dry run")
+
+    def other_writers(self) -> int:
+        return 0
+
+    def take_over(self) -> None: ...
+
+    def close(self) -> None: ...
+
+
+def ticks_of(speaks: Iterable[bool]) -> list[int]:
+    """Ticks of the states of a robot that speaks so."""
+    plant = RobotPlant(config_of(), "r1", Script(iter(speaks)), armed=False, say=str)
+    ticks = []
+    with suppress(StopIteration):
+        while True:
+            ticks += [state.tick for state in plant.states().values()]
+            plant.step({})
+    return ticks
+
+
+def test_states_have_even_ticks_and_each_sample_has_one() -> None:
+    assert ticks_of(k % 2 == 0 for k in range(40)) == list(range(2, 41, 2))
+    late = [True, *[False] * 4, True, *[False] * 10]
+    assert ticks_of(late * 3) == [2, 6, 10, 18, 20, 22, 34, 38, 40]
+
+
+def test_at_a_sample_without_anything_new_the_last_report_counts_unless_it_is_old() -> None:
+    last_at_six = [k == 5 for k in range(25)]
+    assert ticks_of(last_at_six) == [6, 10]
+    last_at_four = [k == 3 for k in range(25)]
+    assert ticks_of(last_at_four) == [4]
+
+
+def test_headings_count_from_where_the_robot_starts() -> None:
+    config: Config = config_of()
+    turned = np.array([np.cos(0.7), 0.0, 0.0, np.sin(0.7)])
+    report = standing(config, quat_wxyz=turned)
+    yaw = yaw_of(turned)
+    assert yaw == pytest.approx(1.4)
+    np.testing.assert_allclose(to_state(report, 4, yaw).imu_quat_wxyz, [1, 0, 0, 0], atol=1e-12)
+    rolled = to_state(replace(report, quat_wxyz=tilted(0.3)), 4, 0.0)
+    np.testing.assert_allclose(rolled.imu_quat_wxyz, tilted(0.3))

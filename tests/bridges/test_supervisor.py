@@ -1,0 +1,171 @@
+"""The seven states of a bridge, and every reason to stop."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from quadriga.bridges.supervisor import (
+    BridgeMode,
+    Supervised,
+    Supervisor,
+    SupervisorInputs,
+    SupervisorState,
+    Wish,
+    tilt_of,
+)
+from quadriga.shared.unitree.packets import OFF, PROTECTED, SERVO, Battery
+from quadriga.shared.wire.messages import Command
+from tests.bridges.robots import config_of, pressing, standing, tilted
+
+CONFIG = config_of()
+ROBOT = CONFIG.robot
+SUPERVISOR = Supervisor(ROBOT, CONFIG.bridge, SERVO)
+REPORT = standing(CONFIG)
+COMMAND = Command(
+    0, 0, np.full(12, 2.0), ROBOT.q_stand, np.zeros(12), np.full(12, 30.0), np.ones(12)
+)
+
+
+def at(now: int = 100, **fields: Any) -> SupervisorInputs:
+    inputs = SupervisorInputs(now=now, report=REPORT, report_age=0, command=COMMAND)
+    return replace(inputs, **fields)
+
+
+def in_mode(mode: BridgeMode, **fields: Any) -> SupervisorState:
+    state = SUPERVISOR.initial(0, armed=True)
+    return replace(state, mode=mode, **fields)
+
+
+def step(state: SupervisorState, inputs: SupervisorInputs) -> tuple[SupervisorState, Supervised]:
+    return SUPERVISOR.step(state, inputs)
+
+
+@given(st.sampled_from(list(Wish)), st.integers(0, 10**6))
+def test_a_dry_run_never_sends(wish: Wish, now: int) -> None:
+    state = SUPERVISOR.initial(0, armed=False)
+    after, supervised = step(state, at(now, wish=wish))
+    assert supervised.targets is None
+    assert after.mode is BridgeMode.DRY
+
+
+def test_up_walk_and_down() -> None:
+    """From limp over standing up, standing, walking, lying down to limp, each named once."""
+    state, named = SUPERVISOR.initial(0, armed=True), list[BridgeMode]()
+    ends = round(1000 * CONFIG.bridge.stand_s)
+    wishes = [Wish.STAND] * (ends + 3) + [Wish.WALK] * 50 + [Wish.LIE] * (ends + 3)
+    for now, wish in enumerate(wishes):
+        state, supervised = step(state, at(now, wish=wish))
+        named += [mode for mode, _ in supervised.changes]
+        assert supervised.targets is not None
+    assert named == [
+        BridgeMode.STANDING_UP,
+        BridgeMode.STANDING,
+        BridgeMode.WALKING,
+        BridgeMode.LYING_DOWN,
+        BridgeMode.LIMP,
+    ]
+
+
+def test_a_limp_robot_has_its_motors_off() -> None:
+    _, supervised = step(in_mode(BridgeMode.LIMP), at())
+    assert supervised.targets is not None
+    assert (supervised.targets.mode == OFF).all()
+    np.testing.assert_array_equal(supervised.targets.kp, 0.0)
+
+
+def test_walking_passes_the_agents_command_on() -> None:
+    _, supervised = step(in_mode(BridgeMode.WALKING), at(wish=Wish.WALK, command_age=3))
+    targets = supervised.targets
+    assert targets is not None
+    np.testing.assert_allclose(targets.tau, COMMAND.tau)
+    np.testing.assert_allclose(targets.kp, COMMAND.kp)
+    assert (targets.mode == SERVO).all()
+
+
+def test_a_late_agent_is_waited_for_with_the_joints_held_then_the_robot_stops() -> None:
+    state = in_mode(BridgeMode.WALKING)
+    hold, damp = CONFIG.bridge.hold_ms, CONFIG.bridge.damp_ms
+    first = standing(CONFIG, q=ROBOT.q_stand + 0.1)
+    state, held = step(state, at(wish=Wish.WALK, report=first, command_age=hold + 1))
+    assert held.targets is not None
+    np.testing.assert_allclose(held.targets.q, first.q)
+    state, held = step(state, at(102, wish=Wish.WALK, command_age=damp))
+    assert held.targets is not None
+    np.testing.assert_allclose(held.targets.q, first.q)
+    fresh, _ = step(state, at(103, wish=Wish.WALK, command_age=0))
+    assert (fresh.mode, fresh.held) == (BridgeMode.WALKING, None)
+    stopped, supervised = step(state, at(103, wish=Wish.WALK, command_age=damp + 1))
+    assert (stopped.mode, stopped.reason) == (BridgeMode.STOPPED, f"command-late:{damp + 1} ms")
+    assert supervised.targets is not None
+    np.testing.assert_array_equal(supervised.targets.kp, 0.0)
+    assert (supervised.targets.kd > 0.0).all()
+
+
+HOT = standing(CONFIG, temperature=np.full(12, 81.0))
+SICK = {
+    "remote": standing(CONFIG, remote=pressing("L2", "B", "up")),
+    "tilt": standing(CONFIG, quat_wxyz=tilted(0.95)),
+    "motor-protected": standing(CONFIG, mode=np.array([SERVO] * 11 + [PROTECTED], np.uint8)),
+    "temperature": HOT,
+    "speed": standing(CONFIG, dq=np.full(12, 20.5)),
+    "battery": standing(CONFIG, battery=Battery(9, -5.0, 20.0)),
+    "report-not-finite": standing(CONFIG, q=np.full(12, np.nan)),
+}
+
+
+@pytest.mark.parametrize("mode", [BridgeMode.STANDING, BridgeMode.WALKING])
+@pytest.mark.parametrize("reason", list(SICK))
+def test_a_sick_robot_stops_for_good(mode: BridgeMode, reason: str) -> None:
+    state, supervised = step(in_mode(mode), at(wish=Wish.WALK, report=SICK[reason]))
+    assert state.mode is BridgeMode.STOPPED
+    assert state.reason.partition(":")[0] == reason
+    assert supervised.changes == ((BridgeMode.STOPPED, state.reason),)
+    for wish in Wish:  # nothing brings it back
+        again, _ = step(state, at(101, wish=wish))
+        assert again.mode is BridgeMode.STOPPED
+
+
+@pytest.mark.parametrize(
+    ("fields", "reason"), [({"report_age": 51}, "report-late"), ({"writers": 1}, "second-writer")]
+)
+def test_a_lost_robot_or_another_writer_stops_it(fields: dict[str, Any], reason: str) -> None:
+    state, _ = step(in_mode(BridgeMode.STANDING), at(**fields))
+    assert state.reason.partition(":")[0] == reason
+
+
+def test_a_stopped_robot_is_damped_and_then_limp() -> None:
+    state = in_mode(BridgeMode.STOPPED, since=0)
+    passive = round(1000 * CONFIG.bridge.passive_s)
+    _, damped = step(state, at(passive))
+    _, limp = step(state, at(passive + 1))
+    assert damped.targets is not None
+    assert limp.targets is not None
+    assert (damped.targets.mode == SERVO).all()
+    assert (limp.targets.mode == OFF).all()
+
+
+def test_the_stop_buttons_hold_a_limp_robot_down_too() -> None:
+    inputs = at(wish=Wish.STAND, report=standing(CONFIG, remote=pressing("L2", "B")))
+    assert step(in_mode(BridgeMode.LIMP), inputs)[0].mode is BridgeMode.STOPPED
+    one = at(wish=Wish.STAND, report=standing(CONFIG, remote=pressing("B")))
+    assert step(in_mode(BridgeMode.LIMP), one)[0].mode is BridgeMode.STANDING_UP
+
+
+def test_nobody_walks_before_the_agent_has_spoken() -> None:
+    standing_still = in_mode(BridgeMode.STANDING)
+    for fields in ({"command": None}, {"command_age": 21}):
+        state, _ = step(standing_still, at(wish=Wish.WALK, **fields))
+        assert state.mode is BridgeMode.STANDING
+
+
+@given(st.floats(-3.1, 3.1))
+def test_the_tilt_is_the_angle_to_the_vertical(angle: float) -> None:
+    assert tilt_of(3.0 * tilted(angle)) == pytest.approx(abs(angle), abs=1e-6)
+    assert tilt_of(np.zeros(4)) == pytest.approx(np.pi)
+    assert tilt_of(np.full(4, np.nan)) == pytest.approx(np.pi)

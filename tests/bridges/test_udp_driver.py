@@ -1,0 +1,116 @@
+"""A driver on real sockets, against the board of a simulated robot and against a noisy network."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from quadriga.bridges.udp_driver import UdpDriver
+from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.unitree.packets import OFF, SERVO, RobotReport
+from quadriga.shared.unitree.udp import A1, GO1
+from quadriga.shared.unitree.udp_port import Address, BridgeError, UdpPort
+from tests.bridges.robots import config_of, holding, standing
+
+HOST = "127.0.0.1"
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind((HOST, 0))
+        return int(probe.getsockname()[1])
+
+
+class Link:
+    """A driver of an A1, and the other end of its network."""
+
+    def __init__(self) -> None:
+        robot, listen = Address(HOST, free_port()), Address(HOST, free_port())
+        self.robot = UdpPort(robot, listen)
+        self.config = BridgeConfig(f"{HOST}:{robot.port}", f"{HOST}:{listen.port}")
+        self.driver = UdpDriver("a1", self.config)
+
+    def report(self, tick: int) -> None:
+        packet = A1.encode_report(replace(standing(config_of()), tick=tick))
+        assert self.robot.send(packet)
+
+
+@pytest.fixture
+def link() -> Iterator[Link]:
+    made = Link()
+    yield made
+    made.driver.close()
+    made.robot.close()
+
+
+def received(link: Link) -> RobotReport | None:
+    return link.driver.receive()
+
+
+def test_the_newest_report_counts(link: Link) -> None:
+    assert received(link) is None
+    for tick in (5, 6, 7):
+        link.report(tick)
+    report = received(link)
+    assert report is not None
+    assert report.tick == 7
+    assert received(link) is None
+    assert link.driver.counters == {"received": 3}
+
+
+def test_repeated_older_and_damaged_packets_are_noticed_and_not_used(link: Link) -> None:
+    link.report(10)
+    assert received(link) is not None
+    link.report(10)
+    link.report(9)
+    link.robot.send(b"garbage")
+    link.robot.send(GO1.encode_report(standing(config_of("go1"))))
+    assert received(link) is None
+    assert link.driver.counters == {"received": 1, "repeated": 1, "older": 1, "malformed": 2}
+
+
+def test_the_counter_may_wrap_and_a_restarted_robot_is_followed(link: Link) -> None:
+    for tick in (2**32 - 1, 0):
+        link.report(tick)
+        report = received(link)
+        assert report is not None
+        assert report.tick == tick
+    link.report(2**30)
+    assert received(link) is not None
+    ticks = []
+    for tick in range(150):
+        link.report(tick)
+        report = received(link)
+        ticks += [] if report is None else [report.tick]
+    assert ticks == list(range(99, 150))
+
+
+def test_what_is_sent_arrives_as_a_command(link: Link) -> None:
+    targets = holding(config_of(), tau=np.arange(12.0))
+    link.driver.send(targets)
+    ((packet, sender),) = link.robot.drain()
+    read = A1.decode_command(packet)
+    np.testing.assert_allclose(read.tau, targets.tau)
+    assert set(read.mode.tolist()) == {SERVO}
+    assert sender.host == HOST
+    assert OFF not in read.mode
+
+
+def test_a_port_in_use_and_a_wrong_address_are_one_clear_error(link: Link) -> None:
+    with pytest.raises(BridgeError, match=r"UDP port \d+ of 127.0.0.1: got Address already in use"):
+        UdpDriver("a1", link.config)
+    with pytest.raises(ConfigError, match=r"bridge.endpoint: got 'robot', expected HOST:PORT"):
+        UdpDriver("a1", replace(link.config, endpoint="robot"))
+
+
+def test_a_robot_that_is_off_costs_no_exception(link: Link) -> None:
+    link.robot.close()
+    for _ in range(3):
+        link.driver.send(holding(config_of()))
+        assert received(link) is None
+    assert sum(link.driver.counters.values()) == 3

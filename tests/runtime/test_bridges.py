@@ -1,0 +1,133 @@
+"""The whole path of a real robot, on simulated ones that speak its protocol, in real time."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.wire.messages import Event, Measurement, Status
+from quadriga.team.endpoint import free_endpoint
+from tests.bridges.test_udp_driver import HOST, free_port
+from tests.runtime.conftest import WAIT
+
+QUADRIGA = (sys.executable, "-m", "quadriga")
+# A machine that runs other tests stalls longer than a robot's may.
+PATIENT: dict[str, Any] = {
+    "bridge.hold_ms": 200,
+    "bridge.damp_ms": 1000,
+    "bridge.report_max_ms": 1000,
+    "bridge.stand_s": 2.0,
+    "bridge.speed_share": 1.5,
+}
+
+pytestmark = pytest.mark.usefixtures("_compiled")
+
+
+@pytest.fixture(params=["a1", "go1"])
+def config(request: pytest.FixtureRequest) -> Config:
+    """A robot on this machine's loopback."""
+    return load(
+        overrides=PATIENT
+        | {
+            "team.robot": request.param,
+            "team.robots": 1,
+            "team.plant": "robots",
+            "team.plants": "each",
+            "world.mode": "realtime",
+            "world.seconds": 2.0,
+            "planner.kind": "none",
+            "bus.endpoint": free_endpoint(),
+            "bridge.endpoint": f"{HOST}:{free_port()}",
+            "bridge.listen": f"{HOST}:{free_port()}",
+        }
+    )
+
+
+@pytest.fixture
+def file(config: Config, tmp_path: Path) -> Path:
+    path = tmp_path / "team.toml"
+    path.write_text(to_toml(config), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def robots(config: Config, file: Path, tmp_path: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """The simulated robots, on the network."""
+    log = tmp_path / "robots.log"
+    with log.open("wb") as out:
+        command = [*QUADRIGA, "sim", "--as", config.team.robot, "--config", str(file)]
+        process = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT)
+    deadline = monotonic() + WAIT
+    while "on the network" not in log.read_text(encoding="utf-8"):
+        assert process.poll() is None, log.read_text(encoding="utf-8")
+        assert monotonic() < deadline
+        sleep(0.05)
+    yield process
+    process.kill()
+    process.wait()
+
+
+def walk(file: Path, out: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    command = [*QUADRIGA, "walk", "--config", str(file), "--out", str(out), "--no-render", *options]
+    return subprocess.run(command, capture_output=True, text=True, timeout=2 * WAIT, check=False)
+
+
+def modes_of(recording: Recording) -> list[str]:
+    return [e.detail for e in recording.messages(Event) if e.code == "bridge-mode"]
+
+
+def test_a_robot_stands_up_walks_and_lies_down_through_its_own_protocol(
+    file: Path, robots: subprocess.Popen[bytes], tmp_path: Path
+) -> None:
+    out = tmp_path / "run"
+    done = walk(file, out, "--armed")
+    assert done.returncode == 0, done.stdout + done.stderr
+    said = (out / "logs" / "plant_r1.log").read_text(encoding="utf-8")
+    ways = ["r1: standing-up", "r1: standing", "r1: walking", "r1: lying-down", "r1: limp"]
+    assert [line for line in ways if line in said] == ways
+    recording = Recording(out / "run.mcap")
+    assert modes_of(recording) == ["walking"]
+    assert max(m.y[1] for m in recording.messages(Measurement, "r1")) > 0.3, "it walks"
+    status = list(recording.messages(Status, "plant_r1"))[-1]
+    assert status.mode == "walking"
+    assert status.counters["received"] > 1000
+    replay = subprocess.run(
+        [*QUADRIGA, "replay", str(out), "--all"],
+        capture_output=True,
+        text=True,
+        timeout=WAIT,
+        check=False,
+    )
+    assert replay.returncode == 0, replay.stdout + replay.stderr
+    robots.terminate()
+    assert robots.wait(WAIT) == 0
+
+
+@pytest.mark.usefixtures("robots")
+def test_without_armed_the_robot_does_not_move(file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    walk(file, out)
+    said = (out / "logs" / "plant_r1.log").read_text(encoding="utf-8")
+    assert "dry run, nothing is sent" in said
+    recording = Recording(out / "run.mcap")
+    assert modes_of(recording) == []
+    status = list(recording.messages(Status, "plant_r1"))[-1]
+    assert status.mode == "dry"
+    assert "sent" not in status.counters
+
+
+def test_a_robot_that_is_off_is_one_clear_error(file: Path, tmp_path: Path) -> None:
+    done = walk(file, tmp_path / "run", "--armed")
+    assert done.returncode == 1
+    assert "robot r1: reports: got 0 in 1 s, expected at least 800 (cable, address" in done.stderr
+    assert "Traceback" not in done.stderr
