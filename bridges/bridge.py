@@ -6,8 +6,9 @@ import sys
 from dataclasses import replace
 
 from quadriga.bridges.driver import RobotDriver
+from quadriga.bridges.go2_driver import Go2Driver
 from quadriga.bridges.robot_plant import RobotPlant
-from quadriga.bridges.udp_driver import CODECS, UdpDriver
+from quadriga.bridges.udp_driver import UdpDriver
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 
@@ -21,7 +22,7 @@ def build_bridge(config: Config, names: tuple[str, ...], *, armed: bool = False)
         armed: whether it may be commanded.
 
     Raises:
-        ConfigError: more than one robot, or a kind that has no driver.
+        ConfigError: more than one robot, or no address or interface that can be used.
         BridgeError: the way to the robot cannot be opened.
     """
     if len(names) != 1:
@@ -34,18 +35,20 @@ def open_driver(config: Config, name: str) -> RobotDriver:
     """The way to the robot of this name, by its kind.
 
     Raises:
-        ConfigError: a kind that has no driver, or an address that does not parse.
+        ConfigError: no interface, or an address that does not parse.
         BridgeError: the way cannot be opened.
     """
     kind, number = config.team.robot, name.removeprefix("r")
+    # On the loopback, robots that real ones keep apart by their cables have domains of their own.
+    domain = int(number) - 1 if config.bridge.interface == "lo" else 0
     bridge = replace(
         config.bridge,
         endpoint=config.bridge.endpoint.replace("{number}", number),
         listen=config.bridge.listen.replace("{number}", number),
     )
-    if kind in CODECS:
-        return UdpDriver(kind, bridge)
-    raise ConfigError("team.robot", repr(kind), f"one of {', '.join(CODECS)}", "no driver for it")
+    if kind == "go2":
+        return Go2Driver(replace(bridge, domain=bridge.domain + domain))
+    return UdpDriver(kind, bridge)
 
 
 def _say(text: str) -> None:

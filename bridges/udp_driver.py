@@ -7,10 +7,9 @@ from typing import Final
 
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.unitree.packets import SERVO, MotorTargets, PacketError, RobotReport
-from quadriga.shared.unitree.udp import A1, GO1, UdpCodec
+from quadriga.shared.unitree.udp import CODECS, UdpCodec
 from quadriga.shared.unitree.udp_port import Address, UdpPort, parse_address
 
-CODECS: Final = {"a1": A1, "go1": GO1}
 _ROBOT: Final = Address("192.168.123.10", 8007)
 _LISTEN: Final = {"a1": Address("", 8080), "go1": Address("", 8090)}
 _HALF: Final = 1 << 31  # of the counter's range: a tick is behind another if it is less than this

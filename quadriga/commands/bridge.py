@@ -14,7 +14,7 @@ def add(add_command: AddCommand) -> None:
     command = add_command("bridge", run, "the bridge to one real robot: a dry run, unless --armed")
     command.add_argument("--robot", required=True, metavar="NAME", help="r1 … rn")
     command.add_argument(
-        "--driver", choices=("a1", "go1"), help="kind of robot: must be that of the team"
+        "--driver", choices=("a1", "go1", "go2"), help="kind of robot: must be that of the team"
     )
     command.add_argument(
         "--armed", action="store_true", help="command the robot; without, nothing is ever sent"

@@ -21,7 +21,7 @@ def add(add_command: AddCommand) -> None:
         "--as",
         dest="native",
         default="",
-        choices=("a1", "go1"),
+        choices=("a1", "go1", "go2"),
         help="the simulated robots speak the protocol of this kind, for bridges, and lie at first",
     )
 

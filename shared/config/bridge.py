@@ -20,6 +20,10 @@ class BridgeConfig:
         "A1, Go1: where its packets arrive, HOST:PORT; empty: port 8080 (A1) or 8090 (Go1) of any "
         "address",
     )
+    interface: str = key(
+        "", "-", "Go2: network interface that it hangs on, such as eth0; lo: a simulated one"
+    )
+    domain: int = key(0, "1", "Go2: number of its DDS domain; on lo that of r1", low=0, high=200)
     stop_buttons: str = key("L2+B", "-", "buttons of the remote control that stop the robot")
     torque_share: float = key(
         0.9, "1", "share of each motor's greatest torque that may be asked for", low=0.05, high=1.0

@@ -210,3 +210,4 @@ GO1: Final = UdpCodec(
         *_FEET, *_END,
     ]),
 )  # fmt: skip
+CODECS: Final = {"a1": A1, "go1": GO1}  # by the kind of robot

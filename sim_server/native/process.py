@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from quadriga.shared.config.sections import Config
@@ -13,13 +13,14 @@ from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.unitree.udp import A1, GO1
+from quadriga.shared.unitree.udp import CODECS
 from quadriga.shared.unitree.udp_port import Address, parse_address
 from quadriga.shared.wire.codes import FALL
+from quadriga.sim_server.native.board import Board
+from quadriga.sim_server.native.go2_robot import Go2Robot
 from quadriga.sim_server.native.udp_robot import UdpRobot
 from quadriga.sim_server.world.world import World
 
-_CODECS = {"a1": A1, "go1": GO1}
 _TICK = 1e-3  # s
 
 
@@ -45,21 +46,21 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
             robot.close()
 
 
-def open_robots(config: Config) -> dict[str, UdpRobot]:
-    """The robots' boards by name.
+def open_robots(config: Config) -> dict[str, Board]:
+    """The robots' boards by name, each on a network of its own.
 
     Raises:
         ConfigError, BridgeError: see `run`.
     """
-    if config.team.robot not in _CODECS:
-        kinds = ", ".join(_CODECS)
-        raise ConfigError("team.robot", repr(config.team.robot), f"one of {kinds}")
-    codec = _CODECS[config.team.robot]
-    robots = {}
-    for number, name in enumerate(robot_names(config.team.robots), start=1):
+    names, bridge = robot_names(config.team.robots), config.bridge
+    if config.team.robot == "go2":
+        interface = bridge.interface or "lo"
+        return {name: Go2Robot(bridge.domain + k, interface) for k, name in enumerate(names)}
+    boards = dict[str, Board]()
+    for number, name in enumerate(names, start=1):
         here, listener = (
             parse_address(
-                getattr(config.bridge, key).replace("{number}", str(number)),
+                getattr(bridge, key).replace("{number}", str(number)),
                 f"bridge.{key}",
                 Address("", 0),
             )
@@ -73,12 +74,12 @@ def open_robots(config: Config) -> dict[str, UdpRobot]:
                 "a simulated robot is not at the address of a real one: "
                 "deploy/desk.toml has addresses on this machine",
             )
-        robots[name] = UdpRobot(codec, here, listener)
-    return robots
+        boards[name] = UdpRobot(CODECS[config.team.robot], here, listener)
+    return boards
 
 
 def _serve(
-    world: World, robots: dict[str, UdpRobot], config: Config, stopped: Callable[[], bool]
+    world: World, robots: Mapping[str, Board], config: Config, stopped: Callable[[], bool]
 ) -> None:
     end_collection()
     take_priority(config.runtime.priority)

@@ -134,7 +134,7 @@ class Script:
 
 def ticks_of(speaks: Iterable[bool]) -> list[int]:
     """Ticks of the states of a robot that speaks so."""
-    plant = RobotPlant(config_of(), "r1", Script(iter(speaks)), armed=False, say=str)
+    plant = RobotPlant(config_of(), "r1", Script(iter(speaks)), armed=False, say=list[str]().append)
     ticks = []
     with suppress(StopIteration):
         while True:

@@ -1,0 +1,262 @@
+"""SHELL of the Go2's network: CycloneDDS's C library through ctypes.
+
+Topics are declared without type information. CycloneDDS's Python package sends it, and what its
+version 11 sends ends every process with version 0.10 on the same topics, the robot's own among
+them. So that package is never imported: only its library is loaded.
+"""
+
+from __future__ import annotations
+
+import ctypes as c
+import importlib.util
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final, Self
+
+import numpy as np
+
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.unitree.udp_port import BridgeError
+
+# Operations of a topic's descriptor: how the library finds the fields of a struct.
+_ADDRESS: Final = 1 << 24
+_STRING, _SEQUENCE, _ARRAY = 5 << 16, 7 << 16, 8 << 16
+_SIZES: Final = {1: 1, 2: 2, 4: 3, 8: 4}  # code of a number by its bytes
+_KINDS: Final = {"u": 0, "i": 4, "f": 2}  # flag of a number by numpy's kind
+_SEQUENCE_OF_BYTES: Final = _ADDRESS | _SEQUENCE | _SIZES[1] << 8
+_UNREAD: Final = 2 | 4 | 8 | 16  # any view, instances that are alive, samples not read
+_CONFIG: Final = (
+    '<CycloneDDS><Domain Id="any"><General><Interfaces>'
+    '<NetworkInterface name="{interface}" priority="default" multicast="default"/>'
+    "</Interfaces></General>{more}</Domain></CycloneDDS>"
+)
+# The loopback has no multicast: whoever is on this machine is asked one by one.
+_LOOPBACK: Final = (
+    "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>60"
+    '</MaxAutoParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>'
+)
+
+
+class _Serialised(c.Structure):
+    _fields_ = (("data", c.c_void_p), ("size", c.c_uint32))
+
+
+class _Descriptor(c.Structure):
+    """`dds_topic_descriptor_t`; what is left zero is the type information."""
+
+    _fields_ = (
+        ("size", c.c_uint32), ("alignment", c.c_uint32), ("flags", c.c_uint32),
+        ("keys_count", c.c_uint32), ("typename", c.c_char_p), ("keys", c.c_void_p),
+        ("ops_count", c.c_uint32), ("ops", c.c_void_p), ("meta", c.c_char_p),
+        ("type_information", _Serialised), ("type_mapping", _Serialised),
+        ("data_representation", c.c_uint32),
+    )  # fmt: skip
+
+
+class _SampleInfo(c.Structure):
+    _fields_ = (
+        ("sample_state", c.c_int), ("view_state", c.c_int), ("instance_state", c.c_int),
+        ("valid_data", c.c_bool), ("source_timestamp", c.c_int64), ("instance", c.c_uint64),
+        ("publication", c.c_uint64), ("disposed", c.c_uint32), ("no_writers", c.c_uint32),
+        ("sample_rank", c.c_uint32), ("generation_rank", c.c_uint32),
+        ("absolute_generation_rank", c.c_uint32),
+    )  # fmt: skip
+
+
+_ARGUMENTS: Final = {
+    "dds_create_domain": (c.c_uint32, c.c_char_p),
+    "dds_create_participant": (c.c_uint32, c.c_void_p, c.c_void_p),
+    "dds_create_topic": (c.c_int32, c.c_void_p, c.c_char_p, c.c_void_p, c.c_void_p),
+    "dds_create_reader": (c.c_int32, c.c_int32, c.c_void_p, c.c_void_p),
+    "dds_create_writer": (c.c_int32, c.c_int32, c.c_void_p, c.c_void_p),
+    "dds_take": (c.c_int32, c.c_void_p, c.c_void_p, c.c_size_t, c.c_uint32),
+    "dds_write": (c.c_int32, c.c_void_p),
+    "dds_delete": (c.c_int32,),
+    "dds_get_matched_publications": (c.c_int32, c.c_void_p, c.c_size_t),
+    "dds_get_matched_subscriptions": (c.c_int32, c.c_void_p, c.c_size_t),
+}
+
+
+def load_library() -> Any:
+    """The C library that CycloneDDS's wheel brings along.
+
+    Raises:
+        ConfigError: it is not installed.
+    """
+    found = importlib.util.find_spec("cyclonedds")  # which does not import it
+    places = [] if found is None or found.origin is None else [Path(found.origin).parent]
+    for place in places:
+        folders = (place.parent / "cyclonedds.libs", place / ".libs")
+        for file in (path for folder in folders for path in sorted(folder.glob("libddsc*.so*"))):
+            library = c.CDLL(str(file))
+            for name, types in _ARGUMENTS.items():
+                function = getattr(library, name)
+                function.argtypes, function.restype = types, c.c_int32
+            return library
+    raise ConfigError(
+        "the driver of the Go2", "no CycloneDDS", "its library", "pip install -e '.[go2]'"
+    )
+
+
+def operations(layout: np.dtype[Any], base: int = 0) -> list[int]:
+    """How to find the numbers of a struct; structs within it and arrays of them are laid out flat.
+
+    On the wire that is the same: XCDR1 has neither padding of structs nor marks between them.
+    """
+    ops = list[int]()
+    for name in layout.names or ():
+        field, offset = _field_of(layout, name)
+        at = base + int(offset)
+        one, shape = field.subdtype or (field, ())
+        count = int(np.prod(shape)) if shape else 1
+        if one.names:
+            for k in range(count):
+                ops += operations(one, at + k * one.itemsize)
+            continue
+        kind, size = _KINDS[one.kind], _SIZES[one.itemsize]
+        if shape:
+            ops += [_ADDRESS | _ARRAY | size << 8 | kind, at, count]
+        else:
+            ops += [_ADDRESS | size << 16 | kind, at]
+    return ops
+
+
+def _field_of(layout: np.dtype[Any], name: str) -> tuple[np.dtype[Any], int]:
+    if layout.fields is None:
+        raise TypeError(f"{layout} is no struct")
+    field, offset, *_ = layout.fields[name]
+    return field, offset
+
+
+def string_at(offset: int) -> list[int]:
+    """How to find a string, a `char *` at this offset."""
+    return [_ADDRESS | _STRING, offset]
+
+
+def bytes_at(offset: int) -> list[int]:
+    """How to find a sequence of bytes: maximum, length, buffer, whether it is ours to free."""
+    return [_SEQUENCE_OF_BYTES, offset]
+
+
+def describe_topic(typename: str, size: int, alignment: int, ops: Sequence[int]) -> Any:
+    """A topic's descriptor without type information, and what must live as long as it does."""
+    program = np.array([*ops, 0], dtype=np.uint32)
+    descriptor = _Descriptor(
+        size, alignment, 0, 0, typename.encode(), None, len(program), program.ctypes.data, b""
+    )
+    return descriptor, program
+
+
+class DdsParticipant:
+    """One side's part in a DDS domain. Close it: others keep what is not closed for ten seconds.
+
+    Args:
+        domain: its number; the robot's is 0.
+        interface: name of the network interface, such as eth0.
+
+    Raises:
+        ConfigError: CycloneDDS is not installed.
+        BridgeError: there is no such interface, or the domain cannot be joined.
+    """
+
+    def __init__(self, domain: int, interface: str) -> None:
+        self.library = load_library()
+        more = _LOOPBACK if interface == "lo" else ""
+        text = _CONFIG.format(interface=interface, more=more).encode()
+        where = f"DDS domain {domain} on {interface!r}"
+        self._domain = self._check(self.library.dds_create_domain(domain, text), where)
+        created = self.library.dds_create_participant(domain, None, None)
+        if created < 0:
+            self.library.dds_delete(self._domain)
+        self.handle = self._check(created, where)
+        self._kept: list[Any] = []
+
+    def topic(self, name: str, typename: str, size: int, alignment: int, ops: list[int]) -> int:
+        """Declare a topic.
+
+        Raises:
+            BridgeError: it is there with another type.
+        """
+        descriptor, program = describe_topic(typename, size, alignment, ops)
+        self._kept += [descriptor, program]
+        made = self.library.dds_create_topic(
+            self.handle, c.addressof(descriptor), name.encode(), None, None
+        )
+        return self._check(made, f"DDS topic {name}")
+
+    def struct_topic(self, name: str, typename: str, layout: np.dtype[np.void]) -> int:
+        """Declare a topic whose samples are structs of numbers.
+
+        Raises:
+            BridgeError: it is there with another type.
+        """
+        ops = operations(layout)
+        return self.topic(name, typename, layout.itemsize, layout.alignment, ops)
+
+    def reader(self, topic: int) -> int:
+        """A reader: best effort, keeps the last sample."""
+        made = self.library.dds_create_reader(self.handle, topic, None, None)
+        return self._check(made, "DDS reader")
+
+    def writer(self, topic: int) -> int:
+        """A writer: reliable, keeps the last sample."""
+        made = self.library.dds_create_writer(self.handle, topic, None, None)
+        return self._check(made, "DDS writer")
+
+    def writers_seen_by(self, reader: int) -> int:
+        """How many writers a reader is matched with, this participant's own included."""
+        return max(0, int(self.library.dds_get_matched_publications(reader, None, 0)))
+
+    def readers_seen_by(self, writer: int) -> int:
+        """How many readers a writer is matched with."""
+        return max(0, int(self.library.dds_get_matched_subscriptions(writer, None, 0)))
+
+    def close(self) -> None:
+        """Leave the domain, and have the others know it."""
+        if self.handle >= 0:
+            self.library.dds_delete(self.handle)
+            self.library.dds_delete(self._domain)
+            self.handle = -1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @staticmethod
+    def _check(handle: int, what: str) -> int:
+        if handle < 0:
+            cause = "is there such an interface? does another process use it with other settings?"
+            raise BridgeError(what, f"error {handle} of CycloneDDS", "to be open", cause)
+        return handle
+
+
+class StructReader:
+    """Takes samples that are structs of numbers."""
+
+    def __init__(self, participant: DdsParticipant, topic: int, size: int) -> None:
+        self._library, self.handle = participant.library, participant.reader(topic)
+        self._sample = c.create_string_buffer(size)
+        self._samples = (c.c_void_p * 1)(c.addressof(self._sample))
+        self._info = _SampleInfo()
+
+    def take(self) -> bytes | None:
+        """The newest sample; None if there is none since the last call."""
+        taken = self._library.dds_take(
+            self.handle, c.addressof(self._samples), c.addressof(self._info), 1, 1
+        )
+        return self._sample.raw if taken > 0 and self._info.valid_data else None
+
+
+class StructWriter:
+    """Writes samples that are structs of numbers."""
+
+    def __init__(self, participant: DdsParticipant, topic: int, size: int) -> None:
+        self._library, self.handle = participant.library, participant.writer(topic)
+        self._sample = c.create_string_buffer(size)
+
+    def write(self, sample: bytes) -> bool:
+        """Write; whether the library took it."""
+        self._sample.raw = sample
+        return bool(self._library.dds_write(self.handle, c.addressof(self._sample)) >= 0)
