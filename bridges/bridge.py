@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 
-from quadriga.bridges.driver import RobotDriver
-from quadriga.bridges.go2_driver import Go2Driver
+from quadriga.bridges.guard import Guard
+from quadriga.bridges.open_driver import open_driver
 from quadriga.bridges.robot_plant import RobotPlant
-from quadriga.bridges.udp_driver import UdpDriver
+from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 
@@ -27,28 +27,26 @@ def build_bridge(config: Config, names: tuple[str, ...], *, armed: bool = False)
     """
     if len(names) != 1:
         raise ConfigError("team.plants", f"a plant of {', '.join(names)}", "'each'")
-    driver = open_driver(config, names[0])
-    return RobotPlant(config, names[0], driver, armed=armed, say=_say)
+    kind, bridge = config.team.robot, bridge_of(config, names[0])
+    driver = open_driver(kind, bridge)
+    guard = None
+    if armed:
+        guard = Guard(kind, bridge)
+        driver.own_guards = 1
+    return RobotPlant(config, names[0], driver, guard=guard, say=_say)
 
 
-def open_driver(config: Config, name: str) -> RobotDriver:
-    """The way to the robot of this name, by its kind.
-
-    Raises:
-        ConfigError: no interface, or an address that does not parse.
-        BridgeError: the way cannot be opened.
-    """
-    kind, number = config.team.robot, name.removeprefix("r")
+def bridge_of(config: Config, name: str) -> BridgeConfig:
+    """The section `bridge` for the robot of this name, with its number filled in."""
+    bridge, number = config.bridge, name.removeprefix("r")
     # On the loopback, robots that real ones keep apart by their cables have domains of their own.
-    domain = int(number) - 1 if config.bridge.interface == "lo" else 0
-    bridge = replace(
-        config.bridge,
-        endpoint=config.bridge.endpoint.replace("{number}", number),
-        listen=config.bridge.listen.replace("{number}", number),
+    domain = bridge.domain + (int(number) - 1 if bridge.interface == "lo" else 0)
+    return replace(
+        bridge,
+        domain=domain,
+        endpoint=bridge.endpoint.replace("{number}", number),
+        listen=bridge.listen.replace("{number}", number),
     )
-    if kind == "go2":
-        return Go2Driver(replace(bridge, domain=bridge.domain + domain))
-    return UdpDriver(kind, bridge)
 
 
 def _say(text: str) -> None:

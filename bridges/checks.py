@@ -16,7 +16,6 @@ from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.unitree.packets import PROTECTED, RobotReport
 
-_LEAST_SHARE: Final = 0.8  # of the reports that a second should have
 _FLAT: Final = 0.6  # rad, tilt at which a robot still lies as it should
 _GRAVITY_OFF: Final = 1.5  # m/s²
 _VERTICAL_OFF: Final = 0.25  # rad between the accelerometer's vertical and the attitude's
@@ -68,8 +67,8 @@ def check_reports(
         Finding(
             "reports",
             f"{len(reports)} in {seconds:g} s",
-            f"at least {_LEAST_SHARE * wanted:.0f}",
-            len(reports) >= _LEAST_SHARE * wanted,
+            f"at least {config.report_share * wanted:.0f}",
+            len(reports) >= config.report_share * wanted,
             "cable, address, port or interface; is the robot on?",
         )
     ]

@@ -15,11 +15,13 @@ class RobotDriver(Protocol):
         servo: the motors' mode in which they follow commands.
         period_ms: between two packets in each direction.
         counters: packets by what became of them.
+        own_guards: guards of this bridge, which are no other writers.
     """
 
     servo: int
     period_ms: int
     counters: Counter[str]
+    own_guards: int
 
     def receive(self) -> RobotReport | None:
         """The newest report that has come since the last call; None if there is none."""

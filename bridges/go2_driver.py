@@ -26,6 +26,7 @@ class Go2Driver:
 
     Args:
         config: interface and domain.
+        guards: whether it only ever sends, and has the right to from the start.
 
     Raises:
         ConfigError: no interface is given, or CycloneDDS is not installed.
@@ -34,7 +35,7 @@ class Go2Driver:
 
     servo, period_ms = ON, 2
 
-    def __init__(self, config: BridgeConfig) -> None:
+    def __init__(self, config: BridgeConfig, *, guards: bool = False) -> None:
         if not config.interface:
             raise ConfigError(
                 "bridge.interface", "nothing", "the one the robot hangs on, e.g. eth0"
@@ -47,6 +48,9 @@ class Go2Driver:
         self._witness = StructReader(self._participant, commands, go2.COMMAND.itemsize)
         self._commands_topic = commands
         self._commands: StructWriter | None = None
+        self.own_guards = 0
+        if guards:
+            self._open_commands()
         self._switcher = RpcEnd(self._participant, rpc.MOTION_SWITCHER, serves=False)
         self._sport = RpcEnd(self._participant, rpc.SPORT, serves=False)
         self.counters: Counter[str] = Counter()
@@ -69,8 +73,8 @@ class Go2Driver:
         self.counters["sent" if sent else "unsent"] += 1
 
     def other_writers(self) -> int:
-        """How many others write commands."""
-        own = self._commands is not None
+        """How many others write commands, but for this bridge's guard."""
+        own = self.own_guards + (self._commands is not None)
         return max(0, self._participant.writers_seen_by(self._witness.handle) - own)
 
     def take_over(self) -> None:
@@ -90,6 +94,9 @@ class Go2Driver:
         if others := self.other_writers():
             cause = "its own controller, or another bridge on the same network"
             raise BridgeError("rt/lowcmd", f"{others} others who write it", "nobody else", cause)
+        self._open_commands()
+
+    def _open_commands(self) -> None:
         self._commands = StructWriter(self._participant, self._commands_topic, go2.COMMAND.itemsize)
 
     def _motion_mode(self) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from quadriga.bridges.checks import CheckError, check_reports, refuse_failed
 from quadriga.bridges.driver import RobotDriver
+from quadriga.bridges.guard import BEAT_MS, Guard
 from quadriga.bridges.supervisor import (
     BridgeMode,
     Supervised,
@@ -23,7 +24,7 @@ from quadriga.bridges.supervisor import (
 from quadriga.plant.protocol import Plant
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import Array
-from quadriga.shared.runtime.clock import Rate
+from quadriga.shared.runtime.clock import Rate, monotonic
 from quadriga.shared.unitree.packets import RobotReport
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Command, Event, State, Status
@@ -42,14 +43,16 @@ class RobotPlant(Plant):
         config: the team's configuration.
         name: of the robot.
         driver: the way to it.
-        armed: whether it may be commanded.
+        guard: brings the robot to rest when this process dies or hangs; None: a dry run, in which
+            nothing is ever sent.
         say: tells the operator what happens.
+        now: a clock that never goes back, s.
 
     Raises:
         ConfigError: `bridge.stop_buttons` names no buttons.
     """
 
-    grades_commands = True
+    is_robot = True
 
     def __init__(
         self,
@@ -57,19 +60,23 @@ class RobotPlant(Plant):
         name: str,
         driver: RobotDriver,
         *,
-        armed: bool,
+        guard: Guard | None,
         say: Callable[[str], None],
+        now: Callable[[], float] = monotonic,
     ) -> None:
         self.names, self.tick = (name,), 0
-        self._config, self._driver, self._armed, self._say = config, driver, armed, say
+        self._config, self._driver, self._guard, self._say = config, driver, guard, say
+        self._clock, self._turned_at = now, now()
+        self._idle_rate = Rate(_TICK, now=now, slack=3.0)
         self._supervisor = Supervisor(config.robot, config.bridge, driver.servo)
-        self._memory: SupervisorState = self._supervisor.initial(0, armed=armed)
+        self._memory: SupervisorState = self._supervisor.initial(0, armed=guard is not None)
         self._now = 0  # ms since this plant was made; ticks begin with the walk
         self._report: RobotReport | None = None
         self._report_at = -1
         self._published_at = -1
         self._yaw: float | None = None
         self._in_charge = False  # of the robot's motors
+        self._guard_gone = False
         self._cut: Counter[str] = Counter()
 
     @property
@@ -87,12 +94,13 @@ class RobotPlant(Plant):
         name, config = self.names[0], self._config
         if not self._look(stopped):
             return False
-        if not self._armed:
+        if self._guard is None:
             self._say(f"{name}: dry run, nothing is sent; --armed commands the robot")
             return True
         self._driver.take_over()
         self._in_charge = True
-        rate, left = Rate(_TICK), round(1000 * config.bridge.stand_s) + _SLACK_MS
+        self._stall()
+        rate, left = self._idle_rate, round(1000 * config.bridge.stand_s) + _SLACK_MS
         while self.mode is not BridgeMode.STANDING:
             if stopped():
                 return False
@@ -146,10 +154,17 @@ class RobotPlant(Plant):
         self.tick += 1
         return events
 
+    def idle(self) -> None:
+        """A millisecond of standing, while the others are waited for."""
+        self._turn(None, 0, Wish.STAND)
+        self._idle_rate.wait()
+
     def finish(self) -> None:
         """Have the robot lie down, switch its motors off, and leave."""
         if self._in_charge:
             self._come_to_rest()
+        if self._guard is not None:
+            self._guard.dismiss()
         self._driver.close()
 
     def _come_to_rest(self) -> None:
@@ -183,6 +198,8 @@ class RobotPlant(Plant):
     def _receive(self) -> bool:
         """Take the newest report; whether there is one. Counts a millisecond."""
         self._now += 1
+        if self._in_charge and self._guard is not None and self._now % BEAT_MS == 0:
+            self._guard_gone = not self._guard.beat()
         report = self._driver.receive()
         if report is None:
             return False
@@ -203,12 +220,19 @@ class RobotPlant(Plant):
             command_age=age,
             wish=wish,
             writers=self._driver.other_writers(),
+            stall=self._stall(),
+            guarded=not self._guard_gone,
         )
         self._memory, supervised = self._supervisor.step(self._memory, inputs)
         self._cut.update(supervised.cut)
         if supervised.targets is not None and self._is_due(supervised):
             self._driver.send(supervised.targets)
         return [self._announce(mode, reason) for mode, reason in supervised.changes]
+
+    def _stall(self) -> int:
+        """Milliseconds since this was asked last: more than one if the process stood still."""
+        before, self._turned_at = self._turned_at, self._clock()
+        return round(1000.0 * (self._turned_at - before))
 
     def _is_due(self, supervised: Supervised) -> bool:
         return bool(supervised.changes) or self._now % self._driver.period_ms == 0

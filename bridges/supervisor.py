@@ -92,6 +92,8 @@ class SupervisorInputs:
         command_age: ms.
         wish: of the team.
         writers: how many others command the robot's motors.
+        stall: ms since the step before, by the clock.
+        guarded: whether the bridge's guard is there.
     """
 
     now: int
@@ -101,6 +103,8 @@ class SupervisorInputs:
     command_age: int = 0
     wish: Wish = Wish.REST
     writers: int = 0
+    stall: int = 1
+    guarded: bool = True
 
 
 class Supervised(NamedTuple):
@@ -188,8 +192,12 @@ class Supervisor:
             return with_detail("remote", config.stop_buttons)
         if inputs.writers:
             return with_detail("second-writer", f"{inputs.writers} others command the motors")
+        if not inputs.guarded:
+            return "guard-gone"
         if mode is BridgeMode.LIMP:
             return ""
+        if inputs.stall > config.damp_ms:  # by then the guard has damped the motors
+            return with_detail("bridge-late", f"{inputs.stall} ms")
         if inputs.report_age > config.report_max_ms:
             return with_detail("report-late", f"{inputs.report_age} ms")
         if not np.isfinite([*report.q, *report.dq, *report.quat_wxyz]).all():

@@ -22,6 +22,7 @@ class UdpDriver:
     Args:
         kind: "a1" or "go1".
         config: where the robot is, and where its packets arrive.
+        guards: whether it only ever sends, from any port.
 
     Raises:
         ConfigError: an address does not parse.
@@ -30,13 +31,14 @@ class UdpDriver:
 
     servo, period_ms = SERVO, 1
 
-    def __init__(self, kind: str, config: BridgeConfig) -> None:
+    def __init__(self, kind: str, config: BridgeConfig, *, guards: bool = False) -> None:
         robot = parse_address(config.endpoint, "bridge.endpoint", _ROBOT)
         listen = parse_address(config.listen, "bridge.listen", _LISTEN[kind])
         self._codec: UdpCodec = CODECS[kind]
-        self._port = UdpPort(listen, robot)
+        self._port = UdpPort(Address(listen.host, 0) if guards else listen, robot)
         self._tick: int | None = None
         self._older = 0
+        self.own_guards = 0
         self.counters: Counter[str] = Counter()
 
     def receive(self) -> RobotReport | None:

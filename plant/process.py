@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from quadriga.plant.end import End
 from quadriga.plant.lockstep import run_lockstep
 from quadriga.plant.protocol import Plant
 from quadriga.plant.realtime import run_realtime
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_time import team_time
-from quadriga.shared.bus.barrier import meet, start_together
+from quadriga.shared.bus.barrier import await_agents, meet, start_together
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
@@ -55,7 +56,7 @@ def run(
         end_collection()
         take_priority(config.runtime.priority)
         try:
-            if not (plant.prepare(stopped) and start_together(bus, config, stopped)):
+            if not _start(bus, config, plant, stopped):
                 return
             loop = run_realtime if config.world.mode == "realtime" else run_lockstep
             end = loop(server, stopped)
@@ -63,10 +64,30 @@ def run(
                 server.announce(end.code, "", end.detail)
         finally:
             plant.finish()
-    if time.end is not None and time.end.code == codes.PLANT_GONE:
+    _check_end(time.end, team)
+
+
+def _start(bus: Bus, config: Config, plant: Plant, stopped: Callable[[], bool]) -> bool:
+    """Get the robots to stand, and start the team; False if `stopped()` came first."""
+    if not plant.is_robot:
+        return plant.prepare(stopped) and start_together(bus, config, stopped)
+    return (
+        await_agents(bus, config, stopped)
+        and plant.prepare(stopped)
+        and start_together(bus, config, stopped, plant.idle)
+    )
+
+
+def _check_end(end: End | None, team: str) -> None:
+    """Complain if another plant has left.
+
+    Raises:
+        BusError: it did, while the team walked.
+    """
+    if end is not None and end.code == codes.PLANT_GONE:
         raise BusError(
             f"team {team!r}",
-            time.end.detail,
+            end.detail,
             "the plants of all robots until the end",
             "it failed, was stopped, or lost its link: see what it says itself",
         )

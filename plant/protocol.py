@@ -16,17 +16,21 @@ class Plant(Protocol):
     Attributes:
         names: of the robots, in the order of every stacked array.
         tick: world time that has passed, ms.
-        grades_commands: whether it sees to late commands itself; in real time it then gets every
-            robot's newest command, however old.
+        is_robot: whether it is a real robot. That stands up once the agents are ready, is attended
+            to all the time, and sees to late commands itself: it gets the newest, however old.
     """
 
     names: tuple[str, ...]
     tick: int
-    grades_commands: bool = False
+    is_robot: bool = False
 
     def prepare(self, stopped: Callable[[], bool]) -> bool:
         """Get the robots to stand, before the team walks; False if `stopped()` came first."""
         return not stopped()
+
+    def idle(self) -> None:
+        """Let a millisecond pass, while a robot that stands waits for the others."""
+        return
 
     def finish(self) -> None:
         """Bring the robots to rest, after the walk."""

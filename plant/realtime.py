@@ -64,7 +64,7 @@ class _Motors:
             age = tick - server.commands.tick_of(name)
             state = grade(age, server.config.world)
             self.deadlines.note_age(name, age)
-            if server.plant.grades_commands:
+            if server.plant.is_robot:
                 if command is not None:
                     chosen[name] = command
                 continue

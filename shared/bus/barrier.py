@@ -7,7 +7,7 @@ from collections.abc import Callable
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
-from quadriga.shared.members import LEADS, Member, has_lead, team_members
+from quadriga.shared.members import LEADS, SIM, Member, has_lead, team_members
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import robot_names
 
@@ -54,17 +54,32 @@ def meet(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
     return present
 
 
-def start_together(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
-    """A plant's wait until all others are ready; the one that drives time starts the team.
+def await_agents(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
+    """A robot's wait until all but plants are ready: only then it stands up.
 
     False if `stopped()` came first.
+
+    Raises:
+        BusError: some were not ready in time.
+    """
+    names = {member.name for member in processes(config) if member.role.name != SIM}
+    return bus.wait_for(READY, names, config.bus.barrier_timeout, stopped)
+
+
+def start_together(
+    bus: Bus, config: Config, stopped: Callable[[], bool], pause: Callable[[], None] | None = None
+) -> bool:
+    """A plant's wait until all others are ready; the one that drives time starts the team.
+
+    False if `stopped()` came first. While it waits, `pause()` is called all the time.
 
     Raises:
         BusError: some were not ready in time, or two carry one name.
     """
     if bus.name not in LEADS:
         bus.declare(READY)
-    if not bus.wait_for(READY, members(config), config.bus.barrier_timeout, stopped):
+    waiting = {} if pause is None else {"pause": pause}
+    if not bus.wait_for(READY, members(config), config.bus.barrier_timeout, stopped, **waiting):
         return False
     _check_single(bus, config)
     bus.declare(READY)

@@ -33,6 +33,10 @@ _ACK_TIMEOUT: Final = 2.0  # s
 _LINK_TIMEOUT: Final = 5.0  # s
 
 
+def _pause() -> None:
+    sleep(0.005)
+
+
 class Bus:
     """One process's connection to its team.
 
@@ -191,9 +195,16 @@ class Bus:
         return self._presence.duplicates(stage, [self.name] if stage in self._declared else [])
 
     def wait_for(
-        self, stage: str, names: Iterable[str], timeout: float, stopped: Callable[[], bool]
+        self,
+        stage: str,
+        names: Iterable[str],
+        timeout: float,
+        stopped: Callable[[], bool],
+        pause: Callable[[], None] = _pause,
     ) -> bool:
         """Wait until all `names` are at `stage`; False if `stopped()` came first.
+
+        Between two looks `pause()` is called, which takes some milliseconds.
 
         Raises:
             BusError: some were still absent after `timeout` seconds; the message names them.
@@ -212,7 +223,7 @@ class Bus:
                     if self.linked
                     else "no link to anyone: is bus.endpoint right and reachable?",
                 )
-            sleep(0.005)
+            pause()
         return True
 
     def close(self) -> None:

@@ -65,6 +65,13 @@ class BridgeConfig:
         low=20.0,
         high=120.0,
     )
+    report_share: float = key(
+        0.8,
+        "1",
+        "share of the packets of a second that must come before the robot is commanded",
+        low=0.01,
+        high=1.0,
+    )
     report_max_ms: int = key(
         50, "ms", "age of the robot's last packet at which it stops", low=5, high=1000
     )

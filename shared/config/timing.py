@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from quadriga.shared.config.sections import Config
+from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.wire.topics import (
     CLOCK,
+    COMMAND,
     CONFIGURED,
     PLAN,
     SAMPLE_MS,
+    STATE,
     STATUS,
     STATUS_MS,
     TABLE,
@@ -20,7 +22,8 @@ def periods(config: Config) -> dict[str, int]:
     """World time between two messages of a topic by its name, ms; 0: sent on event.
 
     In real time an agent that was late says its status later. Several plants in lock-step follow
-    every tick of the clock; an operator needs no more than every tenth.
+    every tick of the clock; an operator needs no more than every tenth. Robots behind bridges speak
+    by clocks of their own: all that is sure is a state at every sample.
     """
     lockstep = config.world.mode == "lockstep"
     configured = {
@@ -29,10 +32,13 @@ def periods(config: Config) -> dict[str, int]:
         STATUS: STATUS_MS if lockstep else 0,
         TRUTH: 1 if config.estimator.kind == "truth" else SAMPLE_MS,
     }
-    return {
+    found = {
         topic.name: configured[topic] if topic.period_ms == CONFIGURED else topic.period_ms
         for topic in TABLE
     }
+    if config.team.plant == BRIDGED:
+        found |= dict.fromkeys((STATE.name, COMMAND.name), SAMPLE_MS)
+    return found
 
 
 def max_ages(config: Config) -> dict[str, int]:

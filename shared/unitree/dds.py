@@ -24,6 +24,7 @@ _STRING, _SEQUENCE, _ARRAY = 5 << 16, 7 << 16, 8 << 16
 _SIZES: Final = {1: 1, 2: 2, 4: 3, 8: 4}  # code of a number by its bytes
 _KINDS: Final = {"u": 0, "i": 4, "f": 2}  # flag of a number by numpy's kind
 _SEQUENCE_OF_BYTES: Final = _ADDRESS | _SEQUENCE | _SIZES[1] << 8
+_THERE_ALREADY: Final = -4  # DDS_RETCODE_PRECONDITION_NOT_MET, of a domain
 _UNREAD: Final = 2 | 4 | 8 | 16  # any view, instances that are alive, samples not read
 _CONFIG: Final = (
     '<CycloneDDS><Domain Id="any"><General><Interfaces>'
@@ -164,7 +165,9 @@ class DdsParticipant:
         more = _LOOPBACK if interface == "lo" else ""
         text = _CONFIG.format(interface=interface, more=more).encode()
         where = f"DDS domain {domain} on {interface!r}"
-        self._domain = self._check(self.library.dds_create_domain(domain, text), where)
+        self._domain = self.library.dds_create_domain(domain, text)
+        if self._domain != _THERE_ALREADY:  # made by another participant of this process
+            self._check(self._domain, where)
         created = self.library.dds_create_participant(domain, None, None)
         if created < 0:
             self.library.dds_delete(self._domain)
@@ -215,7 +218,8 @@ class DdsParticipant:
         """Leave the domain, and have the others know it."""
         if self.handle >= 0:
             self.library.dds_delete(self.handle)
-            self.library.dds_delete(self._domain)
+            if self._domain >= 0:
+                self.library.dds_delete(self._domain)
             self.handle = -1
 
     def __enter__(self) -> Self:

@@ -30,6 +30,7 @@ class Go2Robot:
     """
 
     period_ms = 2
+    lets_go = True  # of the motors, when its motion controller is asked to
 
     def __init__(self, domain: int, interface: str) -> None:
         self._participant = DdsParticipant(domain, interface)
@@ -71,7 +72,7 @@ class Go2Robot:
             if message.api == rpc.CHECK_MODE:
                 text = json.dumps({"form": "0", "name": self.controller})
             elif message.api == rpc.RELEASE_MODE:
-                self.controller = ""
+                self.controller = "" if self.lets_go else self.controller
             elif message.api == rpc.SELECT_MODE:
                 self.controller, self._targets = _IN_CHARGE, None
             else:

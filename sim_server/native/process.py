@@ -16,11 +16,13 @@ from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.unitree.udp import CODECS
 from quadriga.shared.unitree.udp_port import Address, parse_address
 from quadriga.shared.wire.codes import FALL
+from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.native.board import Board
 from quadriga.sim_server.native.go2_robot import Go2Robot
 from quadriga.sim_server.native.udp_robot import UdpRobot
 from quadriga.sim_server.world.world import World
 
+OFF, DAMPED, DRIVEN = "motors off", "motors damped", "motors driven"
 _TICK = 1e-3  # s
 
 
@@ -83,10 +85,8 @@ def _serve(
 ) -> None:
     end_collection()
     take_priority(config.runtime.priority)
-    rate = Rate(_TICK, slack=3.0)
-    print(
-        f"{len(robots)} simulated {config.robot.title} on the network", file=sys.stderr, flush=True
-    )
+    rate, motors = Rate(_TICK, slack=3.0), dict.fromkeys(robots, OFF)
+    _say(f"{len(robots)} simulated {config.robot.title} on the network")
     while not stopped():
         states = world.states()
         for k, (name, robot) in enumerate(robots.items()):
@@ -94,8 +94,22 @@ def _serve(
                 robot.report(states[name], world.motors.heat[k])
         rate.wait()
         commands = {name: robot.obey() for name, robot in robots.items()}
+        for name, command in commands.items():
+            if (doing := describe_motors(command)) != motors[name]:
+                motors[name] = doing
+                _say(f"{world.tick} ms: {name} {doing}")
         for event in world.step({n: c for n, c in commands.items() if c is not None}):
             if event.code != FALL:  # robots that lie are no news here
-                text = f"{event.tick} ms: {event.kind} {event.robot} {event.detail}"
-                print(text, file=sys.stderr, flush=True)
+                _say(f"{event.tick} ms: {event.kind} {event.robot} {event.detail}")
         world.settle()
+
+
+def describe_motors(command: Command | None) -> str:
+    """What the motors do under a command: off, damped or driven."""
+    if command is None:
+        return OFF
+    return DRIVEN if command.kp.any() or command.tau.any() else DAMPED
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

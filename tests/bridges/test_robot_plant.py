@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quadriga.bridges.bridge import open_driver
 from quadriga.bridges.checks import CheckError
+from quadriga.bridges.guard import Guard
+from quadriga.bridges.open_driver import open_driver
 from quadriga.bridges.robot_plant import RobotPlant, to_state, yaw_of
 from quadriga.bridges.supervisor import BridgeMode
 from quadriga.shared.config.load import load
@@ -69,8 +70,9 @@ def board() -> Iterator[Board]:
 @contextmanager
 def bridge_to(board: Board, said: list[str], *, armed: bool = False) -> Iterator[RobotPlant]:
     config = load(overrides=board.keys)
-    driver = open_driver(config, "r1")
-    plant = RobotPlant(config, "r1", driver, armed=armed, say=said.append)
+    driver = open_driver("a1", config.bridge)
+    guard = Guard("a1", config.bridge) if armed else None
+    plant = RobotPlant(config, "r1", driver, guard=guard, say=said.append)
     try:
         yield plant
     finally:
@@ -112,6 +114,7 @@ class Script:
     """A driver whose robot speaks at given milliseconds of the bridge."""
 
     servo, period_ms = SERVO, 2
+    own_guards = 0
 
     def __init__(self, speaks: Iterator[bool]) -> None:
         self._speaks, self._tick = speaks, 0
@@ -134,7 +137,7 @@ class Script:
 
 def ticks_of(speaks: Iterable[bool]) -> list[int]:
     """Ticks of the states of a robot that speaks so."""
-    plant = RobotPlant(config_of(), "r1", Script(iter(speaks)), armed=False, say=list[str]().append)
+    plant = RobotPlant(config_of(), "r1", Script(iter(speaks)), guard=None, say=list[str]().append)
     ticks = []
     with suppress(StopIteration):
         while True:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +29,7 @@ PATIENT: dict[str, Any] = {
     "bridge.hold_ms": 200,
     "bridge.damp_ms": 1000,
     "bridge.report_max_ms": 1000,
+    "bridge.report_share": 0.05,
     "bridge.stand_s": 2.0,
     "bridge.speed_share": 1.5,
 }
@@ -33,7 +37,7 @@ PATIENT: dict[str, Any] = {
 pytestmark = pytest.mark.usefixtures("_compiled")
 
 
-@pytest.fixture(params=["a1", "go1"])
+@pytest.fixture(params=["a1", "go2"])
 def config(request: pytest.FixtureRequest) -> Config:
     """A robot on this machine's loopback."""
     return load(
@@ -49,6 +53,8 @@ def config(request: pytest.FixtureRequest) -> Config:
             "bus.endpoint": free_endpoint(),
             "bridge.endpoint": f"{HOST}:{free_port()}",
             "bridge.listen": f"{HOST}:{free_port()}",
+            "bridge.interface": "lo",
+            "bridge.domain": 150 + os.getpid() % 40,  # tests run side by side
         }
     )
 
@@ -100,7 +106,7 @@ def test_a_robot_stands_up_walks_and_lies_down_through_its_own_protocol(
     assert max(m.y[1] for m in recording.messages(Measurement, "r1")) > 0.3, "it walks"
     status = list(recording.messages(Status, "plant_r1"))[-1]
     assert status.mode == "walking"
-    assert status.counters["received"] > 1000
+    assert status.counters["received"] > 500
     replay = subprocess.run(
         [*QUADRIGA, "replay", str(out), "--all"],
         capture_output=True,
@@ -114,6 +120,7 @@ def test_a_robot_stands_up_walks_and_lies_down_through_its_own_protocol(
 
 
 @pytest.mark.usefixtures("robots")
+@pytest.mark.parametrize("config", ["go2"], indirect=True)
 def test_without_armed_the_robot_does_not_move(file: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
     walk(file, out)
@@ -126,8 +133,64 @@ def test_without_armed_the_robot_does_not_move(file: Path, tmp_path: Path) -> No
     assert "sent" not in status.counters
 
 
+@pytest.mark.parametrize("config", ["a1"], indirect=True)
 def test_a_robot_that_is_off_is_one_clear_error(file: Path, tmp_path: Path) -> None:
     done = walk(file, tmp_path / "run", "--armed")
     assert done.returncode == 1
-    assert "robot r1: reports: got 0 in 1 s, expected at least 800 (cable, address" in done.stderr
+    assert "robot r1: reports: got 0 in 1 s, expected at least" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def process_of(file: Path, *words: str) -> int:
+    """The process whose command line has these words and runs for this configuration, or 0."""
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            line = (folder / "cmdline").read_bytes().decode().split("\0")
+        except (OSError, UnicodeDecodeError):
+            continue
+        if all(word in line for word in words) and any(str(file.parent) in part for part in line):
+            return int(folder.name)
+    return 0
+
+
+def guards() -> set[str]:
+    """Guards that run, by their process."""
+    found = set()
+    for folder in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if b"quadriga.bridges.guard" in (folder / "cmdline").read_bytes():
+                found.add(folder.name)
+    return found
+
+
+@pytest.mark.usefixtures("robots")
+@pytest.mark.parametrize(
+    ("config", "number"), [("a1", signal.SIGKILL), ("go2", signal.SIGSTOP)], indirect=["config"]
+)
+def test_a_bridge_that_dies_or_hangs_leaves_a_robot_that_is_damped_and_then_limp(
+    file: Path, tmp_path: Path, number: signal.Signals
+) -> None:
+    out, log, before = tmp_path / "run", tmp_path / "robots.log", guards()
+    command = [*QUADRIGA, "walk", "--config", str(file), "--out", str(out), "--no-render"]
+    command += ["--armed", "--seconds", "60"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as walking:
+        said = out / "logs" / "plant_r1.log"
+        wait_until(lambda: said.is_file() and "r1: walking" in said.read_text(encoding="utf-8"))
+        assert "motors driven" in log.read_text(encoding="utf-8").splitlines()[-1]
+        bridge = process_of(out / "config.toml", "bridge", "--armed")
+        os.kill(bridge, number)
+        wait_until(lambda: "motors off" in log.read_text(encoding="utf-8").splitlines()[-1])
+        last = [line.partition("r1 ")[2] for line in log.read_text(encoding="utf-8").splitlines()]
+        assert last[-3:] == ["motors driven", "motors damped", "motors off"]
+        wait_until(lambda: guards() <= before)  # it leaves by itself
+        if number is signal.SIGSTOP:
+            os.kill(bridge, signal.SIGCONT)
+            wait_until(lambda: "r1: stopped " in said.read_text(encoding="utf-8"))
+        walking.terminate()
+
+
+def wait_until(happens: Callable[[], bool]) -> None:
+    deadline = monotonic() + WAIT
+    while not happens():
+        assert monotonic() < deadline
+        sleep(0.02)

@@ -1,0 +1,104 @@
+"""DDS on the loopback, both ends in one process, and what must never be sent."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.unitree import go2, rpc
+from quadriga.shared.unitree.dds import (
+    DdsParticipant,
+    StructReader,
+    StructWriter,
+    describe_topic,
+    load_library,
+    operations,
+)
+from quadriga.shared.unitree.packets import MotorTargets
+from quadriga.shared.unitree.rpc import RpcEnd, RpcMessage
+from quadriga.shared.unitree.udp_port import BridgeError
+
+DOMAIN = 190  # of no other test
+WAIT = 10.0  # s
+
+
+@pytest.fixture
+def participant() -> Iterator[DdsParticipant]:
+    with DdsParticipant(DOMAIN, "lo") as made:
+        yield made
+
+
+def command_topic(participant: DdsParticipant) -> int:
+    return participant.struct_topic(go2.COMMAND_TOPIC, go2.COMMAND_TYPE, go2.COMMAND)
+
+
+def test_a_topic_has_no_type_information() -> None:
+    """With it, processes of version 0.10 on the same topic end: the robot's own among them."""
+    for layout, typename in ((go2.COMMAND, go2.COMMAND_TYPE), (go2.REPORT, go2.REPORT_TYPE)):
+        ops = operations(layout)
+        descriptor, program = describe_topic(typename, layout.itemsize, layout.alignment, ops)
+        for part in (descriptor.type_information, descriptor.type_mapping):
+            assert (part.data, part.size) == (None, 0)
+        assert descriptor.flags == 0
+        assert descriptor.ops_count == len(program) == len(ops) + 1
+
+
+def test_the_python_package_is_never_imported() -> None:
+    """It would send type information for whatever is declared through it."""
+    code = (
+        "import sys; from quadriga.shared.unitree.dds import load_library; "
+        "import quadriga.bridges.go2_driver, quadriga.sim_server.native.go2_robot; "
+        "load_library(); print(any(name.split('.')[0] == 'cyclonedds' for name in sys.modules))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert done.stdout.strip() == "False"
+    assert load_library() is not None
+
+
+def test_what_is_written_is_read_to_the_byte(participant: DdsParticipant) -> None:
+    topic = command_topic(participant)
+    writer = StructWriter(participant, topic, go2.COMMAND.itemsize)
+    reader = StructReader(participant, topic, go2.COMMAND.itemsize)
+    random = np.random.default_rng(0)
+    rows = random.normal(size=(5, 12))
+    packet = go2.GO2.encode_command(MotorTargets(np.ones(12, np.uint8), *rows))
+    assert reader.take() is None
+    assert writer.write(packet)
+    deadline = monotonic() + WAIT
+    while (read := reader.take()) is None:
+        assert monotonic() < deadline
+        sleep(0.001)
+    assert read == packet
+    assert reader.take() is None
+    assert participant.writers_seen_by(reader.handle) == 1
+    assert participant.readers_seen_by(writer.handle) == 1
+
+
+def test_a_call_is_answered_with_its_number(participant: DdsParticipant) -> None:
+    client = RpcEnd(participant, rpc.MOTION_SWITCHER, serves=False)
+    server = RpcEnd(participant, rpc.MOTION_SWITCHER, serves=True)
+    texts = ("{}", "", "ä" * 300)
+    deadline = monotonic() + WAIT
+    for number, text in enumerate(texts):
+        assert client.send(RpcMessage(number, rpc.CHECK_MODE, text))
+        answers = list[RpcMessage]()
+        while not answers:
+            for request in server.receive():
+                assert request == RpcMessage(number, rpc.CHECK_MODE, text)
+                server.send(RpcMessage(request.id, request.api, f"got {text}", 7))
+            answers = list(client.receive())
+            assert monotonic() < deadline
+            sleep(0.001)
+        assert answers == [RpcMessage(number, rpc.CHECK_MODE, f"got {text}", 7)]
+
+
+def test_an_interface_that_is_not_there_is_one_clear_error() -> None:
+    with pytest.raises(BridgeError, match=r"DDS domain 191 on 'eth77': got error -\d+ of Cyclone"):
+        DdsParticipant(191, "eth77")
