@@ -46,22 +46,36 @@ class _Descriptor(c.Structure):
     """`dds_topic_descriptor_t`; what is left zero is the type information."""
 
     _fields_ = (
-        ("size", c.c_uint32), ("alignment", c.c_uint32), ("flags", c.c_uint32),
-        ("keys_count", c.c_uint32), ("typename", c.c_char_p), ("keys", c.c_void_p),
-        ("ops_count", c.c_uint32), ("ops", c.c_void_p), ("meta", c.c_char_p),
-        ("type_information", _Serialised), ("type_mapping", _Serialised),
+        ("size", c.c_uint32),
+        ("alignment", c.c_uint32),
+        ("flags", c.c_uint32),
+        ("keys_count", c.c_uint32),
+        ("typename", c.c_char_p),
+        ("keys", c.c_void_p),
+        ("ops_count", c.c_uint32),
+        ("ops", c.c_void_p),
+        ("meta", c.c_char_p),
+        ("type_information", _Serialised),
+        ("type_mapping", _Serialised),
         ("data_representation", c.c_uint32),
-    )  # fmt: skip
+    )
 
 
 class _SampleInfo(c.Structure):
     _fields_ = (
-        ("sample_state", c.c_int), ("view_state", c.c_int), ("instance_state", c.c_int),
-        ("valid_data", c.c_bool), ("source_timestamp", c.c_int64), ("instance", c.c_uint64),
-        ("publication", c.c_uint64), ("disposed", c.c_uint32), ("no_writers", c.c_uint32),
-        ("sample_rank", c.c_uint32), ("generation_rank", c.c_uint32),
+        ("sample_state", c.c_int),
+        ("view_state", c.c_int),
+        ("instance_state", c.c_int),
+        ("valid_data", c.c_bool),
+        ("source_timestamp", c.c_int64),
+        ("instance", c.c_uint64),
+        ("publication", c.c_uint64),
+        ("disposed", c.c_uint32),
+        ("no_writers", c.c_uint32),
+        ("sample_rank", c.c_uint32),
+        ("generation_rank", c.c_uint32),
         ("absolute_generation_rank", c.c_uint32),
-    )  # fmt: skip
+    )
 
 
 _ARGUMENTS: Final = {

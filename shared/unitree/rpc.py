@@ -23,25 +23,35 @@ _RESPONSE_TYPE: Final = "unitree_api::msg::dds_::Response_"
 _INT64, _INT32, _BOOL = 1 << 24 | 4 << 16 | 4, 1 << 24 | 3 << 16 | 4, 1 << 24 | 1 << 16
 
 
-class _Bytes(c.Structure):
+class _RpcBytes(c.Structure):
     _fields_ = (
-        ("maximum", c.c_uint32), ("length", c.c_uint32), ("buffer", c.c_void_p),
+        ("maximum", c.c_uint32),
+        ("length", c.c_uint32),
+        ("buffer", c.c_void_p),
         ("release", c.c_bool),
-    )  # fmt: skip
+    )
 
 
-class _Request(c.Structure):
+class _RpcRequest(c.Structure):
     _fields_ = (
-        ("id", c.c_int64), ("api", c.c_int64), ("lease", c.c_int64), ("priority", c.c_int32),
-        ("no_reply", c.c_bool), ("parameter", c.c_char_p), ("binary", _Bytes),
-    )  # fmt: skip
+        ("id", c.c_int64),
+        ("api", c.c_int64),
+        ("lease", c.c_int64),
+        ("priority", c.c_int32),
+        ("no_reply", c.c_bool),
+        ("parameter", c.c_char_p),
+        ("binary", _RpcBytes),
+    )
 
 
-class _Response(c.Structure):
+class _RpcResponse(c.Structure):
     _fields_ = (
-        ("id", c.c_int64), ("api", c.c_int64), ("code", c.c_int32), ("data", c.c_char_p),
-        ("binary", _Bytes),
-    )  # fmt: skip
+        ("id", c.c_int64),
+        ("api", c.c_int64),
+        ("code", c.c_int32),
+        ("data", c.c_char_p),
+        ("binary", _RpcBytes),
+    )
 
 
 def _operations(layout: Any, numbers: dict[str, int], text: str) -> list[int]:
@@ -50,11 +60,13 @@ def _operations(layout: Any, numbers: dict[str, int], text: str) -> list[int]:
 
 
 _REQUEST_OPS: Final = _operations(
-    _Request,
+    _RpcRequest,
     {"id": _INT64, "api": _INT64, "lease": _INT64, "priority": _INT32, "no_reply": _BOOL},
     "parameter",
 )
-_RESPONSE_OPS: Final = _operations(_Response, {"id": _INT64, "api": _INT64, "code": _INT32}, "data")
+_RESPONSE_OPS: Final = _operations(
+    _RpcResponse, {"id": _INT64, "api": _INT64, "code": _INT32}, "data"
+)
 
 
 class RpcMessage(NamedTuple):
@@ -89,8 +101,8 @@ class RpcEnd:
                 f"rt/api/{service}/{kind}", typename, c.sizeof(layout), c.alignment(layout), ops
             )
             for kind, typename, layout, ops in (
-                ("request", _REQUEST_TYPE, _Request, _REQUEST_OPS),
-                ("response", _RESPONSE_TYPE, _Response, _RESPONSE_OPS),
+                ("request", _REQUEST_TYPE, _RpcRequest, _REQUEST_OPS),
+                ("response", _RESPONSE_TYPE, _RpcResponse, _RESPONSE_OPS),
             )
         }
         mine, others = ("response", "request") if serves else ("request", "response")
@@ -99,16 +111,16 @@ class RpcEnd:
             participant.writer(topics[mine]),
             participant.reader(topics[others]),
         )
-        self._sample: Any = _Request() if serves else _Response()
+        self._sample: Any = _RpcRequest() if serves else _RpcResponse()
         self._samples = (c.c_void_p * 1)(c.addressof(self._sample))
         self._info = _SampleInfo()
 
     def send(self, message: RpcMessage) -> bool:
         """Send; whether the library took it."""
         if self._serves:
-            sample: Any = _Response(message.id, message.api, message.code, message.text.encode())
+            sample: Any = _RpcResponse(message.id, message.api, message.code, message.text.encode())
         else:
-            sample = _Request(message.id, message.api, parameter=message.text.encode())
+            sample = _RpcRequest(message.id, message.api, parameter=message.text.encode())
         return bool(self._library.dds_write(self._writer, c.addressof(sample)) >= 0)
 
     def receive(self) -> Iterator[RpcMessage]:
