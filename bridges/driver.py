@@ -13,12 +13,14 @@ class RobotDriver(Protocol):
 
     Attributes:
         servo: the motors' mode in which they follow commands.
-        period_ms: between two packets in each direction.
+        packets_ms: between two packets of the robot.
+        period_ms: between two of its states that are used, and two commands.
         counters: packets by what became of them.
         own_guards: guards of this bridge, which are no other writers.
     """
 
     servo: int
+    packets_ms: int
     period_ms: int
     counters: Counter[str]
     own_guards: int

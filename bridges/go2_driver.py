@@ -33,7 +33,7 @@ class Go2Driver:
         BridgeError: the domain cannot be joined.
     """
 
-    servo, period_ms = ON, 2
+    servo, packets_ms = ON, 2
 
     def __init__(self, config: BridgeConfig, *, guards: bool = False) -> None:
         if not config.interface:
@@ -48,6 +48,7 @@ class Go2Driver:
         self._witness = StructReader(self._participant, commands, go2.COMMAND.itemsize)
         self._commands_topic = commands
         self._commands: StructWriter | None = None
+        self.period_ms = config.period_ms or self.packets_ms
         self.own_guards = 0
         if guards:
             self._open_commands()

@@ -121,7 +121,7 @@ class RobotPlant(Plant):
             if self._receive():
                 reports += [] if self._report is None else [self._report]
             rate.wait()
-        bridge, period = self._config.bridge, self._driver.period_ms
+        bridge, period = self._config.bridge, self._driver.packets_ms
         findings = check_reports(reports, _LOOK_MS / 1000, period, bridge, self._config.robot)
         for finding in findings:
             self._say(f"{finding.name}: {finding.got}{'' if finding.ok else '  <- not right'}")
@@ -131,8 +131,8 @@ class RobotPlant(Plant):
     def states(self) -> Mapping[str, State]:
         """What the robot measures; nothing at ticks at which it has not said anything new.
 
-        States have even ticks if the robot speaks at 500 Hz. At each sample there is one, the
-        newest, unless even that is old.
+        States have even ticks at 500 Hz. At each sample there is one, the newest, unless even that
+        is old.
         """
         report, tick = self._report, self.tick
         if report is None or tick % self._driver.period_ms:

@@ -200,7 +200,7 @@ class Supervisor:
             return with_detail("bridge-late", f"{inputs.stall} ms")
         if inputs.report_age > config.report_max_ms:
             return with_detail("report-late", f"{inputs.report_age} ms")
-        if not np.isfinite([*report.q, *report.dq, *report.quat_wxyz]).all():
+        if not math.isfinite(report.q.sum() + report.dq.sum() + report.quat_wxyz.sum()):
             return "report-not-finite"
         if mode is BridgeMode.WALKING and inputs.command_age > config.damp_ms:
             return with_detail("command-late", f"{inputs.command_age} ms")
@@ -281,14 +281,13 @@ def _begin(
 
 def tilt_of(quat_wxyz: Array) -> float:
     """Angle between the trunk's z axis and the vertical, rad; of no attitude: π."""
-    norm = float(np.linalg.norm(quat_wxyz))
-    if not norm > 0.5:
+    w, x, y, z = quat_wxyz.tolist()
+    square = w * w + x * x + y * y + z * z
+    if not square > 0.25:
         return math.pi
-    x, y = quat_wxyz[1] / norm, quat_wxyz[2] / norm
-    return math.acos(min(1.0, max(-1.0, 1.0 - 2.0 * (x * x + y * y))))
+    return math.acos(min(1.0, max(-1.0, 1.0 - 2.0 * (x * x + y * y) / square)))
 
 
 def _first(where: NDArray[np.bool_]) -> int | None:
     """The first place that is true."""
-    places = np.flatnonzero(where)
-    return int(places[0]) if len(places) else None
+    return int(where.argmax()) if where.any() else None

@@ -29,7 +29,7 @@ class UdpDriver:
         BridgeError: the port is taken.
     """
 
-    servo, period_ms = SERVO, 1
+    servo, packets_ms = SERVO, 1
 
     def __init__(self, kind: str, config: BridgeConfig, *, guards: bool = False) -> None:
         robot = parse_address(config.endpoint, "bridge.endpoint", _ROBOT)
@@ -38,6 +38,7 @@ class UdpDriver:
         self._port = UdpPort(Address(listen.host, 0) if guards else listen, robot)
         self._tick: int | None = None
         self._older = 0
+        self.period_ms = config.period_ms or self.packets_ms
         self.own_guards = 0
         self.counters: Counter[str] = Counter()
 

@@ -24,6 +24,13 @@ class BridgeConfig:
         "", "-", "Go2: network interface that it hangs on, such as eth0; lo: a simulated one"
     )
     domain: int = key(0, "1", "Go2: number of its DDS domain; on lo that of r1", low=0, high=200)
+    period_ms: int = key(
+        0,
+        "ms",
+        "between two states of the robot, and two commands; 0: 1 for A1 and Go1, 2 for Go2",
+        low=0,
+        high=2,
+    )
     stop_buttons: str = key("L2+B", "-", "buttons of the remote control that stop the robot")
     torque_share: float = key(
         0.9, "1", "share of each motor's greatest torque that may be asked for", low=0.05, high=1.0

@@ -113,7 +113,7 @@ def test_a_robot_that_is_not_as_it_must_be_gets_no_packet() -> None:
 class Script:
     """A driver whose robot speaks at given milliseconds of the bridge."""
 
-    servo, period_ms = SERVO, 2
+    servo, packets_ms, period_ms = SERVO, 2, 2
     own_guards = 0
 
     def __init__(self, speaks: Iterator[bool]) -> None:
