@@ -42,6 +42,7 @@ class Board:
             "world.mode": "realtime",
             "bridge.endpoint": f"{HOST}:{here.port}",
             "bridge.listen": f"{HOST}:{listen.port}",
+            "bridge.report_share": 0.05,
         }
         self._thread = threading.Thread(target=self._run)
         self._thread.start()

@@ -40,7 +40,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
         ),
         (
             ["sim", "--set", "team.plant=mujoko"],
-            "team.plant: got 'mujoko', expected one of mujoco (did you mean 'mujoco'?)",
+            "team.plant: got 'mujoko', expected one of mujoco, robots (did you mean 'mujoco'?)",
         ),
         (["walk", "--set", "team.plant=mujoko"], "team.plant: got 'mujoko'"),
         (["agent", "--robot", "r4"], "--robot: got 'r4', expected one of r1, r2, r3"),
