@@ -10,7 +10,7 @@ import pinocchio
 
 from quadriga.bridges.supervisor import tilt_of
 from quadriga.shared.config.bridge import BridgeConfig
-from quadriga.shared.errors import QuadrigaError
+from quadriga.shared.errors import CheckError
 from quadriga.shared.robot.conventions import FOOT_FRAMES, GRAVITY, JOINT_NAMES, Array
 from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 from quadriga.shared.robot.spec import RobotSpec
@@ -22,10 +22,6 @@ _VERTICAL_OFF: Final = 0.25  # rad between the accelerometer's vertical and the 
 _STILL_GYRO, _STILL_JOINT = 0.3, 0.5  # rad/s
 _FEET_OFF: Final = 0.12  # m between the highest and the lowest foot of a robot on level ground
 _BEYOND: Final = 0.1  # rad by which a joint may be read beyond its limits
-
-
-class CheckError(QuadrigaError):
-    """A robot is not as it must be before it is commanded."""
 
 
 class Finding(NamedTuple):

@@ -7,13 +7,12 @@ from collections import Counter
 from typing import Any, Final
 
 from quadriga.shared.config.bridge import BridgeConfig
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import BridgeError, ConfigError
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
 from quadriga.shared.unitree import go2, rpc
 from quadriga.shared.unitree.dds import DdsParticipant, StructReader, StructWriter
 from quadriga.shared.unitree.packets import ON, MotorTargets, PacketError, RobotReport
 from quadriga.shared.unitree.rpc import RpcEnd, RpcMessage
-from quadriga.shared.unitree.udp_port import BridgeError
 
 _ANSWER: Final = 2.0  # s, for the robot to answer a call
 _LETTING_GO: Final = 15.0  # s, for its controller to let go of the motors

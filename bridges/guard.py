@@ -22,10 +22,10 @@ from quadriga.bridges.driver import RobotDriver
 from quadriga.bridges.open_driver import open_driver
 from quadriga.bridges.postures import damped, passive
 from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.errors import BridgeError
 from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.runtime.scheduling import take_priority
-from quadriga.shared.unitree.udp_port import BridgeError
 
 ALIVE: Final = b"."
 GOODBYE: Final = b"q"

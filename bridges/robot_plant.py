@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.bridges.checks import CheckError, check_reports, refuse_failed
+from quadriga.bridges.checks import check_reports, refuse_failed
 from quadriga.bridges.driver import RobotDriver
 from quadriga.bridges.guard import BEAT_MS, Guard
 from quadriga.bridges.supervisor import (
@@ -23,6 +23,7 @@ from quadriga.bridges.supervisor import (
 )
 from quadriga.plant.protocol import Plant
 from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import CheckError
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.clock import Rate, monotonic
 from quadriga.shared.unitree.packets import RobotReport

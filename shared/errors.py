@@ -59,6 +59,14 @@ class MeshError(QuadrigaError):
     """The URDF of a robot, or a mesh file that it names, is missing or cannot be read."""
 
 
+class BridgeError(QuadrigaError):
+    """The way to a robot cannot be opened, or the robot does not let itself be commanded."""
+
+
+class CheckError(QuadrigaError):
+    """A robot is not as it must be before it is commanded."""
+
+
 class ProcessError(QuadrigaError):
     """A process of the team failed or did not start."""
 

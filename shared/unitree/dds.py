@@ -15,8 +15,7 @@ from typing import Any, Final, Self
 
 import numpy as np
 
-from quadriga.shared.errors import ConfigError
-from quadriga.shared.unitree.udp_port import BridgeError
+from quadriga.shared.errors import BridgeError, ConfigError
 
 # Operations of a topic's descriptor: how the library finds the fields of a struct.
 _ADDRESS: Final = 1 << 24
@@ -61,7 +60,9 @@ class _Descriptor(c.Structure):
     )
 
 
-class _SampleInfo(c.Structure):
+class SampleInfo(c.Structure):
+    """`dds_sample_info_t`."""
+
     _fields_ = (
         ("sample_state", c.c_int),
         ("view_state", c.c_int),
@@ -132,7 +133,7 @@ def operations(layout: np.dtype[Any], base: int = 0) -> list[int]:
         if shape:
             ops += [_ADDRESS | _ARRAY | size << 8 | kind, at, count]
         else:
-            ops += [_ADDRESS | size << 16 | kind, at]
+            ops += number_at(at, one.kind, one.itemsize)
     return ops
 
 
@@ -141,6 +142,11 @@ def _field_of(layout: np.dtype[Any], name: str) -> tuple[np.dtype[Any], int]:
         raise TypeError(f"{layout} is no struct")
     field, offset, *_ = layout.fields[name]
     return field, offset
+
+
+def number_at(offset: int, kind: str, size: int) -> list[int]:
+    """How to find a number of numpy's `kind` and of `size` bytes at this offset."""
+    return [_ADDRESS | _SIZES[size] << 16 | _KINDS[kind], offset]
 
 
 def string_at(offset: int) -> list[int]:
@@ -257,7 +263,7 @@ class StructReader:
         self._library, self.handle = participant.library, participant.reader(topic)
         self._sample = c.create_string_buffer(size)
         self._samples = (c.c_void_p * 1)(c.addressof(self._sample))
-        self._info = _SampleInfo()
+        self._info = SampleInfo()
 
     def take(self) -> bytes | None:
         """The newest sample; None if there is none since the last call."""

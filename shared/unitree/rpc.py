@@ -9,7 +9,7 @@ import ctypes as c
 from collections.abc import Iterator
 from typing import Any, Final, NamedTuple
 
-from quadriga.shared.unitree.dds import DdsParticipant, _SampleInfo, bytes_at, string_at
+from quadriga.shared.unitree.dds import DdsParticipant, SampleInfo, bytes_at, number_at, string_at
 
 MOTION_SWITCHER: Final = "motion_switcher"
 SPORT: Final = "sport"
@@ -20,7 +20,7 @@ UNKNOWN: Final = 3203  # there is no such call
 
 _REQUEST_TYPE: Final = "unitree_api::msg::dds_::Request_"
 _RESPONSE_TYPE: Final = "unitree_api::msg::dds_::Response_"
-_INT64, _INT32, _BOOL = 1 << 24 | 4 << 16 | 4, 1 << 24 | 3 << 16 | 4, 1 << 24 | 1 << 16
+_INT64, _INT32, _BOOL = ("i", 8), ("i", 4), ("u", 1)  # numpy's kind, and bytes
 
 
 class _RpcBytes(c.Structure):
@@ -54,8 +54,10 @@ class _RpcResponse(c.Structure):
     )
 
 
-def _operations(layout: Any, numbers: dict[str, int], text: str) -> list[int]:
-    ops = [word for name, op in numbers.items() for word in (op, getattr(layout, name).offset)]
+def _operations(layout: Any, numbers: dict[str, tuple[str, int]], text: str) -> list[int]:
+    ops = list[int]()
+    for name, (kind, size) in numbers.items():
+        ops += number_at(getattr(layout, name).offset, kind, size)
     return [*ops, *string_at(getattr(layout, text).offset), *bytes_at(layout.binary.offset)]
 
 
@@ -113,7 +115,7 @@ class RpcEnd:
         )
         self._sample: Any = _RpcRequest() if serves else _RpcResponse()
         self._samples = (c.c_void_p * 1)(c.addressof(self._sample))
-        self._info = _SampleInfo()
+        self._info = SampleInfo()
 
     def send(self, message: RpcMessage) -> bool:
         """Send; whether the library took it."""

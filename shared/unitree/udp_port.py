@@ -6,14 +6,10 @@ import socket
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
-from quadriga.shared.errors import ConfigError, QuadrigaError, system_reason
+from quadriga.shared.errors import BridgeError, ConfigError, system_reason
 
 _LONGEST: Final = 2048  # bytes: longer than any packet, so that one too long is seen as such
 _AT_ONCE: Final = 64  # packets of a call: a flood must not hold up who drains it
-
-
-class BridgeError(QuadrigaError):
-    """The way to a robot cannot be opened, or the robot does not let itself be commanded."""
 
 
 class Address(NamedTuple):

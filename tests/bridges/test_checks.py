@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.bridges.checks import CheckError, Finding, check_reports, refuse_failed
+from quadriga.bridges.checks import Finding, check_reports, refuse_failed
+from quadriga.shared.errors import CheckError
 from quadriga.shared.robot.robots import ROBOTS
 from quadriga.shared.unitree.packets import PROTECTED, Battery, RobotReport
 from tests.bridges.robots import config_of, standing, tilted

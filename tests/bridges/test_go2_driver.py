@@ -11,12 +11,11 @@ import pytest
 from quadriga.bridges.go2_driver import Go2Driver
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.load import load
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import BridgeError, ConfigError
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.unitree import go2
 from quadriga.shared.unitree.dds import StructWriter
 from quadriga.shared.unitree.packets import ON
-from quadriga.shared.unitree.udp_port import BridgeError
 from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.native.go2_robot import Go2Robot
 from quadriga.sim_server.world.world import World

@@ -11,13 +11,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quadriga.bridges.checks import CheckError
 from quadriga.bridges.guard import Guard
 from quadriga.bridges.open_driver import open_driver
 from quadriga.bridges.robot_plant import RobotPlant, to_state, yaw_of
 from quadriga.bridges.supervisor import BridgeMode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import CheckError
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.unitree.packets import SERVO, MotorTargets, RobotReport
 from quadriga.shared.unitree.udp import A1

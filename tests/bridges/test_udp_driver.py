@@ -11,10 +11,10 @@ import pytest
 
 from quadriga.bridges.udp_driver import UdpDriver
 from quadriga.shared.config.bridge import BridgeConfig
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import BridgeError, ConfigError
 from quadriga.shared.unitree.packets import OFF, SERVO, RobotReport
 from quadriga.shared.unitree.udp import A1, GO1
-from quadriga.shared.unitree.udp_port import Address, BridgeError, UdpPort
+from quadriga.shared.unitree.udp_port import Address, UdpPort
 from tests.bridges.robots import config_of, holding, standing
 
 HOST = "127.0.0.1"

@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -33,13 +35,18 @@ def test_the_commands_of_a_section_run(section: str, tmp_path: Path) -> None:
     """In a folder with what they name of the checkout, so that nothing is left in that."""
     shutil.copytree(SOURCE / "tests" / "plugins", tmp_path / "tests" / "plugins")
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    done = subprocess.run(
+    with subprocess.Popen(
         ["bash", "-euo", "pipefail", "-c", SECTIONS[section]],
         cwd=tmp_path,
         env={**os.environ, "PATH": path},
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
-        timeout=_LIMIT,
-        check=False,
-    )
-    assert done.returncode == 0, f"{done.stdout[-2000:]}\n{done.stderr[-4000:]}"
+        start_new_session=True,
+    ) as process:
+        try:
+            said, complained = process.communicate(timeout=_LIMIT)
+        finally:  # a section that fails half way leaves what it started in the background
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+    assert process.returncode == 0, f"{said[-2000:]}\n{complained[-4000:]}"

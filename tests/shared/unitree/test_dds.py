@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from quadriga.shared.errors import BridgeError
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.unitree import go2, rpc
 from quadriga.shared.unitree.dds import (
@@ -21,7 +22,6 @@ from quadriga.shared.unitree.dds import (
 )
 from quadriga.shared.unitree.packets import MotorTargets
 from quadriga.shared.unitree.rpc import RpcEnd, RpcMessage
-from quadriga.shared.unitree.udp_port import BridgeError
 
 DOMAIN = 190  # of no other test
 WAIT = 10.0  # s
