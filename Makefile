@@ -8,7 +8,7 @@ TOOLS := $(VENV)/.tools
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install walk test lint format docs figures clip acceptance bench bench-planner bench-recorder
+.PHONY: install walk test lint fuzz format docs figures clip acceptance bench bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -39,6 +39,10 @@ lint: $(TOOLS)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# A million damaged packets through the bridges of every kind of robot; some eight minutes.
+fuzz: $(TOOLS)
+	$(BIN)/python -m tests.bridges.fuzz $(ARGS)
 
 format: $(TOOLS)
 	$(BIN)/ruff check --fix .

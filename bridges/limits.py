@@ -16,9 +16,13 @@ from quadriga.shared.unitree.packets import MotorTargets
 
 MOST_KP: Final = 500.0  # N·m/rad
 MOST_KD: Final = 30.0  # N·m·s/rad
-LIMITS: Final = ("finite", "gain", "position", "speed", "torque", "rate", "end-stop", "power")
+TOO_FAST: Final = 2.0  # times a joint's greatest speed: no joint moves so
+TOO_FAR: Final = 1.0  # rad beyond its range: no joint is there
+LIMITS: Final = (
+    "finite", "measured", "gain", "position", "speed", "torque", "rate", "end-stop", "power",
+)  # fmt: skip
 """Names of the limits, in the order in which they are applied."""
-_FINITE, _GAIN, _POSITION, _SPEED, _TORQUE, _RATE, _END_STOP, _POWER = range(len(LIMITS))
+_FINITE, _MEASURED, _GAIN, _POSITION, _SPEED, _TORQUE, _RATE, _END_STOP, _POWER = range(len(LIMITS))
 
 
 class JointReading(NamedTuple):
@@ -65,6 +69,13 @@ def joint_limits(config: BridgeConfig, robot: RobotSpec) -> JointLimits:
     )
 
 
+def implausible(measured: JointReading, limits: JointLimits) -> NDArray[np.bool_]:
+    """Joints of which no true sensor could say this, (12,)."""
+    q, dq = measured
+    near = (q >= limits.lower - TOO_FAR) & (q <= limits.upper + TOO_FAR)
+    return ~(near & (np.abs(dq) <= TOO_FAST * limits.speed))
+
+
 def limit_targets(
     targets: MotorTargets, measured: JointReading, before: Array, ms: int, limits: JointLimits
 ) -> Limited:
@@ -73,6 +84,9 @@ def limit_targets(
     The torque that counts is the one that the motor will give, tau + kp (q − q_measured) +
     kd (dq − dq_measured); what must be taken off it is taken off the feed-forward torque. Gains,
     angles and rates are limited first. Where a joint is at its end stop, no torque pushes it on.
+    Where that would need a feed-forward torque beyond the motor's limit, the command has no gains
+    and its torque alone. What is measured of a joint may be wrong (see `implausible`): then nothing
+    is made up for, and the joint has damping alone of its gains.
 
     Args:
         targets: what is asked for; numbers that are none count as zero.
@@ -106,33 +120,46 @@ def _limit(
         for row in range(5):
             if not math.isfinite(asked[row, k]):
                 asked[row, k], applied[_FINITE] = 0.0, True
+        known = (
+            abs(dq[k]) <= TOO_FAST * limits.speed[k]
+            and limits.lower[k] - TOO_FAR <= q[k] <= limits.upper[k] + TOO_FAR
+        )
+        at, moving = (q[k], dq[k]) if known else (0.0, 0.0)
+        applied[_MEASURED] |= not known
         kp, kd = min(max(asked[3, k], 0.0), MOST_KP), min(max(asked[4, k], 0.0), MOST_KD)
         applied[_GAIN] |= kp != asked[3, k] or kd != asked[4, k]
+        if not known:
+            kp = 0.0
         # Without a gain the angle or rate that is asked for means nothing.
-        angle, rate = q[k], 0.0
+        angle, rate = at, 0.0
         if kp > 0.0:
             angle = min(max(asked[1, k], limits.lower[k]), limits.upper[k])
             applied[_POSITION] |= angle != asked[1, k]
         if kd > 0.0:
             rate = min(max(asked[2, k], -limits.speed[k]), limits.speed[k])
             applied[_SPEED] |= rate != asked[2, k]
-        spring = kp * (angle - q[k]) + kd * (rate - dq[k])
+        spring = kp * (angle - at) + kd * (rate - moving)
         wanted = asked[0, k] + spring
         given = min(max(wanted, -limits.torque[k]), limits.torque[k])
         applied[_TORQUE] |= given != wanted
         step = limits.torque_rate * ms
         slow = min(max(given, before[k] - step), before[k] + step)
         applied[_RATE] |= slow != given
-        if (q[k] >= limits.upper[k] and slow > 0.0) or (q[k] <= limits.lower[k] and slow < 0.0):
+        past = at >= limits.upper[k] if slow > 0.0 else at <= limits.lower[k]
+        if known and past and slow != 0.0:
             slow, applied[_END_STOP] = 0.0, True
         torque[k] = slow
-        power += max(slow * dq[k], 0.0)
+        power += max(slow * moving, 0.0)
+        if abs(slow - spring) > limits.torque[k]:
+            kp, kd, spring = 0.0, 0.0, 0.0
         asked[0, k], asked[1, k], asked[2, k] = slow - spring, angle, rate
         asked[3, k], asked[4, k] = kp, kd
     if power > limits.power:
         applied[_POWER] = True
         for k in range(N_JOINTS):
-            if torque[k] * dq[k] > 0.0:
+            if torque[k] * dq[k] > 0.0 and abs(dq[k]) <= TOO_FAST * limits.speed[k]:
                 less = torque[k] * (limits.power / power)
                 asked[0, k] += less - torque[k]
                 torque[k] = less
+                if abs(asked[0, k]) > limits.torque[k]:
+                    asked[0, k], asked[3, k], asked[4, k] = less, 0.0, 0.0

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.bridges.limits import JointReading, joint_limits, limit_targets
+from quadriga.bridges.limits import JointReading, implausible, joint_limits, limit_targets
 from quadriga.bridges.postures import (
     Motion,
     damped,
@@ -69,6 +69,7 @@ class SupervisorState:
         held: angles at which the joints are held while the agent is late, (12,).
         torque: of the last command, (12,), N·m.
         sent: when it was, ms.
+        fast_ms: for how long some joint has been too fast, or its sensor wrong.
     """
 
     mode: BridgeMode
@@ -78,6 +79,7 @@ class SupervisorState:
     held: Array | None
     torque: Array
     sent: int
+    fast_ms: int = 0
 
 
 @record
@@ -94,6 +96,7 @@ class SupervisorInputs:
         writers: how many others command the robot's motors.
         stall: ms since the step before, by the clock.
         guarded: whether the bridge's guard is there.
+        estop: why the team's emergency stop was pressed; "" if it was not.
     """
 
     now: int
@@ -105,6 +108,7 @@ class SupervisorInputs:
     writers: int = 0
     stall: int = 1
     guarded: bool = True
+    estop: str = ""
 
 
 class Supervised(NamedTuple):
@@ -153,7 +157,7 @@ class Supervisor:
         """Decide the mode, and the command of this millisecond."""
         if state.mode is BridgeMode.DRY:
             return state, Supervised(None, (), ())
-        before, state = state, self._change(state, inputs)
+        before, state = state, self._change(self._note_rates(state, inputs), inputs)
         changes = () if state.mode is before.mode else ((state.mode, state.reason),)
         state, targets = self._command(state, inputs)
         measured = JointReading(inputs.report.q, inputs.report.dq)
@@ -167,7 +171,7 @@ class Supervisor:
         """The state with the mode of this millisecond."""
         if state.mode is BridgeMode.STOPPED:
             return state
-        if reason := self.reason_to_stop(state.mode, inputs):
+        if reason := self.reason_to_stop(state, inputs):
             return _begin(state, BridgeMode.STOPPED, inputs.now, reason)
         mode, wish, q = state.mode, inputs.wish, inputs.report.q
         if mode is BridgeMode.LIMP and wish is Wish.STAND:
@@ -185,9 +189,22 @@ class Supervisor:
             return _begin(state, BridgeMode.LIMP, inputs.now)
         return state
 
-    def reason_to_stop(self, mode: BridgeMode, inputs: SupervisorInputs) -> str:
+    def _note_rates(self, state: SupervisorState, inputs: SupervisorInputs) -> SupervisorState:
+        """The state with the time for which some joint has been too fast, or cannot be believed."""
+        if (self._share_of_speed(inputs.report) <= 1.0).all():
+            return state if state.fast_ms == 0 else replace(state, fast_ms=0)
+        return replace(state, fast_ms=state.fast_ms + max(1, inputs.now - state.sent))
+
+    def _share_of_speed(self, report: RobotReport) -> Array:
+        """How fast each joint is, (12,): beyond 1 too fast, ∞ if its sensor is wrong."""
+        wrong = implausible(JointReading(report.q, report.dq), self._limits)
+        return np.where(wrong, np.inf, np.abs(report.dq) / self._fastest)
+
+    def reason_to_stop(self, state: SupervisorState, inputs: SupervisorInputs) -> str:
         """Why the robot must stop now, "" if it need not."""
-        config, report = self._config, inputs.report
+        config, report, mode = self._config, inputs.report, state.mode
+        if inputs.estop:
+            return with_detail("estop", inputs.estop)
         if self._stop_buttons <= read_remote(report.remote).pressed:
             return with_detail("remote", config.stop_buttons)
         if inputs.writers:
@@ -200,10 +217,14 @@ class Supervisor:
             return with_detail("bridge-late", f"{inputs.stall} ms")
         if inputs.report_age > config.report_max_ms:
             return with_detail("report-late", f"{inputs.report_age} ms")
-        if not math.isfinite(report.q.sum() + report.dq.sum() + report.quat_wxyz.sum()):
-            return "report-not-finite"
         if mode is BridgeMode.WALKING and inputs.command_age > config.damp_ms:
             return with_detail("command-late", f"{inputs.command_age} ms")
+        if state.fast_ms > config.speed_ms:
+            shares = self._share_of_speed(report)
+            joint = int(np.argmax(shares))
+            code = "speed" if math.isfinite(shares[joint]) else "joint-reading"
+            measured = f"{report.q[joint]:.2f} rad, {report.dq[joint]:.1f} rad/s"
+            return with_detail(code, f"{JOINT_NAMES[joint]} {measured}")
         return self._reason_of_the_body(report)
 
     def _reason_of_the_body(self, report: RobotReport) -> str:
@@ -216,8 +237,6 @@ class Supervisor:
             return with_detail(
                 "temperature", f"{JOINT_NAMES[joint]} {report.temperature[joint]:.0f} °C"
             )
-        if (joint := _first(np.abs(report.dq) > self._fastest)) is not None:
-            return with_detail("speed", f"{JOINT_NAMES[joint]} {report.dq[joint]:.1f} rad/s")
         battery = report.battery
         if battery is not None and battery.charge < config.battery_min / 2:
             return with_detail("battery", f"{battery.charge} %")

@@ -41,9 +41,12 @@ class BridgeConfig:
     speed_share: float = key(
         0.95,
         "1",
-        "share of a joint's greatest speed beyond which the robot stops",
+        "share of a joint's greatest speed beyond which it is too fast",
         low=0.1,
         high=1.5,
+    )
+    speed_ms: int = key(
+        10, "ms", "for how long a joint may be too fast before the robot stops", low=0, high=100
     )
     power_max: float = key(
         900.0,

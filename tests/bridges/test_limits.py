@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.bridges.limits import JointReading, joint_limits, limit_targets
+from quadriga.bridges.limits import JointReading, implausible, joint_limits, limit_targets
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.unitree.packets import MotorTargets
 from quadriga.shared.unitree.udp import A1
@@ -39,7 +39,7 @@ def test_a_command_within_the_limits_passes_unchanged() -> None:
 @given(
     asked=st.lists(EXTREME, min_size=60, max_size=60),
     q=st.lists(st.floats(-4.0, 4.0), min_size=12, max_size=12),
-    dq=st.lists(st.floats(-40.0, 40.0), min_size=12, max_size=12),
+    dq=st.lists(st.floats(-60.0, 60.0), min_size=12, max_size=12),
     before=st.floats(-30.0, 30.0),
     ms=st.integers(1, 50),
 )
@@ -54,13 +54,36 @@ def test_no_command_gives_more_than_the_limits(
             MotorTargets(holding(CONFIG).mode, *rows), measured, last, ms, LIMITS
         )
     torque = given_torque(limited.targets, measured)
-    np.testing.assert_allclose(torque, limited.torque, rtol=1e-9, atol=1e-6)
-    assert (np.abs(torque) <= LIMITS.torque + 1e-6).all()
-    assert np.maximum(torque * measured.dq, 0.0).sum() <= LIMITS.power * (1 + 1e-9) + 1e-6
+    trusted = ~implausible(measured, LIMITS)
+    np.testing.assert_allclose(torque[trusted], limited.torque[trusted], rtol=1e-9, atol=1e-6)
+    assert (np.abs(limited.torque) <= LIMITS.torque + 1e-6).all()
+    power = np.maximum(limited.torque * measured.dq, 0.0)[trusted].sum()
+    assert power <= LIMITS.power * (1 + 1e-9) + 1e-6
+    assert (np.abs(limited.targets.tau) <= LIMITS.torque + 1e-6).all()
     on = limited.targets.kp > 0.0
     assert (limited.targets.q >= LIMITS.lower)[on].all()
     assert (limited.targets.q <= LIMITS.upper)[on].all()
     A1.encode_command(limited.targets)  # whatever comes out can be sent
+
+
+@given(
+    q=st.lists(EXTREME, min_size=12, max_size=12),
+    dq=st.lists(EXTREME, min_size=12, max_size=12),
+    gain=st.floats(0.0, 500.0),
+)
+def test_no_measurement_makes_the_feed_forward_torque_exceed_the_limits(
+    q: list[float], dq: list[float], gain: float
+) -> None:
+    """The numbers of a sensor that fails must not come out as torque."""
+    measured = JointReading(np.array(q), np.array(dq))
+    targets = holding(CONFIG, kp=np.full(12, gain), kd=np.full(12, gain / 20.0))
+    with np.errstate(over="ignore", invalid="ignore"):
+        limited = limit_targets(targets, measured, np.zeros(12), 1, LIMITS)
+    wrong = implausible(measured, LIMITS)
+    np.testing.assert_array_equal(limited.targets.kp[wrong], 0.0)
+    assert (np.abs(limited.targets.tau) <= LIMITS.torque + 1e-9).all()
+    assert (np.abs(limited.torque) <= LIMITS.torque + 1e-9).all()
+    A1.encode_command(limited.targets)
 
 
 @given(tau=st.floats(-1e3, 1e3), before=st.floats(-20.0, 20.0), ms=st.integers(1, 4))
@@ -90,6 +113,7 @@ def test_a_joint_at_its_end_is_pushed_no_further(end: str, push: float) -> None:
 def test_every_limit_is_named() -> None:
     hard = {
         "finite": (holding(CONFIG, tau=np.full(12, np.nan)), STILL),
+        "measured": (holding(CONFIG), JointReading(STILL.q, np.full(12, 50.0))),
         "gain": (holding(CONFIG, kp=np.full(12, 1e4)), STILL),
         "position": (holding(CONFIG, q=np.full(12, 9.0)), STILL),
         "speed": (holding(CONFIG, dq=np.full(12, 99.0)), STILL),

@@ -19,6 +19,7 @@ from quadriga.bridges.supervisor import (
     Wish,
     tilt_of,
 )
+from quadriga.shared.robot.conventions import JOINT_NAMES
 from quadriga.shared.unitree.packets import OFF, PROTECTED, SERVO, Battery
 from quadriga.shared.wire.messages import Command
 from tests.bridges.robots import config_of, pressing, standing, tilted
@@ -113,9 +114,8 @@ SICK = {
     "tilt": standing(CONFIG, quat_wxyz=tilted(0.95)),
     "motor-protected": standing(CONFIG, mode=np.array([SERVO] * 11 + [PROTECTED], np.uint8)),
     "temperature": HOT,
-    "speed": standing(CONFIG, dq=np.full(12, 20.5)),
     "battery": standing(CONFIG, battery=Battery(9, -5.0, 20.0)),
-    "report-not-finite": standing(CONFIG, q=np.full(12, np.nan)),
+    "joint-reading": standing(CONFIG, q=np.full(12, np.nan)),
 }
 
 
@@ -129,6 +129,29 @@ def test_a_sick_robot_stops_for_good(mode: BridgeMode, reason: str) -> None:
     for wish in Wish:  # nothing brings it back
         again, _ = step(state, at(101, wish=wish))
         assert again.mode is BridgeMode.STOPPED
+
+
+@given(st.integers(1, 4), st.integers(0, 11), st.sampled_from([-1.0, 1.0]))
+def test_a_joint_that_stays_too_fast_stops_the_robot(period: int, joint: int, sign: float) -> None:
+    """A swing leg may pass the limit for a moment; a joint that runs away may not."""
+    dq = np.zeros(12)
+    dq[joint] = sign * 1.01 * CONFIG.bridge.speed_share * ROBOT.speed[joint % 3]
+    fast, state = standing(CONFIG, dq=dq), in_mode(BridgeMode.WALKING, sent=100)
+    for now in range(100 + period, 100 + CONFIG.bridge.speed_ms + 1, period):
+        state, _ = step(state, at(now, wish=Wish.WALK, report=fast))
+        assert state.mode is BridgeMode.WALKING
+    calm, _ = step(state, at(now + 1, wish=Wish.WALK))
+    assert (calm.mode, calm.fast_ms) == (BridgeMode.WALKING, 0)
+    state, _ = step(state, at(now + period, wish=Wish.WALK, report=fast))
+    assert state.mode is BridgeMode.STOPPED
+    assert state.reason.startswith(f"speed:{JOINT_NAMES[joint]} ")
+
+
+@pytest.mark.parametrize("mode", [m for m in BridgeMode if m is not BridgeMode.DRY])
+def test_an_emergency_stop_of_the_team_stops_a_robot_in_every_state(mode: BridgeMode) -> None:
+    state, _ = step(in_mode(mode), at(estop="dog on the track"))
+    assert state.mode is BridgeMode.STOPPED
+    assert mode is BridgeMode.STOPPED or state.reason == "estop:dog on the track"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,281 @@
+"""Packets of every kind of damage through a robot's driver and its supervisor.
+
+`python -m tests.bridges.fuzz` sends a million of them over real sockets and prints what became of
+them. No packet may raise an exception, and no command that leaves may hold a torque beyond limits.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from quadriga.bridges.limits import MOST_KD, MOST_KP, JointReading, implausible, joint_limits
+from quadriga.bridges.robot_plant import to_state
+from quadriga.bridges.supervisor import (
+    BridgeMode,
+    Supervisor,
+    SupervisorInputs,
+    SupervisorState,
+    Wish,
+)
+from quadriga.bridges.udp_driver import UdpDriver
+from quadriga.plant.commands import CommandBox
+from quadriga.shared.config.sections import Config
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.unitree import udp
+from quadriga.shared.unitree.crc import crc32
+from quadriga.shared.unitree.go2 import GO2
+from quadriga.shared.unitree.packets import PacketCodec, PacketError, RobotReport
+from quadriga.shared.unitree.udp_port import Address, UdpPort
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Command
+from quadriga.shared.wire.topics import COMMAND
+from tests.bridges.robots import config_of, standing
+from tests.bridges.test_udp_driver import HOST, free_port
+
+KINDS: Final = ("a1", "go1", "go2")
+_MODES: Final = tuple(mode for mode in BridgeMode if mode is not BridgeMode.DRY)
+_WISHES: Final = (*Wish, *20 * (Wish.WALK,))
+_ANEW: Final = 0.3  # share of steps of a stopped robot after which it is in some other state
+_EXTREMES: Final = np.array(
+    [np.nan, np.inf, -np.inf, 3e38, -3e38, 1e30, 1e5, -1e3, 1e-40, 0.0], np.float32
+)
+
+
+class Link(NamedTuple):
+    """What a fuzzed robot and its bridge have between them.
+
+    Attributes:
+        codec: of its packets.
+        send: has the robot send bytes.
+        receive: the bridge's newest report.
+        command: sends a command.
+        arrived: commands that reached the robot, as bytes.
+    """
+
+    codec: PacketCodec
+    send: Callable[[bytes], None]
+    receive: Callable[[], RobotReport | None]
+    command: Callable[..., None]
+    arrived: Callable[[], list[bytes]]
+
+
+@contextmanager
+def link_to(kind: str, config: Config) -> Iterator[Link]:
+    """A1 and Go1: the bridge's driver and a robot's port. Go2: its packets without the network."""
+    if kind == "go2":
+        yield _go2_link()
+        return
+    here, bridge = Address(HOST, free_port()), Address(HOST, free_port())
+    robot = UdpPort(here)
+    ends = {"endpoint": f"{HOST}:{here.port}", "listen": f"{HOST}:{bridge.port}"}
+    driver = UdpDriver(kind, config_of(kind, **ends).bridge)
+    try:
+        yield Link(
+            udp.CODECS[kind],
+            lambda packet: _sent(robot.send(packet, bridge)),
+            driver.receive,
+            driver.send,
+            lambda: [packet for packet, _ in robot.drain()],
+        )
+    finally:
+        robot.close()
+        driver.close()
+
+
+def _sent(arrived: bool) -> None:
+    if not arrived:
+        raise OSError("a packet did not fit into the loopback")
+
+
+def _go2_link() -> Link:
+    reports, commands = list[bytes](), list[bytes]()
+
+    def receive() -> RobotReport | None:
+        newest = None
+        while reports:
+            try:
+                newest = GO2.decode_report(reports.pop(0))
+            except PacketError:
+                continue
+        return newest
+
+    def arrived() -> list[bytes]:
+        taken = commands.copy()
+        commands.clear()
+        return taken
+
+    return Link(
+        GO2, reports.append, receive, lambda t: commands.append(GO2.encode_command(t)), arrived
+    )
+
+
+class Damage:
+    """Makes packets of a good one: noise, cut, torn, or forged with a right check sum.
+
+    Args:
+        good: the packet.
+        seed: of the damage.
+        counter: where in it the robot counts; None if nobody looks at that.
+    """
+
+    def __init__(self, good: bytes, seed: int, counter: int | None = None) -> None:
+        self._good, self._random = np.frombuffer(good, np.uint8), np.random.default_rng(seed)
+        self._counter, self._made = counter, 0
+
+    def packet(self) -> bytes:
+        """The next one."""
+        random, packet = self._random, self._good.copy()
+        kind = random.integers(6)
+        if kind == 0:
+            return random.bytes(int(random.integers(0, 1500)))
+        if kind == 1:
+            return packet[: random.integers(0, len(packet) + 1)].tobytes()
+        if kind == 2:
+            for _ in range(random.integers(1, 9)):
+                packet[random.integers(len(packet))] ^= 1 << random.integers(8)
+            return packet.tobytes()
+        where = random.integers(22, len(packet) - 8, size=random.integers(1, 40))
+        if kind == 3:
+            packet[where] = random.integers(0, 256, size=len(where), dtype=np.uint8)
+        elif kind == 4:
+            for at in where:
+                packet[at : at + 4] = np.frombuffer(random.choice(_EXTREMES).tobytes(), np.uint8)
+        self._made += 1
+        if self._counter is not None:  # else a driver takes it for one that it has had
+            count = np.frombuffer(self._made.to_bytes(4, "little"), np.uint8)
+            packet[self._counter : self._counter + 4] = count
+        return seal(packet.tobytes())
+
+
+def seal(packet: bytes) -> bytes:
+    """The packet with the check sum that belongs to it."""
+    covered = (len(packet) // 4 - 1) * 4
+    return packet[:-4] + crc32(packet[:covered]).to_bytes(4, "little")
+
+
+class Fuzz:
+    """One robot and its bridge.
+
+    Attributes:
+        counts: packets and commands by what became of them.
+    """
+
+    def __init__(self, kind: str, seed: int, link: Link, config: Config) -> None:
+        self._config, self._link = config, link
+        self._random = np.random.default_rng([seed, 1])
+        self._supervisor = Supervisor(config.robot, config.bridge, servo=10)
+        self._limits = joint_limits(config.bridge, config.robot)
+        report = standing(config)
+        layout = None if kind == "go2" else udp.CODECS[kind].report
+        counter = None if layout is None or layout.fields is None else layout.fields["tick"][1]
+        self._damage = Damage(link.codec.encode_report(report), seed, counter)
+        good = np.stack([np.zeros(12), config.robot.q_stand, *np.ones((3, 12))])
+        self._key = COMMAND.key(config.team.name, "r1")
+        self._box = CommandBox(config.team.name, ("r1",))
+        self._agent = Damage(encode(Command(1, 0, *good)), seed + 1)
+        self._report, self._age = report, 0
+        self._state = self._begin(0)
+        self.counts: Counter[str] = Counter()
+
+    def _begin(self, now: int) -> SupervisorState:
+        """A state that a bridge may be in."""
+        limp = self._supervisor.initial(now, armed=True)
+        mode = _MODES[self._random.integers(len(_MODES))]
+        if mode in (BridgeMode.STANDING_UP, BridgeMode.LYING_DOWN):
+            inputs = SupervisorInputs(now, standing(self._config), 0, wish=Wish.STAND)
+            limp, _ = self._supervisor.step(limp, inputs)
+        return replace(limp, mode=mode)
+
+    def run(self, packets: int) -> None:
+        """Send packets.
+
+        Raises:
+            AssertionError: a command that left is beyond the limits.
+        """
+        for now in range(1, packets + 1):
+            if self._state.mode is BridgeMode.STOPPED and self._random.random() < _ANEW:
+                self._state, self._report = self._begin(now), standing(self._config)
+            self._turn(now)
+
+    def _turn(self, now: int) -> None:
+        self._link.send(self._damage.packet())
+        report = self._link.receive()
+        self._age = 0 if report is not None else self._age + 1
+        if report is not None:
+            self._report = report
+            self.counts["accepted"] += 1
+            encode(to_state(report, now, 0.3))
+        self._box.take(self._key, self._agent.packet(), tick=now, oldest=0)
+        command = self._box.latest.get("r1")
+        inputs = SupervisorInputs(
+            now=now,
+            report=self._report,
+            report_age=self._age,
+            command=command,
+            command_age=int(self._random.integers(0, 60)),
+            wish=_WISHES[self._random.integers(len(_WISHES))],
+        )
+        self._state, supervised = self._supervisor.step(self._state, inputs)
+        self.counts[str(self._state.mode)] += 1
+        if supervised.targets is not None:
+            self._link.command(supervised.targets)
+        for packet in self._link.arrived():
+            self._check(packet)
+
+    def _check(self, packet: bytes) -> None:
+        """What arrives at the robot holds numbers, gains, and torques within the limits."""
+        self.counts["commands"] += 1
+        targets, limits = self._link.codec.decode_command(packet), self._limits
+        assert (np.abs(targets.tau) <= limits.torque + 0.01).all(), targets
+        assert ((targets.kp >= 0.0) & (targets.kp <= MOST_KP)).all(), targets
+        assert ((targets.kd >= 0.0) & (targets.kd <= MOST_KD)).all(), targets
+        on, damped = targets.kp > 0.0, targets.kd > 0.0
+        within = (targets.q >= limits.lower - 1e-6) & (targets.q <= limits.upper + 1e-6)
+        assert within[on].all(), targets
+        assert (np.abs(targets.dq) <= limits.speed + 1e-6)[damped].all(), targets
+        q, dq = self._report.q, self._report.dq
+        known = ~implausible(JointReading(q, dq), limits)
+        asked = np.array([targets.tau, targets.kp, targets.q, targets.kd, targets.dq])[:, known]
+        tau, kp, angle, kd, rate = asked
+        torque = tau + kp * (angle - q[known]) + kd * (rate - dq[known])
+        # A packet's gains have 16 bits and are cut to their steps, 1/32 and 1/16.
+        cut = np.abs(angle - q[known]) / 32.0 + np.abs(rate - dq[known]) / 16.0
+        assert (np.abs(torque) <= limits.torque[known] + cut + 0.01).all(), (targets, torque)
+
+
+def fuzz(kind: str, packets: int, seed: int) -> Counter[str]:
+    """Send damaged packets of a kind of robot; what became of them.
+
+    Raises:
+        AssertionError: a command that left is beyond the limits.
+    """
+    config = config_of(kind)
+    with link_to(kind, config) as link, np.errstate(all="ignore"):  # numbers that are none
+        robot = Fuzz(kind, seed, link, config)
+        robot.run(packets)
+    return robot.counts
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--packets", type=int, default=1_000_000, help="of all kinds together")
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
+    for kind in KINDS:
+        begun = monotonic()
+        counts = fuzz(kind, arguments.packets // len(KINDS) + 1, arguments.seed)
+        took = monotonic() - begun
+        print(f"{kind}: {took:.0f} s, {', '.join(f'{k} {n}' for k, n in sorted(counts.items()))}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
