@@ -79,6 +79,7 @@ class RobotPlant(Plant):
         self._in_charge = False  # of the robot's motors
         self._guard_gone = False
         self._cut: Counter[str] = Counter()
+        self._untold = list[tuple[int, BridgeMode, str]]()  # changes of before the walk, and when
 
     @property
     def mode(self) -> BridgeMode:
@@ -148,10 +149,14 @@ class RobotPlant(Plant):
         return {self.names[0]: to_state(report, tick, self._yaw)}
 
     def step(self, commands: Mapping[str, Command]) -> Sequence[Event]:
-        """One millisecond of the walk."""
+        """One millisecond of the walk; its first tells of the time before it, too."""
         command = commands.get(self.names[0])
         age = 0 if command is None else self.tick - command.tick
-        events = self._turn(command, age, Wish.WALK)
+        told, self._untold = self._untold, []
+        begun = [self._event(mode, reason, self._now - at) for at, mode, reason in told]
+        changes = self._turn(command, age, Wish.WALK)
+        events = begun + [self._event(mode, reason) for mode, reason in changes]
+        self._untold = []
         self.tick += 1
         return events
 
@@ -207,12 +212,14 @@ class RobotPlant(Plant):
         self._report, self._report_at = report, self._now
         return True
 
-    def _turn(self, command: Command | None, age: int, wish: Wish) -> list[Event]:
+    def _turn(
+        self, command: Command | None, age: int, wish: Wish
+    ) -> tuple[tuple[BridgeMode, str], ...]:
         """A millisecond: receive, decide, send. What changed."""
         self._receive()
         report = self._report
         if report is None:
-            return []
+            return ()
         inputs = SupervisorInputs(
             now=self._now,
             report=report,
@@ -228,7 +235,10 @@ class RobotPlant(Plant):
         self._cut.update(supervised.cut)
         if supervised.targets is not None and self._is_due(supervised):
             self._driver.send(supervised.targets)
-        return [self._announce(mode, reason) for mode, reason in supervised.changes]
+        for mode, reason in supervised.changes:
+            self._say(f"{self.names[0]}: {mode} {reason}".rstrip())
+            self._untold.append((self._now, mode, reason))
+        return supervised.changes
 
     def _stall(self) -> int:
         """Milliseconds since this was asked last: more than one if the process stood still."""
@@ -238,9 +248,9 @@ class RobotPlant(Plant):
     def _is_due(self, supervised: Supervised) -> bool:
         return bool(supervised.changes) or self._now % self._driver.period_ms == 0
 
-    def _announce(self, mode: BridgeMode, reason: str) -> Event:
+    def _event(self, mode: BridgeMode, reason: str, ms_ago: int = 0) -> Event:
         text = f"{mode} {reason}".rstrip()
-        self._say(f"{self.names[0]}: {text}")
+        text += f", {ms_ago / 1000:.1f} s before the walk" if ms_ago else ""
         code = codes.ROBOT_STOPPED if mode is BridgeMode.STOPPED else codes.BRIDGE_MODE
         return Event.of(self.tick, code, self.names[0], text)
 

@@ -15,6 +15,7 @@ from quadriga.commands import (
     check,
     collect,
     config,
+    desk,
     echo,
     estop,
     experiments,
@@ -50,9 +51,9 @@ INTERRUPTED: Final = 130
 
 # In the order of `quadriga --help`.
 _COMMANDS: Final = (
-    walk.add, scenarios.add, sim.add, bridge.add, agent.add, plan.add, record.add, report.add,
-    play.add, resim.add, export.add, info.add, recover.add, check.add, echo.add, hz.add, replay.add,
-    router.add, prepare.add, operate.add, collect.add, fit.add, probe.add, campaign.add,
+    walk.add, scenarios.add, sim.add, bridge.add, desk.add, agent.add, plan.add, record.add,
+    report.add, play.add, resim.add, export.add, info.add, recover.add, check.add, echo.add, hz.add,
+    replay.add, router.add, prepare.add, operate.add, collect.add, fit.add, probe.add, campaign.add,
     experiments.add, tune.add, estop.add, config.add, version.add,
 )  # fmt: skip
 

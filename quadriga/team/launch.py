@@ -101,6 +101,11 @@ class Launch:
         """Process id of each that still runs, by name."""
         return {name: process.pid for name, process in self._running.items()}
 
+    @property
+    def alive(self) -> set[str]:
+        """Names of those that have not ended."""
+        return {name for name, process in self._running.items() if process.poll() is None}
+
     def watch(self, look: Callable[[], bool]) -> None:
         """Wait until the plant has ended the walk, then until the others have left.
 

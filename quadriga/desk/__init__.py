@@ -1,0 +1,1 @@
+"""The hardware path on one machine: simulated robots behind their own protocols, and the team."""

@@ -1,0 +1,143 @@
+"""Walks on the desk, one after another, kept as rows of a file and summed up in a table."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from quadriga.desk.faults import BY_NAME, NO_FAULT, Fault
+from quadriga.desk.trial import run_trial, walk_without_bridges
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError, ProcessError, did_you_mean, name_file_errors
+
+ROWS: Final = "rows.jsonl"
+WITHOUT: Final = "without-bridges"
+ALL: Final = "all"
+
+
+def named_faults(names: Sequence[str]) -> list[Fault]:
+    """Faults by their names, in the order of the table; without a name the walk alone.
+
+    Raises:
+        ConfigError: there is no such fault.
+    """
+    if not names:
+        return [NO_FAULT]
+    for name in names:
+        if name not in (ALL, NO_FAULT.name, *BY_NAME):
+            hint = did_you_mean(name, BY_NAME)
+            raise ConfigError("--fault", repr(name), f"all, none, {', '.join(BY_NAME)}", hint)
+    chosen = [fault for name, fault in BY_NAME.items() if name in names or ALL in names]
+    return ([NO_FAULT] if NO_FAULT.name in names else []) + chosen
+
+
+def run_campaign(
+    config: Config,
+    faults: Sequence[Fault],
+    seeds: Sequence[int],
+    folder: Path,
+    console: Console,
+    *,
+    compare: bool,
+) -> list[dict[str, Any]]:
+    """Every fault with every seed; what is in the folder already is not walked again.
+
+    Args:
+        config: of bridged robots on this machine.
+        faults: what goes wrong.
+        seeds: of the worlds.
+        folder: gets a folder for each walk, and `rows.jsonl`.
+        console: told of each walk.
+        compare: whether each seed also walks without bridges.
+
+    Raises:
+        ConfigError: the folder cannot be written to.
+    """
+    with name_file_errors(ConfigError, f"--out {folder}", "a folder that can be written to"):
+        folder.mkdir(parents=True, exist_ok=True)
+        rows = read_rows(folder)
+        known = {(row["fault"], row["seed"]) for row in rows}
+        todo = [t for t in _trials(faults, seeds, compare=compare) if t[:2] not in known]
+        for number, (name, seed, fault) in enumerate(todo, start=1):
+            row = _walk(config, name, seed, fault, folder / f"{name}-{seed}")
+            rows.append(row)
+            with (folder / ROWS).open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row, ensure_ascii=False) + "\n")
+            console.print(f"{number}/{len(todo)} {name} {seed}: {describe_row(row)}", markup=False)
+    return rows
+
+
+def _trials(
+    faults: Sequence[Fault], seeds: Sequence[int], *, compare: bool
+) -> Iterator[tuple[str, int, Fault | None]]:
+    for fault in faults:
+        for seed in seeds:
+            yield fault.name, seed, fault
+    for seed in seeds if compare else ():
+        yield WITHOUT, seed, None
+
+
+def _walk(
+    config: Config, name: str, seed: int, fault: Fault | None, folder: Path
+) -> dict[str, Any]:
+    try:
+        if fault is None:
+            return walk_without_bridges(config, seed, folder)
+        return run_trial(config, fault, seed, folder)
+    except ProcessError as error:
+        return {"fault": name, "seed": seed, "error": str(error)}
+
+
+def read_rows(folder: Path) -> list[dict[str, Any]]:
+    """What has been walked already."""
+    path = folder / ROWS
+    if not path.is_file():
+        return []
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def describe_row(row: dict[str, Any]) -> str:
+    """A walk in one line."""
+    if "error" in row:
+        return f"no walk: {row['error'].splitlines()[0]}"
+    parts = [f"fell: {', '.join(row['fell']) or 'none'}"]
+    if row.get("figures"):
+        speed = np.mean([figures.get("vx", np.nan) for figures in row["figures"].values()])
+        parts.append(f"{speed:.2f} m/s")
+    if row.get("robot"):
+        parts.append(f"fault of {row['robot']}")
+    if row.get("rest_ms"):
+        rest = ", ".join(f"{name} {ms}" for name, ms in row["rest_ms"].items())
+        parts.append(f"ms to rest: {rest}")
+    parts += [f"{name}: {what}" for name, what in row.get("status", {}).items()]
+    return "; ".join(parts)
+
+
+def build_fault_table(rows: Sequence[dict[str, Any]]) -> Table:
+    """For each fault: tries, falls, and how long its robot took to be damped."""
+    table = Table(title="faults", title_justify="left")
+    for name in ("fault", "tries", "its robot fell", "others fell", "ms to damping p50", "max"):
+        table.add_column(name, justify="left" if name == "fault" else "right")
+    table.add_column("stopped")
+    for name, fault in BY_NAME.items():
+        found = [row for row in rows if row["fault"] == name and "error" not in row]
+        if not found:
+            continue
+        rest = [row["rest_ms"][row["robot"]] for row in found]
+        times = [ms for ms in rest if ms is not None]
+        table.add_row(
+            fault.name,
+            str(len(found)),
+            str(sum(row["robot"] in row["fell"] for row in found)),
+            str(sum(len(set(row["fell"]) - {row["robot"]}) for row in found)),
+            f"{np.median(times):.0f}" if times else "-",
+            f"{max(times)}" if times else "-",
+            f"{len(times)} of {len(found)}",
+        )
+    return table

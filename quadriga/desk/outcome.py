@@ -1,0 +1,117 @@
+"""What came of a walk on the desk: from the robots' own words, and from the truth on them."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from quadriga.desk.robots import Said
+from quadriga.shared.robot.conventions import Array
+from quadriga.shared.wire.messages import Truth
+
+FELL: Final = 0.8  # rad, tilt of a trunk: a robot that lies down or sinks stays flatter
+_AT_REST: Final = ("motors damped", "motors off")
+
+
+@dataclass(frozen=True, slots=True)
+class TrunkTrace:
+    """A trunk over the simulated robots' own time, from their file of truth.
+
+    Attributes:
+        ms: (T,).
+        xyz: m, (T, 3).
+        rpy: rad, (T, 3).
+        velocity: forward and lateral, m/s, (T, 2), and the yaw rate, rad/s: (T, 3).
+    """
+
+    ms: Array
+    xyz: Array
+    rpy: Array
+    velocity: Array
+
+    def tilt(self, begin: float, end: float = float("inf")) -> float:
+        """Greatest tilt from `begin` to `end`, ms; rad."""
+        now = (self.ms >= begin) & (self.ms <= end)
+        roll, pitch = self.rpy[now, 0], self.rpy[now, 1]
+        return float(np.arccos(np.clip(np.cos(roll) * np.cos(pitch), -1, 1)).max(initial=0.0))
+
+
+def read_truth(path: Path, names: Sequence[str]) -> dict[str, TrunkTrace]:
+    """The trunks of the robots with these names.
+
+    Args:
+        path: written by `quadriga sim --as KIND --truth`: columns `ms` and `<robot>_<x …>`.
+        names: of the robots.
+    """
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    columns = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+    def stack(name: str, *fields: str) -> Array:
+        return np.stack([columns[f"{name}_{field}"] for field in fields], axis=-1)
+
+    return {
+        name: TrunkTrace(
+            columns["ms"],
+            stack(name, "x", "y", "z"),
+            stack(name, "roll", "pitch", "yaw"),
+            stack(name, "vx", "vy", "wz"),
+        )
+        for name in names
+    }
+
+
+def traces_of(truths: Sequence[Truth]) -> list[TrunkTrace]:
+    """The trunks of a recorded walk by its truth, robot by robot."""
+    positions, velocities = (
+        np.array([getattr(truth, name) for truth in truths]) for name in ("base_pos", "base_vel")
+    )
+    rates = np.array([truth.base_omega[:, 2] for truth in truths])
+    w, x, y, z = np.moveaxis(np.array([truth.base_quat_wxyz for truth in truths]), -1, 0)
+    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    cos, sin, (vx, vy) = np.cos(yaw), np.sin(yaw), np.moveaxis(velocities[..., :2], -1, 0)
+    angles = np.stack([roll, pitch, yaw], axis=-1)
+    forward = np.stack([cos * vx + sin * vy, cos * vy - sin * vx, rates], axis=-1)
+    ms = np.array([float(truth.tick) for truth in truths])
+    return [TrunkTrace(ms, positions[:, k], angles[:, k], forward[:, k]) for k in range(w.shape[1])]
+
+
+def time_to_rest(said: Sequence[Said], robot: str, since: int) -> int | None:
+    """From `since` until a robot's motors were damped or off for the first time; ms."""
+    for line in said:
+        if line.ms >= since and line.text in {f"{robot} {state}" for state in _AT_REST}:
+            return line.ms - since
+    return None
+
+
+def describe_walk(trace: TrunkTrace, begin: float, end: float) -> Mapping[str, Any]:
+    """Figures of the steady part of a walk.
+
+    Args:
+        trace: of one trunk.
+        begin: of the steady part, ms.
+        end: of it, ms.
+    """
+    now = (trace.ms >= begin) & (trace.ms <= end)
+    if now.sum() < 2:
+        return {}
+    way = np.diff(trace.xyz[now][:, :2], axis=0)
+    return {
+        "vx": float(trace.velocity[now, 0].mean()),
+        "vy_rms": _rms(trace.velocity[now, 1]),
+        "wz_rms": _rms(trace.velocity[now, 2]),
+        "roll_rms": _rms(trace.rpy[now, 0]),
+        "pitch_rms": _rms(trace.rpy[now, 1]),
+        "distance": float(np.linalg.norm(way, axis=1).sum()),
+    }
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

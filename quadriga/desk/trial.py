@@ -1,0 +1,253 @@
+"""SHELL of one walk on the desk: everything started, one thing made to go wrong, all taken down."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from rich.console import Console
+
+from quadriga.desk.faults import AGENT, GUARD, PLANT, ROUTER, Fault
+from quadriga.desk.outcome import FELL, describe_walk, read_truth, time_to_rest, traces_of
+from quadriga.desk.robots import SimulatedRobots
+from quadriga.identification.predictors import ensure_predictor
+from quadriga.recordings.readable import open_readable
+from quadriga.recordings.summary import RECORDING
+from quadriga.shared.config.sections import SIMULATED, Config
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.errors import ProcessError, RecordingError
+from quadriga.shared.members import SIM, plant_name
+from quadriga.shared.planner_kinds import find_kind
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Event, Status, Truth
+from quadriga.shared.wire.topics import EVENT, STATUS, topic_of
+from quadriga.team.endpoint import free_endpoint
+from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec, process_table
+from quadriga.team.run_folder import CONFIG
+
+_STEADY_S: Final = 4.0  # from the begin of a walk to its steady part
+_EARLIEST_S, _LATEST_S = 2.0, 4.0  # from the begin of a walk until something goes wrong
+_START_S: Final = 120.0  # for the team to start and stand up
+_AFTER_S: Final = 12.0  # for robots to come to rest once a walk must be over
+_WALKS: Final = "walking"
+
+
+def run_trial(config: Config, fault: Fault, seed: int, folder: Path) -> dict[str, Any]:
+    """Walk once; a row of the table.
+
+    Args:
+        config: of bridged robots on this machine.
+        fault: what goes wrong, at a moment that the seed decides.
+        seed: of the world.
+        folder: gets configuration, logs, recording and truth.
+
+    Raises:
+        ProcessError: the simulated robots did not come up, or the team did not begin to walk.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    routed = ROUTER in fault.processes
+    config = replace(
+        config,
+        world=replace(config.world, seed=seed),
+        bus=replace(
+            config.bus, endpoint=free_endpoint(), mode="client" if routed else config.bus.mode
+        ),
+    )
+    (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
+    with SimulatedRobots(folder / CONFIG, config.team.robot, folder) as robots:
+        with Launch(_rows(config, folder, routed), folder / "logs") as launch:
+            trial = _Trial(config, fault, folder, robots, launch)
+            row = trial.run(np.random.default_rng(seed))
+        row |= trial.come_to_rest()
+    return {"fault": fault.name, "seed": seed} | row | trial.describe()
+
+
+def _rows(config: Config, folder: Path, routed: bool) -> Sequence[ProcessSpec]:
+    predictor = None
+    if find_kind(config.planner.kind).needs_predictor:
+        predictor = ensure_predictor(config, Console(stderr=True))
+    rows = process_table(config, folder, predictor, "", armed=True)
+    if not routed:
+        return rows
+    command = (*QUADRIGA, "router", "--listen", config.bus.endpoint)
+    return (ProcessSpec(ROUTER, (*command, "--config", str(folder / CONFIG)), 5.0), *rows)
+
+
+class _Trial:
+    def __init__(
+        self, config: Config, fault: Fault, folder: Path, robots: SimulatedRobots, launch: Launch
+    ) -> None:
+        self._config, self._fault, self._folder = config, fault, folder
+        self._robots, self._launch = robots, launch
+        self._names = robot_names(config.team.robots)
+        self._begun = self._since = 0
+        self._patient = ""
+
+    def run(self, random: np.random.Generator) -> dict[str, Any]:
+        """Wait for the walk, let the fault happen, and wait until the robots are at rest."""
+        if not self._robots.wait_until(self._all_walk, _START_S):
+            raise ProcessError("the team", self._last_words(), f"a walk within {_START_S:g} s")
+        self._begun = self._robots.order("all clear")
+        after = random.uniform(_EARLIEST_S, _LATEST_S)
+        self._patient = self._fault.robot or self._names[random.integers(len(self._names))]
+        self._robots.wait_until(lambda: False, after)
+        self._since = self._robots.order("all clear")
+        pids = [pid for what in self._fault.processes for pid in self._pids(what)]
+        for pid in pids:
+            os.kill(pid, self._fault.signal)
+        for order in self._fault.orders:
+            self._since = self._robots.order(f"{self._patient} {order}")
+        longest = self._config.world.seconds + self._config.bridge.stand_s + _AFTER_S
+        self._robots.wait_until(self._is_over, longest)
+        for pid in pids:
+            with suppress(OSError):
+                os.kill(pid, signal.SIGKILL)
+        return {"robot": self._patient, "walked_s": round((self._since - self._begun) / 1000, 2)}
+
+    def come_to_rest(self) -> dict[str, Any]:
+        """Wait until no motor is driven any more, the team being gone."""
+        self._robots.wait_until(self._all_off, _AFTER_S)
+        said = self._robots.said()
+        rest = {name: time_to_rest(said, name, self._since) for name in self._names}
+        return {"rest_ms": rest}
+
+    def describe(self) -> dict[str, Any]:
+        """What the robots did, and what was said of it."""
+        traces = read_truth(self._robots.truth, self._names)
+        tilts = {name: traces[name].tilt(self._since) for name in self._names}
+        figures: dict[str, Any] = {}
+        if not (self._fault.orders or self._fault.processes):
+            end = self._begun + 1000.0 * self._config.world.seconds
+            steady = self._begun + 1000.0 * _STEADY_S
+            figures = {n: describe_walk(traces[n], steady, end) for n in self._names}
+        return {
+            "tilt_max": {name: round(tilt, 3) for name, tilt in tilts.items()},
+            "fell": [name for name, tilt in tilts.items() if tilt > FELL],
+            "said": {name: self._modes(name) for name in self._names},
+            "figures": figures,
+            **self._recorded(),
+        }
+
+    def _recorded(self) -> dict[str, Any]:
+        """Last status of each bridge, how the walk ended, and how late commands were."""
+        try:
+            source, _ = open_readable(self._folder / RECORDING)
+        except RecordingError as error:
+            return {"end": str(error), "status": {}, "late": {}}
+        last, end = dict[str, Status](), "none recorded"
+        for entry in source.entries():
+            topic, member = topic_of(entry.key)
+            if topic is STATUS:
+                last[member] = decode(entry.payload, Status)
+            if topic is not EVENT:
+                continue
+            event = decode(entry.payload, Event)
+            end = f"{event.code}: {event.detail}" if event.kind == "stop" else end
+        plants = {n: last[plant_name(n)] for n in self._names if plant_name(n) in last}
+        status = {name: f"{plant.mode} {plant.reason}".strip() for name, plant in plants.items()}
+        return {"end": end, "status": status, "late": {n: late_of(p, n) for n, p in plants.items()}}
+
+    def _all_walk(self) -> bool:
+        return all(any(_WALKS in line for line in self._modes(name)) for name in self._names)
+
+    def _is_over(self) -> bool:
+        """Whether all processes have left but those that cannot."""
+        left = self._launch.alive
+        gone = {self._name_of(what) for what in self._fault.processes}
+        return not (left - gone) or self._all_off()
+
+    def _all_off(self) -> bool:
+        last = dict[str, str]()
+        for said in self._robots.said():
+            robot, _, what = said.text.partition(" ")
+            if robot in self._names and what.startswith("motors"):
+                last[robot] = what
+        return all(last.get(name) == "motors off" for name in self._names)
+
+    def _modes(self, robot: str) -> list[str]:
+        """What the robot's bridge has said of it."""
+        log = self._folder / "logs" / f"{plant_name(robot)}.log"
+        if not log.is_file():
+            return []
+        begin = f"bridge: {robot}: "
+        lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
+        return [line.removeprefix(begin) for line in lines if line.startswith(begin)]
+
+    def _name_of(self, what: str) -> str:
+        return {PLANT: plant_name(self._patient), AGENT: self._patient}.get(what, what)
+
+    def _pids(self, what: str) -> list[int]:
+        pids = self._launch.pids
+        if what == GUARD:
+            return children_of(pids[plant_name(self._patient)])
+        return [pids[self._name_of(what)]]
+
+    def _last_words(self) -> str:
+        words = []
+        for log in sorted((self._folder / "logs").glob("*.log")):
+            lines = log.read_text(encoding="utf-8", errors="replace").splitlines()[-3:]
+            words += [f"  {log.stem}: {line}" for line in lines]
+        return "\n".join(words)
+
+
+def children_of(pid: int) -> list[int]:
+    """Processes that a process has started, and that are not over."""
+    children = list[int]()
+    for tasks in Path(f"/proc/{pid}/task").glob("*/children"):
+        with suppress(OSError):
+            children += map(int, tasks.read_text().split())
+    return children
+
+
+def late_of(plant: Status, robot: str) -> dict[str, float]:
+    """Age of the commands that a robot's motors followed, ms, and the share of late ones."""
+    begin, ticks = f"{robot}.command.", plant.counters.get("ticks", 0)
+    ages = {k.removeprefix(begin): v for k, v in plant.ages_ms.items() if k.startswith(begin)}
+    return {**ages, "share": plant.counters.get(f"{robot}.late", 0) / max(ticks, 1)}
+
+
+def walk_without_bridges(config: Config, seed: int, folder: Path) -> dict[str, Any]:
+    """The same walk of the simulated world without bridges, in real time; a row of the table.
+
+    Args:
+        config: of bridged robots on this machine.
+        seed: of the world.
+        folder: gets configuration, logs and recording.
+
+    Raises:
+        ProcessError: a process failed or left too early.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    config = replace(
+        config,
+        team=replace(config.team, plant=SIMULATED, plants="one"),
+        world=replace(config.world, seed=seed),
+        bus=replace(config.bus, endpoint=free_endpoint()),
+    )
+    (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
+    with Launch(_rows(config, folder, routed=False), folder / "logs") as launch:
+        launch.watch(lambda: False)
+    recording = Recording(folder / RECORDING)
+    names, traces = robot_names(config.team.robots), traces_of(list(recording.messages(Truth)))
+    end = 1000.0 * config.world.seconds
+    plant = list(recording.messages(Status, SIM))[-1]
+    tilts = {name: trace.tilt(0.0) for name, trace in zip(names, traces, strict=True)}
+    return {
+        "fault": "without-bridges",
+        "seed": seed,
+        "tilt_max": tilts,
+        "fell": [name for name, tilt in tilts.items() if tilt > FELL],
+        "figures": {
+            name: describe_walk(trace, 1000.0 * _STEADY_S, end)
+            for name, trace in zip(names, traces, strict=True)
+        },
+        "late": {name: late_of(plant, name) for name in names},
+    }
