@@ -24,6 +24,11 @@ def add(add_command: AddCommand) -> None:
         choices=("a1", "go1", "go2"),
         help="the simulated robots speak the protocol of this kind, for bridges, and lie at first",
     )
+    command.add_argument(
+        "--hung",
+        action="store_true",
+        help="with --as: the robots hang in the air, for a test of their joints",
+    )
 
 
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
@@ -33,7 +38,9 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     from quadriga.team.plants import plant_factory
 
     if arguments.native:
-        return _run_native(arguments.native, config)
+        return _run_native(arguments, config)
+    if arguments.hung:
+        raise ConfigError("--hung", "no --as", "--as with a kind of robot")
     robot, plants = arguments.robot, config.team.plants
     permitted = robot_names(config.team.robots) if plants == "each" else ("",)
     if robot not in permitted:
@@ -43,11 +50,12 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     return 0
 
 
-def _run_native(kind: str, config: Config) -> int:
+def _run_native(arguments: argparse.Namespace, config: Config) -> int:
     from quadriga.sim_server.native import process
 
+    kind = arguments.native
     if kind != config.team.robot:
         cause = "team.robot says what the team is made of"
         raise ConfigError("--as", repr(kind), repr(config.team.robot), cause)
-    process.run(config)
+    process.run(config, hung=arguments.hung)
     return 0

@@ -19,6 +19,7 @@ from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.native.board import Board
 from quadriga.sim_server.native.go2_robot import Go2Robot
+from quadriga.sim_server.native.hanger import Hanger
 from quadriga.sim_server.native.udp_robot import UdpRobot
 from quadriga.sim_server.world.world import World
 
@@ -26,13 +27,14 @@ OFF, DAMPED, DRIVEN = "motors off", "motors damped", "motors driven"
 _TICK = 1e-3  # s
 
 
-def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
-    """Be the robots until told to stop. They lie on the ground at first.
+def run(config: Config, stopped: Callable[[], bool] | None = None, *, hung: bool = False) -> None:
+    """Be the robots until told to stop. They lie on the ground at first, or hang.
 
     Args:
         config: the team's configuration; `bridge.endpoint` and `bridge.listen` say where each robot
             is, and where its reports go.
         stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
+        hung: whether the robots hang in the air.
 
     Raises:
         ConfigError: an address does not parse or is missing, or this kind has no protocol here.
@@ -40,9 +42,12 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
     """
     stopped = stopped or stop_on_signals()
     world = World(replace(config, world=replace(config.world, spawn="lying")))
+    hanger = Hanger(world)
+    if hung:
+        hanger.spawn_hung()
     robots = open_robots(config)
     try:
-        _serve(world, robots, config, stopped)
+        _serve(world, hanger, robots, config, stopped)
     finally:
         for robot in robots.values():
             robot.close()
@@ -81,7 +86,11 @@ def open_robots(config: Config) -> dict[str, Board]:
 
 
 def _serve(
-    world: World, robots: Mapping[str, Board], config: Config, stopped: Callable[[], bool]
+    world: World,
+    hanger: Hanger,
+    robots: Mapping[str, Board],
+    config: Config,
+    stopped: Callable[[], bool],
 ) -> None:
     end_collection()
     take_priority(config.runtime.priority)
@@ -98,6 +107,7 @@ def _serve(
             if (doing := describe_motors(command)) != motors[name]:
                 motors[name] = doing
                 _say(f"{world.tick} ms: {name} {doing}")
+        hanger.hold()
         for event in world.step({n: c for n, c in commands.items() if c is not None}):
             if event.code != FALL:  # robots that lie are no news here
                 _say(f"{event.tick} ms: {event.kind} {event.robot} {event.detail}")
