@@ -1,8 +1,9 @@
 """Robots that hang in the air: a rope and a frame at each trunk, as in a test of joints.
 
 A trunk is held by a spring and a damper: in place, level and in its heading. The rope pulls up and
-never down, so that a robot that is lowered stands on its legs and the rope becomes slack; then it is
-let go of. The force acts at the trunk's centre of mass, close to the origin whose place is held.
+never down, so that a robot that is lowered comes to stand on its legs, and the rope becomes slack;
+then it is let go of. The force acts at the trunk's centre of mass, close to the origin whose place
+is held.
 """
 
 from __future__ import annotations
