@@ -44,6 +44,7 @@ def bridge_of(config: Config, name: str) -> BridgeConfig:
     return replace(
         bridge,
         domain=domain,
+        interface=bridge.interface.replace("{number}", number),
         endpoint=bridge.endpoint.replace("{number}", number),
         listen=bridge.listen.replace("{number}", number),
     )

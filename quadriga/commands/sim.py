@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from quadriga.commands.command import AddCommand, Given
 from quadriga.shared.config.sections import Config
@@ -24,6 +25,27 @@ def add(add_command: AddCommand) -> None:
         choices=("a1", "go1", "go2"),
         help="the simulated robots speak the protocol of this kind, for bridges, and lie at first",
     )
+    command.add_argument(
+        "--hung",
+        action="store_true",
+        help="with --as: the robots hang in the air, for a test of their joints",
+    )
+    command.add_argument(
+        "--do",
+        dest="orders",
+        action="append",
+        default=[],
+        metavar="ORDER",
+        help="with --as: what happens to a robot, such as 'r1 loss 0.05' or '4.0 r1 battery 8', "
+        "4 s after the start; may be repeated; so are lines on the standard input, which 'help' "
+        "explains",
+    )
+    command.add_argument(
+        "--truth",
+        default="",
+        metavar="FILE.csv",
+        help="with --as: write there, every 10 ms, where the robots truly are",
+    )
 
 
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
@@ -33,7 +55,14 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     from quadriga.team.plants import plant_factory
 
     if arguments.native:
-        return _run_native(arguments.native, config)
+        return _run_native(arguments, config)
+    for given, name in (
+        (arguments.hung, "--hung"),
+        (arguments.orders, "--do"),
+        (arguments.truth, "--truth"),
+    ):
+        if given:
+            raise ConfigError(name, "no --as", "--as with a kind of robot")
     robot, plants = arguments.robot, config.team.plants
     permitted = robot_names(config.team.robots) if plants == "each" else ("",)
     if robot not in permitted:
@@ -43,11 +72,13 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     return 0
 
 
-def _run_native(kind: str, config: Config) -> int:
+def _run_native(arguments: argparse.Namespace, config: Config) -> int:
     from quadriga.sim_server.native import process
 
+    kind = arguments.native
     if kind != config.team.robot:
         cause = "team.robot says what the team is made of"
         raise ConfigError("--as", repr(kind), repr(config.team.robot), cause)
-    process.run(config)
+    truth = Path(arguments.truth) if arguments.truth else None
+    process.run(config, process.NativeTask(arguments.hung, tuple(arguments.orders), truth))
     return 0

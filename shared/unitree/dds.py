@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes as c
 import importlib.util
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, Self
@@ -28,13 +29,15 @@ _UNREAD: Final = 2 | 4 | 8 | 16  # any view, instances that are alive, samples n
 _CONFIG: Final = (
     '<CycloneDDS><Domain Id="any"><General><Interfaces>'
     '<NetworkInterface name="{interface}" priority="default" multicast="default"/>'
-    "</Interfaces></General>{more}</Domain></CycloneDDS>"
+    "</Interfaces></General><Discovery><ExternalDomainId>{domain}</ExternalDomainId>{more}"
+    "</Discovery></Domain></CycloneDDS>"
 )
 # The loopback has no multicast: whoever is on this machine is asked one by one.
 _LOOPBACK: Final = (
-    "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>60"
-    '</MaxAutoParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>'
+    "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>60"
+    '</MaxAutoParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers>'
 )
+_NUMBERS: Final = 0x7FFFFFFF  # of domains within a process
 
 
 class _Serialised(c.Structure):
@@ -171,6 +174,8 @@ def describe_topic(typename: str, size: int, alignment: int, ops: Sequence[int])
 class DdsParticipant:
     """One side's part in a DDS domain. Close it: others keep what is not closed for ten seconds.
 
+    Within a process the library knows a domain on one interface from the same domain on another.
+
     Args:
         domain: its number; the robot's is 0.
         interface: name of the network interface, such as eth0.
@@ -183,12 +188,13 @@ class DdsParticipant:
     def __init__(self, domain: int, interface: str) -> None:
         self.library = load_library()
         more = _LOOPBACK if interface == "lo" else ""
-        text = _CONFIG.format(interface=interface, more=more).encode()
+        text = _CONFIG.format(interface=interface, domain=domain, more=more).encode()
         where = f"DDS domain {domain} on {interface!r}"
-        self._domain = self.library.dds_create_domain(domain, text)
+        inner = zlib.crc32(f"{domain} {interface}".encode()) & _NUMBERS
+        self._domain = self.library.dds_create_domain(inner, text)
         if self._domain != _THERE_ALREADY:  # made by another participant of this process
             self._check(self._domain, where)
-        created = self.library.dds_create_participant(domain, None, None)
+        created = self.library.dds_create_participant(inner, None, None)
         if created < 0:
             self.library.dds_delete(self._domain)
         self.handle = self._check(created, where)
@@ -284,3 +290,7 @@ class StructWriter:
         """Write; whether the library took it."""
         self._sample.raw = sample
         return bool(self._library.dds_write(self.handle, c.addressof(self._sample)) >= 0)
+
+    def close(self) -> None:
+        """Write no more, and have the readers know it; the participant stays."""
+        self._library.dds_delete(self.handle)

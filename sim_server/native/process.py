@@ -3,112 +3,118 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.unitree.udp import CODECS
-from quadriga.shared.unitree.udp_port import Address, parse_address
 from quadriga.shared.wire.codes import FALL
-from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.native.board import Board
-from quadriga.sim_server.native.go2_robot import Go2Robot
-from quadriga.sim_server.native.udp_robot import UdpRobot
+from quadriga.sim_server.native.console import Console
+from quadriga.sim_server.native.hanger import Hanger
+from quadriga.sim_server.native.news import News
+from quadriga.sim_server.native.open_boards import open_boards
+from quadriga.sim_server.native.orders import parse_order
+from quadriga.sim_server.native.steering import Steering
+from quadriga.sim_server.native.truth_log import PERIOD_MS, TruthLog
 from quadriga.sim_server.world.world import World
 
-OFF, DAMPED, DRIVEN = "motors off", "motors damped", "motors driven"
-_TICK = 1e-3  # s
+_TICK: Final = 1e-3  # s
+_STDIN: Final = 0
 
 
-def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
-    """Be the robots until told to stop. They lie on the ground at first.
+@dataclass(frozen=True)
+class NativeTask:
+    """What else simulated robots are to do.
+
+    Attributes:
+        hung: whether they hang in the air from the start.
+        orders: lines of orders that they get at the start.
+        truth: where to write where they truly are; None: nowhere.
+    """
+
+    hung: bool = False
+    orders: Sequence[str] = ()
+    truth: Path | None = None
+
+
+def run(
+    config: Config, task: NativeTask | None = None, stopped: Callable[[], bool] | None = None
+) -> None:
+    """Be the robots until told to stop. They lie on the ground at first, or hang.
+
+    Lines on the standard input are orders, see `orders`.
 
     Args:
-        config: the team's configuration; `bridge.endpoint` and `bridge.listen` say where each robot
-            is, and where its reports go.
+        config: the team's configuration; `bridge.endpoint` and `bridge.listen`, or
+            `bridge.interface` and `bridge.domain`, say where each robot is.
+        task: what else; by default nothing.
         stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
 
     Raises:
-        ConfigError: an address does not parse or is missing, or this kind has no protocol here.
-        BridgeError: a port is taken.
+        ConfigError: an address does not parse or is missing, an order is none, or the file for the
+            truth cannot be written.
+        BridgeError: a port is taken, or there is no such interface.
     """
-    stopped = stopped or stop_on_signals()
+    stopped, task = stopped or stop_on_signals(), task or NativeTask()
+    orders = [parse_order(line, robot_names(config.team.robots)) for line in task.orders]
     world = World(replace(config, world=replace(config.world, spawn="lying")))
-    robots = open_robots(config)
-    try:
-        _serve(world, robots, config, stopped)
-    finally:
-        for robot in robots.values():
-            robot.close()
+    hanger = Hanger(world)
+    if task.hung:
+        hanger.spawn_hung()
+    with ExitStack() as stack:
+        log = stack.enter_context(TruthLog(task.truth, world.names)) if task.truth else None
+        boards = open_boards(config)
+        for board in boards.values():
+            stack.callback(board.close)
+        steering = Steering(boards, hanger, Console(_STDIN), orders, _say)
+        _serve(_Served(world, boards, hanger, steering, log), config, stopped)
 
 
-def open_robots(config: Config) -> dict[str, Board]:
-    """The robots' boards by name, each on a network of its own.
-
-    Raises:
-        ConfigError, BridgeError: see `run`.
-    """
-    names, bridge = robot_names(config.team.robots), config.bridge
-    if config.team.robot == "go2":
-        interface = bridge.interface or "lo"
-        return {name: Go2Robot(bridge.domain + k, interface) for k, name in enumerate(names)}
-    boards = dict[str, Board]()
-    for number, name in enumerate(names, start=1):
-        here, listener = (
-            parse_address(
-                getattr(bridge, key).replace("{number}", str(number)),
-                f"bridge.{key}",
-                Address("", 0),
-            )
-            for key in ("endpoint", "listen")
-        )
-        if not here.port or not listener.port:
-            raise ConfigError(
-                "bridge.endpoint, bridge.listen",
-                "nothing",
-                "HOST:PORT",
-                "a simulated robot is not at the address of a real one: "
-                "deploy/desk.toml has addresses on this machine",
-            )
-        boards[name] = UdpRobot(CODECS[config.team.robot], here, listener)
-    return boards
+@dataclass(frozen=True)
+class _Served:
+    world: World
+    boards: Mapping[str, Board]
+    hanger: Hanger
+    steering: Steering
+    log: TruthLog | None
 
 
-def _serve(
-    world: World, robots: Mapping[str, Board], config: Config, stopped: Callable[[], bool]
-) -> None:
+def _serve(served: _Served, config: Config, stopped: Callable[[], bool]) -> None:
+    world, boards, log = served.world, served.boards, served.log
+    news = News(world, config.robot.stand_height, config.robot.feet_under_hips)
     end_collection()
     take_priority(config.runtime.priority)
-    rate, motors = Rate(_TICK, slack=3.0), dict.fromkeys(robots, OFF)
-    _say(f"{len(robots)} simulated {config.robot.title} on the network")
+    rate = Rate(_TICK, slack=3.0)
+    _say(f"{len(boards)} simulated {config.robot.title} on the network")
     while not stopped():
+        if log is not None and world.tick % PERIOD_MS == 0:
+            log.note(world.truth())
+        served.steering.turn(world.tick)
         states = world.states()
-        for k, (name, robot) in enumerate(robots.items()):
-            if world.tick % robot.period_ms == 0:
-                robot.report(states[name], world.motors.heat[k])
+        for k, (name, board) in enumerate(boards.items()):
+            board.report(states[name], world.motors.heat[k])
         rate.wait()
-        commands = {name: robot.obey() for name, robot in robots.items()}
-        for name, command in commands.items():
-            if (doing := describe_motors(command)) != motors[name]:
-                motors[name] = doing
-                _say(f"{world.tick} ms: {name} {doing}")
+        commands = {name: board.obey() for name, board in boards.items()}
+        for line in news.of_motors(commands):
+            _say(line)
+        served.hanger.hold()
         for event in world.step({n: c for n, c in commands.items() if c is not None}):
-            if event.code != FALL:  # robots that lie are no news here
+            if event.code != FALL:  # the news has them, but for robots that have never stood
                 _say(f"{event.tick} ms: {event.kind} {event.robot} {event.detail}")
+        for line in news.of_postures(served.hanger.hung):
+            _say(line)
         world.settle()
-
-
-def describe_motors(command: Command | None) -> str:
-    """What the motors do under a command: off, damped or driven."""
-    if command is None:
-        return OFF
-    return DRIVEN if command.kp.any() or command.tau.any() else DAMPED
+    for line in news.rest():
+        _say(line)
+    _say(f"{world.tick} ms: end, {rate.overruns} ticks began late")
 
 
 def _say(text: str) -> None:

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Iterator, Sequence
 
-from quadriga.shared.robot.conventions import N_JOINTS, Array
-from quadriga.shared.unitree.packets import OFF, MotorTargets, PacketError
+from quadriga.shared.unitree.packets import SERVO
 from quadriga.shared.unitree.udp import UdpCodec
 from quadriga.shared.unitree.udp_port import Address, UdpPort
-from quadriga.shared.wire.messages import Command, State
-from quadriga.sim_server.native.board import to_command, to_report
+from quadriga.sim_server.native.board import Board, Intruder
+from quadriga.sim_server.native.link import Parcel
 
 
-class UdpRobot:
-    """One robot's board.
-
-    Like a real one it has no watchdog: while no packet comes, its motors go on with the last one.
+class UdpRobot(Board):
+    """One robot's board. It answers whoever commanded it last.
 
     Args:
         codec: of its packets.
         here: where it takes commands.
         listener: where it sends reports until somebody commands it.
+        seed: of its chance.
 
     Raises:
         BridgeError: the port is taken.
@@ -28,30 +26,44 @@ class UdpRobot:
 
     period_ms = 1
 
-    def __init__(self, codec: UdpCodec, here: Address, listener: Address) -> None:
-        self._codec, self._port, self._listener = codec, UdpPort(here), listener
-        self._targets: MotorTargets | None = None
-        self.malformed = 0
-        self.received = 0
+    def __init__(
+        self, codec: UdpCodec, here: Address, listener: Address, seed: Sequence[int] = (0,)
+    ) -> None:
+        super().__init__(codec, SERVO, seed, keeps_size=False)
+        self._here, self._port = here, UdpPort(here)
+        self._first_listener = self._listener = listener
 
-    def report(self, state: State, heat: Array) -> None:
-        """Send what the robot measures; `heat` of its motors, (12,), 1 where torque lasts."""
-        mode = np.full(N_JOINTS, OFF, np.uint8) if self._targets is None else self._targets.mode
-        packet = self._codec.encode_report(to_report(state, heat, mode))
+    def _send(self, packet: bytes) -> None:
         self._port.send(packet, self._listener)
 
-    def obey(self) -> Command | None:
-        """The command that the motors follow now; None: they are off, and brake."""
-        for packet, sender in self._port.drain():
-            try:
-                self._targets = self._codec.decode_command(packet)
-            except PacketError:
-                self.malformed += 1
-                continue
-            self._listener = sender
-            self.received += 1
-        return to_command(self._targets)
+    def _take(self) -> Iterator[Parcel]:
+        return (Parcel(packet, sender) for packet, sender in self._port.drain())
+
+    def _take_note(self, parcel: Parcel) -> None:
+        if parcel.sender is not None:
+            self._listener = Address(*parcel.sender)
+
+    def _open_intruder(self) -> Intruder:
+        return _UdpIntruder(self._here)
+
+    def _boot(self) -> None:
+        super()._boot()
+        self._listener = self._first_listener
+
+    def _close(self) -> None:
+        self._port.close()
+
+
+class _UdpIntruder:
+    """A socket of its own that sends to a robot."""
+
+    def __init__(self, robot: Address) -> None:
+        self._port = UdpPort(Address(robot.host, 0), robot)
+
+    def write(self, packet: bytes, /) -> bool:
+        """See `Intruder`."""
+        return self._port.send(packet)
 
     def close(self) -> None:
-        """Leave the network."""
+        """See `Intruder`."""
         self._port.close()

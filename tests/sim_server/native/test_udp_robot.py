@@ -12,7 +12,7 @@ from quadriga.shared.errors import ConfigError
 from quadriga.shared.unitree.packets import NO_ANGLE, NO_RATE, OFF, PacketError
 from quadriga.shared.unitree.udp import A1
 from quadriga.shared.unitree.udp_port import Address, UdpPort
-from quadriga.sim_server.native.process import open_robots
+from quadriga.sim_server.native.open_boards import open_boards
 from quadriga.sim_server.native.udp_robot import UdpRobot
 from quadriga.sim_server.world.world import World
 from tests.bridges.robots import config_of, holding
@@ -73,6 +73,6 @@ def test_what_is_not_asked_for_is_not_an_angle(ends: tuple[UdpRobot, UdpPort]) -
 
 def test_robots_without_an_address_of_their_own_are_refused() -> None:
     with pytest.raises(ConfigError, match=r"bridge\.endpoint, bridge\.listen: got nothing"):
-        open_robots(load(overrides={"team.robots": 1}))
+        open_boards(load(overrides={"team.robots": 1}))
     with pytest.raises(PacketError):
         A1.decode_command(b"")
