@@ -26,6 +26,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.clock import Rate, monotonic
+from quadriga.shared.runtime.histogram import Histogram
 from quadriga.shared.unitree.packets import RobotReport
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Command, Event, State, Status
@@ -34,6 +35,9 @@ from quadriga.shared.wire.topics import SAMPLE_MS
 _TICK: Final = 1e-3  # s
 _LOOK_MS: Final = 1000  # of reports that are checked before anything is sent
 _SAMPLE_AGE: Final = 5  # ms, that a report may be old at a sample of which there is no newer one
+_REMEMBERED: Final = 64  # ticks, for which the arrival of their reports is known
+_NOTHING: Final = (-1, 0.0)
+_ANSWER_BIN: Final = 0.05  # ms
 _SLACK_MS: Final = 3000  # beyond what standing up or lying down takes
 
 
@@ -75,6 +79,9 @@ class RobotPlant(Plant):
         self._report: RobotReport | None = None
         self._report_at = -1
         self._published_at = -1
+        self._arrived = 0.0  # by the clock
+        self._arrivals = [_NOTHING] * _REMEMBERED  # tick of a state, and when its report came
+        self._answers = Histogram(_ANSWER_BIN)
         self._yaw: float | None = None
         self._in_charge = False  # of the robot's motors
         self._guard_gone = False
@@ -144,6 +151,7 @@ class RobotPlant(Plant):
         if not (is_new or (tick % SAMPLE_MS == 0 and age <= _SAMPLE_AGE)):
             return {}
         self._published_at = self._report_at
+        self._arrivals[tick % _REMEMBERED] = tick, self._arrived
         if self._yaw is None:
             self._yaw = yaw_of(report.quat_wxyz)
         return {self.names[0]: to_state(report, tick, self._yaw)}
@@ -190,7 +198,12 @@ class RobotPlant(Plant):
                 rate.wait()
 
     def describe(self, status: Status) -> Status:
-        """With the bridge's mode and reason, and counters of the robot and of its packets."""
+        """With the bridge's mode and reason, and counters of the robot and of its packets.
+
+        `<robot>.answer` of `ages_ms` is the time from the arrival of a report to the command that
+        the agent made of it.
+        """
+        ages = {**status.ages_ms, **self._answers.quantiles(f"{self.names[0]}.answer")}
         counters = {**status.counters, **self._driver.counters}
         counters |= {f"limited_{name}": count for name, count in self._cut.items()}
         report = self._report
@@ -199,7 +212,8 @@ class RobotPlant(Plant):
             counters["motors_lost"] = int(np.sum(report.lost))
             if report.battery is not None:
                 counters["battery_percent"] = report.battery.charge
-        return replace(status, mode=str(self.mode), reason=self._memory.reason, counters=counters)
+        mode, reason = str(self.mode), self._memory.reason
+        return replace(status, mode=mode, reason=reason, ages_ms=ages, counters=counters)
 
     def _receive(self) -> bool:
         """Take the newest report; whether there is one. Counts a millisecond."""
@@ -209,7 +223,7 @@ class RobotPlant(Plant):
         report = self._driver.receive()
         if report is None:
             return False
-        self._report, self._report_at = report, self._now
+        self._report, self._report_at, self._arrived = report, self._now, self._clock()
         return True
 
     def _turn(
@@ -235,10 +249,19 @@ class RobotPlant(Plant):
         self._cut.update(supervised.cut)
         if supervised.targets is not None and self._is_due(supervised):
             self._driver.send(supervised.targets)
+            if command is not None and self.mode is BridgeMode.WALKING:
+                self._note_answer(command.tick)
         for mode, reason in supervised.changes:
             self._say(f"{self.names[0]}: {mode} {reason}".rstrip())
             self._untold.append((self._now, mode, reason))
         return supervised.changes
+
+    def _note_answer(self, tick: int) -> None:
+        """The command of the state of this tick has been sent."""
+        if self._arrivals[tick % _REMEMBERED][0] == tick:
+            arrived = self._arrivals[tick % _REMEMBERED][1]
+            self._answers.add(1e3 * (self._clock() - arrived))
+            self._arrivals[tick % _REMEMBERED] = _NOTHING  # sent again, it is no answer
 
     def _stall(self) -> int:
         """Milliseconds since this was asked last: more than one if the process stood still."""
@@ -246,7 +269,9 @@ class RobotPlant(Plant):
         return round(1000.0 * (self._turned_at - before))
 
     def _is_due(self, supervised: Supervised) -> bool:
-        return bool(supervised.changes) or self._now % self._driver.period_ms == 0
+        """In step with the states: the answer to one is sent in its own millisecond."""
+        clock = self.tick if self.mode is BridgeMode.WALKING else self._now
+        return bool(supervised.changes) or clock % self._driver.period_ms == 0
 
     def _event(self, mode: BridgeMode, reason: str, ms_ago: int = 0) -> Event:
         text = f"{mode} {reason}".rstrip()

@@ -31,7 +31,8 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Walk; 1 if a robot that nothing was done to fell."""
     from rich.console import Console
 
-    from quadriga.desk.campaign import build_fault_table, named_faults, run_campaign
+    from quadriga.desk.campaign import named_faults, run_campaign
+    from quadriga.desk.tables import build_fault_table, build_walk_table
     from quadriga.team.run_folder import make_run_dir
 
     if config.team.plant != BRIDGED:
@@ -51,6 +52,8 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
         console,
         compare=arguments.compare,
     )
-    console.print(build_fault_table(rows))
+    for table in (build_walk_table(rows), build_fault_table(rows)):
+        if table.row_count:
+            console.print(table)
     console.print(f"folder: {folder}", markup=False, highlight=False)
     return int(any(set(row.get("fell", ())) - {row.get("robot")} for row in rows))

@@ -9,15 +9,14 @@ from typing import Any, Final
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from quadriga.desk.faults import BY_NAME, NO_FAULT, Fault
-from quadriga.desk.trial import run_trial, walk_without_bridges
+from quadriga.desk.trial import WITHOUT, run_trial, walk_without_bridges
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, ProcessError, did_you_mean, name_file_errors
+from quadriga.warm_up import warm_up
 
 ROWS: Final = "rows.jsonl"
-WITHOUT: Final = "without-bridges"
 ALL: Final = "all"
 
 
@@ -63,6 +62,7 @@ def run_campaign(
         folder.mkdir(parents=True, exist_ok=True)
         rows = read_rows(folder)
         known = {(row["fault"], row["seed"]) for row in rows}
+        warm_up(config, console)
         todo = [t for t in _trials(faults, seeds, compare=compare) if t[:2] not in known]
         for number, (name, seed, fault) in enumerate(todo, start=1):
             row = _walk(config, name, seed, fault, folder / f"{name}-{seed}")
@@ -117,27 +117,3 @@ def describe_row(row: dict[str, Any]) -> str:
         parts.append(f"ms to rest: {rest}")
     parts += [f"{name}: {what}" for name, what in row.get("status", {}).items()]
     return "; ".join(parts)
-
-
-def build_fault_table(rows: Sequence[dict[str, Any]]) -> Table:
-    """For each fault: tries, falls, and how long its robot took to be damped."""
-    table = Table(title="faults", title_justify="left")
-    for name in ("fault", "tries", "its robot fell", "others fell", "ms to damping p50", "max"):
-        table.add_column(name, justify="left" if name == "fault" else "right")
-    table.add_column("stopped")
-    for name, fault in BY_NAME.items():
-        found = [row for row in rows if row["fault"] == name and "error" not in row]
-        if not found:
-            continue
-        rest = [row["rest_ms"][row["robot"]] for row in found]
-        times = [ms for ms in rest if ms is not None]
-        table.add_row(
-            fault.name,
-            str(len(found)),
-            str(sum(row["robot"] in row["fell"] for row in found)),
-            str(sum(len(set(row["fell"]) - {row["robot"]}) for row in found)),
-            f"{np.median(times):.0f}" if times else "-",
-            f"{max(times)}" if times else "-",
-            f"{len(times)} of {len(found)}",
-        )
-    return table

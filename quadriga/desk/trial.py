@@ -19,7 +19,7 @@ from quadriga.desk.robots import SimulatedRobots
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.recordings.readable import open_readable
 from quadriga.recordings.summary import RECORDING
-from quadriga.shared.config.sections import SIMULATED, Config
+from quadriga.shared.config.sections import BRIDGED, SIMULATED, Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ProcessError, RecordingError
 from quadriga.shared.members import SIM, plant_name
@@ -38,6 +38,7 @@ _EARLIEST_S, _LATEST_S = 2.0, 4.0  # from the begin of a walk until something go
 _START_S: Final = 120.0  # for the team to start and stand up
 _AFTER_S: Final = 12.0  # for robots to come to rest once a walk must be over
 _WALKS: Final = "walking"
+WITHOUT: Final = "without-bridges"  # in place of a fault: the same walk of the simulated world
 
 
 def run_trial(config: Config, fault: Fault, seed: int, folder: Path) -> dict[str, Any]:
@@ -74,7 +75,7 @@ def _rows(config: Config, folder: Path, routed: bool) -> Sequence[ProcessSpec]:
     predictor = None
     if find_kind(config.planner.kind).needs_predictor:
         predictor = ensure_predictor(config, Console(stderr=True))
-    rows = process_table(config, folder, predictor, "", armed=True)
+    rows = process_table(config, folder, predictor, "", armed=config.team.plant == BRIDGED)
     if not routed:
         return rows
     command = (*QUADRIGA, "router", "--listen", config.bus.endpoint)
@@ -110,7 +111,7 @@ class _Trial:
         for pid in pids:
             with suppress(OSError):
                 os.kill(pid, signal.SIGKILL)
-        return {"robot": self._patient, "walked_s": round((self._since - self._begun) / 1000, 2)}
+        return {"robot": self._patient, "after_s": round((self._since - self._begun) / 1000, 2)}
 
     def come_to_rest(self) -> dict[str, Any]:
         """Wait until no motor is driven any more, the team being gone."""
@@ -241,7 +242,7 @@ def walk_without_bridges(config: Config, seed: int, folder: Path) -> dict[str, A
     plant = list(recording.messages(Status, SIM))[-1]
     tilts = {name: trace.tilt(0.0) for name, trace in zip(names, traces, strict=True)}
     return {
-        "fault": "without-bridges",
+        "fault": WITHOUT,
         "seed": seed,
         "tilt_max": tilts,
         "fell": [name for name, tilt in tilts.items() if tilt > FELL],
