@@ -19,8 +19,16 @@ MOST_KD: Final = 30.0  # N·m·s/rad
 TOO_FAST: Final = 2.0  # times a joint's greatest speed: no joint moves so
 TOO_FAR: Final = 1.0  # rad beyond its range: no joint is there
 LIMITS: Final = (
-    "finite", "measured", "gain", "position", "speed", "torque", "rate", "end-stop", "power",
-)  # fmt: skip
+    "finite",
+    "measured",
+    "gain",
+    "position",
+    "speed",
+    "torque",
+    "rate",
+    "end-stop",
+    "power",
+)
 """Names of the limits, in the order in which they are applied."""
 _FINITE, _MEASURED, _GAIN, _POSITION, _SPEED, _TORQUE, _RATE, _END_STOP, _POWER = range(len(LIMITS))
 

@@ -50,7 +50,7 @@ FAULTS: Final = (
     Fault("remote-stop", "L2+B is pressed on the remote control", ("remote L2+B",)),
     Fault("battery-low", "the battery falls to 5 %", ("battery 5",)),
     Fault("motor-protected", "a knee's motor switches itself off", ("protect FR_calf_joint",)),
-)  # fmt: skip
+)
 """In the order of the table."""
 BY_NAME: Final = {fault.name: fault for fault in FAULTS}
 NO_FAULT: Final = Fault("none", "nothing goes wrong")

@@ -25,13 +25,14 @@ _MISSING: Final = "-"
 def build_walk_table(rows: Sequence[dict[str, Any]]) -> Table:
     """Walks in which nothing went wrong, beside the same without bridges: means over robots.
 
-    Ages of commands are the median of the walks' medians and the worst of their p99 and maxima; a
+    The time from a report to the command made of it is the median of the walks' medians and the
+    worst of their p99 and maxima; without bridges the command's age, in whole milliseconds. A
     command is late if it is of an earlier tick than the one at which the motors follow it.
     """
     table = Table(title="walks", title_justify="left")
     headings = ["through", "walks", "no walk", "falls", "stops"]
     headings += [name for _, name, _, _ in _FIGURES]
-    for name in (*headings, "age ms p50", "p99", "max", "late %"):
+    for name in (*headings, "answer ms p50", "p99", "max", "late %"):
         table.add_column(name, justify="left" if name == "through" else "right")
     for kind, title in ((NO_FAULT.name, "bridges"), (WITHOUT, "no bridges")):
         every = [row for row in rows if row["fault"] == kind]
@@ -59,9 +60,10 @@ def _ages(rows: Sequence[dict[str, Any]]) -> list[str]:
     late = [ages for row in rows for ages in row["late"].values()]
     if not late:
         return [_MISSING] * 4
+    kind = "answer" if all("answer.median" in ages for ages in late) else "command"
     return [
-        f"{np.median([ages['median'] for ages in late]):.0f}",
-        *(f"{max(ages[name] for ages in late):.0f}" for name in ("p99", "max")),
+        f"{np.median([ages[f'{kind}.median'] for ages in late]):.2f}",
+        *(f"{max(ages[f'{kind}.{name}'] for ages in late):.2f}" for name in ("p99", "max")),
         f"{100 * np.mean([ages['share'] for ages in late]):.1f}",
     ]
 

@@ -209,8 +209,12 @@ def children_of(pid: int) -> list[int]:
 
 
 def late_of(plant: Status, robot: str) -> dict[str, float]:
-    """Age of the commands that a robot's motors followed, ms, and the share of late ones."""
-    begin, ticks = f"{robot}.command.", plant.counters.get("ticks", 0)
+    """Age of the commands that a robot's motors followed, ms, and the share of late ones.
+
+    Keys are `command.median`, `command.p99`, `command.max`, of a bridge also `answer.…`, from the
+    arrival of a report to the command made of it, and `share`.
+    """
+    begin, ticks = f"{robot}.", plant.counters.get("ticks", 0)
     ages = {k.removeprefix(begin): v for k, v in plant.ages_ms.items() if k.startswith(begin)}
     return {**ages, "share": plant.counters.get(f"{robot}.late", 0) / max(ticks, 1)}
 
