@@ -35,7 +35,6 @@ class Condition:
 
     Attributes:
         off: whether it is switched off.
-        protected: motors that have switched themselves off, (12,).
 
     Args:
         seed: of its chance.
@@ -45,12 +44,13 @@ class Condition:
         self._chance = np.random.default_rng(tuple(seed))
         self._first = int(self._chance.integers(_COUNTER))  # what its counter says at tick 0
         self._lost = np.zeros(N_JOINTS, dtype=np.int64)
-        self._lost_until = 0  # ms
         self._charge, self._charged_at = FULL, 0  # %, ms
+        self._battery = _battery(FULL)
+        self._second = 0  # ms, when what changes slowly is looked at again
         self._remote = _IDLE
         self._idle_at: int | None = None  # tick
         self.off = False
-        self.protected = np.zeros(N_JOINTS, dtype=np.bool_)
+        self._protected = list[int]()  # motors that have switched themselves off
 
     def switch_on(self, now: int) -> None:
         """Switch it on, and have its counter begin anew."""
@@ -60,6 +60,11 @@ class Condition:
     def set_charge(self, percent: float, now: int) -> None:
         """Give the battery this charge, %, from which it goes on to drain."""
         self._charge, self._charged_at = percent, now
+        self._battery = _battery(percent)
+
+    def protect(self, joint: int) -> None:
+        """Have a motor switch itself off until all is cleared; its index in `JOINT_NAMES`."""
+        self._protected.append(joint)
 
     def press(self, buttons: frozenset[str], until: int | None) -> None:
         """Press these buttons of the remote control alone, until a tick, ms; None: for good."""
@@ -72,7 +77,7 @@ class Condition:
     def clear(self, now: int) -> None:
         """Be as it was when it was switched on; its counters go on."""
         self.switch_on(now)
-        self.protected[:] = False
+        self._protected.clear()
         self.set_charge(FULL, now)
         self.press(frozenset(), None)
 
@@ -87,6 +92,8 @@ class Condition:
         now = state.tick
         if self._idle_at is not None and now >= self._idle_at:
             self._remote, self._idle_at = _IDLE, None
+        if now >= self._second:
+            self._pass_a_second(now)
         return RobotReport(
             tick=(self._first + now) % _COUNTER,
             quat_wxyz=state.imu_quat_wxyz,
@@ -98,17 +105,18 @@ class Condition:
             foot=state.foot_force,
             mode=self._mode(targets),
             temperature=_COLD + _WARMER * heat,
-            lost=self._lost_by(now),
+            lost=self._lost,
             imu_temperature=_IMU_TEMPERATURE,
             remote=self._remote,
-            battery=self._battery(now),
+            battery=self._battery,
         )
 
     def command(self, targets: MotorTargets | None) -> Command | None:
         """What the world's motors do under a robot's command; None if all are off."""
         if self.off or targets is None or not (on := targets.mode != OFF).any():
             return None
-        on &= ~self.protected
+        if self._protected:
+            on[self._protected] = False
         share = on.astype(float)
         # Where nothing is asked for, an angle or a rate is a huge number, with a gain of zero.
         q = np.where(targets.kp > 0.0, targets.q, 0.0)
@@ -117,17 +125,17 @@ class Condition:
 
     def _mode(self, targets: MotorTargets | None) -> NDArray[np.uint8]:
         mode = np.full(N_JOINTS, OFF, np.uint8) if targets is None else targets.mode
-        if self.protected.any():
-            mode = np.where(self.protected, np.uint8(PROTECTED), mode)
+        if self._protected:
+            mode = mode.copy()
+            mode[self._protected] = PROTECTED
         return mode
 
-    def _lost_by(self, now: int) -> NDArray[np.int64]:
-        if now >= self._lost_until:
-            self._lost = self._lost + self._chance.poisson(_LOST, N_JOINTS)
-            self._lost_until = now + _SECOND
-        return self._lost
+    def _pass_a_second(self, now: int) -> None:
+        self._second = now + _SECOND
+        self._lost = self._lost + self._chance.poisson(_LOST, N_JOINTS)
+        self._battery = _battery(max(0.0, self._charge - _DRAIN * (now - self._charged_at)))
 
-    def _battery(self, now: int) -> Battery:
-        charge = max(0.0, self._charge - _DRAIN * (now - self._charged_at))
-        volts = _EMPTY_V + (_FULL_V - _EMPTY_V) * charge / 100.0
-        return Battery(math.ceil(charge), _CURRENT, volts)
+
+def _battery(charge: float) -> Battery:
+    volts = _EMPTY_V + (_FULL_V - _EMPTY_V) * charge / 100.0
+    return Battery(math.ceil(charge), _CURRENT, volts)

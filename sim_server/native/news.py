@@ -23,6 +23,7 @@ _BRAKING: Final = 3.0  # N·m by which a damping motor's torque may differ from 
 _STANDS: Final = 0.75  # share of the height of its stand
 _UPRIGHT: Final = math.cos(0.5)  # of the tilt of one that stands
 _STANDS_MS: Final = 200  # for which it does
+_LOOK_MS: Final = 10  # between two looks at one that does not
 _FALLEN: Final = math.cos(1.0)  # of the tilt of one that has fallen, as the world has it
 _LOW: Final = 0.12  # m, trunk above the ground, of one that is down, as the world has it
 _GENTLE: Final = 0.3  # m/s: who comes down more slowly has lain down
@@ -100,6 +101,8 @@ class PostureNews:
             pose: of the trunk: position and quaternion wxyz, (7,), world.
             sinking: speed of its trunk downwards, m/s.
         """
+        if not self._stands and now % _LOOK_MS:
+            return ""
         x, y, z, qw, qx, qy, qz = pose.tolist()
         cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
         # With these comparisons a state that is not a number counts as a fall.

@@ -111,7 +111,7 @@ class Steering:
             case Charge(percent):
                 board.condition.set_charge(percent, now)
             case Protect(joint):
-                board.condition.protected[joint] = True
+                board.condition.protect(joint)
             case Switch(on):
                 board.switch(on=on)
             case Intrude(there):
