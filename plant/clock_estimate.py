@@ -8,8 +8,8 @@ So with the offset `θ(t)`, the leader's reading minus mine when mine is t,
 
 however long each way takes and however late the answer is. The offset changes by its drift `d`,
 which is the same within `WANDER` over a window. All pairs of such limits bound `d`, and with `d`
-all of them bound θ now: that is an interval, and its middle is the estimate. With the least round
-trip alone it would be half of that.
+all of them bound θ now: that is an interval, and its middle is the estimate. It is never wider than
+what the exchange with the least round trip alone would tell.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class WallReading:
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
+class KnownOffset:
     """The leader's clock minus mine, ns, and how far that may be off, as of `at` of my clock.
 
     Attributes:
@@ -78,12 +78,12 @@ class Estimate:
     drift_error: float
     source: str
 
-    def at_time(self, now: int) -> Estimate:
+    def at_time(self, now: int) -> KnownOffset:
         """The same knowledge at a later time of my clock."""
         age = now - self.at
         offset = self.offset + round(self.drift * age)
         error = self.error + ceil(self.drift_error * abs(age))
-        return Estimate(now, offset, error, self.drift, self.drift_error, self.source)
+        return KnownOffset(now, offset, error, self.drift, self.drift_error, self.source)
 
     def to_mine(self, instant: int) -> int:
         """My clock's reading when the leader's shows `instant`."""
@@ -102,8 +102,8 @@ class ClockEstimate:
     def __init__(self) -> None:
         self.exchanges: deque[Exchange] = deque(maxlen=WINDOW)
         self.contradicted = False
-        self._by_exchanges: Estimate | None = None
-        self._by_walls: Estimate | None = None
+        self._by_exchanges: KnownOffset | None = None
+        self._by_walls: KnownOffset | None = None
 
     @property
     def round_trip(self) -> int:
@@ -126,7 +126,7 @@ class ClockEstimate:
             apart = abs(self._by_walls.at_time(found.at).offset - found.offset)
             self.contradicted |= apart > self._by_walls.error + found.error
 
-    def at_time(self, now: int) -> Estimate | None:
+    def at_time(self, now: int) -> KnownOffset | None:
         """The better of both estimates; None before the first exchange."""
         if self._by_exchanges is None:
             return None
@@ -137,22 +137,18 @@ class ClockEstimate:
         return walls if walls.error < best.error else best
 
 
-def offset_of(exchanges: deque[Exchange]) -> Estimate | None:
+def offset_of(exchanges: deque[Exchange]) -> KnownOffset | None:
     """The offset when the newest of exchanges arrived; None if no steady drift explains them all.
 
     A newer limit at t and an older one at s bound the drift by what lies between them, over t - s.
     """
     base = exchanges[-1]
     about = base.received - base.asked  # of the size of an offset, so that floats are exact to ns
-    rows = np.array(
-        [
-            (e.asked - base.arrived, e.received - e.asked - about,
-             e.arrived - base.arrived, e.answered - e.arrived - about)
-            for e in exchanges
-        ],
-        dtype=float,
-    )  # fmt: skip
-    upper_at, upper, lower_at, lower = rows.T
+    # Limits, from above and below, and when they hold.
+    upper_at = np.array([e.asked - base.arrived for e in exchanges], dtype=float)
+    upper = np.array([e.received - e.asked - about for e in exchanges], dtype=float)
+    lower_at = np.array([e.arrived - base.arrived for e in exchanges], dtype=float)
+    lower = np.array([e.answered - e.arrived - about for e in exchanges], dtype=float)
     upper, lower = upper - WANDER * upper_at, lower + WANDER * lower_at  # the times are ≤ 0
     apart = lower_at[:, None] - upper_at[None, :]
     gap = lower[:, None] - upper[None, :]
@@ -162,7 +158,7 @@ def offset_of(exchanges: deque[Exchange]) -> Estimate | None:
         return None
     high = float(np.min(upper - greatest * upper_at))
     low = float(np.max(lower - least * lower_at))
-    return Estimate(
+    return KnownOffset(
         at=base.arrived,
         offset=about + round(0.5 * (low + high)),
         error=ceil(0.5 * (high - low)) + 1,
@@ -172,7 +168,9 @@ def offset_of(exchanges: deque[Exchange]) -> Estimate | None:
     )
 
 
-def offset_of_walls(leader: WallReading, mine: WallReading, other: Estimate) -> Estimate | None:
+def offset_of_walls(
+    leader: WallReading, mine: WallReading, other: KnownOffset
+) -> KnownOffset | None:
     """The offset that two synchronised wall clocks tell; None if one is not synchronised.
 
     A clock and the wall clock of one machine differ by a constant. The drift is that of `other`.
@@ -181,7 +179,9 @@ def offset_of_walls(leader: WallReading, mine: WallReading, other: Estimate) -> 
         return None
     offset = leader.clock - leader.wall - (mine.clock - mine.wall)
     error = leader.error + mine.error
-    return Estimate(mine.clock, offset, error, other.drift, other.drift_error, source=SYSTEM_CLOCK)
+    return KnownOffset(
+        mine.clock, offset, error, other.drift, other.drift_error, source=SYSTEM_CLOCK
+    )
 
 
 def _largest(gap: Array, apart: Array, among: NDArray[np.bool_]) -> float:

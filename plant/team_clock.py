@@ -2,7 +2,7 @@
 
 Tick k begins when the clock of the plant that leads shows `start + k` ms. The others estimate that
 clock by asks and answers, and hold their ticks by it. Nobody's ticks jump or repeat: see
-`plant.schedule`.
+`plant.tick_schedule`.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from quadriga.plant.clock_estimate import (
     PING_PONG,
     SYSTEM_CLOCK,
     ClockEstimate,
-    Estimate,
+    KnownOffset,
     Exchange,
     WallReading,
 )
-from quadriga.plant.schedule import TICK_NS, Schedule
+from quadriga.plant.tick_schedule import TICK_NS, TickSchedule
 from quadriga.shared.wire.messages import ClockAnswer, ClockAsk, Status
 
 ENOUGH_NS: Final = 1_000_000  # error of a clock by which a robot may walk
@@ -42,13 +42,14 @@ class TeamClock:
     Attributes:
         start: when tick 0 begins, ns of the clock that leads; 0: not agreed yet.
         late: how late the newest tick began, ns.
+        off: how far the planned tick may be off the clock that leads, ns.
     """
 
     def __init__(self, others: Iterable[str], timeout: int, slack: int) -> None:
-        self.start, self.late = 0, 0
+        self.start, self.late, self.off = 0, 0, 0
         self._heard = dict.fromkeys(others, 0)
         self._timeout, self._slack = timeout, slack
-        self._schedule = Schedule(0)
+        self._schedule = TickSchedule(0)
         self._worst, self._reported, self._is_enough = 0, 0, True
 
     def to_mine(self, instant: int, now: int) -> int:
@@ -62,7 +63,7 @@ class TeamClock:
     def walk(self, now: int) -> int:
         """Have tick 0 begin, at once or soon; when, ns of this plant's clock."""
         first = self.to_mine(self.start, now)
-        self._schedule = Schedule(first + TICK_NS)
+        self._schedule = TickSchedule(first + TICK_NS)
         self._heard = dict.fromkeys(self._heard, max(now, first))
         return first
 
@@ -70,7 +71,8 @@ class TeamClock:
         """When the tick after the newest is to begin, ns of this plant's clock."""
         due = self.to_mine(self.start + tick * TICK_NS, now)
         begin = self._schedule.plan(due)
-        self._worst = max(self._worst, self.error(now) + abs(self._schedule.planned - due))
+        self.off = self.error(now) + abs(self._schedule.planned - due)
+        self._worst = max(self._worst, self.off)
         return begin
 
     def begin(self, now: int) -> int:
@@ -121,10 +123,8 @@ class LeadingClock(TeamClock):
         self._heard[asker] = max(self._heard.get(asker, 0), arrived)
         if ask.start_ns == self.start and ask.late_ns > self._slack:
             self._slip(ask.late_ns)
-        return ClockAnswer(
-            tick, tick * TICK_NS,
-            ask.asked_ns, arrived, wall.clock, wall.wall, wall.error, self.start,
-        )  # fmt: skip
+        known = (wall.clock, wall.wall, wall.error, self.start)
+        return ClockAnswer(tick, tick * TICK_NS, ask.asked_ns, arrived, *known)
 
     def begin(self, now: int) -> int:
         late = super().begin(now)
@@ -156,7 +156,7 @@ class FollowingClock(TeamClock):
         self._clock = ClockEstimate()
         self.answers, self._answered = 0, 0
 
-    def known(self, now: int) -> Estimate | None:
+    def known(self, now: int) -> KnownOffset | None:
         """What is known of the clock that leads."""
         return self._clock.at_time(now)
 

@@ -74,7 +74,7 @@ class BusConfig:
         0.5,
         "s",
         "realtime, plants of their own: silence after which a plant is given up and the walk ends",
-        low=0.2,
+        low=0.3,
         high=10.0,
     )
 

@@ -15,7 +15,7 @@ _GREATEST_SHIFT_NS: Final = TICK_NS // 2
 _GAIN: Final = 0.05  # share of what is left that a tick corrects: 1 ms is gone in 60 ticks
 
 
-class Schedule:
+class TickSchedule:
     """The instants at which ticks are to begin, ns of the plant's own clock.
 
     Args:
