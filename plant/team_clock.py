@@ -15,8 +15,8 @@ from quadriga.plant.clock_estimate import (
     PING_PONG,
     SYSTEM_CLOCK,
     ClockEstimate,
-    KnownOffset,
     Exchange,
+    KnownOffset,
     WallReading,
 )
 from quadriga.plant.tick_schedule import TICK_NS, TickSchedule

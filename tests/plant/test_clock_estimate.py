@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,8 +37,8 @@ class Leader:
 
     def at(self, mine: float) -> int:
         """Its reading when mine is `mine`."""
-        angle = 2.0 * np.pi * mine / self.period
-        swung = self.swing * self.period / (2.0 * np.pi) * np.sin(angle)
+        angle = 2.0 * math.pi * mine / self.period
+        swung = self.swing * self.period / (2.0 * math.pi) * math.sin(angle)
         return round(mine + self.offset + self.drift * mine + swung)
 
 

@@ -65,8 +65,11 @@ class VirtualTeam:
         self._lead, self.delay, self._random = names[0], delay, np.random.default_rng(1)
         leading = LeadingClock(names[1:], TIMEOUT, slack)
         following = [FollowingClock(self._lead, TIMEOUT, slack) for _ in names[1:]]
-        parts = zip(names, (leading, *following), clocks, strict=True)
-        self.computers = {name: Computer(part, *clock) for name, part, clock in parts}
+        parts: list[LeadingClock | FollowingClock] = [leading, *following]
+        self.computers = {
+            name: Computer(part, *clock)
+            for name, part, clock in zip(names, parts, clocks, strict=True)
+        }
         self._events: list[tuple[float, int, Callable[[float], None]]] = []
         self._serial = count()
         for name in names:
