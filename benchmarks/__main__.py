@@ -1,4 +1,4 @@
-"""The benchmark on one page: planner, low level, messages, world, recorder, fit, walks.
+"""The benchmark on one page: planner, low level, messages, world, clock, recorder, fit, walks.
 
 Run: python -m benchmarks [PART ...] [--robots 1 2 3 5 10] [--seconds 4] [--out FILE]
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
 
 from quadriga.plant.end import End
 from quadriga.plant.lockstep import run_lockstep
 from quadriga.plant.protocol import Plant
 from quadriga.plant.realtime import run_realtime
 from quadriga.plant.server import PlantServer
+from quadriga.plant.team_pace import TeamPace, team_pace
 from quadriga.plant.team_time import team_time
 from quadriga.shared.bus.barrier import await_agents, meet, start_together
 from quadriga.shared.bus.zenoh_bus import Bus
@@ -16,11 +18,14 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import plant_name
 from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.topics import COMMAND
+
+_PAUSE: Final = 0.002  # s, between two looks of a simulated robot's plant that waits
 
 PlantFactory = Callable[[Config, tuple[str, ...]], Plant]
 
@@ -50,16 +55,17 @@ def run(
     with Bus.open(config.bus, team, name, stopped) as bus:
         for key in sorted({*time.keys, *(COMMAND.key(team, own) for own in plant.names)}):
             bus.subscribe(key)
+        pace = team_pace(bus, config, robot, is_robot=plant.is_robot)
         server = PlantServer(config, plant, bus, time, name)
         if not meet(bus, config, stopped):
             return
         end_collection()
         take_priority(config.runtime.priority)
         try:
-            if not _start(bus, config, plant, stopped):
+            if not _start(server, pace, stopped):
                 return
-            loop = run_realtime if config.world.mode == "realtime" else run_lockstep
-            end = loop(server, stopped)
+            realtime = config.world.mode == "realtime"
+            end = run_realtime(server, stopped, pace) if realtime else run_lockstep(server, stopped)
             if time.drives:
                 server.announce(end.code, "", end.detail)
         finally:
@@ -67,15 +73,21 @@ def run(
     _check_end(time.end, team)
 
 
-def _start(bus: Bus, config: Config, plant: Plant, stopped: Callable[[], bool]) -> bool:
+def _start(server: PlantServer, pace: TeamPace | None, stopped: Callable[[], bool]) -> bool:
     """Get the robots to stand, and start the team; False if `stopped()` came first."""
-    if not plant.is_robot:
-        return plant.prepare(stopped) and start_together(bus, config, stopped)
-    return (
-        await_agents(bus, config, stopped)
-        and plant.prepare(stopped)
-        and start_together(bus, config, stopped, plant.idle)
-    )
+    bus, config, plant = server.bus, server.config, server.plant
+    if plant.is_robot and not await_agents(bus, config, stopped):
+        return False
+    if not plant.prepare(stopped):
+        return False
+    pause = plant.idle if plant.is_robot else None
+    if pace is None:
+        return start_together(bus, config, stopped, pause)
+    return pace.start(pause or _pause, stopped)
+
+
+def _pause() -> None:
+    sleep(_PAUSE)
 
 
 def _check_end(end: End | None, team: str) -> None:

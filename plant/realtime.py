@@ -9,42 +9,61 @@ from quadriga.plant.deadlines import DAMPED, HELD, PERIOD_MS, Deadlines
 from quadriga.plant.end import TOLD_TO_STOP, End
 from quadriga.plant.late import FRESH, HOLD, grade, hold_joints
 from quadriga.plant.server import PlantServer
+from quadriga.plant.team_pace import TeamPace
 from quadriga.shared.bus.zenoh_bus import HERE
 from quadriga.shared.runtime.clock import Rate
-from quadriga.shared.wire.messages import Command
+from quadriga.shared.wire import codes
+from quadriga.shared.wire.messages import Command, Status
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 TICK: Final = 1e-3  # s
-_SLACK: Final = 3.0  # ticks that are made up for
+_SLACK: Final = 3.0  # ticks that the plant of all robots makes up for
 
 
-def run_realtime(server: PlantServer, stopped: Callable[[], bool]) -> End:
-    """Step until the walk is over; why it is, with what came late."""
+def run_realtime(
+    server: PlantServer, stopped: Callable[[], bool], pace: TeamPace | None = None
+) -> End:
+    """Step until the walk is over; why it is, with what came late.
+
+    Args:
+        server: the plant.
+        stopped: asked with every tick whether to stop.
+        pace: of one of several plants; None: of the plant of all robots.
+    """
     # A world that fell behind slows down: in ticks made up for at once nobody could answer.
-    rate, motors = Rate(TICK, slack=_SLACK), _Motors(server)
+    rate, motors = pace or Rate(TICK, slack=_SLACK), _Motors(server)
     end: End | None = None
     while end is None and not stopped():
         server.publish()
         motors.deadlines.note_lateness(rate.wait())  # meanwhile the agents answer
         for packet in server.bus.drain():
             server.take(*packet, oldest=0)
-        if not server.time.alone:
-            _keep_time(server, rate)
+        if pace is not None:
+            _look_at_others(server, pace)
         end = server.step(motors.commands())
         if server.plant.tick % PERIOD_MS == 0 or end is not None:
             status = motors.deadlines.status(server.plant.tick, rate.overruns)
+            if pace is not None:
+                status = _describe_clock(server, pace, status)
             server.publish_status(server.plant.describe(status))
     code, detail = end or TOLD_TO_STOP
     late = motors.deadlines.describe_late()
     return End(code, f"{detail}; late ticks: {late}; overruns of the world: {rate.overruns}")
 
 
-def _keep_time(server: PlantServer, rate: Rate) -> None:
-    """Follow the team's clock, and see whether the other plants are still there."""
-    tick, time = server.plant.tick, server.time
-    if tick % SAMPLE_MS == 0:
+def _look_at_others(server: PlantServer, pace: TeamPace) -> None:
+    """See whether the other plants are still there."""
+    time = server.time
+    if server.plant.tick % SAMPLE_MS == 0:
         time.look(server.bus.members_at(HERE))
-    rate.delay(TICK * max(time.ahead(tick), 1.0 - _SLACK))
+        time.end = time.end or pace.look()
+
+
+def _describe_clock(server: PlantServer, pace: TeamPace, status: Status) -> Status:
+    status = pace.describe(status)
+    if news := pace.news():
+        server.announce(codes.CLOCK, server.plant.names[0], news)
+    return status
 
 
 class _Motors:

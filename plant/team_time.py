@@ -1,9 +1,9 @@
 """The plants of a team among each other: who drives time, who waits for whom, when one must end.
 
 The plant of all robots has nobody to ask. Where each robot has a plant of its own, that of the
-first robot drives time and the others follow its clock. In lock-step no follower takes a tick
-before the clock has come to its end, and the clock waits for every state and command of a tick:
-so the team ends as one, and what is recorded does not depend on who was faster.
+first robot drives time. In lock-step no follower takes a tick before the clock has come to its
+end, and the clock waits for every state and command of a tick: so the team ends as one, and what
+is recorded does not depend on who was faster. In real time ticks begin by `plant.team_clock`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.messages import Clock, Event
 from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, STATE
 
-_DRIFT_MS: Final = 3  # that two clocks of one team may differ: a message under way is no drift
 _JUMP_MS: Final = 5000  # no clock of a team that still walks is so far ahead
 
 
@@ -50,10 +49,6 @@ class TeamTime:
     def awaited(self, tick: int) -> frozenset[str]:
         """Plants without which this one may not take `tick` in lock-step."""
         return frozenset()
-
-    def ahead(self, tick: int) -> int:
-        """Ticks by which this plant is ahead of who drives time, negative if behind; told once."""
-        return 0
 
     def look(self, present: Collection[str]) -> None:
         """Set `end` if a plant on which this one depends is not among those `present`."""
@@ -124,7 +119,7 @@ class FollowerTime(TeamTime):
         self._key, self._event = CLOCK.key(config.team.name), EVENT.key(config.team.name)
         self.keys = frozenset({self._key, self._event})
         self._lead = frozenset({plant_name(robot_names(config.team.robots)[0])})
-        self._now, self._fresh = -1, False
+        self._now = -1
 
     def take(self, key: str, payload: bytes, tick: int) -> None:
         try:
@@ -137,15 +132,10 @@ class FollowerTime(TeamTime):
         except MessageError:
             return
         if self._now < now <= tick + _JUMP_MS:
-            self._now, self._fresh = now, True
+            self._now = now
 
     def awaited(self, tick: int) -> frozenset[str]:
         return self._lead if self._now <= tick else frozenset()
-
-    def ahead(self, tick: int) -> int:
-        drift = tick - self._now if self._fresh else 0
-        self._fresh = False
-        return drift if abs(drift) > _DRIFT_MS else 0
 
     def look(self, present: Collection[str]) -> None:
         if self.end is None and not has_lead(present):

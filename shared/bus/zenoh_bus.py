@@ -21,9 +21,10 @@ from quadriga.shared.bus.zenoh_settings import (
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import ROUTER
-from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
 
 Packet = tuple[str, bytes]  # key, payload as received
+Arrival = tuple[int, str, bytes]  # when, ns of `monotonic_ns`, and the packet
 
 HERE: Final = "here"  # a process has declared its subscribers
 READY: Final = "ready"  # it has also warmed up: the world may start
@@ -157,6 +158,31 @@ class Bus:
                 key, _direct(self._inbox.put), allowed_origin=zenoh.Locality.REMOTE
             )
         )
+
+    def collect(self, key: str) -> Callable[[], list[Arrival]]:
+        """Keep what others publish on `key` apart from the inbox, each with when it arrived.
+
+        That is noted by the thread that receives it, so it does not matter when it is looked at.
+
+        Returns:
+            A function that gives all that have arrived since it was called last, oldest first.
+        """
+        kept: SimpleQueue[Arrival] = SimpleQueue()
+
+        def keep(sample: zenoh.Sample) -> None:
+            now = monotonic_ns()
+            kept.put((now, str(sample.key_expr), sample.payload.to_bytes()))
+
+        self._declarations.append(
+            self._session.declare_subscriber(
+                key, _direct(keep), allowed_origin=zenoh.Locality.REMOTE
+            )
+        )
+
+        def take() -> list[Arrival]:
+            return [kept.get_nowait() for _ in range(kept.qsize())]
+
+        return take
 
     def get(self, timeout: float) -> Packet | None:
         """The oldest packet of the inbox, waiting at most `timeout` seconds for one."""

@@ -17,6 +17,7 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "team.robot": "a1",
         "team.plant": "mujoco",
         "team.plants": "one",
+        "bus.clock_timeout": 0.5,
         "planner.options": "",
         "planner.cost": "own",
         "planner.tracked": "speeds",

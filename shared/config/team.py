@@ -70,6 +70,13 @@ class BusConfig:
     barrier_timeout: float = key(
         60.0, "s", "how long to wait for all processes before giving up", low=0.1, high=3600.0
     )
+    clock_timeout: float = key(
+        0.5,
+        "s",
+        "realtime, plants of their own: silence after which a plant is given up and the walk ends",
+        low=0.3,
+        high=10.0,
+    )
 
 
 @dataclass(frozen=True, slots=True)

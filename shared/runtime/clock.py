@@ -17,7 +17,10 @@ def monotonic_ns() -> int:
 
 
 def wall_ns() -> int:
-    """Nanoseconds since 1970: for log times and names of run folders, never for control."""
+    """Nanoseconds since 1970: for log times and names of run folders, never for control.
+
+    The clocks of computers are compared by it where they say how exact it is.
+    """
     return time.time_ns()
 
 
@@ -46,10 +49,6 @@ class Rate:
         self._period, self._now, self._pause, self._slack = period, now, pause, slack
         self._next = now()
         self.overruns = 0
-
-    def delay(self, seconds: float) -> None:
-        """Move the turns to come to later, or to earlier if negative."""
-        self._next += seconds
 
     def wait(self) -> float:
         """Wait for the next turn and return how late it begins, in seconds."""

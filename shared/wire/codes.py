@@ -35,6 +35,7 @@ SIGNAL: Final = "signal"
 PLANT_GONE: Final = "plant-gone"
 BRIDGE_MODE: Final = "bridge-mode"
 ROBOT_STOPPED: Final = "robot-stopped"
+CLOCK: Final = "clock"
 
 EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
     {
@@ -50,6 +51,7 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         MALFORMED: EventCode("fault", "commands did not decode"),
         BRIDGE_MODE: EventCode("bridge", "a bridge's robot begins to stand up, walk or lie down"),
         ROBOT_STOPPED: EventCode("fault", "a bridge has stopped its robot: damped, then limp"),
+        CLOCK: EventCode("fault", "how well a plant knows the team's clock crosses 1 ms"),
         TIME_OVER: EventCode("stop", "the walk is over: world.seconds have passed"),
         FALLEN: EventCode("stop", "the walk is over: a robot fell"),
         SIGNAL: EventCode("stop", "the walk is over: the world was told to stop"),

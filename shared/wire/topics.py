@@ -55,9 +55,18 @@ CLOCK: Final = Topic(
     "clock", msg.Clock, (SIM,), (OPERATOR, LAUNCHER, members.ESTOP, SIM),
     period_ms=CONFIGURED, recorded=False,
 )  # fmt: skip
+# In real time between plants of single robots; clocks of computers, so not of a replay. They tell
+# afterwards how well the team's clock was known, and cost 2 kB/s.
+CLOCK_ASK: Final = Topic(
+    "clock_ask", msg.ClockAsk, (SIM,), (SIM,), per_robot=True, period_ms=0, repeats=True
+)
+CLOCK_ANSWER: Final = Topic(
+    "clock_answer", msg.ClockAnswer, (SIM,), (SIM,), per_robot=True, period_ms=0, repeats=True
+)
 
 _OWN: Final = (
     STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, ESTOP, TRUTH, EVENT, CLOCK,
+    CLOCK_ASK, CLOCK_ANSWER,
 )  # fmt: skip
 TABLE: Final = (*_OWN, *plugin_topics(_OWN))
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}

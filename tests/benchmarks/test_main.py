@@ -57,6 +57,16 @@ def test_parts_print_their_lines_and_write_their_figures(
     assert (tmp_path / "b.png").stat().st_size > 10_000
 
 
+def test_plants_whose_clocks_are_far_apart_begin_ticks_together(tmp_path: Path) -> None:
+    """On a machine however busy: where clocks were not brought together it would be 1000 s."""
+    page, found = run(tmp_path / "b.json", "clock")
+    (row,) = found["parts"]["clock"]["rows"]
+    assert row["ticks"] == 1500
+    assert 0.0 < row["median_us"] < 1e5
+    assert row["gap_ms"][0] > 0.0
+    assert "two plants" in page
+
+
 def test_walks_are_measured_with_and_without_the_bus(tmp_path: Path) -> None:
     words = ("walks", "--planner", "none", "--robots", "1", "--seconds", "1")
     page, found = run(tmp_path / "b.json", *words)

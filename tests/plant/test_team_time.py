@@ -92,15 +92,6 @@ def test_a_follower_takes_a_tick_once_the_clock_is_past_it(config: Config) -> No
     assert time.awaited(1) == {"plant_r1"}, "no clock of a team that walks jumps so far"
 
 
-def test_a_follower_knows_once_for_each_clock_how_far_it_has_drifted(config: Config) -> None:
-    time = FollowerTime(config)
-    drift = []
-    for now, tick in ((100, 101), (110, 120), (120, 90), (130, 131)):
-        time.take(CLOCK.key("team"), clock(now), tick)
-        drift += [time.ahead(tick), time.ahead(tick)]
-    assert drift == [0, 0, 10, 0, -30, 0, 0, 0]
-
-
 def test_followers_leave_by_the_same_event_as_all_others(config: Config) -> None:
     time = FollowerTime(config)
     time.take(EVENT.key("team"), event(codes.FALL, "r1"), 5)

@@ -45,8 +45,9 @@ def test_an_input_may_miss_a_turn_before_it_is_too_old(topic: Topic, preset: str
 
 @rows
 def test_one_robot_has_what_per_robot_says(topic: Topic) -> None:
-    agents_alone = {members.AGENT} & {*topic.senders, *topic.receivers}
-    assert not topic.per_robot or agents_alone
+    """An agent, or a plant, of which there may be one for each robot."""
+    its_own = {members.AGENT, members.SIM} & {*topic.senders, *topic.receivers}
+    assert not topic.per_robot or its_own
 
 
 @pytest.mark.parametrize("kind", ["distributed", "centralised", "none"])
@@ -85,6 +86,8 @@ def test_the_keys_are_the_contract_with_other_tools() -> None:
         "team/sim/truth",
         "team/sim/event",
         "team/clock",
+        "team/r1/clock_ask",
+        "team/r1/clock_answer",
     ]
 
 

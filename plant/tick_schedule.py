@@ -1,0 +1,46 @@
+"""When the ticks of a plant begin: a millisecond apart on the team's clock, without jumps.
+
+A correction of the clock moves the instants to come by a share of it with each tick, so that no
+two are less than half or more than one and a half milliseconds apart. A tick that begins late
+moves nothing: those after it begin half a millisecond apart until they are on time.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+TICK_NS: Final = 1_000_000
+LEAST_GAP_NS: Final = TICK_NS // 2  # between the beginnings of two ticks
+_GREATEST_SHIFT_NS: Final = TICK_NS // 2
+_GAIN: Final = 0.05  # share of what is left that a tick corrects: 1 ms is gone in 60 ticks
+
+
+class TickSchedule:
+    """The instants at which ticks are to begin, ns of the plant's own clock.
+
+    Args:
+        first: that of the first tick.
+
+    Attributes:
+        planned: when the newest tick was to begin.
+        begun: when it began.
+    """
+
+    def __init__(self, first: int) -> None:
+        self.planned = self.begun = first - TICK_NS
+
+    def plan(self, due: int) -> int:
+        """Plan the next tick, which is due at an instant by the team's clock; when to begin it."""
+        shift = _GAIN * (due - self.planned - TICK_NS)
+        shift = max(-_GREATEST_SHIFT_NS, min(shift, _GREATEST_SHIFT_NS))
+        self.planned += TICK_NS + round(shift)
+        return max(self.planned, self.begun + LEAST_GAP_NS)
+
+    def begin(self, now: int) -> int:
+        """Note that the planned tick begins now; how late it is, ns."""
+        self.begun = now
+        return max(now - self.planned, 0)
+
+    def slip(self, late: int) -> None:
+        """Let all ticks from the newest on be later than planned so far."""
+        self.planned += late

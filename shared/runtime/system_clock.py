@@ -1,0 +1,60 @@
+"""How well the system keeps its wall clock: what a daemon of PTP or NTP has told the kernel."""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from functools import cache
+from typing import Any, Final
+
+from quadriga.shared.runtime.clock import monotonic_ns, wall_ns
+
+# Some daemons (phc2sys of linuxptp, systemd-timesyncd) tell the kernel of no error at all.
+LEAST_ERROR_NS: Final = 100_000
+_UNSYNCHRONISED: Final = 0x0040  # STA_UNSYNC of <sys/timex.h>
+
+
+class _Timex(ctypes.Structure):
+    """`struct timex` of <sys/timex.h>, on 64 bits."""
+
+    _fields_ = (
+        ("modes", ctypes.c_uint),
+        ("offset", ctypes.c_long),
+        ("freq", ctypes.c_long),
+        ("maxerror", ctypes.c_long),  # µs
+        ("esterror", ctypes.c_long),
+        ("status", ctypes.c_int),
+        ("rest", ctypes.c_long * 32),  # more than the kernel writes
+    )
+
+
+def system_clock_error_ns() -> int:
+    """How far the wall clock may be off true time, ns; 0 if nobody says that it is synchronised.
+
+    It is never said to be better than `LEAST_ERROR_NS`. The kernel lets the error grow by 500 ppm
+    from one correction to the next.
+    """
+    if sys.platform != "linux":
+        return 0
+    found = _Timex()  # modes 0: nothing is changed
+    if _libc().adjtimex(ctypes.byref(found)) < 0 or found.status & _UNSYNCHRONISED:
+        return 0
+    return max(1000 * int(found.maxerror), LEAST_ERROR_NS)
+
+
+@cache
+def _libc() -> Any:
+    return ctypes.CDLL(None)
+
+
+def read_clocks() -> tuple[int, int, int]:
+    """The monotonic clock, the wall clock at the same time, and the wall clock's error, ns.
+
+    The error is that of `system_clock_error_ns`, with what passed between both readings if there
+    is one.
+    """
+    before = monotonic_ns()
+    wall = wall_ns()
+    apart = monotonic_ns() - before
+    error = system_clock_error_ns()
+    return before + apart // 2, wall, error + apart if error else 0
