@@ -69,7 +69,7 @@ class RobotPlant(Plant):
         say: Callable[[str], None],
         now: Callable[[], float] = monotonic,
     ) -> None:
-        self.names, self.tick = (name,), 0
+        self.names, self.tick, self.period_ms = (name,), 0, driver.period_ms
         self._config, self._driver, self._guard, self._say = config, driver, guard, say
         self._clock, self._turned_at = now, now()
         self._idle_rate = Rate(_TICK, now=now, slack=3.0)
@@ -85,6 +85,7 @@ class RobotPlant(Plant):
         self._yaw: float | None = None
         self._in_charge = False  # of the robot's motors
         self._guard_gone = False
+        self._estops: Callable[[], str] = str
         self._cut: Counter[str] = Counter()
         self._untold = list[tuple[int, BridgeMode, str]]()  # changes of before the walk, and when
 
@@ -136,6 +137,9 @@ class RobotPlant(Plant):
             self._say(f"{finding.name}: {finding.got}{'' if finding.ok else '  <- not right'}")
         refuse_failed(self.names[0], findings)
         return True
+
+    def listen(self, estops: Callable[[], str]) -> None:
+        self._estops = estops
 
     def states(self) -> Mapping[str, State]:
         """What the robot measures; nothing at ticks at which it has not said anything new.
@@ -244,6 +248,7 @@ class RobotPlant(Plant):
             writers=self._driver.other_writers(),
             stall=self._stall(),
             guarded=not self._guard_gone,
+            estop=self._estops(),
         )
         self._memory, supervised = self._supervisor.step(self._memory, inputs)
         self._cut.update(supervised.cut)

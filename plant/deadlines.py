@@ -25,10 +25,12 @@ class Deadlines:
     Attributes:
         late: number of ticks by robot and grade: `LATE` counts every tick without a command of
             that tick, `HELD` and `DAMPED` those of them at which the motors held or were damped.
+            Of a robot that takes commands every other tick, only those count.
     """
 
     def __init__(self, names: Iterable[str]) -> None:
         self.late: Counter[tuple[str, str]] = Counter()
+        self._due: Counter[str] = Counter()
         self._ages = {name: Histogram(1.0) for name in names}
         self._jitter = Histogram(_BIN_MS)
         self._lateness_us: list[float] = []
@@ -36,6 +38,7 @@ class Deadlines:
     def note_age(self, robot: str, age_ms: int) -> None:
         """A tick has been taken with a robot's command of this age."""
         self._ages[robot].add(age_ms)
+        self._due[robot] += 1
         self.late[robot, LATE] += age_ms > 0
 
     def note_lateness(self, late_s: float) -> None:
@@ -52,13 +55,14 @@ class Deadlines:
         """The report, as sent on `<team>/sim/status`.
 
         `ages_ms` holds median, p99 and max of `<robot>.command` and of the world's own `jitter`;
-        counters are `<robot>.late`, `.held`, `.damped`, `ticks` and `overruns`; `tick_us` holds the
+        counters are `<robot>.due`, `.late`, `.held`, `.damped`, `ticks` and `overruns`; `tick_us` holds the
         lateness of each tick since the last status.
         """
         ages: dict[str, float] = self._jitter.quantiles("jitter")
         for robot, histogram in self._ages.items():
             ages |= histogram.quantiles(f"{robot}.command")
         counters = {"overruns": overruns, "ticks": tick}
+        counters |= {f"{robot}.due": count for robot, count in sorted(self._due.items())}
         for (robot, grade), count in sorted(self.late.items()):
             counters[f"{robot}.{grade or 'late'}"] = count
         lateness, self._lateness_us = np.array(self._lateness_us), []

@@ -15,7 +15,7 @@ from quadriga.plant.team_time import team_time
 from quadriga.shared.bus.barrier import await_agents, meet, start_together
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import BusError
+from quadriga.shared.errors import BusError, MessageError
 from quadriga.shared.members import plant_name
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import sleep
@@ -23,7 +23,9 @@ from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire import codes
-from quadriga.shared.wire.topics import COMMAND
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import EStop
+from quadriga.shared.wire.topics import COMMAND, ESTOP
 
 _PAUSE: Final = 0.002  # s, between two looks of a simulated robot's plant that waits
 
@@ -55,6 +57,8 @@ def run(
     with Bus.open(config.bus, team, name, stopped) as bus:
         for key in sorted({*time.keys, *(COMMAND.key(team, own) for own in plant.names)}):
             bus.subscribe(key)
+        if plant.is_robot:
+            plant.listen(_estops(bus))
         pace = team_pace(bus, config, robot, is_robot=plant.is_robot)
         server = PlantServer(config, plant, bus, time, name)
         if not meet(bus, config, stopped):
@@ -84,6 +88,21 @@ def _start(server: PlantServer, pace: TeamPace | None, stopped: Callable[[], boo
     if pace is None:
         return start_together(bus, config, stopped, pause)
     return pace.start(pause or _pause, stopped)
+
+
+def _estops(bus: Bus) -> Callable[[], str]:
+    """A function that tells why the team's emergency stop was pressed; "" until it is."""
+    take = bus.collect(ESTOP.key(bus.team))
+
+    def reason() -> str:
+        for _, _, payload in take():
+            try:
+                return decode(payload, EStop).reason or ESTOP.name
+            except MessageError:
+                return "unreadable"  # somebody wanted to stop the team
+        return ""
+
+    return reason
 
 
 def _pause() -> None:

@@ -18,15 +18,24 @@ class Plant(Protocol):
         tick: world time that has passed, ms.
         is_robot: whether it is a real robot. That stands up once the agents are ready, is attended
             to all the time, and sees to late commands itself: it gets the newest, however old.
+        period_ms: between two ticks at which it is commanded.
     """
 
     names: tuple[str, ...]
     tick: int
     is_robot: bool = False
+    period_ms: int = 1
 
     def prepare(self, stopped: Callable[[], bool]) -> bool:
         """Get the robots to stand, before the team walks; False if `stopped()` came first."""
         return not stopped()
+
+    def listen(self, estops: Callable[[], str]) -> None:
+        """Ask `estops()` from now on why the team's emergency stop was pressed; "" if it was not.
+
+        Agents hear it, too. A robot must not depend on them.
+        """
+        return
 
     def idle(self) -> None:
         """Let a millisecond pass, while a robot that stands waits for the others."""

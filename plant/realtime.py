@@ -82,7 +82,8 @@ class _Motors:
             command = server.commands.latest.get(name)
             age = tick - server.commands.tick_of(name)
             state = grade(age, server.config.world)
-            self.deadlines.note_age(name, age)
+            if tick % server.plant.period_ms == 0:
+                self.deadlines.note_age(name, age)
             if server.plant.is_robot:
                 if command is not None:
                     chosen[name] = command

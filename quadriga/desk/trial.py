@@ -214,9 +214,9 @@ def late_of(plant: Status, robot: str) -> dict[str, float]:
     Keys are `command.median`, `command.p99`, `command.max`, of a bridge also `answer.…`, from the
     arrival of a report to the command made of it, and `share`.
     """
-    begin, ticks = f"{robot}.", plant.counters.get("ticks", 0)
+    begin, due = f"{robot}.", plant.counters.get(f"{robot}.due", 0)
     ages = {k.removeprefix(begin): v for k, v in plant.ages_ms.items() if k.startswith(begin)}
-    return {**ages, "share": plant.counters.get(f"{robot}.late", 0) / max(ticks, 1)}
+    return {**ages, "share": plant.counters.get(f"{robot}.late", 0) / max(due, 1)}
 
 
 def walk_without_bridges(config: Config, seed: int, folder: Path) -> dict[str, Any]:

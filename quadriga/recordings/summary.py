@@ -174,6 +174,7 @@ def _deadlines(traces: Traces) -> dict[str, Any]:
     }
     for robot, sim_status in plants.items():
         own, ticks = traces.statuses[robot], sim_status.counters.get("ticks", 0)
+        ticks = sim_status.counters.get(f"{robot}.due", ticks)
         late = sim_status.counters.get(f"{robot}.late", 0)
         by_member[robot] = {
             "late": late,

@@ -45,7 +45,7 @@ REFERENCE: Final = Topic(
     "reference", msg.Reference, (OPERATOR,), _PLANS,
     period_ms=REFERENCE_EPOCH_MS, max_age_ms=500, repeats=True,
 )  # fmt: skip
-ESTOP: Final = Topic("estop", msg.EStop, (members.ESTOP,), (AGENT,), period_ms=0)
+ESTOP: Final = Topic("estop", msg.EStop, (members.ESTOP,), (AGENT, SIM), period_ms=0)
 TRUTH: Final = Topic("sim/truth", msg.Truth, (SIM,), (AGENT, LAUNCHER), period_ms=CONFIGURED)
 EVENT: Final = Topic(
     "sim/event", msg.Event, (SIM,), (*_PLANS, OPERATOR, LAUNCHER, SIM), period_ms=0, repeats=True
