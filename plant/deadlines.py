@@ -55,8 +55,8 @@ class Deadlines:
         """The report, as sent on `<team>/sim/status`.
 
         `ages_ms` holds median, p99 and max of `<robot>.command` and of the world's own `jitter`;
-        counters are `<robot>.due`, `.late`, `.held`, `.damped`, `ticks` and `overruns`; `tick_us` holds the
-        lateness of each tick since the last status.
+        counters are `<robot>.due` (ticks at which it takes a command), `.late`, `.held`, `.damped`,
+        `ticks` and `overruns`; `tick_us` holds the lateness of each tick since the last status.
         """
         ages: dict[str, float] = self._jitter.quantiles("jitter")
         for robot, histogram in self._ages.items():

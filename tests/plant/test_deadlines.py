@@ -20,6 +20,8 @@ def test_ages_of_commands_and_lateness_of_the_world_are_told() -> None:
     assert decode(encode(status), Status).counters == {
         "overruns": 1,
         "ticks": 200,
+        "r1.due": 200,
+        "r2.due": 200,
         "r1.late": 0,
         "r2.late": 50,
         "r2.held": 2,
