@@ -101,6 +101,8 @@ class _Trial:
         self._patient = self._fault.robot or self._names[random.integers(len(self._names))]
         self._robots.wait_until(lambda: False, after)
         self._since = self._robots.order("all clear")
+        if early := [name for name in self._names if self._modes(name)[-1] != _WALKS]:
+            raise ProcessError("the team", f"{self._modes(early[0])[-1]} of {early[0]}", "a walk")
         pids = [pid for what in self._fault.processes for pid in self._pids(what)]
         for pid in pids:
             os.kill(pid, self._fault.signal)
