@@ -60,6 +60,28 @@ def test_the_world_starts_when_all_are_ready_and_nobody_joins_later() -> None:
             meet(late, config, never)
 
 
+@pytest.mark.parametrize("again", ["plant_r2", "r2"])
+def test_a_robot_that_is_started_again_does_not_join_a_team_that_walks(again: str) -> None:
+    """Its bridge, or its agent, even where the one before is gone already."""
+    each = {"team.robots": 2, "team.plants": "each", "team.yokes": "none", "planner.kind": "none"}
+    config = team(**each)
+    names = sorted(members(config), key=lambda name: name != "plant_r1")
+    buses = {name: join(config, name) for name in names}
+    all_meet(config, *buses.values())
+    for name, bus in buses.items():
+        if name != "plant_r1":
+            bus.declare(READY)
+    assert start_together(buses["plant_r1"], config, never)
+    buses[again].close()
+    with (
+        join(config, again) as late,
+        pytest.raises(BusError, match="a team that walks already, expected a network without"),
+    ):
+        meet(late, config, never)
+    for bus in reversed(buses.values()):
+        bus.close()
+
+
 def test_a_team_does_not_start_with_two_of_one_name() -> None:
     config = team()
     with (

@@ -14,7 +14,7 @@ import pytest
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
-from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.team.endpoint import free_endpoint
 
 WAIT = 10.0  # s, far more than anything here takes
@@ -88,6 +88,28 @@ def test_get_waits_no_longer_than_told(opened: Open) -> None:
     begun = monotonic()
     assert sim.get(0.05) is None
     assert 0.04 < monotonic() - begun < 1.0
+
+
+def test_what_is_collected_is_apart_from_the_inbox_and_has_the_time_it_arrived(
+    opened: Open,
+) -> None:
+    sim, r1 = opened("sim"), opened("r1")
+    collected, put = r1.collect("team/clock"), sim.publisher("team/clock")
+    r1.subscribe("team/other")
+    other = sim.publisher("team/other")
+    meet(sim, r1)
+    sent = monotonic_ns()
+    for number in range(3):
+        put(b"%d" % number)
+    other(b"9")
+    assert numbers(r1, 1) == [9]
+    arrivals, looked = collected(), monotonic_ns()
+    assert [(key, payload) for _, key, payload in arrivals] == [
+        ("team/clock", b"%d" % number) for number in range(3)
+    ]
+    times = [at for at, _, _ in arrivals]
+    assert [sent, *times, looked] == sorted([sent, *times, looked])
+    assert collected() == []
 
 
 def test_what_was_sent_before_closing_arrives(opened: Open) -> None:

@@ -1,0 +1,48 @@
+"""Both clocks are read at once, with what the kernel says of the wall clock."""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+
+import pytest
+
+from quadriga.shared.runtime import system_clock
+from quadriga.shared.runtime.clock import monotonic_ns, wall_ns
+from quadriga.shared.runtime.system_clock import LEAST_ERROR_NS, read_clocks, system_clock_error_ns
+
+
+def test_both_clocks_are_read_between_before_and_after() -> None:
+    before = monotonic_ns(), wall_ns()
+    clock, wall, error = read_clocks()
+    assert before[0] <= clock <= monotonic_ns()
+    assert before[1] <= wall <= wall_ns()
+    assert error == 0 or error >= LEAST_ERROR_NS
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="adjtimex is Linux's")
+def test_the_kernel_s_struct_is_read_where_its_fields_are() -> None:
+    """Two fields behind those that are used have known values."""
+    found = system_clock._Timex()
+    assert ctypes.CDLL(None).adjtimex(ctypes.byref(found)) >= 0
+    tolerance, tick = found.rest[2], found.rest[5]
+    assert tolerance == 500 << 16  # ppm, of which 16 bits are a fraction
+    assert 9_000 <= tick <= 11_000  # µs between two of 100 a second
+
+
+@pytest.mark.parametrize(
+    ("status", "maxerror", "error"),
+    [(0x0040, 10, 0), (0x2001, 250, 250_000), (0x2001, 0, LEAST_ERROR_NS)],
+)
+def test_the_error_is_none_of_a_clock_that_nobody_keeps_and_never_nothing(
+    monkeypatch: pytest.MonkeyPatch, status: int, maxerror: int, error: int
+) -> None:
+    class Kernel:
+        @staticmethod
+        def adjtimex(timex: object) -> int:
+            timex._obj.status, timex._obj.maxerror = status, maxerror  # type: ignore[attr-defined]
+            return 0
+
+    monkeypatch.setattr(system_clock, "_libc", Kernel)
+    monkeypatch.setattr(sys, "platform", "linux")
+    assert system_clock_error_ns() == error
