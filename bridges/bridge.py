@@ -6,6 +6,7 @@ import sys
 from dataclasses import replace
 
 from quadriga.bridges.guard import Guard
+from quadriga.bridges.joint_tester import JointTester
 from quadriga.bridges.open_driver import open_driver
 from quadriga.bridges.robot_plant import RobotPlant
 from quadriga.shared.config.bridge import BridgeConfig
@@ -34,6 +35,19 @@ def build_bridge(config: Config, names: tuple[str, ...], *, armed: bool = False)
         guard = Guard(kind, bridge)
         driver.own_guards = 1
     return RobotPlant(config, names[0], driver, guard=guard, say=_say)
+
+
+def build_joint_tester(config: Config, name: str) -> JointTester:
+    """The test of the joints of the robot of this name.
+
+    Raises:
+        ConfigError: no address or interface that can be used.
+        BridgeError: the way to the robot cannot be opened.
+    """
+    kind, bridge = config.team.robot, bridge_of(config, name)
+    driver, guard = open_driver(kind, bridge), Guard(kind, bridge)
+    driver.own_guards = 1
+    return JointTester(config, name, driver, guard, _say)
 
 
 def bridge_of(config: Config, name: str) -> BridgeConfig:

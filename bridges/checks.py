@@ -48,8 +48,10 @@ def check_reports(
     period_ms: int,
     config: BridgeConfig,
     robot: RobotSpec,
+    *,
+    hung: bool = False,
 ) -> list[Finding]:
-    """Everything that the first reports of a robot that lies still can tell.
+    """Everything that the first reports of a robot that lies or hangs still can tell.
 
     Args:
         reports: all that came, in their order.
@@ -57,6 +59,7 @@ def check_reports(
         period_ms: between two reports of a robot that is well.
         config: the limits.
         robot: that it should be.
+        hung: whether it hangs: then its feet may be at any height.
     """
     wanted = 1000.0 * seconds / period_ms
     findings = [
@@ -80,7 +83,8 @@ def check_reports(
         return findings
     findings += [_check_ticks(reports), _check_battery(last, config), *_check_motors(last, config)]
     findings += [_check_angles(reports, robot), *_check_still(reports), *_check_gravity(reports)]
-    findings.append(_check_feet(last, robot))
+    if not hung:
+        findings.append(_check_feet(last, robot))
     return findings
 
 

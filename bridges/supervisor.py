@@ -1,4 +1,4 @@
-"""What a bridge lets its robot do: seven states, a command a millisecond, every reason to stop.
+"""What a bridge lets its robot do: ten states, a command a millisecond, every reason to stop.
 
 The supervisor knows no agent, bus or socket. It is told what the robot last said, what the agent
 last asked for and how old both are, and it gives the command that may be sent.
@@ -8,20 +8,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from enum import StrEnum
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quadriga.bridges.joint_motion import TORQUE, joint_motion, led_gently, stray
 from quadriga.bridges.limits import JointReading, implausible, joint_limits, limit_targets
+from quadriga.bridges.modes import BY_ITSELF, BY_WISH, BridgeMode, Wish
 from quadriga.bridges.postures import (
     Motion,
     damped,
     lie_down,
     passive,
     posture_at,
+    press_by_diagonals,
     stand_up,
+    stay,
     towards,
 )
 from quadriga.shared.config.bridge import BridgeConfig
@@ -34,27 +37,7 @@ from quadriga.shared.wire.codes import with_detail
 from quadriga.shared.wire.messages import Command
 
 _HOTTER: Final = 10.0  # °C above `temperature_max` that stop a robot
-
-
-class BridgeMode(StrEnum):
-    """The states of a bridge."""
-
-    DRY = "dry"  # nothing is ever sent
-    LIMP = "limp"  # motors off
-    STANDING_UP = "standing-up"
-    STANDING = "standing"
-    WALKING = "walking"  # the agent's commands, limited
-    LYING_DOWN = "lying-down"
-    STOPPED = "stopped"  # damped, then motors off, until the bridge is started again
-
-
-class Wish(StrEnum):
-    """What the team wants of the robot."""
-
-    REST = "rest"
-    STAND = "stand"
-    WALK = "walk"
-    LIE = "lie"
+_LETTING_GO: Final = 1.0  # s, for which a robot that has lain down is damped
 
 
 @record
@@ -62,10 +45,10 @@ class SupervisorState:
     """What a supervisor remembers.
 
     Attributes:
-        mode: which of the seven.
+        mode: which of the ten.
         reason: why it is stopped; "" otherwise.
         since: when the mode began, ms.
-        motion: of standing up or lying down.
+        motion: that the bridge makes itself.
         held: angles at which the joints are held while the agent is late, (12,).
         torque: of the last command, (12,), N·m.
         sent: when it was, ms.
@@ -141,6 +124,7 @@ class Supervisor:
         self._robot, self._config, self._servo = robot, config, servo
         self._stop_buttons = parse_buttons(config.stop_buttons, "bridge.stop_buttons")
         self._limits = joint_limits(config, robot)
+        self._gentle = self._limits._replace(torque=np.minimum(TORQUE, self._limits.torque))
         still = JointReading(np.zeros(N_JOINTS), np.zeros(N_JOINTS))
         # Compiled, or loaded, now and not in the first millisecond.
         limit_targets(passive(still.q), still, np.zeros(N_JOINTS), 1, self._limits)
@@ -161,8 +145,9 @@ class Supervisor:
         changes = () if state.mode is before.mode else ((state.mode, state.reason),)
         state, targets = self._command(state, inputs)
         measured = JointReading(inputs.report.q, inputs.report.dq)
+        limits = self._gentle if state.mode is BridgeMode.TESTING else self._limits
         limited = limit_targets(
-            targets, measured, state.torque, max(1, inputs.now - state.sent), self._limits
+            targets, measured, state.torque, max(1, inputs.now - state.sent), limits
         )
         state = replace(state, torque=limited.torque, sent=inputs.now)
         return state, Supervised(limited.targets, changes, limited.cut)
@@ -173,21 +158,31 @@ class Supervisor:
             return state
         if reason := self.reason_to_stop(state, inputs):
             return _begin(state, BridgeMode.STOPPED, inputs.now, reason)
-        mode, wish, q = state.mode, inputs.wish, inputs.report.q
-        if mode is BridgeMode.LIMP and wish is Wish.STAND:
-            motion = stand_up(q, self._robot, self._config)
-            return _begin(state, BridgeMode.STANDING_UP, inputs.now, motion=motion)
-        if mode is BridgeMode.STANDING_UP and self._is_over(state, inputs):
-            return _begin(state, BridgeMode.STANDING, inputs.now)
-        if mode is BridgeMode.STANDING and wish is Wish.WALK and self._is_fresh(inputs):
-            return _begin(state, BridgeMode.WALKING, inputs.now)
-        upright = (BridgeMode.STANDING_UP, BridgeMode.STANDING, BridgeMode.WALKING)
-        if mode in upright and wish is Wish.LIE:
-            motion = lie_down(q, self._robot, self._config)
-            return _begin(state, BridgeMode.LYING_DOWN, inputs.now, motion=motion)
-        if mode is BridgeMode.LYING_DOWN and self._is_over(state, inputs):
-            return _begin(state, BridgeMode.LIMP, inputs.now)
-        return state
+        if state.mode is BridgeMode.TESTING and (joint := self._stray(state, inputs)):
+            return _begin(state, BridgeMode.STOPPED, inputs.now, with_detail("joint-strays", joint))
+        mode = BY_WISH.get((state.mode, inputs.wish), state.mode)
+        if mode is BridgeMode.WALKING and not self._is_fresh(inputs):
+            return state
+        if mode is state.mode and self._is_over(state, inputs):
+            mode = BY_ITSELF.get(mode, mode)
+        if mode is state.mode:
+            return state
+        return _begin(state, mode, inputs.now, motion=self._motion(mode, inputs.report.q))
+
+    def _motion(self, mode: BridgeMode, q: Array) -> Motion | None:
+        """The motion that a mode makes from measured angles, if it makes one."""
+        if mode is BridgeMode.STANDING_UP:
+            return stand_up(q, self._robot, self._config)
+        if mode is BridgeMode.LYING_DOWN:
+            return lie_down(q, self._robot, self._config)
+        if mode is BridgeMode.WEIGHING:
+            return press_by_diagonals(self._robot, self._config)
+        if mode is BridgeMode.TESTING:
+            return joint_motion(q, self._robot)
+        return stay(q, _LETTING_GO) if mode is BridgeMode.LETTING_GO else None
+
+    def _stray(self, state: SupervisorState, inputs: SupervisorInputs) -> str:
+        return stray(inputs.report.q, self._posture(state, inputs)[0])
 
     def _note_rates(self, state: SupervisorState, inputs: SupervisorInputs) -> SupervisorState:
         """The state with the time for which some joint has been too fast, or cannot be believed."""
@@ -257,10 +252,18 @@ class Supervisor:
         if mode is BridgeMode.STANDING:
             still = np.zeros(N_JOINTS)
             return state, towards(self._robot.q_stand, still, self._servo, self._config)
-        if state.motion is None:
-            raise ValueError(f"no motion while {mode}")
-        posture = posture_at(state.motion, self._seconds(state, inputs))
+        if mode is BridgeMode.LETTING_GO:
+            return state, damped(q, self._servo)
+        posture = self._posture(state, inputs)
+        if mode is BridgeMode.TESTING:
+            return state, led_gently(*posture, self._servo, self._seconds(state, inputs))
         return state, towards(*posture, self._servo, self._config)
+
+    def _posture(self, state: SupervisorState, inputs: SupervisorInputs) -> tuple[Array, Array]:
+        """Angles and rates of the motion now, (12,) each, rad and rad/s."""
+        if state.motion is None:
+            raise ValueError(f"no motion while {state.mode}")
+        return posture_at(state.motion, self._seconds(state, inputs))
 
     def _follow(
         self, state: SupervisorState, inputs: SupervisorInputs

@@ -19,6 +19,11 @@ def add(add_command: AddCommand) -> None:
     command.add_argument(
         "--armed", action="store_true", help="command the robot; without, nothing is ever sent"
     )
+    command.add_argument(
+        "--test-joints",
+        action="store_true",
+        help="the robot hangs: move each joint a little, and judge it; without a team",
+    )
 
 
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
@@ -35,5 +40,30 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     if arguments.driver not in (None, team.robot):
         cause = "team.robot says what the team is made of"
         raise ConfigError("--driver", repr(arguments.driver), repr(team.robot), cause)
+    if arguments.test_joints:
+        if not arguments.armed:
+            cause = "it moves the joints: hang the robot up first"
+            raise ConfigError("--test-joints", "no --armed", "--armed with it", cause)
+        return _test_joints(config, arguments.robot)
     process.run(config, partial(build_bridge, armed=arguments.armed), arguments.robot)
+    return 0
+
+
+def _test_joints(config: Config, name: str) -> int:
+    from quadriga.bridges.bridge import build_joint_tester
+    from quadriga.bridges.joint_test import refuse_wrong, table
+    from quadriga.shared.runtime.collector import end_collection
+    from quadriga.shared.runtime.scheduling import take_priority
+    from quadriga.shared.runtime.signals import stop_on_signals
+
+    stopped = stop_on_signals()
+    tester = build_joint_tester(config, name)
+    end_collection()
+    take_priority(config.runtime.priority)
+    verdicts = tester.run(stopped)
+    print(table(verdicts))
+    tester.refuse_stopped()
+    if stopped():
+        raise KeyboardInterrupt
+    refuse_wrong(name, verdicts)
     return 0

@@ -17,14 +17,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.bridges.limits import MOST_KD, MOST_KP, JointReading, implausible, joint_limits
+from quadriga.bridges.modes import BridgeMode, Wish
 from quadriga.bridges.robot_plant import to_state
-from quadriga.bridges.supervisor import (
-    BridgeMode,
-    Supervisor,
-    SupervisorInputs,
-    SupervisorState,
-    Wish,
-)
+from quadriga.bridges.supervisor import Supervisor, SupervisorInputs, SupervisorState
 from quadriga.bridges.udp_driver import UdpDriver
 from quadriga.plant.commands import CommandBox
 from quadriga.shared.config.sections import Config
@@ -41,7 +36,7 @@ from tests.bridges.robots import config_of, standing
 from tests.bridges.test_udp_driver import HOST, free_port
 
 KINDS: Final = ("a1", "go1", "go2")
-_MODES: Final = tuple(mode for mode in BridgeMode if mode is not BridgeMode.DRY)
+_BEGINNINGS: Final = (BridgeMode.LIMP, BridgeMode.STANDING, BridgeMode.WALKING)
 _WISHES: Final = (*Wish, *20 * (Wish.WALK,))
 _ANEW: Final = 0.3  # share of steps of a stopped robot after which it is in some other state
 _EXTREMES: Final = np.array(
@@ -169,11 +164,11 @@ class Fuzz:
     """
 
     def __init__(self, kind: str, seed: int, link: Link, config: Config) -> None:
-        self._config, self._link = config, link
+        self._link = link
         self._random = np.random.default_rng([seed, 1])
         self._supervisor = Supervisor(config.robot, config.bridge, servo=10)
         self._limits = joint_limits(config.bridge, config.robot)
-        report = standing(config)
+        report = self._good = standing(config)
         layout = None if kind == "go2" else udp.CODECS[kind].report
         counter = None if layout is None or layout.fields is None else layout.fields["tick"][1]
         self._damage = Damage(link.codec.encode_report(report), seed, counter)
@@ -186,13 +181,11 @@ class Fuzz:
         self.counts: Counter[str] = Counter()
 
     def _begin(self, now: int) -> SupervisorState:
-        """A state that a bridge may be in."""
+        """A state that a bridge may be in, and what follows it by some wish."""
         limp = self._supervisor.initial(now, armed=True)
-        mode = _MODES[self._random.integers(len(_MODES))]
-        if mode in (BridgeMode.STANDING_UP, BridgeMode.LYING_DOWN):
-            inputs = SupervisorInputs(now, standing(self._config), 0, wish=Wish.STAND)
-            limp, _ = self._supervisor.step(limp, inputs)
-        return replace(limp, mode=mode)
+        state = replace(limp, mode=_BEGINNINGS[self._random.integers(len(_BEGINNINGS))])
+        wish = list(Wish)[self._random.integers(len(Wish))]
+        return self._supervisor.step(state, SupervisorInputs(now, self._good, 0, wish=wish))[0]
 
     def run(self, packets: int) -> None:
         """Send packets.
@@ -202,7 +195,7 @@ class Fuzz:
         """
         for now in range(1, packets + 1):
             if self._state.mode is BridgeMode.STOPPED and self._random.random() < _ANEW:
-                self._state, self._report = self._begin(now), standing(self._config)
+                self._state, self._report = self._begin(now), self._good
             self._turn(now)
 
     def _turn(self, now: int) -> None:

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from quadriga.bridges.guard import Guard
+from quadriga.bridges.modes import BridgeMode
 from quadriga.bridges.open_driver import open_driver
 from quadriga.bridges.robot_plant import RobotPlant, to_state, yaw_of
-from quadriga.bridges.supervisor import BridgeMode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError

@@ -1,4 +1,4 @@
-"""The seven states of a bridge, and every reason to stop."""
+"""The ten states of a bridge, and every reason to stop."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quadriga.bridges.modes import BridgeMode, Wish
 from quadriga.bridges.supervisor import (
-    BridgeMode,
     Supervised,
     Supervisor,
     SupervisorInputs,
     SupervisorState,
-    Wish,
     tilt_of,
 )
 from quadriga.shared.robot.conventions import JOINT_NAMES
@@ -59,7 +58,7 @@ def test_up_walk_and_down() -> None:
     """From limp over standing up, standing, walking, lying down to limp, each named once."""
     state, named = SUPERVISOR.initial(0, armed=True), list[BridgeMode]()
     ends = round(1000 * CONFIG.bridge.stand_s)
-    wishes = [Wish.STAND] * (ends + 3) + [Wish.WALK] * 50 + [Wish.LIE] * (ends + 3)
+    wishes = [Wish.STAND] * (ends + 3) + [Wish.WALK] * 50 + [Wish.LIE] * (ends + 1003)
     for now, wish in enumerate(wishes):
         state, supervised = step(state, at(now, wish=wish))
         named += [mode for mode, _ in supervised.changes]
@@ -69,6 +68,7 @@ def test_up_walk_and_down() -> None:
         BridgeMode.STANDING,
         BridgeMode.WALKING,
         BridgeMode.LYING_DOWN,
+        BridgeMode.LETTING_GO,
         BridgeMode.LIMP,
     ]
 

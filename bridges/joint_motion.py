@@ -1,0 +1,66 @@
+"""Small motions of a robot that hangs: one joint after the other, there and back."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from quadriga.bridges.postures import Motion
+from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
+from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.unitree.packets import MotorTargets
+
+WAY: Final = 0.15  # rad that a joint moves
+KP: Final = 60.0  # N·m/rad, that holds a hanging leg
+KD: Final = 2.0  # N·m·s/rad
+TORQUE: Final = 8.0  # N·m, the most that any joint gives
+STRAY: Final = 0.4  # rad off its posture at which a joint stops the test
+_ROOM: Final = 0.05  # rad that is kept free before an end stop
+_BEGIN: Final = 2.0  # s, in which the motors gain their stiffness
+_HALF: Final = 0.5  # s, there, and back
+_REST: Final = 0.2  # s, before the next joint
+
+
+def joint_motion(q: Array, robot: RobotSpec) -> Motion:
+    """The motion of all joints from measured angles, which are kept but for joints at their stops.
+
+    Of its postures, 1 + 3 k is where joint k begins, 2 + 3 k its turning point and 3 + 3 k where it
+    is back; the first is where the motors are switched on.
+    """
+    lower, upper = np.array(robot.lower) + _ROOM, np.array(robot.upper) - _ROOM
+    base = np.clip(q, lower, upper)
+    postures, times = [q, base], [_BEGIN]
+    for k in range(N_JOINTS):
+        way = np.zeros(N_JOINTS)
+        way[k] = WAY if base[k] + WAY <= upper[k] else -WAY
+        postures += [base + way, base, base]
+        times += [_HALF, _HALF, _REST]
+    return Motion(np.stack(postures), np.cumsum(times))
+
+
+def moving_joint(motion: Motion, seconds: float) -> int | None:
+    """Which joint moves then, or rests after it has moved; None before the first."""
+    k = (int(np.searchsorted(motion.ends, seconds, side="right")) - 1) // 3
+    return None if seconds < _BEGIN else min(k, N_JOINTS - 1)
+
+
+def led_gently(q: Array, dq: Array, mode: int, seconds: float) -> MotorTargets:
+    """The command that leads the joints, softly at first: a wrong order or sign shows early.
+
+    Args:
+        q: where to, (12,), rad.
+        dq: likewise, rad/s.
+        mode: in which the motors follow.
+        seconds: since the motors were switched on.
+    """
+    share = min(1.0, seconds / _BEGIN)
+    gains = np.full(N_JOINTS, share * KP), np.full(N_JOINTS, KD)
+    return MotorTargets(np.full(N_JOINTS, mode, dtype=np.uint8), q, dq, np.zeros(N_JOINTS), *gains)
+
+
+def stray(q: Array, asked: Array) -> str:
+    """The joint that is farthest off what is asked for, with by how much; "" if all are near."""
+    off = q - asked
+    worst = int(np.argmax(np.abs(off)))
+    return f"{JOINT_NAMES[worst]} {off[worst]:+.2f} rad" if abs(off[worst]) > STRAY else ""
