@@ -17,6 +17,7 @@ from quadriga.bridges.robot_loop import TICK, Answer, RobotLoop
 from quadriga.bridges.statics import Statics
 from quadriga.plant.protocol import Plant
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.errors import CheckError
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.clock import Rate, monotonic
@@ -68,7 +69,8 @@ class RobotPlant(Plant):
         self._published_at = -1
         self._arrivals = [_NOTHING] * _REMEMBERED  # tick of a state, and when its report came
         self._yaw: float | None = None
-        self._statics = Statics(config.robot)  # loaded now, and not while the robot stands
+        alone = not yoke_pairs(config.team.robots, config.team.yokes)
+        self._statics = Statics(config.robot, alone=alone)  # loaded now, not while the robot stands
         self._scales: FootScales | None = None
 
     @property

@@ -20,12 +20,14 @@ class Statics:
 
     Args:
         robot: its kind.
+        alone: whether nothing but the ground bears it: no yoke pulls at it.
 
     Raises:
         ConfigError: the URDF is not installed.
     """
 
-    def __init__(self, robot: RobotSpec) -> None:
+    def __init__(self, robot: RobotSpec, *, alone: bool) -> None:
+        self._alone = alone
         self._model = build_pinocchio_model(robot)
         self._data = self._model.createData()
         self._feet = [self._model.getFrameId(foot) for foot in FOOT_FRAMES]
@@ -35,8 +37,9 @@ class Statics:
         """Vertical forces of the ground on the feet, (4,), N.
 
         The joints' torques tell each foot's force, with the error of friction in the joints:
-        f = J⁻ᵀ (g − τ). Of all forces that carry the weight, and have their centre of pressure
-        below the centre of mass, these are the nearest to those.
+        f = J⁻ᵀ (g − τ). Of a robot that is alone, these are the nearest to those of all forces that
+        carry its weight and have their centre of pressure below the centre of mass. What a yoke
+        adds is as unknown as what is missing there.
         """
         model, data = self._model, self._data
         w, x, y, z = report.quat_wxyz
@@ -53,6 +56,8 @@ class Statics:
             joints = slice(3 * leg, 3 * leg + 3)
             by_torque[leg] = np.linalg.lstsq(J.T, gravity[columns] - report.tau[joints])[0][2]
             arms[1:, leg] = (data.oMf[foot].translation - com)[:2]
+        if not self._alone:
+            return by_torque
         missing = np.array([self._weight, 0.0, 0.0]) - arms @ by_torque
         loads: Array = by_torque + np.linalg.lstsq(arms, missing)[0]
         return loads

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from rich.console import Console
 
-from quadriga.desk.faults import AGENT, GUARD, PLANT, ROUTER, Fault
+from quadriga.desk.faults import AGENT, GUARD, NO_FAULT, PLANT, ROUTER, Fault
 from quadriga.desk.outcome import FELL, describe_walk, read_truth, time_to_rest, traces_of
 from quadriga.desk.robots import SimulatedRobots
 from quadriga.identification.predictors import ensure_predictor
@@ -97,7 +97,7 @@ class _Trial:
         if not self._robots.wait_until(self._all_walk, _START_S):
             raise ProcessError("the team", self._last_words(), f"a walk within {_START_S:g} s")
         self._begun = self._robots.order("all clear")
-        after = random.uniform(_EARLIEST_S, _LATEST_S)
+        after = random.uniform(_EARLIEST_S, _LATEST_S) if self._fault is not NO_FAULT else 0.0
         self._patient = self._fault.robot or self._names[random.integers(len(self._names))]
         self._robots.wait_until(lambda: False, after)
         self._since = self._robots.order("all clear")
@@ -127,7 +127,7 @@ class _Trial:
         traces = read_truth(self._robots.truth, self._names)
         tilts = {name: traces[name].tilt(self._since) for name in self._names}
         figures: dict[str, Any] = {}
-        if not (self._fault.orders or self._fault.processes):
+        if self._fault is NO_FAULT:
             end = self._begun + 1000.0 * self._config.world.seconds
             steady = self._begun + 1000.0 * _STEADY_S
             figures = {n: describe_walk(traces[n], steady, end) for n in self._names}
