@@ -85,6 +85,7 @@ class RobotLoop:
         self.now = 0
         self.report: RobotReport | None = None
         self.report_at, self.arrived = -1, 0.0
+        self._sent_at = 0
         self.estops: Callable[[], str] = str
         self.untold = list[tuple[int, BridgeMode, str]]()
         self.answers = Histogram(_ANSWER_BIN)
@@ -170,15 +171,20 @@ class RobotLoop:
         )
         self.memory, supervised = self._supervisor.step(self.memory, inputs)
         self._cut.update(supervised.cut)
-        due = (self.now if tick is None else tick) % self._driver.period_ms == 0
-        if supervised.targets is not None and (due or supervised.changes):
+        if supervised.targets is not None and self._is_due(answer, supervised):
             self._driver.send(supervised.targets)
+            self._sent_at = self.now
             if answer is not None and answer.arrived is not None:
                 self.answers.add(1e3 * (self._clock() - answer.arrived))
         for mode, reason in supervised.changes:
             self._say(f"{self._name}: {mode} {reason}".rstrip())
             self.untold.append((self.now, mode, reason))
         return supervised
+
+    def _is_due(self, answer: Answer | None, supervised: Supervised) -> bool:
+        is_new = answer is not None and answer.arrived is not None
+        overdue = self.now - self._sent_at >= self._driver.period_ms
+        return is_new or overdue or bool(supervised.changes)
 
     def leave(self) -> None:
         """Have the robot lie down, switch its motors off, and leave."""

@@ -180,7 +180,7 @@ class RobotPlant(Plant):
         """One millisecond of the walk; its first tells of the time before it, too."""
         before = self._take_changes()
         command = commands.get(self.names[0])
-        self._loop.turn(self._answer(command), Wish.WALK, self.tick)
+        self._loop.turn(self._answer(command), Wish.WALK)
         events = before + self._take_changes()
         self.tick += 1
         return events
@@ -190,7 +190,7 @@ class RobotPlant(Plant):
             return None
         place, age = command.tick % _REMEMBERED, self.tick - command.tick
         tick, arrived = self._arrivals[place]
-        if tick != command.tick or self.tick % self.period_ms:
+        if tick != command.tick:
             return Answer(command, age)
         self._arrivals[place] = _NOTHING  # sent again, it is no answer
         return Answer(command, age, arrived)
