@@ -32,8 +32,9 @@ _GENTLE: Final = 0.3  # m/s: who comes down more slowly has lain down
 def describe_motors(command: Command | None, rates: Array) -> str:
     """What the motors do under a command: off, damped or driven.
 
-    They are damped if none is stiff and all give no more than what brakes its joint: a bridge that
-    damps a robot keeps its limits of torque, and takes something off.
+    They are damped if none is stiff and each gives no more than what brakes its joint: a bridge
+    that damps a robot keeps its limits of torque, and takes something off. A motor in protection
+    mode gives nothing.
 
     Args:
         command: None: off.
@@ -46,7 +47,7 @@ def describe_motors(command: Command | None, rates: Array) -> str:
     if not command.tau.any():
         return DAMPED if command.kd.any() else OFF
     braking = command.kd * np.abs(command.v_des - rates) + _BRAKING
-    damped = command.kd.all() and (np.abs(command.tau) <= braking).all()
+    damped = command.kd.any() and (np.abs(command.tau) <= braking).all()
     return DAMPED if damped else DRIVEN
 
 

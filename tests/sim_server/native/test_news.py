@@ -46,7 +46,8 @@ def test_torque_or_stiffness_drives_them() -> None:
     one = np.eye(12)[3]
     assert describe_motors(command(kp=80.0 * one, kd=ONES), still) == DRIVEN
     assert describe_motors(command(tau=0.1 * one), still) == DRIVEN
-    assert describe_motors(command(tau=one, kd=ONES - one), still) == DRIVEN
+    assert describe_motors(command(tau=5.0 * one, kd=ONES - one), still) == DRIVEN
+    assert describe_motors(command(kd=ONES - one), still) == DAMPED
 
 
 def test_what_lasts_is_told_with_the_tick_at_which_it_began() -> None:
