@@ -15,7 +15,7 @@ import numpy as np
 from quadriga.shared.robot.conventions import N_JOINTS, Array
 from quadriga.shared.unitree.packets import NO_ANGLE, MotorTargets, PacketCodec, PacketError
 from quadriga.shared.wire.messages import Command, State
-from quadriga.sim_server.native.condition import Condition
+from quadriga.sim_server.native.condition import RobotCondition
 from quadriga.sim_server.native.link import NO_FAULTS, Link, Parcel
 
 COMMANDS, REPORTS = "commands", "reports"  # the two directions of a robot's network
@@ -61,7 +61,7 @@ class Board(ABC):
             way: Link((*seed, stream), keeps_size=keeps_size) for way, stream in _LINKS.items()
         }
         self._inwards, self._outwards = self._links[COMMANDS], self._links[REPORTS]
-        self.condition = Condition((*seed, _CONDITION))
+        self.condition = RobotCondition((*seed, _CONDITION))
         self._targets: MotorTargets | None = None
         self._intruder: Intruder | None = None
         self._now = 0  # ms
