@@ -21,7 +21,10 @@ class BridgeConfig:
         "address",
     )
     interface: str = key(
-        "", "-", "Go2: network interface that it hangs on, such as eth0; lo: a simulated one"
+        "",
+        "-",
+        "Go2: network interface that it hangs on, such as eth0; {number} is that of the robot; "
+        "lo: simulated ones",
     )
     domain: int = key(0, "1", "Go2: number of its DDS domain; on lo that of r1", low=0, high=200)
     period_ms: int = key(

@@ -15,11 +15,11 @@ import numpy as np
 from quadriga.shared.robot.conventions import N_JOINTS, Array
 from quadriga.shared.unitree.packets import NO_ANGLE, MotorTargets, PacketCodec, PacketError
 from quadriga.shared.wire.messages import Command, State
-from quadriga.sim_server.native.condition import Condition
+from quadriga.sim_server.native.condition import RobotCondition
 from quadriga.sim_server.native.link import NO_FAULTS, Link, Parcel
 
 COMMANDS, REPORTS = "commands", "reports"  # the two directions of a robot's network
-_LINKS, _CONDITION = {COMMANDS: 0, REPORTS: 1}, 2  # streams of a robot's seed
+_LINKS, _CONDITION, _INTRUDER = {COMMANDS: 0, REPORTS: 1}, 2, 3  # streams of a robot's seed
 _DAMPING: Final = 2.0  # N·m·s/rad, that a second writer asks for
 
 
@@ -61,9 +61,11 @@ class Board(ABC):
             way: Link((*seed, stream), keeps_size=keeps_size) for way, stream in _LINKS.items()
         }
         self._inwards, self._outwards = self._links[COMMANDS], self._links[REPORTS]
-        self.condition = Condition((*seed, _CONDITION))
+        self.condition = RobotCondition((*seed, _CONDITION))
         self._targets: MotorTargets | None = None
         self._intruder: Intruder | None = None
+        self._intruder_chance = np.random.default_rng((*seed, _INTRUDER))
+        self._intruder_waits = False
         self._now = 0  # ms
         self.malformed = 0
         self.received = 0
@@ -78,7 +80,10 @@ class Board(ABC):
         self._now = state.tick
         due = state.tick % self.period_ms == 0
         if self._intruder is not None and due:
-            self._intruder.write(self._codec.encode_command(self._harmless()))
+            # Sometimes before the bridge's command of this tick, sometimes behind it.
+            self._intruder_waits = bool(self._intruder_chance.integers(2))
+            if not self._intruder_waits:
+                self._write_as_intruder()
         if self.condition.off:
             return
         parcels: Sequence[Parcel] = ()
@@ -92,6 +97,9 @@ class Board(ABC):
 
     def obey(self) -> Command | None:
         """The command that the motors follow now; None: they are off, and brake."""
+        if self._intruder_waits:
+            self._intruder_waits = False
+            self._write_as_intruder()
         parcels = self._inwards.pass_on(tuple(self._take()), self._now)
         if self.condition.off:
             return None
@@ -163,9 +171,12 @@ class Board(ABC):
         """Answer whatever else is asked of it."""
         return
 
-    def _harmless(self) -> MotorTargets:
+    def _write_as_intruder(self) -> None:
+        """Send a command that does no harm, as somebody else."""
+        if self._intruder is None:
+            return
         zero = np.zeros(N_JOINTS)
-        return MotorTargets(
+        harmless = MotorTargets(
             mode=np.full(N_JOINTS, self._servo, np.uint8),
             q=np.full(N_JOINTS, NO_ANGLE),
             dq=zero,
@@ -173,6 +184,7 @@ class Board(ABC):
             kp=zero,
             kd=np.full(N_JOINTS, _DAMPING),
         )
+        self._intruder.write(self._codec.encode_command(harmless))
 
     @abstractmethod
     def _send(self, packet: bytes) -> None:

@@ -27,7 +27,7 @@ _REMOTE_OFF: Final = write_remote(RemoteReading(False, frozenset()))
 _IDLE: Final = write_remote(RemoteReading(True, frozenset()))
 
 
-class Condition:
+class RobotCondition:
     """Counter, battery, remote control and motors of one robot.
 
     Its counter counts milliseconds, as those of Unitree's simulators do, from a number that means

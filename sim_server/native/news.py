@@ -26,14 +26,15 @@ _STANDS_MS: Final = 200  # for which it does
 _LOOK_MS: Final = 10  # between two looks at one that does not
 _FALLEN: Final = math.cos(1.0)  # of the tilt of one that has fallen, as the world has it
 _LOW: Final = 0.12  # m, trunk above the ground, of one that is down, as the world has it
-_GENTLE: Final = 0.3  # m/s: who comes down more slowly has lain down
+_GENTLE: Final = 0.8  # m/s: who comes down upright and more slowly, as a damped one does, lies
 
 
 def describe_motors(command: Command | None, rates: Array) -> str:
     """What the motors do under a command: off, damped or driven.
 
-    They are damped if none is stiff and all give no more than what brakes its joint: a bridge that
-    damps a robot keeps its limits of torque, and takes something off.
+    They are damped if none is stiff and each gives no more than what brakes its joint: a bridge
+    that damps a robot keeps its limits of torque, and takes something off. A motor in protection
+    mode gives nothing.
 
     Args:
         command: None: off.
@@ -46,7 +47,7 @@ def describe_motors(command: Command | None, rates: Array) -> str:
     if not command.tau.any():
         return DAMPED if command.kd.any() else OFF
     braking = command.kd * np.abs(command.v_des - rates) + _BRAKING
-    damped = command.kd.all() and (np.abs(command.tau) <= braking).all()
+    damped = command.kd.any() and (np.abs(command.tau) <= braking).all()
     return DAMPED if damped else DRIVEN
 
 
@@ -119,7 +120,7 @@ class PostureNews:
             return ""
         self._stands, self._up_since = False, None
         if cosine >= _FALLEN and sinking <= _GENTLE:
-            return f"{now} ms: {{name}} lies"
+            return f"{now} ms: {{name}} lies, {sinking:.2f} m/s down"
         tilt = math.acos(max(-1.0, min(1.0, cosine)))
         return (
             f"{now} ms: fall {{name}} tilt {tilt:.2f} rad, height {above:.3f} m, "

@@ -103,11 +103,22 @@ class ClearFaults:
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class MarkTime:
     """Say the time."""
 
 
-Act = Disturb | Press | RemoteOff | Charge | Protect | Switch | Intrude | Hang | ClearFaults | Mark
+Act = (
+    Disturb
+    | Press
+    | RemoteOff
+    | Charge
+    | Protect
+    | Switch
+    | Intrude
+    | Hang
+    | ClearFaults
+    | MarkTime
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +156,7 @@ def parse_order(line: str, names: Sequence[str]) -> RobotOrder:
         at, words = round(1000.0 * seconds), words[1:]
     text = " ".join(words)
     if words and words[0] == _MARK:
-        return RobotOrder((), Mark(), at, text)
+        return RobotOrder((), MarkTime(), at, text)
     if not words or words[0] not in (_ALL, *names):
         got = repr(words[0]) if words else "nothing"
         raise _refusal(got, f"{_ALL}, {', '.join(names)}, {_MARK} or help")

@@ -18,7 +18,7 @@ from quadriga.sim_server.native.orders import (
     Disturb,
     Hang,
     Intrude,
-    Mark,
+    MarkTime,
     Press,
     Protect,
     RemoteOff,
@@ -96,7 +96,7 @@ class Steering:
         for name in order.robots:
             self._act(name, order, now)
         # Others know when by their own clocks.
-        clock = f" (clock {monotonic():.4f} s)" if isinstance(order.act, Mark) else ""
+        clock = f" (clock {monotonic():.4f} s)" if isinstance(order.act, MarkTime) else ""
         self._say(f"{now} ms: order {order.text}{clock}")
 
     def _act(self, name: str, order: RobotOrder, now: int) -> None:
@@ -120,5 +120,5 @@ class Steering:
                 self._hanger.pull_up(name) if up else self._hanger.let_down(name)
             case ClearFaults():
                 board.clear()
-            case Mark():
+            case MarkTime():
                 pass

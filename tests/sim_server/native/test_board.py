@@ -128,6 +128,15 @@ def test_somebody_else_who_sends_damps_the_motors(desk: Desk) -> None:
     assert desk.robot.received == received + 21
 
 
+def test_two_who_send_take_turns_at_the_motors(desk: Desk) -> None:
+    desk.robot.intrude(there=True)
+    driven = 0
+    for _ in range(200):
+        desk.tick(send=True)
+        driven += desk.command is not None and bool(desk.command.kp.any())
+    assert 50 < driven < 150
+
+
 def test_all_is_well_again_when_it_is_cleared(desk: Desk) -> None:
     for fault in ("loss", "duplicate", "garbage"):
         desk.robot.disturb(fault, 0.5, (REPORTS, COMMANDS))

@@ -12,7 +12,7 @@ from quadriga.shared.robot.conventions import JOINT_NAMES
 from quadriga.shared.unitree.packets import OFF, PROTECTED, SERVO, RobotReport
 from quadriga.shared.unitree.remote import read_remote
 from quadriga.shared.wire.messages import State
-from quadriga.sim_server.native.condition import FULL, Condition
+from quadriga.sim_server.native.condition import FULL, RobotCondition
 from quadriga.sim_server.world.world import World
 from tests.bridges.robots import config_of, holding
 
@@ -24,20 +24,20 @@ def at(tick: int) -> State:
     return replace(STATE, tick=tick)
 
 
-def report(condition: Condition, tick: int) -> RobotReport:
+def report(condition: RobotCondition, tick: int) -> RobotReport:
     return condition.report(at(tick), COLD, holding(config_of()))
 
 
 def test_its_counter_begins_anywhere_and_counts_milliseconds() -> None:
-    firsts = {report(Condition((seed,)), 0).tick for seed in range(20)}
+    firsts = {report(RobotCondition((seed,)), 0).tick for seed in range(20)}
     assert len(firsts) == 20
-    condition = Condition((1,))
+    condition = RobotCondition((1,))
     first = report(condition, 0).tick
     assert [(report(condition, k).tick - first) % 2**32 for k in (1, 5, 10_000)] == [1, 5, 10_000]
 
 
 def test_a_robot_that_is_switched_on_again_counts_anew() -> None:
-    condition = Condition((1,))
+    condition = RobotCondition((1,))
     condition.switch_on(500)  # it is on: nothing happens
     assert report(condition, 500).tick != 0
     condition.off = True
@@ -47,7 +47,7 @@ def test_a_robot_that_is_switched_on_again_counts_anew() -> None:
 
 
 def test_its_battery_drains_slowly_from_what_it_is_given() -> None:
-    condition = Condition((1,))
+    condition = RobotCondition((1,))
     charges = []
     for tick in range(0, 3_600_001, 60_000):
         battery = report(condition, tick).battery
@@ -67,7 +67,7 @@ def test_its_battery_drains_slowly_from_what_it_is_given() -> None:
 
 
 def test_buttons_are_let_go_of_at_their_time() -> None:
-    condition = Condition((1,))
+    condition = RobotCondition((1,))
     idle = read_remote(report(condition, 0).remote)
     assert idle.on
     assert not idle.pressed
@@ -81,7 +81,7 @@ def test_buttons_are_let_go_of_at_their_time() -> None:
 
 
 def test_a_motor_in_protection_mode_says_so_and_gives_nothing_until_it_is_cleared() -> None:
-    condition, targets = Condition((1,)), holding(config_of(), tau=np.ones(12))
+    condition, targets = RobotCondition((1,)), holding(config_of(), tau=np.ones(12))
     joint = JOINT_NAMES.index("FR_calf_joint")
     condition.protect(joint)
     said = condition.report(at(0), COLD, targets)
@@ -101,7 +101,7 @@ def test_a_motor_in_protection_mode_says_so_and_gives_nothing_until_it_is_cleare
 
 
 def test_a_robot_that_is_off_commands_nothing() -> None:
-    condition, targets = Condition((1,)), holding(config_of())
+    condition, targets = RobotCondition((1,)), holding(config_of())
     assert condition.command(targets) is not None
     assert condition.command(None) is None
     assert condition.command(replace(targets, mode=np.full(12, OFF, np.uint8))) is None
@@ -110,7 +110,7 @@ def test_a_robot_that_is_off_commands_nothing() -> None:
 
 
 def test_its_motors_lose_a_packet_now_and_then() -> None:
-    condition = Condition((1,))
+    condition = RobotCondition((1,))
     lost = np.array([report(condition, tick).lost for tick in range(0, 600_000, 1000)])
     assert (np.diff(lost, axis=0) >= 0).all()
     assert lost[-1].mean() == pytest.approx(0.05 * 600, rel=0.3)

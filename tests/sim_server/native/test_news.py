@@ -46,7 +46,8 @@ def test_torque_or_stiffness_drives_them() -> None:
     one = np.eye(12)[3]
     assert describe_motors(command(kp=80.0 * one, kd=ONES), still) == DRIVEN
     assert describe_motors(command(tau=0.1 * one), still) == DRIVEN
-    assert describe_motors(command(tau=one, kd=ONES - one), still) == DRIVEN
+    assert describe_motors(command(tau=5.0 * one, kd=ONES - one), still) == DRIVEN
+    assert describe_motors(command(kd=ONES - one), still) == DAMPED
 
 
 def test_what_lasts_is_told_with_the_tick_at_which_it_began() -> None:
@@ -97,7 +98,7 @@ def test_a_robot_that_tips_over_or_drops_has_fallen(posture: PostureNews) -> Non
 def test_a_robot_that_comes_down_slowly_has_lain_down(posture: PostureNews) -> None:
     stand(posture)
     assert posture.look(1000, pose(0.13), 0.1) == ""
-    assert posture.look(1001, pose(0.11), 0.1) == "1001 ms: {name} lies"
+    assert posture.look(1001, pose(0.11), 0.1) == "1001 ms: {name} lies, 0.10 m/s down"
 
 
 def test_a_state_that_is_no_number_is_a_fall(posture: PostureNews) -> None:
@@ -120,7 +121,7 @@ def test_the_news_of_a_world_name_its_robots() -> None:
         told += news.of_postures(hung=())
     assert told[0] == "0 ms: r1 motors driven"
     assert "0 ms: r1 stands" in told or "10 ms: r1 stands" in told
-    assert any(line.endswith("r2 lies") or "fall r2" in line for line in told)
+    assert any("r2 lies, " in line or "fall r2" in line for line in told)
     assert not any("fall r1" in line for line in told)
     commands["r1"] = None
     news.of_motors(commands)

@@ -21,7 +21,7 @@ from quadriga.sim_server.native.orders import (
     Disturb,
     Hang,
     Intrude,
-    Mark,
+    MarkTime,
     Press,
     Protect,
     RemoteOff,
@@ -68,7 +68,7 @@ def test_each_word_is_understood(line: str, act: Act) -> None:
 
 def test_a_mark_needs_no_robot() -> None:
     order = parse_order("mark agent r1 killed", NAMES)
-    assert (order.robots, order.act, order.text) == ((), Mark(), "mark agent r1 killed")
+    assert (order.robots, order.act, order.text) == ((), MarkTime(), "mark agent r1 killed")
 
 
 @pytest.mark.parametrize(
