@@ -10,6 +10,7 @@ from quadriga.shared.bus.barrier import lead
 from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.clock import sleep
+from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 
 _STAGES: Final = 3  # waits of the barrier: for the router, for everyone's presence, for readiness
@@ -31,6 +32,7 @@ def run(
     """
     stopped = stopped or stop_on_signals()
     with Bus.route(listen, config.team.name) as bus:
+        take_priority(config.runtime.priority)  # every command waits for it
         print(f"routing at {listen}", file=sys.stderr, flush=True)
         if once:
             bus.wait_for(READY, [lead(config)], _STAGES * config.bus.barrier_timeout, stopped)
