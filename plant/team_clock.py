@@ -126,6 +126,10 @@ class LeadingClock(TeamClock):
         known = (wall.clock, wall.wall, wall.error, self.start)
         return ClockAnswer(tick, tick * TICK_NS, ask.asked_ns, arrived, *known)
 
+    def news_of_start(self, now: int, tick: int) -> ClockAnswer:
+        """What tells at once, unasked, that the team's time has been delayed."""
+        return ClockAnswer(tick, tick * TICK_NS, 0, now, now, 0, 0, self.start)
+
     def begin(self, now: int) -> int:
         late = super().begin(now)
         if late > self._slack:
@@ -188,19 +192,20 @@ class FollowingClock(TeamClock):
         return ClockAsk(tick, tick * TICK_NS, now, self.start, self.late)
 
     def take(self, answer: ClockAnswer, arrived: int, mine: WallReading) -> None:
-        """Learn from an answer; one that was not asked for, or came before, is none."""
-        if answer.asked_ns not in self._asked:
+        """Learn from an answer; one to no ask of this plant, or older than another, is none."""
+        asked = answer.asked_ns
+        exchange = Exchange(asked, answer.received_ns, answer.answered_ns, arrived)
+        if answer.answered_ns < max(answer.received_ns, self._answered):
             return
-        del self._asked[answer.asked_ns]
-        exchange = Exchange(answer.asked_ns, answer.received_ns, answer.answered_ns, arrived)
-        if answer.answered_ns < answer.received_ns or exchange.round_trip < 0:
+        if asked and (asked not in self._asked or exchange.round_trip < 0):
             return
-        self.answers += 1
-        if answer.answered_ns >= self._answered:
-            self.start, self._answered = answer.start_ns, answer.answered_ns
+        self.start, self._answered = answer.start_ns, answer.answered_ns
         self._heard[self._lead] = max(self._heard[self._lead], arrived)
-        leader = WallReading(answer.answered_ns, answer.wall_ns, answer.wall_error_ns)
-        self._clock.take(exchange, leader, mine)
+        if asked:
+            del self._asked[asked]
+            self.answers += 1
+            leader = WallReading(answer.answered_ns, answer.wall_ns, answer.wall_error_ns)
+            self._clock.take(exchange, leader, mine)
 
     def _figures(self, now: int) -> tuple[Mapping[str, float], Mapping[str, int]]:
         known = self.known(now)

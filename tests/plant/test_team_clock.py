@@ -144,6 +144,19 @@ def test_what_was_not_asked_for_or_cannot_be_is_not_taken() -> None:
     assert (clock.answers, clock.start) == (1, 7)
 
 
+def test_that_time_is_delayed_is_heard_at_once_and_teaches_nothing_else() -> None:
+    leads, follows = (
+        LeadingClock(["plant_r2"], TIMEOUT, MS),
+        FollowingClock("plant_r1", TIMEOUT, MS),
+    )
+    leads.start = S
+    leads.walk(S)
+    leads.begin(leads.plan(1, S) + 5 * MS)
+    assert (leads.start, leads.slips, leads.late) == (S + 5 * MS, 1, 5 * MS)
+    follows.take(leads.news_of_start(2 * S, 5), 100, WallReading(100, 0, 0))
+    assert (follows.start, follows.answers, follows.known(100)) == (leads.start, 0, None)
+
+
 def test_a_status_tells_source_error_drift_and_round_trip() -> None:
     team = walk(lan)
     empty = Status(0, 0, "realtime", "", "", {"jitter.max": 1.0}, {"ticks": 5}, *np.zeros((2, 0)))
