@@ -41,7 +41,7 @@ class TeamClock:
 
     Attributes:
         start: when tick 0 begins, ns of the clock that leads; 0: not agreed yet.
-        late: how late the newest tick began, ns.
+        late: how late the newest tick began by the clock that leads, ns.
         off: how far the planned tick may be off the clock that leads, ns.
     """
 
@@ -49,7 +49,7 @@ class TeamClock:
         self.start, self.late, self.off = 0, 0, 0
         self._heard = dict.fromkeys(others, 0)
         self._timeout, self._slack = timeout, slack
-        self._schedule = TickSchedule(0)
+        self._schedule, self._due = TickSchedule(0), 0
         self._worst, self._reported, self._is_enough = 0, 0, True
 
     def to_mine(self, instant: int, now: int) -> int:
@@ -69,9 +69,9 @@ class TeamClock:
 
     def plan(self, tick: int, now: int) -> int:
         """When the tick after the newest is to begin, ns of this plant's clock."""
-        due = self.to_mine(self.start + tick * TICK_NS, now)
-        begin = self._schedule.plan(due)
-        self.off = self.error(now) + abs(self._schedule.planned - due)
+        self._due = self.to_mine(self.start + tick * TICK_NS, now)
+        begin = self._schedule.plan(self._due)
+        self.off = self.error(now) + abs(self._schedule.planned - self._due)
         self._worst = max(self._worst, self.off)
         return begin
 
@@ -80,7 +80,8 @@ class TeamClock:
         absence = now - self._schedule.begun
         if absence > _ABSENCE_NS:
             self._heard = {name: at + absence for name, at in self._heard.items()}
-        self.late = self._schedule.begin(now)
+        self._schedule.begin(now)
+        self.late = max(now - self._due, 0)
         return self.late
 
     def silent(self, now: int) -> list[str]:
@@ -134,7 +135,6 @@ class LeadingClock(TeamClock):
         late = super().begin(now)
         if late > self._slack:
             self._slip(late)
-            self._schedule.slip(late)
         return late
 
     def _slip(self, late: int) -> None:

@@ -2,7 +2,8 @@
 
 A correction of the clock moves the instants to come by a share of it with each tick, so that no
 two are less than half or more than one and a half milliseconds apart. A tick that begins late
-moves nothing: those after it begin half a millisecond apart until they are on time.
+moves nothing: those after it begin half a millisecond apart until they are on time. But what is
+late already need not be moved any more where the team's time is delayed.
 """
 
 from __future__ import annotations
@@ -31,16 +32,12 @@ class TickSchedule:
 
     def plan(self, due: int) -> int:
         """Plan the next tick, which is due at an instant by the team's clock; when to begin it."""
+        self.planned = max(self.planned, min(self.begun, due - TICK_NS))
         shift = _GAIN * (due - self.planned - TICK_NS)
         shift = max(-_GREATEST_SHIFT_NS, min(shift, _GREATEST_SHIFT_NS))
         self.planned += TICK_NS + round(shift)
         return max(self.planned, self.begun + LEAST_GAP_NS)
 
-    def begin(self, now: int) -> int:
-        """Note that the planned tick begins now; how late it is, ns."""
+    def begin(self, now: int) -> None:
+        """Note that the planned tick begins now."""
         self.begun = now
-        return max(now - self.planned, 0)
-
-    def slip(self, late: int) -> None:
-        """Let all ticks from the newest on be later than planned so far."""
-        self.planned += late
