@@ -122,8 +122,9 @@ class LeadingClock(TeamClock):
     ) -> ClockAnswer:
         """The answer to a plant's ask, to be sent when this plant's clock shows `wall.clock`."""
         self._heard[asker] = max(self._heard.get(asker, 0), arrived)
-        if ask.start_ns == self.start and ask.late_ns > self._slack:
-            self._slip(ask.late_ns)
+        late = ask.late_ns - (self.start - ask.start_ns)  # it may not know of the newest delay
+        if ask.start_ns and late > self._slack:
+            self._slip(late)
         known = (wall.clock, wall.wall, wall.error, self.start)
         return ClockAnswer(tick, tick * TICK_NS, ask.asked_ns, arrived, *known)
 
