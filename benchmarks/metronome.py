@@ -15,19 +15,21 @@ from quadriga.plant import process
 from quadriga.plant.protocol import Plant
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.runtime.clock import wall_ns
+from quadriga.shared.runtime.clock import sleep, wall_ns
 from quadriga.shared.wire.messages import Command, Event, State, Status
 
 _NUMBERS = 50  # of a state
 
 
 class Metronome(Plant):
-    """A robot that never moves.
+    """A robot that never moves. It counts as a real one, which keeps real time.
 
     Attributes:
         begun: by the wall clock, which all time namespaces of a machine have in common, ns.
         errors: of the team's clock as the status told them, ms.
     """
+
+    is_robot = True
 
     def __init__(self, _config: Config, names: tuple[str, ...]) -> None:
         self.names, self.tick = names, 0
@@ -37,6 +39,9 @@ class Metronome(Plant):
     def states(self) -> Mapping[str, State]:
         state = State.from_row(self.tick, self.tick * 1_000_000, np.zeros(_NUMBERS))
         return dict.fromkeys(self.names, state)
+
+    def idle(self) -> None:
+        sleep(1e-3)
 
     def step(self, commands: Mapping[str, Command]) -> tuple[Event, ...]:
         self.begun.append(wall_ns())

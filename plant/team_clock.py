@@ -41,7 +41,7 @@ class TeamClock:
 
     Attributes:
         start: when tick 0 begins, ns of the clock that leads; 0: not agreed yet.
-        late: how late the newest tick began, ns.
+        late: how late the newest tick began by the clock that leads, ns.
         off: how far the planned tick may be off the clock that leads, ns.
     """
 
@@ -49,7 +49,7 @@ class TeamClock:
         self.start, self.late, self.off = 0, 0, 0
         self._heard = dict.fromkeys(others, 0)
         self._timeout, self._slack = timeout, slack
-        self._schedule = TickSchedule(0)
+        self._schedule, self._due = TickSchedule(0), 0
         self._worst, self._reported, self._is_enough = 0, 0, True
 
     def to_mine(self, instant: int, now: int) -> int:
@@ -69,9 +69,9 @@ class TeamClock:
 
     def plan(self, tick: int, now: int) -> int:
         """When the tick after the newest is to begin, ns of this plant's clock."""
-        due = self.to_mine(self.start + tick * TICK_NS, now)
-        begin = self._schedule.plan(due)
-        self.off = self.error(now) + abs(self._schedule.planned - due)
+        self._due = self.to_mine(self.start + tick * TICK_NS, now)
+        begin = self._schedule.plan(self._due)
+        self.off = self.error(now) + abs(self._schedule.planned - self._due)
         self._worst = max(self._worst, self.off)
         return begin
 
@@ -80,7 +80,8 @@ class TeamClock:
         absence = now - self._schedule.begun
         if absence > _ABSENCE_NS:
             self._heard = {name: at + absence for name, at in self._heard.items()}
-        self.late = self._schedule.begin(now)
+        self._schedule.begin(now)
+        self.late = max(now - self._due, 0)
         return self.late
 
     def silent(self, now: int) -> list[str]:
@@ -121,16 +122,20 @@ class LeadingClock(TeamClock):
     ) -> ClockAnswer:
         """The answer to a plant's ask, to be sent when this plant's clock shows `wall.clock`."""
         self._heard[asker] = max(self._heard.get(asker, 0), arrived)
-        if ask.start_ns == self.start and ask.late_ns > self._slack:
-            self._slip(ask.late_ns)
+        late = ask.late_ns - (self.start - ask.start_ns)  # it may not know of the newest delay
+        if ask.start_ns and late > self._slack:
+            self._slip(late)
         known = (wall.clock, wall.wall, wall.error, self.start)
         return ClockAnswer(tick, tick * TICK_NS, ask.asked_ns, arrived, *known)
+
+    def news_of_start(self, now: int, tick: int) -> ClockAnswer:
+        """What tells at once, unasked, that the team's time has been delayed."""
+        return ClockAnswer(tick, tick * TICK_NS, 0, now, now, 0, 0, self.start)
 
     def begin(self, now: int) -> int:
         late = super().begin(now)
         if late > self._slack:
             self._slip(late)
-            self._schedule.slip(late)
         return late
 
     def _slip(self, late: int) -> None:
@@ -188,19 +193,20 @@ class FollowingClock(TeamClock):
         return ClockAsk(tick, tick * TICK_NS, now, self.start, self.late)
 
     def take(self, answer: ClockAnswer, arrived: int, mine: WallReading) -> None:
-        """Learn from an answer; one that was not asked for, or came before, is none."""
-        if answer.asked_ns not in self._asked:
+        """Learn from an answer; one to no ask of this plant, or older than another, is none."""
+        asked = answer.asked_ns
+        exchange = Exchange(asked, answer.received_ns, answer.answered_ns, arrived)
+        if answer.answered_ns < max(answer.received_ns, self._answered):
             return
-        del self._asked[answer.asked_ns]
-        exchange = Exchange(answer.asked_ns, answer.received_ns, answer.answered_ns, arrived)
-        if answer.answered_ns < answer.received_ns or exchange.round_trip < 0:
+        if asked and (asked not in self._asked or exchange.round_trip < 0):
             return
-        self.answers += 1
-        if answer.answered_ns >= self._answered:
-            self.start, self._answered = answer.start_ns, answer.answered_ns
+        self.start, self._answered = answer.start_ns, answer.answered_ns
         self._heard[self._lead] = max(self._heard[self._lead], arrived)
-        leader = WallReading(answer.answered_ns, answer.wall_ns, answer.wall_error_ns)
-        self._clock.take(exchange, leader, mine)
+        if asked:
+            del self._asked[asked]
+            self.answers += 1
+            leader = WallReading(answer.answered_ns, answer.wall_ns, answer.wall_error_ns)
+            self._clock.take(exchange, leader, mine)
 
     def _figures(self, now: int) -> tuple[Mapping[str, float], Mapping[str, int]]:
         known = self.known(now)

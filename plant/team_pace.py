@@ -32,7 +32,7 @@ _SETTLE_NS: Final = 10_000_000_000  # from the first answer on
 _QUIET_NS: Final = 2_000_000  # before the first tick, in which nothing else is done
 # A robot keeps real time, and stops by itself if it cannot. A simulated world may go slower.
 _ROBOT_SLACK_NS: Final = 50_000_000
-_WORLD_SLACK_NS: Final = 3_000_000
+_WORLD_SLACK_NS: Final = 20_000_000
 _LATE_NS: Final = 1_000_000  # a tick that begins later is an overrun
 
 
@@ -143,8 +143,9 @@ class LeadingPace(TeamPace):
         super().__init__(bus, config)
         team = config.team.name
         others = [name for name in robot_names(config.team.robots) if name != robot]
-        self._timeout = round(1e9 * config.bus.clock_timeout)
-        self.clock = LeadingClock(map(plant_name, others), self._timeout, slack)
+        timeout = round(1e9 * config.bus.clock_timeout)
+        self.clock = LeadingClock(map(plant_name, others), timeout, slack)
+        self._told = 0  # of the team's time being delayed
         self._asks = bus.collect(CLOCK_ASK.key(team, "*"))
         self._put = {
             CLOCK_ASK.key(team, name): (
@@ -163,11 +164,12 @@ class LeadingPace(TeamPace):
             except MessageError:
                 continue
             asker, put = self._put[key]
-            put(
-                encode(
-                    self.clock.answer(asker, ask, arrived, WallReading(*read_clocks()), self._tick)
-                )
-            )
+            wall = WallReading(*read_clocks())
+            put(encode(self.clock.answer(asker, ask, arrived, wall, self._tick)))
+        if self._told != self.clock.slips:
+            self._told = self.clock.slips
+            for _, put in self._put.values():
+                put(encode(self.clock.news_of_start(monotonic_ns(), self._tick)))
 
     def _agree(self, wait: Pause, stopped: Stopped) -> bool:
         if not start_together(self._bus, self._config, stopped, wait):

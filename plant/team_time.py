@@ -22,6 +22,7 @@ from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.messages import Clock, Event
 from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, STATE
 
+_LOOKS: Final = 10  # in real time one each sample, until a plant that is not there is given up
 _JUMP_MS: Final = 5000  # no clock of a team that still walks is so far ahead
 
 
@@ -120,6 +121,8 @@ class FollowerTime(TeamTime):
         self.keys = frozenset({self._key, self._event})
         self._lead = frozenset({plant_name(robot_names(config.team.robots)[0])})
         self._now = -1
+        # A process's last words may arrive after its token has vanished; lock-step waits for them.
+        self._looks_left = _LOOKS if config.world.mode == "realtime" else 1
 
     def take(self, key: str, payload: bytes, tick: int) -> None:
         try:
@@ -138,7 +141,10 @@ class FollowerTime(TeamTime):
         return self._lead if self._now <= tick else frozenset()
 
     def look(self, present: Collection[str]) -> None:
-        if self.end is None and not has_lead(present):
+        if has_lead(present):
+            return
+        self._looks_left -= 1
+        if self.end is None and self._looks_left <= 0:
             self.end = plant_gone(sorted(self._lead), "gone")
 
 

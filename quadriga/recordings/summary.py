@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isnan
 from pathlib import Path
 from typing import Any, Final
@@ -36,6 +36,7 @@ __all__ = ["RECORDING", "SUMMARY", "steady_from", "summarise", "summary_of"]
 
 RECORDING: Final = "run.mcap"
 SUMMARY: Final = "summary.json"
+_SOURCES: Final = ("clock.leads", "clock.by_ping_pong", "clock.by_system_clock")
 SETTLING_MS: Final = 1000  # after the speed ramp's end, until the steady part begins
 
 
@@ -184,8 +185,26 @@ def _deadlines(traces: Traces) -> dict[str, Any]:
             "command_age_ms": _spread(sim_status, f"{robot}.command"),
             "deadlines_missed": own[-1].counters.get("deadlines_missed") if own else None,
             "jitter_ms": _spread(own[-1], "jitter") if own else {},
+            "clock": _clock(traces.plants[robot]),
         }
     return {"realtime": by_member}
+
+
+def _clock(statuses: Sequence[Status]) -> dict[str, Any] | None:
+    """How well a plant knew the team's clock; None of one that has no other beside it."""
+    errors = [
+        status.ages_ms["clock.error"] for status in statuses if "clock.error" in status.ages_ms
+    ]
+    if not errors:
+        return None
+    last = statuses[-1]
+    sources = [name.removeprefix("clock.") for name in _SOURCES if name in last.counters]
+    return {
+        "source": " ".join(sources).replace("_", " "),
+        "error_ms_max": max(errors),
+        "round_trip_ms": last.ages_ms.get("clock.round_trip"),
+        "drift_ppm": last.ages_ms.get("clock.drift_ppm"),
+    }
 
 
 def _spread(status: Status, name: str) -> dict[str, float]:

@@ -256,7 +256,9 @@ class ClockAsk(Message):
 class ClockAnswer(Message):
     """The answer: clocks are those of the plant that drives time, unless said otherwise."""
 
-    asked_ns: int = plain(int, "as in the ask: by the asker's clock [ns]")
+    asked_ns: int = plain(
+        int, "as in the ask, by the asker's clock; 0: unasked news of start_ns [ns]"
+    )
     received_ns: int = plain(int, "when the ask arrived [ns]")
     answered_ns: int = plain(int, "when the answer was sent [ns]")
     wall_ns: int = plain(int, "its wall clock then [ns since 1970]")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from quadriga.plant.clock_estimate import WallReading
 from quadriga.plant.team_clock import ENOUGH_NS, FollowingClock, LeadingClock
-from quadriga.shared.wire.messages import ClockAnswer, Status
+from quadriga.shared.wire.messages import ClockAnswer, ClockAsk, Status
 from tests.plant.virtual_team import MS, TIMEOUT, Delay, S, VirtualTeam
 
 HOUR = 3600.0 * S
@@ -117,6 +117,7 @@ def test_simulated_worlds_wait_for_one_that_is_slow(slow: str) -> None:
     leading = team.computers["plant_r1"].clock
     assert isinstance(leading, LeadingClock)
     assert leading.slips
+    assert max(other.off[-1] for other in team.computers.values()) < 30 * MS, "no more than is lost"
 
 
 def answer(asked: int, **more: int) -> ClockAnswer:
@@ -142,6 +143,30 @@ def test_what_was_not_asked_for_or_cannot_be_is_not_taken() -> None:
     for _ in range(2):
         clock.take(answer(S), S + 200, wall)
     assert (clock.answers, clock.start) == (1, 7)
+
+
+def test_that_time_is_delayed_is_heard_at_once_and_teaches_nothing_else() -> None:
+    leads, follows = (
+        LeadingClock(["plant_r2"], TIMEOUT, MS),
+        FollowingClock("plant_r1", TIMEOUT, MS),
+    )
+    leads.start = S
+    leads.walk(S)
+    leads.begin(leads.plan(1, S) + 5 * MS)
+    assert (leads.start, leads.slips, leads.late) == (S + 5 * MS, 1, 5 * MS)
+    follows.take(leads.news_of_start(2 * S, 5), 100, WallReading(100, 0, 0))
+    assert (follows.start, follows.answers, follows.known(100)) == (leads.start, 0, None)
+
+
+def test_a_plant_that_has_not_heard_of_a_delay_is_late_by_so_much_less() -> None:
+    leads, wall = LeadingClock(["plant_r2"], TIMEOUT, 10 * MS), WallReading(2 * S, 0, 0)
+    leads.start = S + 30 * MS
+    for late, slips in ((39 * MS, 0), (45 * MS, 1), (45 * MS, 1)):
+        leads.answer("plant_r2", ClockAsk(9, 0, 7, S, late), S, wall, 9)
+        assert leads.slips == slips
+    assert leads.start == S + 45 * MS
+    leads.answer("plant_r2", ClockAsk(0, 0, 7, 0, 0), S, wall, 9)
+    assert leads.slips == 1, "it has not begun"
 
 
 def test_a_status_tells_source_error_drift_and_round_trip() -> None:

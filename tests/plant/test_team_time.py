@@ -111,3 +111,18 @@ def test_a_plant_ends_when_one_that_it_depends_on_is_gone(config: Config) -> Non
         assert time.end is None
         time.look(others)
         assert time.end == (codes.PLANT_GONE, f"{dear} gone")
+
+
+def test_in_real_time_the_last_words_of_who_drives_time_may_come_after_it_left() -> None:
+    keys = {"team.robots": 2, "team.yokes": "none", "team.plants": "each"}
+    config = load(None, {**keys, "world.mode": "realtime"})
+    for heard, code in ((True, codes.TIME_OVER), (False, codes.PLANT_GONE)):
+        time = FollowerTime(config)
+        for _ in range(9):
+            time.look({"r1", "r2"})
+        assert time.end is None
+        if heard:
+            time.take(EVENT.key("team"), event(codes.TIME_OVER), 5)
+        time.look({"r1", "r2"})
+        assert time.end is not None
+        assert time.end.code == code

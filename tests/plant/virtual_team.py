@@ -39,6 +39,7 @@ class Computer:
     arrived: list[Parcel] = field(default_factory=list)
     stalls: dict[int, float] = field(default_factory=dict)  # ns, by tick
     dies_at: float = np.inf
+    told: int = 0  # slips
 
     def now(self, time: float) -> int:
         """Its clock at a true time."""
@@ -142,6 +143,10 @@ class VirtualTeam:
             elif isinstance(me.clock, LeadingClock) and isinstance(message, ClockAsk):
                 answer = me.clock.answer(sender, message, at, wall, me.tick)
                 self._send(name, sender, answer, time)
+        if isinstance(me.clock, LeadingClock) and me.clock.slips != me.told:
+            me.told = me.clock.slips
+            for other in list(self.computers)[1:]:
+                self._send(name, other, me.clock.news_of_start(now, me.tick), time)
         ask = me.clock.ask(me.tick, now) if isinstance(me.clock, FollowingClock) else None
         if ask is not None:
             self._send(name, self._lead, ask, time)

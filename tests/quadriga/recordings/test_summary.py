@@ -15,6 +15,7 @@ from rich.console import Console
 from quadriga.recordings.summary import summarise
 from quadriga.recordings.summary_table import print_summary
 from quadriga.recordings.traces import ERRORS
+from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import RecordingError
@@ -323,6 +324,32 @@ def test_what_came_late_in_real_time(write_run: WriteRun) -> None:
     assert late["r1"]["jitter_ms"] == {"max": 1.5}
     assert late["r2"]["late"] == 0
     assert "5.0 % of commands, 7 held, 0 damped" in table(summary)
+
+
+def test_how_well_plants_of_their_own_knew_the_clock(write_run: WriteRun) -> None:
+    def status(tick: int, ages: dict[str, float], counters: dict[str, int]) -> msg.Status:
+        counted = {"ticks": tick, "overruns": 0, **counters}
+        return msg.Status(tick, 0, "walking", "", "", ages, counted, *np.zeros((2, 0)))
+
+    follows = {"clock.round_trip": 0.4, "clock.drift_ppm": -20.5}
+    by_ping_pong = {"clock.by_ping_pong": 1}
+    extra: list[tuple[str, msg.Message]] = [
+        ("team/plant_r1/status", status(2000, {"clock.error": 0.0}, {"clock.leads": 1})),
+        ("team/plant_r2/status", status(1000, {"clock.error": 0.5, **follows}, by_ping_pong)),
+        ("team/plant_r2/status", status(2000, {"clock.error": 0.3, **follows}, by_ping_pong)),
+    ]
+    each = {"team.plants": "each", "team.yokes": "none", "world.mode": "realtime"}
+    summary = summarise(write_run(load(None, {"team.robots": 2, **each}), extra=extra))
+    clocks = {robot: summary["realtime"][robot]["clock"] for robot in ("r1", "r2")}
+    assert clocks["r1"]["source"] == "leads"
+    assert clocks["r2"] == {
+        "source": "by ping pong",
+        "error_ms_max": 0.5,
+        "round_trip_ms": 0.4,
+        "drift_ppm": -20.5,
+    }
+    text = table(summary)
+    assert "error at most 0.50 ms; round trip 0.40 ms, drift -20 ppm" in " ".join(text.split())
 
 
 def test_in_lock_step_nothing_is_late(known_run: Path) -> None:
