@@ -32,10 +32,12 @@ KEYS: Final = {
     "preset": "controller.preset",
     "endpoint": "bus.endpoint",
 }
+# What some of them mean for one command alone.
+KEYS_OF: Final = {"bridge": {"interface": "bridge.interface"}}
 
 
-def build_config_options() -> argparse.ArgumentParser:
-    """The parent of every command's parser."""
+def build_config_options(command: str) -> argparse.ArgumentParser:
+    """The parent of a command's parser."""
     options = argparse.ArgumentParser(add_help=False)
     options.add_argument("--parent", type=int, default=0, help=argparse.SUPPRESS)
     group = options.add_argument_group("configuration")
@@ -55,7 +57,7 @@ def build_config_options() -> argparse.ArgumentParser:
         help="set any key; may be repeated",
     )
     defaults = Config()
-    for option, name in KEYS.items():
+    for option, name in (KEYS | KEYS_OF.get(command, {})).items():
         section, _, key = name.partition(".")
         values = getattr(defaults, section)
         meta = type(values).__dataclass_fields__[key].metadata
@@ -80,9 +82,8 @@ def read_config(arguments: argparse.Namespace) -> tuple[Config, Given]:
         ConfigError: a key or a value is wrong, or a file cannot be read.
     """
     overrides = dict(parse_assignment(text) for text in arguments.assignments)
-    for name in KEYS.values():
-        value = getattr(arguments, name)
-        if value is not None:
+    for name, value in vars(arguments).items():
+        if "." in name and value is not None:
             overrides[name] = value
     arguments.overrides = overrides
     scenario = arguments.scenario

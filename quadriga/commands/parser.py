@@ -93,11 +93,14 @@ def build_parser() -> argparse.ArgumentParser:
         "then options.",
     )
     commands = top.add_subparsers(metavar="command", required=True)
-    config_options = build_config_options()
 
     def add_command(name: str, run: Run, doc: str) -> argparse.ArgumentParser:
         command = commands.add_parser(
-            name, help=doc, description=doc, parents=[config_options], allow_abbrev=False
+            name,
+            help=doc,
+            description=doc,
+            parents=[build_config_options(name)],
+            allow_abbrev=False,
         )
         command.set_defaults(call=run)
         return command

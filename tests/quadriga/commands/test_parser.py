@@ -9,9 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from quadriga.commands.config_options import KEYS
-from quadriga.commands.parser import main
+from quadriga.commands.config_options import KEYS, read_config
+from quadriga.commands.parser import build_parser, main
 from quadriga.shared.config.load import load
+
+BRIDGED = ("--set", "team.plant=robots", "--set", "team.plants=each")
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -57,6 +59,11 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
             "--output: got walk.mcap, expected DIR/run.mcap",
         ),
         (["report", "/nowhere"], "/nowhere/run.mcap: got No such file"),
+        (
+            ["desk", "--fault", "remot-stop", "--mode", "realtime", *BRIDGED],
+            "--fault: got 'remot-stop'",
+        ),
+        (["desk"], "team.plant: got 'mujoco', expected 'robots' (deploy/desk.toml is"),
         (["router", "--listen", "pigeon/roof"], "bus.endpoint 'pigeon/roof' of router"),
         (["operate", "--endpoint", "pigeon/roof"], "bus.endpoint 'pigeon/roof'"),
         (["record", "-o", "/proc/run.mcap"], "/proc/run.mcap"),
@@ -133,3 +140,11 @@ def test_a_signal_among_the_first_imports_ends_a_process_quietly(number: signal.
     process.send_signal(number)
     _, errors = process.communicate(timeout=30.0)
     assert (process.returncode, errors) == (130, "quadriga: interrupted\n")
+
+
+def test_the_interface_of_a_bridge_is_that_of_the_network() -> None:
+    """Everywhere else `--interface` is what planner and low level have between them."""
+    arguments = build_parser().parse_args(["bridge", "--robot", "r1", "--interface", "eth1"])
+    config, _ = read_config(arguments)
+    assert config.bridge.interface == "eth1"
+    assert config.planner.interface == load().planner.interface
