@@ -19,7 +19,8 @@ OFFSET, SCALE = 30.0 * np.array([0.0, 1.0, -2.0, 3.0]), np.array([2.3, 1.1, 4.0,
 def pressed(n: int = 250) -> Array:
     """Loads of feet that press by diagonals, (n, 4), N."""
     wave = 20.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, n))
-    return 32.0 + wave[:, None] * np.array([1.0, -1.0, -1.0, 1.0])
+    loads: Array = 32.0 + wave[:, None] * np.array([1.0, -1.0, -1.0, 1.0])
+    return loads
 
 
 def raw(loads: Array, seed: int = 0) -> Array:

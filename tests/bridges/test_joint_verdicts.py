@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import pytest
@@ -33,7 +33,8 @@ SUPERVISOR = Supervisor(CONFIG.robot, CONFIG.bridge, SERVO)
 HANGING = np.tile([0.0, 0.8, -1.5], 4)
 STEP = 2  # ms
 INERTIA, FRICTION, GRAVITY = 0.05, 0.3, 4.0  # kg·m², N·m·s/rad, N·m/rad about where a leg hangs
-Commands, Reports = Callable[[MotorTargets], MotorTargets], Callable[[RobotReport], RobotReport]
+Commands = Callable[[MotorTargets], MotorTargets]
+Reports = Callable[[RobotReport], RobotReport]
 
 
 class Hanging:
@@ -105,7 +106,8 @@ def change(how: Callable[[Array], Array], *names: str) -> Callable[[Packet], Pac
     """What changes these fields of each packet that passes."""
 
     def changed(packet: Packet) -> Packet:
-        return replace(packet, **{name: how(getattr(packet, name)) for name in names})
+        fields: dict[str, Any] = {name: how(getattr(packet, name)) for name in names}
+        return replace(packet, **fields)
 
     return changed
 
