@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-import pinocchio
 
+from quadriga.bridges.statics import Statics
 from quadriga.bridges.supervisor import tilt_of
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import CheckError
-from quadriga.shared.robot.conventions import FOOT_FRAMES, GRAVITY, JOINT_NAMES, Array
-from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
+from quadriga.shared.robot.conventions import GRAVITY, JOINT_NAMES, Array
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.unitree.packets import PROTECTED, RobotReport
 
@@ -20,7 +19,9 @@ _FLAT: Final = 0.6  # rad, tilt at which a robot still lies as it should
 _GRAVITY_OFF: Final = 1.5  # m/s²
 _VERTICAL_OFF: Final = 0.25  # rad between the accelerometer's vertical and the attitude's
 _STILL_GYRO, _STILL_JOINT = 0.3, 0.5  # rad/s
-_FEET_OFF: Final = 0.12  # m between the highest and the lowest foot of a robot on level ground
+_TOUCHES: Final = 0.05  # m above the lowest point of a robot, that may touch the ground, too
+_BESIDE: Final = 0.03  # m, of the centre of mass beside what bears it
+_DIRECTIONS: Final = 72
 _BEYOND: Final = 0.1  # rad by which a joint may be read beyond its limits
 
 
@@ -84,7 +85,7 @@ def check_reports(
     findings += [_check_ticks(reports), _check_battery(last, config), *_check_motors(last, config)]
     findings += [_check_angles(reports, robot), *_check_still(reports), *_check_gravity(reports)]
     if not hung:
-        findings.append(_check_feet(last, robot))
+        findings.append(_check_legs(last, robot))
     return findings
 
 
@@ -217,18 +218,28 @@ def _up_in_trunk(quat_wxyz: Array) -> Array:
     return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
 
 
-def _check_feet(report: RobotReport, robot: RobotSpec) -> Finding:
-    """On level ground all feet are about as high, by the angles, the model and the attitude."""
-    model = build_pinocchio_model(robot)
-    data = model.createData()
-    w, x, y, z = report.quat_wxyz
-    pinocchio.framesForwardKinematics(model, data, np.array([0, 0, 0, x, y, z, w, *report.q]))
-    heights = [data.oMf[model.getFrameId(foot)].translation[2] for foot in FOOT_FRAMES]
-    spread = float(max(heights) - min(heights))
+def _check_legs(report: RobotReport, robot: RobotSpec) -> Finding:
+    """What is lowest by the angles, the model and the attitude bears a robot that lies.
+
+    A leg in another place, of another sign or with another zero would reach into the ground, and
+    alone be lowest: then the centre of mass is not above what bears it.
+    """
+    places, heights = Statics(robot).lowest_points(report)
+    off = _outside(places[heights <= _TOUCHES])
     return Finding(
         "legs",
-        f"feet {spread:.2f} m apart in height",
-        f"at most {_FEET_OFF:g} m",
-        spread <= _FEET_OFF,
-        "legs in another order, or it does not lie on all four feet",
+        f"its centre of mass {off:.2f} m beside what is lowest",
+        f"at most {_BESIDE:g} m",
+        off <= _BESIDE,
+        "legs in another order, a sign or a zero that is wrong, or it is held",
     )
+
+
+def _outside(places: Array) -> float:
+    """How far the origin is outside of the hull of places, (n, 2), m; 0 within.
+
+    It is the greatest distance of the origin to a line that has all places on its other side.
+    """
+    angles = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS, endpoint=False)
+    directions = np.stack([np.cos(angles), np.sin(angles)])
+    return max(0.0, float((places @ directions).min(axis=0).max()))

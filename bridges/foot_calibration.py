@@ -64,9 +64,12 @@ def fit_scales(counts: Sequence[Array], loads: Sequence[Array]) -> FootScales:
 def _fit_line(load: Array, count: Array) -> tuple[float, float] | None:
     """Count at no load, and counts per N; None if the count does not tell the load.
 
-    A sensor may fail for a moment, so what is far off the median of slopes' line is left out.
+    A sensor may fail for a moment. Then it reads 0, or what is far off the line through the medians
+    of much and of little load: both are left out.
     """
-    if load.std() < _LEAST_SPREAD:
+    fails = count == 0.0
+    load, count = load[~fails], count[~fails]
+    if len(load) < _FEWEST or load.std() < _LEAST_SPREAD:
         return None
     more, less = load > np.median(load), load <= np.median(load)
     slope = (np.median(count[more]) - np.median(count[less])) / (
@@ -76,7 +79,7 @@ def _fit_line(load: Array, count: Array) -> tuple[float, float] | None:
     off = np.abs(off - np.median(off))
     kept = off <= max(_FAR * float(np.median(off)), 1.0)
     load, count = load[kept], count[kept]
-    if load.std() < _LEAST_SPREAD:
+    if len(load) < _FEWEST or load.std() < _LEAST_SPREAD:
         return None
     covariance = float(np.mean((load - load.mean()) * (count - count.mean())))
     scale = covariance / float(load.var())

@@ -16,6 +16,7 @@ KP: Final = 60.0  # N·m/rad, that holds a hanging leg
 KD: Final = 2.0  # N·m·s/rad
 TORQUE: Final = 8.0  # N·m, the most that any joint gives
 STRAY: Final = 0.4  # rad off its posture at which a joint stops the test
+_OUTWARDS: Final = np.array([1.0, -1.0, 1.0, -1.0])  # sign of a hip's angle, FL FR RL RR
 _ROOM: Final = 0.05  # rad that is kept free before an end stop
 _BEGIN: Final = 2.0  # s, in which the motors gain their stiffness
 _HALF: Final = 0.5  # s, there, and back
@@ -23,17 +24,24 @@ _REST: Final = 0.2  # s, before the next joint
 
 
 def joint_motion(q: Array, robot: RobotSpec) -> Motion:
-    """The motion of all joints from measured angles, which are kept but for joints at their stops.
+    """The motion of all joints from measured angles.
+
+    Joints at their stops are led off them, and legs that hang inwards side by side: there they
+    touch. For the same reason hips move outwards. All other angles are kept.
 
     Of its postures, 1 + 3 k is where joint k begins, 2 + 3 k its turning point and 3 + 3 k where it
     is back; the first is where the motors are switched on.
     """
     lower, upper = np.array(robot.lower) + _ROOM, np.array(robot.upper) - _ROOM
     base = np.clip(q, lower, upper)
+    base[::3] = _OUTWARDS * np.maximum(_OUTWARDS * base[::3], 0.0)
+    sign = np.where(base + WAY <= upper, 1.0, -1.0)
+    roomy = _OUTWARDS * base[::3] + WAY <= np.minimum(upper[::3], -lower[::3])
+    sign[::3] = np.where(roomy, _OUTWARDS, -_OUTWARDS)
     postures, times = [q, base], [_BEGIN]
     for k in range(N_JOINTS):
         way = np.zeros(N_JOINTS)
-        way[k] = WAY if base[k] + WAY <= upper[k] else -WAY
+        way[k] = sign[k] * WAY
         postures += [base + way, base, base]
         times += [_HALF, _HALF, _REST]
     return Motion(np.stack(postures), np.cumsum(times))

@@ -8,7 +8,7 @@ from typing import Final
 from quadriga.bridges.driver import RobotDriver
 from quadriga.bridges.guard import Guard
 from quadriga.bridges.joint_motion import moving_joint
-from quadriga.bridges.joint_test import JointSample, JointVerdict, judge_joints
+from quadriga.bridges.joint_verdicts import JointSample, JointVerdict, judge_joints
 from quadriga.bridges.modes import BridgeMode, Wish
 from quadriga.bridges.postures import Motion
 from quadriga.bridges.robot_loop import TICK, RobotLoop

@@ -13,6 +13,7 @@ from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.unitree.packets import OFF, MotorTargets
 
 DAMPING: Final = 3.0  # N·m·s/rad, of joints that are damped
+SINKING: Final = 8.0  # likewise, with which a robot on folded legs comes down on its belly
 _UNDER: Final = 0.8  # rad by which a joint may be off a stand of some height, and the legs carry
 _BACKWARDS: Final = 1.5  # rad, thigh of a leg whose knee is behind its hip, and not below it
 _KNEE_UP: Final = 2.6  # rad, thigh with which a foot cannot push the ground, whatever the calf does
@@ -131,10 +132,10 @@ def towards(q: Array, dq: Array, mode: int, config: BridgeConfig) -> MotorTarget
     return MotorTargets(_modes(mode), q, dq, np.zeros(N_JOINTS), *gains)
 
 
-def damped(q: Array, mode: int) -> MotorTargets:
-    """The command that damps all joints."""
+def damped(q: Array, mode: int, damping: float = DAMPING) -> MotorTargets:
+    """The command that damps all joints, by default as those of a robot that stops."""
     zero = np.zeros(N_JOINTS)
-    return MotorTargets(_modes(mode), q, zero, zero, zero, np.full(N_JOINTS, DAMPING))
+    return MotorTargets(_modes(mode), q, zero, zero, zero, np.full(N_JOINTS, damping))
 
 
 def passive(q: Array) -> MotorTargets:

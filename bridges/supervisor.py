@@ -17,6 +17,7 @@ from quadriga.bridges.joint_motion import TORQUE, joint_motion, led_gently, stra
 from quadriga.bridges.limits import JointReading, implausible, joint_limits, limit_targets
 from quadriga.bridges.modes import BY_ITSELF, BY_WISH, BridgeMode, Wish
 from quadriga.bridges.postures import (
+    SINKING,
     Motion,
     damped,
     lie_down,
@@ -253,7 +254,7 @@ class Supervisor:
             still = np.zeros(N_JOINTS)
             return state, towards(self._robot.q_stand, still, self._servo, self._config)
         if mode is BridgeMode.LETTING_GO:
-            return state, damped(q, self._servo)
+            return state, damped(q, self._servo, SINKING)
         posture = self._posture(state, inputs)
         if mode is BridgeMode.TESTING:
             return state, led_gently(*posture, self._servo, self._seconds(state, inputs))

@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 
 def _test_joints(config: Config, name: str) -> int:
     from quadriga.bridges.bridge import build_joint_tester
-    from quadriga.bridges.joint_test import refuse_wrong, table
+    from quadriga.bridges.joint_verdicts import refuse_wrong, table
     from quadriga.shared.runtime.collector import end_collection
     from quadriga.shared.runtime.scheduling import take_priority
     from quadriga.shared.runtime.signals import stop_on_signals

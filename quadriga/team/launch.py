@@ -37,11 +37,13 @@ class ProcessSpec:
         name: its name on the bus and of its log file.
         command: its command line; `--parent PID` is added.
         grace: how long it may take to leave once the walk is over or it is told to, s.
+        rest: of that, how long it may take to bring a robot to rest first, s.
     """
 
     name: str
     command: tuple[str, ...]
     grace: float
+    rest: float = 0.0
 
 
 def process_table(
@@ -70,7 +72,9 @@ def process_table(
             options.append("--armed")
         options += ["--config", str(run_dir / "config.toml")]
         command = "bridge" if role.name == SIM and bridged else role.command
-        return ProcessSpec(member.name, (*QUADRIGA, command, *options), role.grace)
+        # Down from the stand, or out of a walk, and some time for the legs to sink.
+        rest = 2.0 * config.bridge.stand_s if command == "bridge" and armed else 0.0
+        return ProcessSpec(member.name, (*QUADRIGA, command, *options), role.grace + rest, rest)
 
     return tuple(map(build_row, processes(config)))
 
@@ -117,11 +121,12 @@ class Launch:
                 names the process, how it ended and its last words.
         """
         first_to_leave, left_at = "", 0.0
+        early = _EARLY + max(row.rest for row in self._rows.values())
         while has_lead(self._running):
             for name in list(self._running):
                 if self._reap(name) and name not in LEADS and not first_to_leave:
                     first_to_leave, left_at = name, monotonic()
-            if first_to_leave and monotonic() - left_at > _EARLY:
+            if first_to_leave and monotonic() - left_at > early:
                 got, expected = "an end while the team walked", "to walk until the end"
                 raise self._error(first_to_leave, got, expected)
             if look():

@@ -19,7 +19,7 @@ _AROUND: Final = 0.03  # s, around the turning point
 _SLOPE: Final = (0.5, 1.5)  # of the measured rate on the derivative of the angle
 _SPAN: Final = 0.02  # s, over which that derivative is taken
 _TORQUE_OFF: Final = (1.5, 0.6)  # N·m, and share of the torque asked for, that is measured else
-_TORQUE_ASKED: Final = 0.3  # N·m on average, from which on the measured torque is judged
+_TORQUE_ASKED: Final = 0.4  # N·m at most, from which on the measured torque is judged
 _CALM: Final = 1.0  # rad/s that the trunk may turn
 
 
@@ -156,12 +156,11 @@ def _numbers_of(k: int, during: _Log) -> tuple[str, str]:
             cause = "its sign" if slope < -_SLOPE[0] else "its unit, or the order of rates"
             return f"its rate is {slope:.1f} times the change of its angle", cause
     asked, measured = during.torque_asked[:, k], during.tau[:, k]
-    size = float(np.mean(np.abs(asked)))
     off = float(np.mean(np.abs(measured - asked)))
-    if size >= _TORQUE_ASKED:
-        if float(np.mean(np.abs(measured + asked))) < 0.5 * off:
+    if float(np.max(np.abs(asked))) >= _TORQUE_ASKED:
+        if float(measured @ asked) < -0.5 * float(asked @ asked):
             return "its torque has the other sign", "the sign of its torque"
-        if off > _TORQUE_OFF[0] + _TORQUE_OFF[1] * size:
+        if off > _TORQUE_OFF[0] + _TORQUE_OFF[1] * float(np.mean(np.abs(asked))):
             text = f"its torque is off by {off:.1f} N·m on average"
             return text, "the unit or the order of torques, or friction"
     turned = float(np.max(np.linalg.norm(during.gyro, axis=1)))
