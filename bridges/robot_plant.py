@@ -69,8 +69,7 @@ class RobotPlant(Plant):
         self._published_at = -1
         self._arrivals = [_NOTHING] * _REMEMBERED  # tick of a state, and when its report came
         self._yaw: float | None = None
-        alone = not yoke_pairs(config.team.robots, config.team.yokes)
-        self._statics = Statics(config.robot, alone=alone)  # loaded now, not while the robot stands
+        self._statics = Statics(config.robot)  # loaded now, and not while the robot stands
         self._scales: FootScales | None = None
 
     @property
@@ -138,10 +137,11 @@ class RobotPlant(Plant):
 
     def _calibrate_feet(self, stopped: Callable[[], bool]) -> bool:
         """Learn what the feet's counts mean; False if `stopped()` came first."""
-        seen = list[tuple[Array, Array]]()
+        seen, team = list[tuple[Array, Array]](), self._config.team
+        alone = not yoke_pairs(team.robots, team.yokes)
 
         def watch(report: RobotReport) -> None:
-            seen.append((report.foot, self._statics.foot_loads(report)))
+            seen.append((report.foot, self._statics.foot_loads(report, alone=alone)))
 
         if not self._lead(Wish.WEIGH, BridgeMode.WEIGHING, stopped, watch):
             return False

@@ -22,14 +22,12 @@ class Statics:
 
     Args:
         robot: its kind.
-        alone: whether nothing but the ground bears it: no yoke pulls at it.
 
     Raises:
         ConfigError: the URDF is not installed.
     """
 
-    def __init__(self, robot: RobotSpec, *, alone: bool) -> None:
-        self._alone = alone
+    def __init__(self, robot: RobotSpec) -> None:
         self._model = build_pinocchio_model(robot)
         self._data = self._model.createData()
         self._feet = [self._model.getFrameId(foot) for foot in FOOT_FRAMES]
@@ -37,13 +35,17 @@ class Statics:
         box = np.array(np.meshgrid(*([-half, half] for half in np.array(robot.trunk_box) / 2)))
         self._corners = box.reshape(3, 8).T
 
-    def foot_loads(self, report: RobotReport) -> Array:
+    def foot_loads(self, report: RobotReport, *, alone: bool) -> Array:
         """Vertical forces of the ground on the feet, (4,), N.
 
         The joints' torques tell each foot's force, with the error of friction in the joints:
         f = J⁻ᵀ (g − τ). Of a robot that is alone, these are the nearest to those of all forces that
         carry its weight and have their centre of pressure below the centre of mass. What a yoke
         adds is as unknown as what is missing there.
+
+        Args:
+            report: what the robot measures.
+            alone: whether nothing but the ground bears it: no yoke pulls at it.
         """
         model, data = self._model, self._data
         w, x, y, z = report.quat_wxyz
@@ -60,7 +62,7 @@ class Statics:
             joints = slice(3 * leg, 3 * leg + 3)
             by_torque[leg] = np.linalg.lstsq(J.T, gravity[columns] - report.tau[joints])[0][2]
             arms[1:, leg] = (data.oMf[foot].translation - com)[:2]
-        if not self._alone:
+        if not alone:
             return by_torque
         missing = np.array([self._weight, 0.0, 0.0]) - arms @ by_torque
         loads: Array = by_torque + np.linalg.lstsq(arms, missing)[0]

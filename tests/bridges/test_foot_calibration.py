@@ -98,18 +98,19 @@ def test_loads_carry_the_weight_whatever_the_torques_say(
 ) -> None:
     config = config_of(kind)
     report = standing(config, tau=np.full(12, torque), quat_wxyz=tilted(tilt))
-    loads = Statics(config.robot).foot_loads(report)
+    loads = Statics(config.robot).foot_loads(report, alone=True)
     assert loads.sum() == pytest.approx(config.robot.weight)
 
 
+@pytest.mark.parametrize("alone", [True, False])
 @pytest.mark.parametrize("kind", list(ROBOTS))
-def test_the_torques_tell_which_diagonal_bears_more(kind: str) -> None:
+def test_the_torques_tell_which_diagonal_bears_more(kind: str, alone: bool) -> None:
     """τ = g − Jᵀ f of a foot under its hip: the calf's torque alone, f times its lever."""
     config = config_of(kind)
     statics, robot = Statics(config.robot), config.robot
-    evenly = statics.foot_loads(standing(config))
+    evenly = statics.foot_loads(standing(config), alone=alone)
     press = 10.0  # N more on one diagonal
     tau = np.zeros(12)
     tau[2::3] = press * robot.geometry.link * np.sin(robot.q_stand[1]) * np.array([1, -1, -1, 1])
-    more = statics.foot_loads(standing(config, tau=tau)) - evenly
+    more = statics.foot_loads(standing(config, tau=tau), alone=alone) - evenly
     np.testing.assert_allclose(more, press * np.array([1, -1, -1, 1]), atol=0.3)
