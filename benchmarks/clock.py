@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from contextlib import ExitStack
 from multiprocessing.synchronize import Event
 from pathlib import Path
@@ -29,6 +30,7 @@ from quadriga.shared.runtime.clock import sleep
 from quadriga.team.endpoint import free_endpoint
 
 _AHEAD: Final = ("unshare", "--time", "--monotonic", "1000", "--fork", "--kill-child")
+_PLANT: Final = (sys.executable, "-m", "benchmarks.metronome")
 _PATIENCE: Final = 60.0  # s, beyond the walk
 
 
@@ -66,10 +68,9 @@ def measure(seconds: float, busy: int, priority: str) -> dict[str, Any]:
         file.write_text(to_toml(config), encoding="utf-8")
         outs = [Path(folder) / f"{name}.npz" for name in names]
         commands = [
-            [*(_AHEAD if apart and k else ()), sys.executable, "-m", "benchmarks.metronome",
-             str(file), name, str(out)]
+            (*(_AHEAD if apart and k else ()), *_PLANT, str(file), name, str(out))
             for k, (name, out) in enumerate(zip(names, outs, strict=True))
-        ]  # fmt: skip
+        ]
         _run_together(commands, seconds + _PATIENCE)
         ended.set()
         found = [np.load(out) for out in outs]
@@ -102,7 +103,7 @@ def _compare(found: list[Any]) -> dict[str, Any]:
     }
 
 
-def _run_together(commands: list[list[str]], patience: float) -> None:
+def _run_together(commands: Sequence[Sequence[str]], patience: float) -> None:
     with ExitStack() as stack:
         plants = [
             stack.enter_context(subprocess.Popen(command, stderr=subprocess.PIPE, text=True))
