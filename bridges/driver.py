@@ -15,7 +15,7 @@ class RobotDriver(Protocol):
         servo: the motors' mode in which they follow commands.
         packets_ms: between two packets of the robot.
         period_ms: between two of its states that are used, and two commands.
-        counters: packets by what became of them.
+        counters: packets by what became of them; "received" those that are good and new.
         own_guards: guards of this bridge, which are no other writers.
     """
 

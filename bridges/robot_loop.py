@@ -116,6 +116,7 @@ class RobotLoop:
             CheckError: the robot is not as it must be.
         """
         rate, reports = Rate(TICK), list[RobotReport]()
+        before = self._driver.counters["received"]
         for _ in range(_LOOK_MS):
             if stopped():
                 return []
@@ -128,6 +129,7 @@ class RobotLoop:
             self._driver.packets_ms,
             self._config.bridge,
             self._config.robot,
+            received=self._driver.counters["received"] - before,
             hung=hung,
         )
         for finding in findings:

@@ -100,3 +100,11 @@ def test_a_robot_that_hangs_may_have_its_feet_anywhere() -> None:
     findings = check_reports(reports, 1.0, 1, config.bridge, config.robot, hung=True)
     refuse_failed("r1", findings)
     assert "legs" not in {finding.name for finding in findings}
+
+
+def test_packets_count_and_not_how_often_a_busy_computer_looked() -> None:
+    config = config_of("a1")
+    reports = lying("a1")[::4]
+    seldom = check_reports(reports, 1.0, 1, config.bridge, config.robot)
+    assert [finding.name for finding in seldom if not finding.ok] == ["reports"]
+    refuse_failed("r1", check_reports(reports, 1.0, 1, config.bridge, config.robot, received=1000))
