@@ -12,8 +12,10 @@ from rich.console import Console
 
 from quadriga.desk.faults import BY_NAME, NO_FAULT, Fault
 from quadriga.desk.trial import WITHOUT, run_trial, walk_without_bridges
+from quadriga.identification.predictors import ensure_predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, ProcessError, did_you_mean, name_file_errors
+from quadriga.shared.planner_kinds import find_kind
 from quadriga.warm_up import warm_up
 
 ROWS: Final = "rows.jsonl"
@@ -63,6 +65,8 @@ def run_campaign(
         rows = read_rows(folder)
         known = {(row["fault"], row["seed"]) for row in rows}
         warm_up(config, console)
+        if find_kind(config.planner.kind).needs_predictor:
+            ensure_predictor(config, console)
         todo = [t for t in _trials(faults, seeds, compare=compare) if t[:2] not in known]
         for number, (name, seed, fault) in enumerate(todo, start=1):
             row = _walk(config, name, seed, fault, folder / f"{name}-{seed}")
@@ -115,5 +119,6 @@ def describe_row(row: dict[str, Any]) -> str:
     if row.get("rest_ms"):
         rest = ", ".join(f"{name} {ms}" for name, ms in row["rest_ms"].items())
         parts.append(f"ms to rest: {rest}")
-    parts += [f"{name}: {what}" for name, what in row.get("status", {}).items()]
+    for who in ("status", "agents"):
+        parts += [f"{who} {name}: {what}" for name, what in row.get(who, {}).items() if what]
     return "; ".join(parts)

@@ -47,8 +47,9 @@ def build_walk_table(rows: Sequence[dict[str, Any]]) -> Table:
 
 
 def _has_stopped(row: dict[str, Any]) -> bool:
-    """Whether a bridge stopped its robot."""
-    return any(mode.startswith("stopped") for said in row.get("said", {}).values() for mode in said)
+    """Whether a bridge or an agent stopped its robot before the end."""
+    bridges = [mode for said in row.get("said", {}).values() for mode in said]
+    return any(row["agents"].values()) or any(mode.startswith("stopped") for mode in bridges)
 
 
 def _mean(rows: Sequence[dict[str, Any]], name: str, factor: float, digits: int) -> str:

@@ -140,11 +140,11 @@ class _Trial:
         }
 
     def _recorded(self) -> dict[str, Any]:
-        """Last status of each bridge, how the walk ended, and how late commands were."""
+        """Last status of each bridge, why agents stopped, how the walk ended, what was late."""
         try:
             source, _ = open_readable(self._folder / RECORDING)
         except RecordingError as error:
-            return {"end": str(error), "status": {}, "late": {}}
+            return {"end": str(error), "status": {}, "agents": {}, "late": {}}
         last, end = dict[str, Status](), "none recorded"
         for entry in source.entries():
             topic, member = topic_of(entry.key)
@@ -155,8 +155,14 @@ class _Trial:
             event = decode(entry.payload, Event)
             end = f"{event.code}: {event.detail}" if event.kind == "stop" else end
         plants = {n: last[plant_name(n)] for n in self._names if plant_name(n) in last}
-        status = {name: f"{plant.mode} {plant.reason}".strip() for name, plant in plants.items()}
-        return {"end": end, "status": status, "late": {n: late_of(p, n) for n, p in plants.items()}}
+        return {
+            "end": end,
+            "status": {
+                name: f"{plant.mode} {plant.reason}".strip() for name, plant in plants.items()
+            },
+            "agents": {name: last[name].reason for name in self._names if name in last},
+            "late": {n: late_of(p, n) for n, p in plants.items()},
+        }
 
     def _all_walk(self) -> bool:
         return all(any(_WALKS in line for line in self._modes(name)) for name in self._names)
@@ -256,5 +262,6 @@ def walk_without_bridges(config: Config, seed: int, folder: Path) -> dict[str, A
             name: describe_walk(trace, 1000.0 * _STEADY_S, end)
             for name, trace in zip(names, traces, strict=True)
         },
+        "agents": {name: list(recording.messages(Status, name))[-1].reason for name in names},
         "late": {name: late_of(plant, name) for name in names},
     }

@@ -13,6 +13,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, MessageError
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import decode, encode, truncate_text
 from quadriga.shared.wire.envelope import envelope
@@ -70,6 +71,7 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
         put = bus.publisher(REFERENCE.key(team))
         if not meet(bus, config, stopped):
             return
+        take_priority(config.runtime.priority)  # without a reference the robots stop
         tick, epoch, over = 0, 0, False
         while True:
             while EPOCH_MS * epoch <= tick + EPOCH_MS * _AHEAD:

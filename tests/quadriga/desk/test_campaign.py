@@ -35,7 +35,15 @@ def test_every_fault_is_one_that_the_desk_understands(fault: Any) -> None:
 
 
 def row(fault: str, seed: int, **fields: Any) -> dict[str, Any]:
-    return {"fault": fault, "seed": seed, "fell": [], "figures": {}, "late": {}, **fields}
+    return {
+        "fault": fault,
+        "seed": seed,
+        "fell": [],
+        "figures": {},
+        "late": {},
+        "agents": {},
+        **fields,
+    }
 
 
 def text_of(table: Any) -> str:
