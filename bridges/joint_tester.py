@@ -45,6 +45,7 @@ class JointTester:
         self._loop = RobotLoop(config, name, driver, guard=guard, say=say)
         self._motion: Motion | None = None
         self._samples: list[JointSample] = []
+        self._sampled_at = -1  # ms
 
     def run(self, stopped: Callable[[], bool]) -> list[JointVerdict]:
         """Test all joints, damp them, and leave; the verdicts, fewer if `stopped()` came first.
@@ -99,7 +100,8 @@ class JointTester:
             return before
         self._motion = memory.motion
         seconds = (self._loop.now - memory.since) / 1000.0
-        if self._loop.report_at == self._loop.now:
+        if self._loop.report_at > self._sampled_at:
+            self._sampled_at = self._loop.report_at
             self._samples.append(_sample(seconds, supervised.targets, memory.torque, report))
         joint = moving_joint(memory.motion, seconds)
         if joint is not None and joint != before:

@@ -77,11 +77,22 @@ def joint_limits(config: BridgeConfig, robot: RobotSpec) -> JointLimits:
     )
 
 
-def implausible(measured: JointReading, limits: JointLimits) -> NDArray[np.bool_]:
-    """Joints of which no true sensor could say this, (12,)."""
-    q, dq = measured
-    near = (q >= limits.lower - TOO_FAR) & (q <= limits.upper + TOO_FAR)
-    return ~(near & (np.abs(dq) <= TOO_FAST * limits.speed))
+@compiled
+def shares_of_speed(q: Array, dq: Array, fastest: Array, limits: JointLimits) -> Array:
+    """How fast each joint is, (12,): beyond 1 too fast, ∞ if no true sensor could say this of it.
+
+    Args:
+        q: measured angles, rad.
+        dq: measured rates, rad/s.
+        fastest: above which a joint is too fast, (12,), rad/s.
+        limits: of this robot.
+    """
+    shares = np.empty(N_JOINTS)
+    for k in range(N_JOINTS):
+        near = limits.lower[k] - TOO_FAR <= q[k] <= limits.upper[k] + TOO_FAR
+        known = near and abs(dq[k]) <= TOO_FAST * limits.speed[k]
+        shares[k] = abs(dq[k]) / fastest[k] if known else np.inf
+    return shares
 
 
 def limit_targets(
@@ -93,8 +104,8 @@ def limit_targets(
     kd (dq − dq_measured); what must be taken off it is taken off the feed-forward torque. Gains,
     angles and rates are limited first. Where a joint is at its end stop, no torque pushes it on.
     Where that would need a feed-forward torque beyond the motor's limit, the command has no gains
-    and its torque alone. What is measured of a joint may be wrong (see `implausible`): then nothing
-    is made up for, and the joint has damping alone of its gains.
+    and its torque alone. What is measured of a joint may be wrong (see `shares_of_speed`): then
+    nothing is made up for, and the joint has damping alone of its gains.
 
     Args:
         targets: what is asked for; numbers that are none count as zero.

@@ -120,7 +120,8 @@ class RobotLoop:
         for _ in range(_LOOK_MS):
             if stopped():
                 return []
-            if self._receive():
+            self._begin_turn()
+            if self.receive():
                 reports += [] if self.report is None else [self.report]
             rate.wait()
         findings = check_reports(
@@ -147,15 +148,26 @@ class RobotLoop:
         self._in_charge = True
         self._stall()
 
-    def turn(self, answer: Answer | None, wish: Wish, tick: int | None = None) -> Supervised | None:
-        """A millisecond: receive, decide, send; nothing before the first report.
+    def turn(self, answer: Answer | None, wish: Wish) -> Supervised | None:
+        """A millisecond: receive, decide, send.
+
+        An agent's new command is sent at once, and some command once in a period at least. In the
+        milliseconds between two commands there is nothing to decide.
 
         Args:
             answer: the agent's newest command; None before the first, and before the walk.
             wish: what the robot is to do.
-            tick: of the walk: every `period_ms` of it a command is sent, in step with the states.
+
+        Returns:
+            What was decided; None between two commands, and before the first report.
         """
-        self._receive()
+        self._begin_turn()
+        period, is_new = self._driver.period_ms, answer is not None and answer.arrived is not None
+        is_due = is_new or self.now - self._sent_at >= period
+        if not is_due:
+            return None
+        if self.now - self.report_at >= period:
+            self.receive()
         report = self.report
         if report is None:
             return None
@@ -173,20 +185,15 @@ class RobotLoop:
         )
         self.memory, supervised = self._supervisor.step(self.memory, inputs)
         self._cut.update(supervised.cut)
-        if supervised.targets is not None and self._is_due(answer, supervised):
+        self._sent_at = self.now
+        if supervised.targets is not None:
             self._driver.send(supervised.targets)
-            self._sent_at = self.now
             if answer is not None and answer.arrived is not None:
                 self.answers.add(1e3 * (self._clock() - answer.arrived))
         for mode, reason in supervised.changes:
             self._say(f"{self._name}: {mode} {reason}".rstrip())
             self.untold.append((self.now, mode, reason))
         return supervised
-
-    def _is_due(self, answer: Answer | None, supervised: Supervised) -> bool:
-        is_new = answer is not None and answer.arrived is not None
-        overdue = self.now - self._sent_at >= self._driver.period_ms
-        return is_new or overdue or bool(supervised.changes)
 
     def leave(self) -> None:
         """Have the robot lie down, switch its motors off, and leave."""
@@ -228,11 +235,14 @@ class RobotLoop:
         mode, reason = str(self.mode), self.memory.reason
         return replace(status, mode=mode, reason=reason, ages_ms=ages, counters=counters)
 
-    def _receive(self) -> bool:
-        """Take the newest report; whether there is one. Counts a millisecond."""
+    def _begin_turn(self) -> None:
+        """Count a millisecond, and tell the guard that there is one."""
         self.now += 1
         if self._in_charge and self._guard is not None and self.now % BEAT_MS == 0:
             self._guard_gone = not self._guard.beat()
+
+    def receive(self) -> bool:
+        """Take the newest report; whether one has come."""
         report = self._driver.receive()
         if report is None:
             return False

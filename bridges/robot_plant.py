@@ -163,8 +163,11 @@ class RobotPlant(Plant):
         is old.
         """
         loop, tick = self._loop, self.tick
+        if tick % self.period_ms:
+            return {}
+        loop.receive()
         report = loop.report
-        if report is None or tick % self.period_ms:
+        if report is None:
             return {}
         is_new = loop.report_at > self._published_at
         age = loop.now - loop.report_at

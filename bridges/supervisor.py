@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.bridges.joint_motion import TORQUE, joint_motion, led_gently, stray
-from quadriga.bridges.limits import JointReading, implausible, joint_limits, limit_targets
+from quadriga.bridges.limits import JointReading, joint_limits, limit_targets, shares_of_speed
 from quadriga.bridges.modes import BY_ITSELF, BY_WISH, BridgeMode, Wish
 from quadriga.bridges.postures import (
     SINKING,
@@ -33,7 +33,7 @@ from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.runtime.record import record
 from quadriga.shared.unitree.packets import PROTECTED, MotorTargets, RobotReport
-from quadriga.shared.unitree.remote import parse_buttons, read_remote
+from quadriga.shared.unitree.remote import are_pressed, parse_buttons
 from quadriga.shared.wire.codes import with_detail
 from quadriga.shared.wire.messages import Command
 
@@ -130,6 +130,7 @@ class Supervisor:
         # Compiled, or loaded, now and not in the first millisecond.
         limit_targets(passive(still.q), still, np.zeros(N_JOINTS), 1, self._limits)
         self._fastest = config.speed_share * np.tile(robot.speed, 4)
+        shares_of_speed(still.q, still.dq, self._fastest, self._limits)
 
     def initial(self, now: int, *, armed: bool) -> SupervisorState:
         """Dry, or limp if it may command the robot."""
@@ -187,21 +188,19 @@ class Supervisor:
 
     def _note_rates(self, state: SupervisorState, inputs: SupervisorInputs) -> SupervisorState:
         """The state with the time for which some joint has been too fast, or cannot be believed."""
-        if (self._share_of_speed(inputs.report) <= 1.0).all():
+        if self._shares_of_speed(inputs.report).max() <= 1.0:
             return state if state.fast_ms == 0 else replace(state, fast_ms=0)
         return replace(state, fast_ms=state.fast_ms + max(1, inputs.now - state.sent))
 
-    def _share_of_speed(self, report: RobotReport) -> Array:
-        """How fast each joint is, (12,): beyond 1 too fast, ∞ if its sensor is wrong."""
-        wrong = implausible(JointReading(report.q, report.dq), self._limits)
-        return np.where(wrong, np.inf, np.abs(report.dq) / self._fastest)
+    def _shares_of_speed(self, report: RobotReport) -> Array:
+        return shares_of_speed(report.q, report.dq, self._fastest, self._limits)
 
     def reason_to_stop(self, state: SupervisorState, inputs: SupervisorInputs) -> str:
         """Why the robot must stop now, "" if it need not."""
         config, report, mode = self._config, inputs.report, state.mode
         if inputs.estop:
             return with_detail("estop", inputs.estop)
-        if self._stop_buttons <= read_remote(report.remote).pressed:
+        if are_pressed(report.remote, self._stop_buttons):
             return with_detail("remote", config.stop_buttons)
         if inputs.writers:
             return with_detail("second-writer", f"{inputs.writers} others command the motors")
@@ -216,7 +215,7 @@ class Supervisor:
         if mode is BridgeMode.WALKING and inputs.command_age > config.damp_ms:
             return with_detail("command-late", f"{inputs.command_age} ms")
         if state.fast_ms > config.speed_ms:
-            shares = self._share_of_speed(report)
+            shares = self._shares_of_speed(report)
             joint = int(np.argmax(shares))
             code = "speed" if math.isfinite(shares[joint]) else "joint-reading"
             measured = f"{report.q[joint]:.2f} rad, {report.dq[joint]:.1f} rad/s"

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.unitree.crc import crc32
+from quadriga.shared.unitree.fields import Fields, Raw
 from quadriga.shared.unitree.packets import (
     FOOT_PLACES,
     JOINT_PLACES,
@@ -25,14 +25,13 @@ from quadriga.shared.unitree.packets import (
     check_crc,
     check_finite,
     check_size,
-    to_project,
 )
 
 COMMAND_TOPIC, REPORT_TOPIC = "rt/lowcmd", "rt/lowstate"
 COMMAND_TYPE, REPORT_TYPE = "unitree_go::msg::dds_::LowCmd_", "unitree_go::msg::dds_::LowState_"
 
 _MOTORS: Final = 20  # of which the robot has twelve
-_HEAD: Final = (0xFE, 0xEF)
+_HEAD: Final = b"\xfe\xef"
 _LOW_LEVEL: Final = 0xFF
 _INT16: Final = np.iinfo(np.int16)
 
@@ -80,59 +79,93 @@ REPORT: Final = _struct([
 class Go2Codec:
     """See `PacketCodec`; torques and gains are floats on this wire, so none is cut."""
 
+    def __init__(self) -> None:
+        joints = JOINT_PLACES
+        self._asked_floats = Fields(
+            COMMAND,
+            motor__q=joints,
+            motor__dq=joints,
+            motor__tau=joints,
+            motor__kp=joints,
+            motor__kd=joints,
+        )
+        self._asked_modes = Fields(COMMAND, motor__mode=joints)
+        self._floats = Fields(
+            REPORT,
+            imu__quaternion=None,
+            imu__gyro=None,
+            imu__accel=None,
+            motor__q=joints,
+            motor__dq=joints,
+            motor__tau=joints,
+        )
+        self._feet, self._lost = (
+            Fields(REPORT, foot=FOOT_PLACES),
+            Fields(REPORT, motor__lost=joints),
+        )
+        self._modes = Fields(REPORT, motor__mode=joints)
+        self._temperatures = Fields(REPORT, motor__temperature=joints, imu__temperature=None)
+        self._blank_command, self._blank_report = _blank(COMMAND), _blank(REPORT)
+        motors = self._blank_command["motor"]
+        motors["mode"], motors["q"], motors["dq"] = ON, NO_ANGLE, NO_RATE  # of those it lacks
+
     def encode_command(self, targets: MotorTargets) -> bytes:
         """See `PacketCodec`."""
         check_finite(targets)
-        packet = _blank(COMMAND)
-        motors = packet["motor"]
-        motors["mode"], motors["q"], motors["dq"] = ON, NO_ANGLE, NO_RATE  # of those it lacks
-        rows = motors[:N_JOINTS]
-        for name in ("mode", "q", "dq", "tau", "kp", "kd"):
-            rows[name] = getattr(targets, name)[JOINT_PLACES]
-        return _seal(packet)
+        raw = np.frombuffer(self._blank_command.tobytes(), np.uint8).copy()
+        t = targets
+        self._asked_modes.write(raw, (t.mode,))
+        self._asked_floats.write(raw, (t.q, t.dq, t.tau, t.kp, t.kd))
+        return _seal(raw)
 
     def decode_command(self, packet: bytes) -> MotorTargets:
         """See `PacketCodec`."""
-        rows = _open(packet, COMMAND, "command of the Go2")["motor"][:N_JOINTS][JOINT_PLACES]
-        numbers = {name: rows[name].astype(float) for name in ("q", "dq", "tau", "kp", "kd")}
-        return MotorTargets(rows["mode"].copy(), **numbers)
+        raw = _open(packet, COMMAND, "command of the Go2")
+        (mode,) = self._asked_modes.read(raw, np.uint8)
+        return MotorTargets(mode, *self._asked_floats.read(raw, float))
 
     def encode_report(self, report: RobotReport) -> bytes:
         """See `PacketCodec`."""
-        packet = _blank(REPORT)
-        imu, rows = packet["imu"], packet["motor"][:N_JOINTS]
-        imu["quaternion"], imu["gyro"], imu["accel"] = report.quat_wxyz, report.gyro, report.accel
-        imu["temperature"] = np.clip(report.imu_temperature, 0, 255)
-        for name in ("mode", "q", "dq", "tau", "lost"):
-            rows[name] = getattr(report, name)[JOINT_PLACES]
-        rows["temperature"] = np.clip(report.temperature[JOINT_PLACES], 0, 255)
-        packet["foot"] = np.clip(np.rint(report.foot[FOOT_PLACES]), _INT16.min, _INT16.max)
-        packet["tick"] = report.tick & 0xFFFFFFFF
-        packet["remote"] = np.frombuffer(report.remote, np.uint8)
+        raw = np.frombuffer(self._blank_report.tobytes(), np.uint8).copy()
+        r = report
+        self._floats.write(raw, (r.quat_wxyz, r.gyro, r.accel, r.q, r.dq, r.tau))
+        self._feet.write(raw, (np.clip(np.rint(r.foot), _INT16.min, _INT16.max),))
+        self._lost.write(raw, (r.lost,))
+        self._modes.write(raw, (r.mode,))
+        degrees = np.clip((*r.temperature, r.imu_temperature), 0, 255)
+        self._temperatures.write(raw, (degrees,))
+        fields = raw.view(REPORT)[0]
+        fields["tick"] = report.tick & 0xFFFFFFFF
+        fields["remote"] = np.frombuffer(report.remote, np.uint8)
         if report.battery is not None:
-            battery = packet["battery"]
+            battery = fields["battery"]
             battery["charge"] = report.battery.charge
             battery["current_ma"] = round(1000.0 * report.battery.current)
-            packet["power_v"] = report.battery.voltage or 0.0
-        return _seal(packet)
+            fields["power_v"] = report.battery.voltage or 0.0
+        return _seal(raw)
 
     def decode_report(self, packet: bytes) -> RobotReport:
         """See `PacketCodec`."""
-        fields = _open(packet, REPORT, "report of the Go2")
-        imu, rows, battery = fields["imu"], fields["motor"][:N_JOINTS], fields["battery"]
+        raw = _open(packet, REPORT, "report of the Go2")
+        quat, gyro, accel, q, dq, tau = self._floats.read(raw, float)
+        (foot,), (lost,) = self._feet.read(raw, float), self._lost.read(raw, np.int64)
+        (mode,) = self._modes.read(raw, np.uint8)
+        temperature, imu_temperature = self._temperatures.read(raw, float)
+        fields = raw.view(REPORT)[0]
+        battery = fields["battery"]
         return RobotReport(
             tick=int(fields["tick"]),
-            quat_wxyz=imu["quaternion"].astype(float),
-            gyro=imu["gyro"].astype(float),
-            accel=imu["accel"].astype(float),
-            q=to_project(rows["q"], JOINT_PLACES),
-            dq=to_project(rows["dq"], JOINT_PLACES),
-            tau=to_project(rows["tau"], JOINT_PLACES),
-            foot=to_project(fields["foot"], FOOT_PLACES),
-            mode=rows["mode"][JOINT_PLACES],
-            temperature=to_project(rows["temperature"], JOINT_PLACES),
-            lost=rows["lost"][JOINT_PLACES].astype(np.int64),
-            imu_temperature=int(imu["temperature"]),
+            quat_wxyz=quat,
+            gyro=gyro,
+            accel=accel,
+            q=q,
+            dq=dq,
+            tau=tau,
+            foot=foot,
+            mode=mode,
+            temperature=temperature,
+            lost=lost,
+            imu_temperature=int(imu_temperature[0]),
             remote=fields["remote"].tobytes(),
             battery=Battery(
                 int(battery["charge"]), 1e-3 * int(battery["current_ma"]), float(fields["power_v"])
@@ -142,30 +175,28 @@ class Go2Codec:
 
 def _blank(layout: np.dtype[np.void]) -> Any:
     packet = np.zeros((), layout)
-    packet["head"], packet["level"] = _HEAD, _LOW_LEVEL
+    packet["head"], packet["level"] = tuple(_HEAD), _LOW_LEVEL
     return packet
 
 
-def _seal(packet: Any) -> bytes:
-    packet["crc"] = crc32(packet.tobytes()[:-4])
-    sealed: bytes = packet.tobytes()
-    return sealed
+def _seal(packet: Raw) -> bytes:
+    body = packet.tobytes()[:-4]
+    return body + crc32(body).to_bytes(4, "little")
 
 
-def _open(packet: bytes, layout: np.dtype[np.void], what: str) -> Any:
-    """The fields of a packet of this layout that is whole.
+def _open(packet: bytes, layout: np.dtype[np.void], what: str) -> Raw:
+    """The bytes of a packet of this layout that is whole.
 
     Raises:
         PacketError: another length or head, damaged, or not of the low level.
     """
     check_size(packet, layout.itemsize, what)
-    fields = np.frombuffer(packet, layout)[0]
-    if tuple(fields["head"]) != _HEAD:
-        raise PacketError(f"{what}: head", fields["head"].tobytes().hex(), "feef")
-    if fields["level"] != _LOW_LEVEL:
-        raise PacketError(f"{what}: level", f"{fields['level']:#x}", f"{_LOW_LEVEL:#x}")
-    check_crc(int(fields["crc"]), crc32(packet[:-4]), what)
-    return fields
+    if packet[:2] != _HEAD:
+        raise PacketError(f"{what}: head", packet[:2].hex(), "feef")
+    if packet[2] != _LOW_LEVEL:
+        raise PacketError(f"{what}: level", f"{packet[2]:#x}", f"{_LOW_LEVEL:#x}")
+    check_crc(int.from_bytes(packet[-4:], "little"), crc32(packet[:-4]), what)
+    return np.frombuffer(packet, np.uint8)
 
 
 GO2: Final = Go2Codec()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 from quadriga.shared.errors import ConfigError
@@ -58,14 +59,25 @@ def read_remote(packet: bytes) -> RemoteReading:
     return RemoteReading(any(packet), pressed, lx, ly, rx, ry)
 
 
+def are_pressed(packet: bytes, buttons: frozenset[str]) -> bool:
+    """Whether all these buttons are down in the 40 bytes of a report, and perhaps others."""
+    (keys,) = _KEYS.unpack_from(packet)
+    wanted = _bits(buttons)
+    return bool(keys & wanted == wanted)
+
+
+@cache
+def _bits(buttons: frozenset[str]) -> int:
+    return sum(1 << bit for bit, name in enumerate(BUTTONS) if name in buttons)
+
+
 def write_remote(reading: RemoteReading) -> bytes:
     """The 40 bytes of a reading, as a robot would send them."""
     packet = bytearray(REMOTE_BYTES)
     if not reading.on:
         return bytes(packet)
     packet[:2] = b"\x55\x51"
-    keys = sum(1 << bit for bit, name in enumerate(BUTTONS) if name in reading.pressed)
-    struct.pack_into("<H", packet, 2, keys)
+    struct.pack_into("<H", packet, 2, _bits(reading.pressed))
     _STICKS.pack_into(packet, _STICKS_AT, reading.lx, reading.rx, reading.ry, 0.0, reading.ly)
     return bytes(packet)
 

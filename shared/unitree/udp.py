@@ -7,14 +7,13 @@ layouts were read off packets that Unitree's own libraries sent and took.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from quadriga.shared.robot.conventions import N_JOINTS, Array
+from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.unitree.crc import crc32
+from quadriga.shared.unitree.fields import Fields, Raw
 from quadriga.shared.unitree.packets import (
     FOOT_PLACES,
     JOINT_PLACES,
@@ -28,15 +27,15 @@ from quadriga.shared.unitree.packets import (
     check_crc,
     check_finite,
     check_size,
-    to_project,
 )
 
 _Fields = Sequence[tuple[Any, ...]]
 
 _MOTORS: Final = 20  # of which the robots have twelve
 _LOW_LEVEL: Final = 0xFF
-_HEAD: Final = (0xFE, 0xEF)
+_HEAD: Final = b"\xfe\xef"
 _SCALE: Final = {"tau": 256.0, "kp": 32.0, "kd": 16.0}  # steps per N·m, N·m/rad, N·m·s/rad
+_STEPS_PER: Final = np.repeat([_SCALE["tau"], _SCALE["kp"], _SCALE["kd"]], N_JOINTS)
 _STEPS: Final = np.iinfo(np.int16)
 _CELLS: Final = 10
 _CELL_V: Final = 0.032
@@ -70,104 +69,125 @@ _FEET: Final[_Fields] = [("foot", "<i2", 4), ("foot_estimate", "<i2", 4), ("tick
 _END: Final[_Fields] = [("remote", "u1", 40), ("reserve", "<u4"), ("crc", "<u4")]
 
 
-@dataclass(frozen=True)
 class UdpCodec:
     """The packets of one kind of robot.
 
-    Attributes:
+    Args:
         name: of the robot, for errors.
         command: layout of a command.
         report: layout of what the robot sends.
+
+    Attributes:
+        command, report: the layouts.
     """
 
-    name: str
-    command: np.dtype[np.void]
-    report: np.dtype[np.void]
+    def __init__(self, name: str, command: np.dtype[np.void], report: np.dtype[np.void]) -> None:
+        self.command, self.report = command, report
+        self._name = name
+        self._has_head = "head" in (command.names or ())
+        self._has_battery = "battery" in (report.names or ())
+        joints, feet = JOINT_PLACES, FOOT_PLACES
+        self._asked_floats = Fields(command, motor__q=joints, motor__dq=joints)
+        self._asked_steps = Fields(command, motor__tau=joints, motor__kp=joints, motor__kd=joints)
+        self._asked_modes = Fields(command, motor__mode=joints)
+        self._floats = Fields(
+            report,
+            imu__quaternion=None,
+            imu__gyro=None,
+            imu__accel=None,
+            motor__q=joints,
+            motor__dq=joints,
+        )
+        self._steps = Fields(report, motor__tau=joints, foot=feet)
+        self._modes = Fields(report, motor__mode=joints)
+        self._temperatures = Fields(report, motor__temperature=joints, imu__temperature=None)
+        self._blank_command, self._blank_report = self._blank(command), self._blank(report)
+        motors = self._blank_command["motor"]
+        motors["mode"], motors["q"], motors["dq"] = SERVO, NO_ANGLE, NO_RATE  # of those it lacks
 
     def encode_command(self, targets: MotorTargets) -> bytes:
         """See `PacketCodec`. Torques and gains are cut towards zero, as Unitree's library does."""
         check_finite(targets)
-        packet = self._blank(self.command)
-        motors = packet["motor"]
-        motors["mode"], motors["q"], motors["dq"] = SERVO, NO_ANGLE, NO_RATE  # of those it lacks
-        rows = motors[:N_JOINTS]
-        rows["mode"] = targets.mode[JOINT_PLACES]
-        for name in ("q", "dq"):
-            rows[name] = getattr(targets, name)[JOINT_PLACES]
-        for name, scale in _SCALE.items():
-            limited = np.clip(getattr(targets, name), _STEPS.min / scale, _STEPS.max / scale)
-            rows[name] = np.trunc(scale * limited[JOINT_PLACES])
-        return _seal(packet)
+        raw = np.frombuffer(self._blank_command.tobytes(), np.uint8).copy()
+        self._asked_modes.write(raw, (targets.mode,))
+        self._asked_floats.write(raw, (targets.q, targets.dq))
+        steps = _STEPS_PER * np.concatenate((targets.tau, targets.kp, targets.kd))
+        self._asked_steps.write(raw, (np.trunc(np.clip(steps, _STEPS.min, _STEPS.max)),))
+        return _seal(raw)
 
     def decode_command(self, packet: bytes) -> MotorTargets:
         """See `PacketCodec`."""
-        fields = self._open(packet, self.command, f"command of the {self.name}")
-        rows = fields["motor"][:N_JOINTS][JOINT_PLACES]
-        scaled = {name: rows[name] / scale for name, scale in _SCALE.items()}
-        return MotorTargets(
-            rows["mode"].copy(), rows["q"].astype(float), rows["dq"].astype(float), **scaled
-        )
+        raw = self._open(packet, self.command, "command")
+        (mode,) = self._asked_modes.read(raw, np.uint8)
+        q, dq = self._asked_floats.read(raw, float)
+        tau, kp, kd = self._asked_steps.read(raw, float)
+        return MotorTargets(mode, q, dq, tau / _SCALE["tau"], kp / _SCALE["kp"], kd / _SCALE["kd"])
 
     def encode_report(self, report: RobotReport) -> bytes:
         """See `PacketCodec`."""
-        packet = self._blank(self.report)
-        imu, rows = packet["imu"], packet["motor"][:N_JOINTS]
-        imu["quaternion"], imu["gyro"], imu["accel"] = report.quat_wxyz, report.gyro, report.accel
-        imu["temperature"] = report.imu_temperature
-        rows["mode"] = report.mode[JOINT_PLACES]
-        rows["q"], rows["dq"] = report.q[JOINT_PLACES], report.dq[JOINT_PLACES]
-        rows["tau"] = _to_steps(_SCALE["tau"] * report.tau[JOINT_PLACES])
-        rows["temperature"] = np.clip(report.temperature[JOINT_PLACES], -128, 127)
-        packet["foot"] = _to_steps(report.foot[FOOT_PLACES])
-        packet["tick"] = report.tick & 0xFFFFFFFF
-        packet["remote"] = np.frombuffer(report.remote, np.uint8)
-        if report.battery is not None and "battery" in (self.report.names or ()):
-            _write_battery(packet["battery"], report.battery)
-        return _seal(packet)
+        raw = np.frombuffer(self._blank_report.tobytes(), np.uint8).copy()
+        r = report
+        self._floats.write(raw, (r.quat_wxyz, r.gyro, r.accel, r.q, r.dq))
+        steps = np.rint(np.concatenate((_SCALE["tau"] * r.tau, r.foot)))
+        self._steps.write(raw, (np.clip(steps, _STEPS.min, _STEPS.max),))
+        self._modes.write(raw, (r.mode,))
+        degrees = np.clip((*r.temperature, r.imu_temperature), -128, 127)
+        self._temperatures.write(raw, (degrees,))
+        fields = raw.view(self.report)[0]
+        fields["tick"] = report.tick & 0xFFFFFFFF
+        fields["remote"] = np.frombuffer(report.remote, np.uint8)
+        if report.battery is not None and self._has_battery:
+            _write_battery(fields["battery"], report.battery)
+        return _seal(raw)
 
     def decode_report(self, packet: bytes) -> RobotReport:
         """See `PacketCodec`."""
-        fields = self._open(packet, self.report, f"report of the {self.name}")
-        imu, rows = fields["imu"], fields["motor"][:N_JOINTS]
-        battery = fields["battery"] if "battery" in (self.report.names or ()) else None
+        raw = self._open(packet, self.report, "report")
+        quat, gyro, accel, q, dq = self._floats.read(raw, float)
+        tau, foot = self._steps.read(raw, float)
+        (mode,) = self._modes.read(raw, np.uint8)
+        temperature, imu_temperature = self._temperatures.read(raw, float)
+        fields = raw.view(self.report)[0]
         return RobotReport(
             tick=int(fields["tick"]),
-            quat_wxyz=imu["quaternion"].astype(float),
-            gyro=imu["gyro"].astype(float),
-            accel=imu["accel"].astype(float),
-            q=to_project(rows["q"], JOINT_PLACES),
-            dq=to_project(rows["dq"], JOINT_PLACES),
-            tau=to_project(rows["tau"], JOINT_PLACES) / _SCALE["tau"],
-            foot=to_project(fields["foot"], FOOT_PLACES),
-            mode=rows["mode"][JOINT_PLACES],
-            temperature=to_project(rows["temperature"], JOINT_PLACES),
-            imu_temperature=int(imu["temperature"]),
+            quat_wxyz=quat,
+            gyro=gyro,
+            accel=accel,
+            q=q,
+            dq=dq,
+            tau=tau / _SCALE["tau"],
+            foot=foot,
+            mode=mode,
+            temperature=temperature,
+            imu_temperature=int(imu_temperature[0]),
             remote=fields["remote"].tobytes(),
-            battery=None if battery is None else _read_battery(battery),
+            battery=_read_battery(fields["battery"]) if self._has_battery else None,
         )
 
     def _blank(self, layout: np.dtype[np.void]) -> Any:
         packet = np.zeros((), layout)
         packet["level"] = _LOW_LEVEL
-        if "head" in (layout.names or ()):
-            packet["head"] = _HEAD
+        if self._has_head:
+            packet["head"] = tuple(_HEAD)
         return packet
 
-    def _open(self, packet: bytes, layout: np.dtype[np.void], what: str) -> Any:
-        """The fields of a packet of this layout that is whole.
+    def _open(self, packet: bytes, layout: np.dtype[np.void], what: str) -> Raw:
+        """The bytes of a packet of this layout that is whole.
 
         Raises:
             PacketError: another length, another head, damaged, or not of the low level.
         """
+        what = f"{what} of the {self._name}"
         check_size(packet, layout.itemsize, what)
-        fields = np.frombuffer(packet, layout)[0]
-        if "head" in (layout.names or ()) and tuple(fields["head"]) != _HEAD:
-            raise PacketError(f"{what}: head", fields["head"].tobytes().hex(), "feef")
-        if fields["level"] != _LOW_LEVEL:
+        if self._has_head and packet[:2] != _HEAD:
+            raise PacketError(f"{what}: head", packet[:2].hex(), "feef")
+        level = packet[2] if self._has_head else packet[0]
+        if level != _LOW_LEVEL:
             cause = "the robot's own controller is still in charge"
-            raise PacketError(f"{what}: level", f"{fields['level']:#x}", f"{_LOW_LEVEL:#x}", cause)
-        check_crc(int(fields["crc"]), crc32(packet[: _covered(len(packet))]), what)
-        return fields
+            raise PacketError(f"{what}: level", f"{level:#x}", f"{_LOW_LEVEL:#x}", cause)
+        got = int.from_bytes(packet[-4:], "little")
+        check_crc(got, crc32(packet[: _covered(len(packet))]), what)
+        return np.frombuffer(packet, np.uint8)
 
 
 def _covered(size: int) -> int:
@@ -175,15 +195,9 @@ def _covered(size: int) -> int:
     return (size // 4 - 1) * 4
 
 
-def _seal(packet: NDArray[np.void]) -> bytes:
+def _seal(packet: Raw) -> bytes:
     body = packet.tobytes()
     return body[:-4] + crc32(body[: _covered(len(body))]).to_bytes(4, "little")
-
-
-def _to_steps(values: Array) -> Array:
-    """Whole numbers of 16 bits, rounded."""
-    rounded: Array = np.clip(np.rint(values), _STEPS.min, _STEPS.max)
-    return rounded
 
 
 def _write_battery(fields: Any, battery: Battery) -> None:

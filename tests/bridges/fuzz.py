@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.bridges.limits import MOST_KD, MOST_KP, JointReading, implausible, joint_limits
+from quadriga.bridges.limits import MOST_KD, MOST_KP, joint_limits, shares_of_speed
 from quadriga.bridges.modes import BridgeMode, Wish
 from quadriga.bridges.robot_plant import to_state
 from quadriga.bridges.supervisor import Supervisor, SupervisorInputs, SupervisorState
@@ -235,7 +235,7 @@ class Fuzz:
         assert within[on].all(), targets
         assert (np.abs(targets.dq) <= limits.speed + 1e-6)[damped].all(), targets
         q, dq = self._report.q, self._report.dq
-        known = ~implausible(JointReading(q, dq), limits)
+        known = np.isfinite(shares_of_speed(q, dq, limits.speed, limits))
         asked = np.array([targets.tau, targets.kp, targets.q, targets.kd, targets.dq])[:, known]
         tau, kp, angle, kd, rate = asked
         torque = tau + kp * (angle - q[known]) + kd * (rate - dq[known])

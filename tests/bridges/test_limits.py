@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.bridges.limits import JointReading, implausible, joint_limits, limit_targets
+from quadriga.bridges.limits import JointReading, joint_limits, limit_targets, shares_of_speed
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.unitree.packets import MotorTargets
 from quadriga.shared.unitree.udp import A1
@@ -54,7 +54,7 @@ def test_no_command_gives_more_than_the_limits(
             MotorTargets(holding(CONFIG).mode, *rows), measured, last, ms, LIMITS
         )
     torque = given_torque(limited.targets, measured)
-    trusted = ~implausible(measured, LIMITS)
+    trusted = np.isfinite(shares_of_speed(*measured, LIMITS.speed, LIMITS))
     np.testing.assert_allclose(torque[trusted], limited.torque[trusted], rtol=1e-9, atol=1e-6)
     assert (np.abs(limited.torque) <= LIMITS.torque + 1e-6).all()
     power = np.maximum(limited.torque * measured.dq, 0.0)[trusted].sum()
@@ -79,7 +79,7 @@ def test_no_measurement_makes_the_feed_forward_torque_exceed_the_limits(
     targets = holding(CONFIG, kp=np.full(12, gain), kd=np.full(12, gain / 20.0))
     with np.errstate(over="ignore", invalid="ignore"):
         limited = limit_targets(targets, measured, np.zeros(12), 1, LIMITS)
-    wrong = implausible(measured, LIMITS)
+    wrong = np.isinf(shares_of_speed(*measured, LIMITS.speed, LIMITS))
     np.testing.assert_array_equal(limited.targets.kp[wrong], 0.0)
     assert (np.abs(limited.targets.tau) <= LIMITS.torque + 1e-9).all()
     assert (np.abs(limited.torque) <= LIMITS.torque + 1e-9).all()

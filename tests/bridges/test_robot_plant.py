@@ -119,12 +119,20 @@ class Script:
     own_guards = 0
 
     def __init__(self, speaks: Iterator[bool]) -> None:
-        self._speaks, self._tick = speaks, 0
+        self._speaks, self._tick, self._spoken = speaks, 0, False
         self.counters: Counter[str] = Counter()
 
+    def pass_ms(self) -> None:
+        """Let a millisecond pass.
+
+        Raises:
+            StopIteration: the script is at its end.
+        """
+        self._tick, self._spoken = self._tick + 1, next(self._speaks) or self._spoken
+
     def receive(self) -> RobotReport | None:
-        self._tick += 1
-        return standing(config_of(), tick=self._tick) if next(self._speaks) else None
+        spoken, self._spoken = self._spoken, False
+        return standing(config_of(), tick=self._tick) if spoken else None
 
     def send(self, targets: MotorTargets) -> None:
         raise AssertionError("a dry run")
@@ -139,11 +147,13 @@ class Script:
 
 def ticks_of(speaks: Iterable[bool]) -> list[int]:
     """Ticks of the states of a robot that speaks so."""
-    plant = RobotPlant(config_of(), "r1", Script(iter(speaks)), guard=None, say=list[str]().append)
+    script = Script(iter(speaks))
+    plant = RobotPlant(config_of(), "r1", script, guard=None, say=list[str]().append)
     ticks = []
     with suppress(StopIteration):
         while True:
             ticks += [state.tick for state in plant.states().values()]
+            script.pass_ms()
             plant.step({})
     return ticks
 

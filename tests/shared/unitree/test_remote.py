@@ -12,6 +12,7 @@ from quadriga.shared.errors import ConfigError
 from quadriga.shared.unitree.remote import (
     BUTTONS,
     RemoteReading,
+    are_pressed,
     parse_buttons,
     read_remote,
     write_remote,
@@ -53,3 +54,10 @@ def test_buttons_pressed_together_are_named() -> None:
     assert parse_buttons("L2 + B", "bridge.stop") == {"L2", "B"}
     with pytest.raises(ConfigError, match=r"bridge\.stop: got 'L3', expected buttons of R1, L1"):
         parse_buttons("L3", "bridge.stop")
+
+
+@given(st.frozensets(st.sampled_from(BUTTONS)), st.frozensets(st.sampled_from(BUTTONS)))
+def test_buttons_are_pressed_together(pressed: frozenset[str], wanted: frozenset[str]) -> None:
+    packet = write_remote(RemoteReading(True, pressed))
+    assert are_pressed(packet, wanted) == (wanted <= pressed)
+    assert are_pressed(packet, wanted) == (wanted <= read_remote(packet).pressed)
