@@ -17,6 +17,7 @@ class RobotDriver(Protocol):
         period_ms: between two of its states that are used, and two commands.
         counters: packets by what became of them; "received" those that are good and new.
         own_guards: guards of this bridge, which are no other writers.
+        released: the robot's own controller that has let go of the motors; "" if none had to.
     """
 
     servo: int
@@ -24,6 +25,7 @@ class RobotDriver(Protocol):
     period_ms: int
     counters: Counter[str]
     own_guards: int
+    released: str
 
     def receive(self) -> RobotReport | None:
         """The newest report that has come since the last call; None if there is none."""

@@ -48,7 +48,7 @@ class Go2Driver:
         self._commands_topic = commands
         self._commands: StructWriter | None = None
         self.period_ms = config.period_ms or self.packets_ms
-        self.own_guards = 0
+        self.own_guards, self.released = 0, ""
         if guards:
             self._open_commands()
         self._switcher = RpcEnd(self._participant, rpc.MOTION_SWITCHER, serves=False)
@@ -77,6 +77,23 @@ class Go2Driver:
         own = self.own_guards + (self._commands is not None)
         return max(0, self._participant.writers_seen_by(self._witness.handle) - own)
 
+    def give_back(self, controller: str) -> None:
+        """Have one of the robot's own controllers take the motors, until it says that it has.
+
+        Args:
+            controller: its name, as `released` had it.
+
+        Raises:
+            BridgeError: it does not.
+        """
+        self._call(self._switcher, rpc.SELECT_MODE, {"name": controller})
+        deadline = monotonic() + _LETTING_GO
+        while (name := self._motion_mode()) != controller:
+            if monotonic() > deadline:
+                expected = f"{controller!r}, which it is asked for"
+                raise BridgeError("the robot's own controller", repr(name), expected)
+            sleep(0.5)
+
     def take_over(self) -> None:
         """Ask the motion controller to lie down and let go, until the robot says that it has.
 
@@ -88,6 +105,7 @@ class Go2Driver:
             if monotonic() > deadline:
                 cause = "switch it off in the app; is the firmware old?"
                 raise BridgeError("the robot's own controller", name, "to let go", cause)
+            self.released = name
             self._call(self._sport, rpc.STAND_DOWN, {})
             self._call(self._switcher, rpc.RELEASE_MODE, {})
             sleep(0.5)

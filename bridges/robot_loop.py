@@ -145,6 +145,11 @@ class RobotLoop:
             BridgeError: it does not let go.
         """
         self._driver.take_over()
+        if released := self._driver.released:
+            self._say(
+                f"{self._name}: its own controller {released!r} has let go of the motors; "
+                f"--restore {released} gives them back"
+            )
         self._in_charge = True
         self._stall()
 

@@ -39,7 +39,7 @@ class UdpDriver:
         self._tick: int | None = None
         self._older = 0
         self.period_ms = config.period_ms or self.packets_ms
-        self.own_guards = 0
+        self.own_guards, self.released = 0, ""
         self.counters: Counter[str] = Counter()
 
     def receive(self) -> RobotReport | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from quadriga.commands.command import AddCommand, Given
+from quadriga.commands.command import AddCommand, Given, say
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ConfigError
 
@@ -24,6 +24,11 @@ def add(add_command: AddCommand) -> None:
         action="store_true",
         help="the robot hangs: move each joint a little, and judge it; without a team",
     )
+    command.add_argument(
+        "--restore",
+        metavar="NAME",
+        help="Go2: give the motors back to its own controller, such as normal; it may stand up",
+    )
 
 
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
@@ -40,12 +45,33 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     if arguments.driver not in (None, team.robot):
         cause = "team.robot says what the team is made of"
         raise ConfigError("--driver", repr(arguments.driver), repr(team.robot), cause)
+    for name, given, cause in (
+        ("--test-joints", arguments.test_joints, "it moves the joints: hang the robot up first"),
+        ("--restore", arguments.restore, "the robot may stand up: keep away from it"),
+    ):
+        if given and not arguments.armed:
+            raise ConfigError(name, "no --armed", "--armed with it", cause)
+    if arguments.restore:
+        return _restore(config, arguments.robot, arguments.restore)
     if arguments.test_joints:
-        if not arguments.armed:
-            cause = "it moves the joints: hang the robot up first"
-            raise ConfigError("--test-joints", "no --armed", "--armed with it", cause)
         return _test_joints(config, arguments.robot)
     process.run(config, partial(build_bridge, armed=arguments.armed), arguments.robot)
+    return 0
+
+
+def _restore(config: Config, name: str, controller: str) -> int:
+    from quadriga.bridges.bridge import bridge_of
+    from quadriga.bridges.go2_driver import Go2Driver
+
+    if config.team.robot != "go2":
+        cause = "A1 and Go1: switch it off and on again"
+        raise ConfigError("--restore", f"a team of {config.robot.title}", "of Go2", cause)
+    driver = Go2Driver(bridge_of(config, name))
+    try:
+        driver.give_back(controller)
+    finally:
+        driver.close()
+    say(f"robot {name}: its own controller {controller!r} has the motors")
     return 0
 
 

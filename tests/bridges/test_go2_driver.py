@@ -83,7 +83,7 @@ def test_the_robots_own_controller_lets_go_and_commands_arrive(
     living: LivingRobot, driver: Go2Driver
 ) -> None:
     driver.take_over()
-    assert living.robot.controller == ""
+    assert (living.robot.controller, driver.released) == ("", "normal")
     targets = holding(config_of("go2"), mode=np.full(12, ON, np.uint8), tau=np.arange(12.0))
 
     def arrived() -> bool:
@@ -94,6 +94,18 @@ def test_the_robots_own_controller_lets_go_and_commands_arrive(
     assert living.command is not None
     np.testing.assert_allclose(living.command.tau, np.arange(12.0))
     assert driver.other_writers() == 0
+    driver.give_back(driver.released)
+    assert living.robot.controller == "normal"
+    wait_until(lambda: living.command is None)
+
+
+def test_a_controller_that_the_robot_does_not_have_is_named(
+    driver: Go2Driver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("quadriga.bridges.go2_driver._LETTING_GO", 0.2)
+    expected = r"own controller: got 'normal', expected 'dance', which it is asked for"
+    with pytest.raises(BridgeError, match=expected):
+        driver.give_back("dance")
 
 
 def test_a_second_writer_is_seen_and_refused(living: LivingRobot, driver: Go2Driver) -> None:

@@ -116,7 +116,7 @@ class Script:
     """A driver whose robot speaks at given milliseconds of the bridge."""
 
     servo, packets_ms, period_ms = SERVO, 2, 2
-    own_guards = 0
+    own_guards, released = 0, ""
 
     def __init__(self, speaks: Iterator[bool]) -> None:
         self._speaks, self._tick, self._spoken = speaks, 0, False
