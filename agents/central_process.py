@@ -24,7 +24,7 @@ from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.collector import end_collection
-from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.codes import code_of
@@ -62,6 +62,7 @@ def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None
         take_priority(config.runtime.priority)
         bus.declare(READY)
         shell.work(stopped)
+        leave_priority()
 
 
 class _CentralShell:

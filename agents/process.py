@@ -20,7 +20,7 @@ from quadriga.shared.members import has_lead
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.collector import end_collection
-from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import State
@@ -62,6 +62,7 @@ def run(
         take_priority(config.runtime.priority)
         bus.declare(READY)
         shell.walk(stopped)
+        leave_priority()
 
 
 class _Shell:

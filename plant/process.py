@@ -20,7 +20,7 @@ from quadriga.shared.members import plant_name
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.collector import end_collection
-from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import decode
@@ -74,6 +74,7 @@ def run(
                 server.announce(end.code, "", end.detail)
         finally:
             plant.finish()
+            leave_priority()
     _check_end(time.end, team)
 
 

@@ -13,7 +13,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, MessageError
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import decode, encode, truncate_text
 from quadriga.shared.wire.envelope import envelope
@@ -78,6 +78,7 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
                 put(encode(reference_at(config, EPOCH_MS * epoch)))
                 epoch += 1
             if over or stopped():
+                leave_priority()
                 return
             bus.declare(READY)
             tick, over = _next_tick(bus, tick)

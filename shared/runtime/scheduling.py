@@ -36,3 +36,14 @@ def take_priority(priority: str) -> bool:
         )
         return False
     return True
+
+
+def leave_priority() -> None:
+    """Schedule all threads of this process as ordinary ones: its work is done.
+
+    What it still does, to leave, must not hold up others, such as bridges that lay a robot down.
+    """
+    with suppress(OSError):
+        for thread in Path("/proc/self/task").iterdir():
+            with suppress(ProcessLookupError):
+                os.sched_setscheduler(int(thread.name), os.SCHED_OTHER, os.sched_param(0))

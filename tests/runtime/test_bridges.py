@@ -13,12 +13,16 @@ from typing import Any
 
 import pytest
 
+from quadriga.shared import members
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.messages import Event, Measurement
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import EStop, Event, Measurement
+from quadriga.shared.wire.topics import ESTOP
 from quadriga.team.endpoint import free_endpoint
 from tests.bridges.test_udp_driver import HOST, free_port
 from tests.runtime.conftest import WAIT
@@ -38,7 +42,7 @@ PATIENT: dict[str, Any] = {
 pytestmark = pytest.mark.usefixtures("_compiled")
 
 
-@pytest.fixture(params=["a1", "go2"])
+@pytest.fixture
 def config(request: pytest.FixtureRequest) -> Config:
     """A robot on this machine's loopback."""
     return load(
@@ -93,32 +97,58 @@ def modes_of(recording: Recording) -> list[str]:
     return [e.detail for e in recording.messages(Event) if e.code == "bridge-mode"]
 
 
+@pytest.mark.parametrize("config", ["a1"], indirect=True)
 def test_a_robot_stands_up_walks_and_lies_down_through_its_own_protocol(
     file: Path, robots: subprocess.Popen[bytes], tmp_path: Path
 ) -> None:
     out = tmp_path / "run"
     done = walk(file, out, "--armed")
     said = (out / "logs" / "plant_r1.log").read_text(encoding="utf-8")
-    ways = ["r1: standing-up", "r1: standing", "r1: walking"]
+    ways = ["r1: standing-up", "r1: weighing", "r1: feet calibrated", "r1: walking"]
     # Where a busy machine gives it too little time it stops, with a reason: a good end, too.
     stopped = "r1: stopped " in said or "r1 stopped" in done.stdout
-    ways += [] if "r1: stopped " in said else ["r1: lying-down", "r1: limp"]
-    assert [line for line in ways if line in said] == ways, said
+    ways += [] if "r1: stopped " in said else ["r1: lying-down", "r1: letting-go", "r1: limp"]
+    assert [way for way in ways if way in said] == ways, said
     assert stopped or done.returncode == 0, done.stdout + done.stderr
     recording = Recording(out / "run.mcap")
-    assert modes_of(recording) == ["walking"]
+    told = [mode.partition(",")[0] for mode in modes_of(recording)]
+    assert told == ["standing-up", "standing", "weighing", "standing", "walking"]
     if not stopped:
         assert max(m.y[1] for m in recording.messages(Measurement, "r1")) > 0.3, "it walks"
-    replay = subprocess.run(
-        [*QUADRIGA, "replay", str(out), "--all"],
-        capture_output=True,
-        text=True,
-        timeout=WAIT,
-        check=False,
-    )
-    assert replay.returncode == 0, replay.stdout + replay.stderr
+    assert replay_all(out) == ""
     robots.terminate()
     assert robots.wait(WAIT) == 0
+
+
+def replay_all(out: Path) -> str:
+    """What differs when all agents are replayed."""
+    command = [*QUADRIGA, "replay", str(out), "--all"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT, check=False)
+    return "" if done.returncode == 0 else done.stdout + done.stderr
+
+
+@pytest.mark.usefixtures("robots")
+@pytest.mark.parametrize("config", ["go2"], indirect=True)
+def test_a_bridge_hears_the_emergency_stop_whatever_its_agent_does(
+    config: Config, file: Path, tmp_path: Path
+) -> None:
+    out, log = tmp_path / "run", tmp_path / "robots.log"
+    command = [*QUADRIGA, "walk", "--config", str(file), "--out", str(out), "--no-render"]
+    command += ["--armed", "--seconds", "60"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as walking:
+        said = out / "logs" / "plant_r1.log"
+        wait_until(lambda: said.is_file() and "r1: walking" in said.read_text(encoding="utf-8"))
+        agent = process_of(out / "config.toml", "agent")
+        with Bus.open(config.bus, config.team.name, members.ESTOP) as bus:
+            put = bus.publisher(ESTOP.key(config.team.name))
+            wait_until(lambda: "r1" in bus.members_at(HERE))
+            os.kill(agent, signal.SIGSTOP)
+            put(encode(EStop(0, 0, "dog")))  # long before the agent's silence stops the robot
+        wait_until(lambda: "r1: stopped " in said.read_text(encoding="utf-8"))
+        wait_until(lambda: "motors off" in log.read_text(encoding="utf-8").splitlines()[-1])
+        os.kill(agent, signal.SIGKILL)
+        walking.terminate()
+    assert "r1: stopped estop:dog" in said.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("config", ["a1"], indirect=True)

@@ -10,11 +10,13 @@ import pytest
 
 _SCRIPT = """
 import os, sys, threading
-from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 if sys.argv[2] == "deny":
     os.setuid(65534)
 threading.Thread(target=threading.Event().wait, daemon=True).start()
 taken = take_priority(sys.argv[1])
+if sys.argv[2] == "leave":
+    leave_priority()
 policies = {os.sched_getscheduler(int(task)) for task in os.listdir("/proc/self/task")}
 print(taken, policies == {os.SCHED_RR}, policies == {os.SCHED_OTHER})
 """
@@ -38,6 +40,11 @@ def permitted() -> bool:
 @pytest.mark.skipif(not permitted(), reason="this user may not schedule in real time")
 def test_all_threads_are_scheduled_in_real_time() -> None:
     assert answer("realtime", "") == (["True", "True", "False"], "")
+
+
+@pytest.mark.skipif(not permitted(), reason="this user may not schedule in real time")
+def test_who_leaves_is_ordinary_again() -> None:
+    assert answer("realtime", "leave") == (["True", "False", "True"], "")
 
 
 def test_ordinary_is_ordinary() -> None:
