@@ -14,4 +14,4 @@ def test_no_packet_is_an_exception_or_a_torque_beyond_limits(kind: str) -> None:
     assert counts["commands"] == 3000
     assert 1000 < counts["accepted"] < 2400, "forged ones are obeyed, damaged ones are not"
     for mode in BridgeMode:
-        assert mode is BridgeMode.DRY or counts[mode] >= 10, counts
+        assert mode is BridgeMode.DRY or counts[mode] >= 3, counts
