@@ -86,7 +86,7 @@ class _Shell:
         """Answer every state until the walk is over."""
         memory = self._agent.initial()
         while not (stopped() or self._inbox.ended):
-            self._receive(POLL)
+            self._receive(0.0 if self._inbox.has_state else POLL)
             state = self._inbox.pop_state()
             if state is not None:
                 memory = self._answer(memory, state)

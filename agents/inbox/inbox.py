@@ -90,6 +90,7 @@ class Inbox:
         self._step_ms = step_ms(config)
         self._now = -1  # tick of the newest state
         self._state: State | None = None
+        self._sample_end: State | None = None  # older than `_state`
         self._estop: EStop | None = None
 
     @property
@@ -147,16 +148,30 @@ class Inbox:
             self._newest[source] = max(self._newest.get(source, _NEVER), order_of(message))
 
     def _keep_newest(self, state: State) -> None:
-        older = state.tick <= self._now
-        if older or self._state is not None:
+        if state.tick <= self._now:
             self.counters["states_passed_over"] += 1
-        if older:
             self.misfits += 1
-        else:
-            self._state, self._now, self.misfits = state, state.tick, 0
+            return
+        passed = self._state
+        if passed is not None and passed.tick % SAMPLE_MS == 0:
+            passed, self._sample_end = self._sample_end, passed
+        if passed is not None:
+            self.counters["states_passed_over"] += 1
+        self._state, self._now, self.misfits = state, state.tick, 0
+
+    @property
+    def has_state(self) -> bool:
+        """Whether there is a state to answer."""
+        return self._state is not None
 
     def pop_state(self) -> State | None:
-        """The newest state, once; ticks only rise."""
+        """The newest state, once; before it that at which a sample ends, if it was passed over.
+
+        Ticks only rise. A missing sample would leave the planner without a window for long.
+        """
+        if self._sample_end is not None:
+            passed, self._sample_end = self._sample_end, None
+            return passed
         state, self._state = self._state, None
         return state
 

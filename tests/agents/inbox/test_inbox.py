@@ -90,6 +90,21 @@ def test_the_newest_state_counts_and_the_others_are_counted() -> None:
     assert box.pop_state() is None
 
 
+def test_the_state_at_which_a_sample_ends_is_not_passed_over() -> None:
+    box = arrivals()
+    feed(box, *(("r2/state", standing(tick)) for tick in (9, 10, 11, 12)))
+    ticks = []
+    while box.has_state:
+        state = box.pop_state()
+        assert state is not None
+        ticks.append(state.tick)
+    assert ticks == [10, 12]
+    assert box.counters["states_passed_over"] == 2
+    feed(box, *(("r2/state", standing(tick)) for tick in (20, 21, 30, 31)))
+    late = [box.pop_state(), box.pop_state(), box.pop_state()]
+    assert [state and state.tick for state in late] == [30, 31, None]
+
+
 def test_of_states_in_any_order_the_newest_counts_and_none_before_it() -> None:
     for order in permutations((4, 5, 6)):
         box = arrivals()
