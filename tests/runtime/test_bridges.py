@@ -145,7 +145,7 @@ def test_a_bridge_hears_the_emergency_stop_whatever_its_agent_does(
             os.kill(agent, signal.SIGSTOP)
             put(encode(EStop(0, 0, "dog")))  # long before the agent's silence stops the robot
         wait_until(lambda: "r1: stopped " in said.read_text(encoding="utf-8"))
-        wait_until(lambda: "motors off" in log.read_text(encoding="utf-8").splitlines()[-1])
+        wait_until(lambda: motors_of(log)[-1] == "motors off")
         os.kill(agent, signal.SIGKILL)
         walking.terminate()
     assert "r1: stopped estop:dog" in said.read_text(encoding="utf-8")
@@ -194,17 +194,22 @@ def test_a_bridge_that_dies_or_hangs_leaves_a_robot_that_is_damped_and_then_limp
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as walking:
         said = out / "logs" / "plant_r1.log"
         wait_until(lambda: said.is_file() and "r1: walking" in said.read_text(encoding="utf-8"))
-        assert "motors driven" in log.read_text(encoding="utf-8").splitlines()[-1]
+        assert motors_of(log)[-1] == "motors driven"
         bridge = process_of(out / "config.toml", "bridge", "--armed")
         os.kill(bridge, number)
-        wait_until(lambda: "motors off" in log.read_text(encoding="utf-8").splitlines()[-1])
-        last = [line.partition("r1 ")[2] for line in log.read_text(encoding="utf-8").splitlines()]
-        assert last[-3:] == ["motors driven", "motors damped", "motors off"]
+        wait_until(lambda: motors_of(log)[-1] == "motors off")
+        assert motors_of(log)[-3:] == ["motors driven", "motors damped", "motors off"]
         wait_until(lambda: guards() <= before)  # it leaves by itself
         if number is signal.SIGSTOP:
             os.kill(bridge, signal.SIGCONT)
             wait_until(lambda: "r1: stopped " in said.read_text(encoding="utf-8"))
         walking.terminate()
+
+
+def motors_of(log: Path) -> list[str]:
+    """What the simulated robots have said of the motors of r1."""
+    said = (line.partition("r1 ")[2] for line in log.read_text(encoding="utf-8").splitlines())
+    return [text for text in said if text.startswith("motors ")]
 
 
 def wait_until(happens: Callable[[], bool]) -> None:
