@@ -28,10 +28,10 @@ def add(add_command: AddCommand) -> None:
 
 
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
-    """Walk; 1 if a robot that nothing was done to fell."""
+    """Walk; 1 if there was no walk, or a robot fell that nothing was done to."""
     from rich.console import Console
 
-    from quadriga.desk.campaign import named_faults, run_campaign
+    from quadriga.desk.campaign import has_failed, named_faults, run_campaign
     from quadriga.desk.tables import build_fault_table, build_walk_table
     from quadriga.team.run_folder import make_run_dir
 
@@ -56,4 +56,4 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
         if table.row_count:
             console.print(table)
     console.print(f"folder: {folder}", markup=False, highlight=False)
-    return int(any(set(row.get("fell", ())) - {row.get("robot")} for row in rows))
+    return int(any(map(has_failed, rows)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Final
 
@@ -60,21 +61,25 @@ def run_campaign(
     Raises:
         ConfigError: the folder cannot be written to.
     """
-    with name_file_errors(ConfigError, f"--out {folder}", "a folder that can be written to"):
+    with _written_to(folder):
         folder.mkdir(parents=True, exist_ok=True)
         rows = read_rows(folder)
-        known = {(row["fault"], row["seed"]) for row in rows}
-        warm_up(config, console)
-        if find_kind(config.planner.kind).needs_predictor:
-            ensure_predictor(config, console)
-        todo = [t for t in _trials(faults, seeds, compare=compare) if t[:2] not in known]
-        for number, (name, seed, fault) in enumerate(todo, start=1):
-            row = _walk(config, name, seed, fault, folder / f"{name}-{seed}")
-            rows.append(row)
-            with (folder / ROWS).open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row, ensure_ascii=False) + "\n")
-            console.print(f"{number}/{len(todo)} {name} {seed}: {describe_row(row)}", markup=False)
+    known = {(row["fault"], row["seed"]) for row in rows}
+    warm_up(config, console)
+    if find_kind(config.planner.kind).needs_predictor:
+        ensure_predictor(config, console)
+    todo = [t for t in _trials(faults, seeds, compare=compare) if t[:2] not in known]
+    for number, (name, seed, fault) in enumerate(todo, start=1):
+        row = _walk(config, name, seed, fault, folder / f"{name}-{seed}")
+        rows.append(row)
+        with _written_to(folder), (folder / ROWS).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row, ensure_ascii=False) + "\n")
+        console.print(f"{number}/{len(todo)} {name} {seed}: {describe_row(row)}", markup=False)
     return rows
+
+
+def _written_to(folder: Path) -> AbstractContextManager[None]:
+    return name_file_errors(ConfigError, f"--out {folder}", "a folder that can be written to")
 
 
 def _trials(
@@ -104,6 +109,11 @@ def read_rows(folder: Path) -> list[dict[str, Any]]:
     if not path.is_file():
         return []
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def has_failed(row: dict[str, Any]) -> bool:
+    """Whether there was no walk, or a robot fell that nothing was done to."""
+    return "error" in row or bool(set(row["fell"]) - {row.get("robot")})
 
 
 def describe_row(row: dict[str, Any]) -> str:

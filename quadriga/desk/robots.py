@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -43,6 +44,7 @@ class SimulatedRobots:
         self._log, self.truth = folder / "robots.log", folder / "truth.csv"
         command = [sys.executable, "-m", "quadriga", "sim", "--as", kind]
         command += ["--config", str(config_file), "--truth", str(self.truth)]
+        command += ["--parent", str(os.getpid())]
         with self._log.open("wb") as log:
             self._process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=log, stderr=subprocess.STDOUT

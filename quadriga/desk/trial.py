@@ -97,8 +97,10 @@ class _Trial:
         if not self._robots.wait_until(self._all_walk, _START_S):
             raise ProcessError("the team", self._last_words(), f"a walk within {_START_S:g} s")
         self._begun = self._robots.order("all clear")
-        after = random.uniform(_EARLIEST_S, _LATEST_S) if self._fault is not NO_FAULT else 0.0
-        self._patient = self._fault.robot or self._names[random.integers(len(self._names))]
+        after = 0.0
+        if self._fault is not NO_FAULT:
+            after = random.uniform(_EARLIEST_S, _LATEST_S)
+            self._patient = self._fault.robot or self._names[random.integers(len(self._names))]
         self._robots.wait_until(lambda: False, after)
         self._since = self._robots.order("all clear")
         if early := [name for name in self._names if self._modes(name)[-1] != _WALKS]:

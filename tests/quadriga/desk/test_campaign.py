@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from quadriga.desk.campaign import ROWS, named_faults, read_rows
+from quadriga.desk.campaign import ROWS, has_failed, named_faults, read_rows
 from quadriga.desk.faults import FAULTS, NO_FAULT
 from quadriga.desk.tables import build_fault_table, build_walk_table
 from quadriga.shared.errors import ConfigError
@@ -91,3 +91,11 @@ def test_rows_are_kept_for_later(tmp_path: Path) -> None:
     assert read_rows(tmp_path) == []
     (tmp_path / ROWS).write_text(json.dumps(row("none", 1)) + "\n", encoding="utf-8")
     assert read_rows(tmp_path) == [row("none", 1)]
+
+
+def test_a_fall_that_nobody_caused_and_a_walk_that_did_not_begin_are_failures() -> None:
+    assert not has_failed(row("none", 1, robot=""))
+    assert has_failed(row("none", 1, robot="", fell=["r1"]))
+    assert has_failed(row("remote-stop", 1, robot="r2", fell=["r1", "r2"]))
+    assert not has_failed(row("remote-stop", 1, robot="r2", fell=["r2"]))
+    assert has_failed({"fault": "none", "seed": 1, "error": "the team: got nothing"})
