@@ -40,7 +40,7 @@ lint: $(TOOLS)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# A million damaged packets through the bridges of every kind of robot; some eight minutes.
+# A million damaged packets through the bridges of every kind of robot; some six minutes.
 fuzz: $(TOOLS)
 	$(BIN)/python -m tests.bridges.fuzz $(ARGS)
 
