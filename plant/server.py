@@ -20,7 +20,7 @@ from quadriga.shared.wire.codec import encode, truncate_text
 from quadriga.shared.wire.messages import Clock, Command, Event, Status
 from quadriga.shared.wire.topics import CLOCK, EVENT, STATE, STATUS, TRUTH
 
-FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first fall
+FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first simulated fall
 
 
 class PlantServer:
@@ -121,7 +121,9 @@ class PlantServer:
     def _note_fall(self, event: Event) -> None:
         if event.code in codes.DOWN:
             self._fallen.add(event.robot)
-            self._last_tick = min(self._last_tick, event.tick + FALL_LINGER_MS)
+            # A robot that a bridge has stopped sinks: those yoked to it may not walk on.
+            linger = FALL_LINGER_MS if event.code == codes.FALL else 0
+            self._last_tick = min(self._last_tick, event.tick + linger)
 
     def _report_malformed(self, *, at_once: bool = False) -> None:
         """Announce malformed commands, once in a second of world time at most unless `at_once`."""

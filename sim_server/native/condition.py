@@ -51,6 +51,8 @@ class RobotCondition:
         self._idle_at: int | None = None  # tick
         self.off = False
         self._protected = list[int]()  # motors that have switched themselves off
+        self._asked: MotorTargets | None = None  # of what the motors follow
+        self._followed: Command | None = None
 
     def switch_on(self, now: int) -> None:
         """Switch it on, and have its counter begin anew."""
@@ -65,6 +67,7 @@ class RobotCondition:
     def protect(self, joint: int) -> None:
         """Have a motor switch itself off until all is cleared; its index in `JOINT_NAMES`."""
         self._protected.append(joint)
+        self._asked = None
 
     def press(self, buttons: frozenset[str], until: int | None) -> None:
         """Press these buttons of the remote control alone, until a tick, ms; None: for good."""
@@ -78,6 +81,7 @@ class RobotCondition:
         """Be as it was when it was switched on; its counters go on."""
         self.switch_on(now)
         self._protected.clear()
+        self._asked = None
         self.set_charge(FULL, now)
         self.press(frozenset(), None)
 
@@ -113,7 +117,15 @@ class RobotCondition:
 
     def command(self, targets: MotorTargets | None) -> Command | None:
         """What the world's motors do under a robot's command; None if all are off."""
-        if self.off or targets is None or not (on := targets.mode != OFF).any():
+        if self.off or targets is None:
+            return None
+        if targets is not self._asked:
+            self._asked, self._followed = targets, self._followed_by(targets)
+        return self._followed
+
+    def _followed_by(self, targets: MotorTargets) -> Command | None:
+        on = targets.mode != OFF
+        if not on.any():
             return None
         if self._protected:
             on[self._protected] = False

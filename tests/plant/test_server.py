@@ -79,20 +79,19 @@ def test_in_real_time_nothing_but_the_end_waits_for_who_does_not_listen(mode: st
 
 
 class BlindPlant(Plant):
-    """One robot that stands, or falls at the first tick; nobody knows where it is."""
+    """One robot that stands, or is down at the first tick; nobody knows where it is."""
 
     names: tuple[str, ...] = ("r1",)
 
-    def __init__(self, *, falls: bool = False) -> None:
-        self.tick, self._falls = 0, falls
+    def __init__(self, down: str = "") -> None:
+        self.tick, self._down = 0, down
 
     def states(self) -> dict[str, State]:
         return {"r1": State.from_row(self.tick, self.tick * 1_000_000, np.zeros(50))}
 
     def step(self, commands: Mapping[str, Command]) -> list[Event]:
         self.tick += 1
-        fell = self._falls and self.tick == 1
-        return [Event(1, 1_000_000, "fall", "r1", "", "fall")] if fell else []
+        return [Event.of(1, self._down, "r1", "")] if self._down and self.tick == 1 else []
 
     def truth(self) -> None:
         return None
@@ -101,10 +100,14 @@ class BlindPlant(Plant):
         pass
 
 
-@pytest.mark.parametrize("falls", [False, True])
-def test_any_plant_is_served(falls: bool) -> None:
+@pytest.mark.parametrize(
+    ("down", "last"),
+    [("", 2000), (codes.FALL, 1 + FALL_LINGER_MS), (codes.ROBOT_STOPPED, 1)],
+    ids=["stands", "falls", "stopped"],
+)
+def test_any_plant_is_served(down: str, last: int) -> None:
     config, listener = configured(seconds=2.0), Listener()
-    server = PlantServer(config, BlindPlant(falls=falls), cast("Bus", listener))
+    server = PlantServer(config, BlindPlant(down), cast("Bus", listener))
     end = None
     while end is None:
         server.publish()
@@ -114,5 +117,5 @@ def test_any_plant_is_served(falls: bool) -> None:
     clock = [decode(p, Clock).tick for key, _, p in listener.packets if key == CLOCK.key("team")]
     assert clock == list(range(0, server.plant.tick, 10))
     fallen, over = (codes.FALLEN, "fall of r1"), (codes.TIME_OVER, "end of world.seconds")
-    assert end == (fallen if falls else over)
-    assert server.plant.tick == (1 + FALL_LINGER_MS if falls else 2000)
+    assert end == (fallen if down else over)
+    assert server.plant.tick == last
