@@ -12,14 +12,19 @@ import numpy as np
 from rich.console import Console
 
 from quadriga.desk.faults import BY_NAME, NO_FAULT, Fault
+from quadriga.desk.tables import is_too_slow
 from quadriga.desk.trial import WITHOUT, run_trial, walk_without_bridges
 from quadriga.identification.predictors import ensure_predictor
+from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import departures, to_toml
 from quadriga.shared.errors import ConfigError, ProcessError, did_you_mean, name_file_errors
 from quadriga.shared.planner_kinds import find_kind
+from quadriga.team.run_folder import CONFIG
 from quadriga.warm_up import warm_up
 
 ROWS: Final = "rows.jsonl"
+_SEED: Final = "world.seed"  # differs from walk to walk
 ALL: Final = "all"
 
 
@@ -59,11 +64,12 @@ def run_campaign(
         compare: whether each seed also walks without bridges.
 
     Raises:
-        ConfigError: the folder cannot be written to.
+        ConfigError: the folder cannot be written to, or holds walks of another configuration.
     """
     with _written_to(folder):
         folder.mkdir(parents=True, exist_ok=True)
         rows = read_rows(folder)
+        keep_config(config, folder)
     known = {(row["fault"], row["seed"]) for row in rows}
     warm_up(config, console)
     if find_kind(config.planner.kind).needs_predictor:
@@ -76,6 +82,26 @@ def run_campaign(
             file.write(json.dumps(row, ensure_ascii=False) + "\n")
         console.print(f"{number}/{len(todo)} {name} {seed}: {describe_row(row)}", markup=False)
     return rows
+
+
+def keep_config(config: Config, folder: Path) -> None:
+    """Write down what all walks in a folder have in common.
+
+    Raises:
+        ConfigError: what has been walked there was configured otherwise.
+    """
+    path = folder / CONFIG
+    if not path.is_file():
+        path.write_text(to_toml(config, without=(_SEED,)), encoding="utf-8")
+        return
+    changed = {name: (new, old) for name, new, old, _ in departures(config, load(path))}
+    changed.pop(_SEED, None)
+    for name, (new, old) in changed.items():
+        raise ConfigError(
+            f"--out {folder}",
+            f"walks with {name} = {old!r}, not {new!r}",
+            "a new folder, or the same configuration",
+        )
 
 
 def _written_to(folder: Path) -> AbstractContextManager[None]:
@@ -121,6 +147,8 @@ def describe_row(row: dict[str, Any]) -> str:
     if "error" in row:
         return f"no walk: {row['error'].splitlines()[0]}"
     parts = [f"fell: {', '.join(row['fell']) or 'none'}"]
+    if is_too_slow(row):
+        parts.insert(0, f"this computer kept {100 * row['kept']:.0f} % of real time")
     if row.get("figures"):
         speed = np.mean([figures.get("vx", np.nan) for figures in row["figures"].values()])
         parts.append(f"{speed:.2f} m/s")

@@ -13,8 +13,10 @@ import numpy as np
 from quadriga.desk.robots import Said
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Truth
+from quadriga.sim_server.native.news import LOST
 
 FELL: Final = 0.8  # rad, tilt of a trunk: a robot that lies down or sinks stays flatter
+_SECOND: Final = 1000  # ms
 _AT_REST: Final = ("motors damped", "motors off")
 
 
@@ -89,6 +91,20 @@ def time_to_rest(said: Sequence[Said], robot: str, since: int) -> int | None:
         if line.ms >= since and line.text in {f"{robot} {state}" for state in _AT_REST}:
             return line.ms - since
     return None
+
+
+def time_kept(said: Sequence[Said], begin: int, end: int) -> float:
+    """Share of real time that the simulated robots kept, 0 … 1; a real one always keeps it.
+
+    Args:
+        said: by their process.
+        begin: of the walk, their ms.
+        end: of it, their ms.
+    """
+    until = end + _SECOND  # a second's loss is told at its end
+    lines = (line.text for line in said if begin < line.ms <= until and line.text.endswith(LOST))
+    lost = sum(int(text.split()[0]) for text in lines)
+    return round((end - begin) / max(end - begin + lost, 1), 4)
 
 
 def describe_walk(trace: TrunkTrace, begin: float, end: float) -> Mapping[str, Any]:

@@ -14,7 +14,14 @@ import numpy as np
 from rich.console import Console
 
 from quadriga.desk.faults import AGENT, GUARD, NO_FAULT, PLANT, ROUTER, Fault
-from quadriga.desk.outcome import FELL, describe_walk, read_truth, time_to_rest, traces_of
+from quadriga.desk.outcome import (
+    FELL,
+    describe_walk,
+    read_truth,
+    time_kept,
+    time_to_rest,
+    traces_of,
+)
 from quadriga.desk.robots import SimulatedRobots
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.recordings.readable import open_readable
@@ -122,7 +129,9 @@ class _Trial:
         self._robots.wait_until(self._all_off, _AFTER_S)
         said = self._robots.said()
         rest = {name: time_to_rest(said, name, self._since) for name in self._names}
-        return {"rest_ms": rest}
+        first = min((ms for ms in rest.values() if ms is not None), default=None)
+        end = said[-1].ms if first is None else self._since + first
+        return {"rest_ms": rest, "kept": time_kept(said, self._begun, end)}
 
     def describe(self) -> dict[str, Any]:
         """What the robots did, and what was said of it."""

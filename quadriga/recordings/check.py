@@ -34,7 +34,7 @@ def check(path: Path) -> list[Finding]:
     filtered = "topics" in source.metadata or "exclude" in source.metadata
     schema = Finding("schema", "messages")
     checks: tuple[Check, ...] = (
-        Order(),
+        Order(config),
         Gaps(config, filtered=filtered),
         Delay(config, whole=error is None),
         Friction(config),

@@ -37,6 +37,7 @@ class Rate:
 
     Attributes:
         overruns: turns that began late by more than one period.
+        lost: by how much the schedule has been moved in all, s.
     """
 
     def __init__(
@@ -48,7 +49,7 @@ class Rate:
     ) -> None:
         self._period, self._now, self._pause, self._slack = period, now, pause, slack
         self._next = now()
-        self.overruns = 0
+        self.overruns, self.lost = 0, 0.0
 
     def wait(self) -> float:
         """Wait for the next turn and return how late it begins, in seconds."""
@@ -60,5 +61,7 @@ class Rate:
         if late > self._period:
             self.overruns += 1
         if late > self._slack * self._period:
-            self._next = self._now()
+            now = self._now()
+            self.lost += now - self._next
+            self._next = now
         return late

@@ -18,11 +18,13 @@ from quadriga.sim_server.world.layout import JOINT_RATES, NQ, NV, POSE
 from quadriga.sim_server.world.world import World
 
 OFF, DAMPED, DRIVEN = "motors off", "motors damped", "motors driven"
+LOST: Final = "behind real time in a second: this computer is too slow"
 LASTS_MS: Final = 20  # for which motors do something before it is told
 _BRAKING: Final = 3.0  # N·m by which a damping motor's torque may differ from what brakes
 _STANDS: Final = 0.75  # share of the height of its stand
 _UPRIGHT: Final = math.cos(0.5)  # of the tilt of one that stands
 _STANDS_MS: Final = 200  # for which it does
+_SECOND: Final = 1000  # ms
 _LOOK_MS: Final = 10  # between two looks at one that does not
 _FALLEN: Final = math.cos(1.0)  # of the tilt of one that has fallen, as the world has it
 _LOW: Final = 0.12  # m, trunk above the ground, of one that is down, as the world has it
@@ -76,6 +78,28 @@ class MotorNews:
             return ""
         self._told = self._doing
         return f"{self._since} ms: {{name}} {self._doing}"
+
+
+class LostTime:
+    """Tells once a second how much behind real time robots fell that this computer is too slow for.
+
+    What they then do says nothing of robots, which never wait.
+    """
+
+    def __init__(self) -> None:
+        self._told = 0.0
+
+    def look(self, now: int, lost: float) -> str:
+        """The news of a tick; mostly "".
+
+        Args:
+            now: tick, ms.
+            lost: real time that has been lost in all, s.
+        """
+        if now % _SECOND or (ms := round(1000.0 * (lost - self._told))) == 0:
+            return ""
+        self._told = lost
+        return f"{now} ms: {ms} ms {LOST}"
 
 
 class PostureNews:

@@ -19,7 +19,7 @@ from quadriga.shared.wire.codes import FALL
 from quadriga.sim_server.native.board import Board
 from quadriga.sim_server.native.console import Console
 from quadriga.sim_server.native.hanger import Hanger
-from quadriga.sim_server.native.news import News
+from quadriga.sim_server.native.news import LostTime, News
 from quadriga.sim_server.native.open_boards import open_boards
 from quadriga.sim_server.native.orders import parse_order
 from quadriga.sim_server.native.steering import Steering
@@ -92,7 +92,7 @@ def _serve(served: _Served, config: Config, stopped: Callable[[], bool]) -> None
     news = News(world, config.robot.stand_height, config.robot.feet_under_hips)
     end_collection()
     take_priority(config.runtime.priority)
-    rate = Rate(_TICK, slack=3.0)
+    rate, lost = Rate(_TICK, slack=3.0), LostTime()
     _say(f"{len(boards)} simulated {config.robot.title} on the network")
     while not stopped():
         if log is not None and world.tick % PERIOD_MS == 0:
@@ -110,6 +110,8 @@ def _serve(served: _Served, config: Config, stopped: Callable[[], bool]) -> None
             if event.code != FALL:  # the news has them, but for robots that have never stood
                 _say(f"{event.tick} ms: {event.kind} {event.robot} {event.detail}")
         for line in news.of_postures(served.hanger.hung):
+            _say(line)
+        if line := lost.look(world.tick, rate.lost):
             _say(line)
         world.settle()
     for line in news.rest():

@@ -10,7 +10,7 @@ from quadriga.shared.config.timing import max_ages, periods
 from quadriga.shared.members import AGENT, PLANNER
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.messages import Plan, Status
+from quadriga.shared.wire.messages import Event, Plan, Status
 from quadriga.shared.wire.topics import COMMAND, ESTOP, MEASUREMENT, STATE, TABLE
 
 _MAY_REPEAT: Final = frozenset(topic.name for topic in TABLE if topic.repeats)
@@ -21,16 +21,25 @@ _TAIL_MS: Final = 20  # a world that was stopped may end in the middle of a samp
 
 
 class Order:
-    """Ticks of one key rise; those of plans by step, then exchange."""
+    """Ticks of one key rise; those of plans by step, then exchange.
 
-    def __init__(self) -> None:
+    Events are of one key, but where each robot has a plant of its own, those of different robots
+    come from different processes, and only each robot's are in order.
+    """
+
+    def __init__(self, config: Config) -> None:
+        """Of a recording made with this configuration."""
         self.finding = Finding("order", "messages")
         self._last: dict[str, tuple[int, int]] = {}
+        self._own_plants = config.team.plants == "each"
 
     def look(self, item: CheckedMessage) -> None:
         message = item.message
         place = message.serial if isinstance(message, Plan) else (message.tick, 0)
-        last = self._last.get(item.key, (-1, 0))
+        sequence = item.key
+        if isinstance(message, Event) and self._own_plants:
+            sequence += f" of {message.robot}"
+        last = self._last.get(sequence, (-1, 0))
         self.finding.looked += 1
         if item.topic != ESTOP.name and (
             place < last or (place == last and item.topic not in _MAY_REPEAT)
@@ -39,7 +48,7 @@ class Order:
             self.finding.add_objection(
                 message.tick, item.key, f"{what} {place[0]} after {last[0]}", f"a later {what}"
             )
-        self._last[item.key] = max(place, last)
+        self._last[sequence] = max(place, last)
 
     def finish(self) -> None:
         """Nothing is left to see."""

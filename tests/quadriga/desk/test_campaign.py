@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import json
-from io import StringIO
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from rich.console import Console
 
-from quadriga.desk.campaign import ROWS, has_failed, named_faults, read_rows
+from quadriga.desk.campaign import ROWS, has_failed, keep_config, named_faults, read_rows
 from quadriga.desk.faults import FAULTS, NO_FAULT
-from quadriga.desk.tables import build_fault_table, build_walk_table
+from quadriga.desk.page import PUBLISHED, to_markdown
+from quadriga.desk.tables import build_fault_table, build_walk_table, outcome_of
+from quadriga.shared.config.load import load
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.runtime.places import SOURCE
 from quadriga.sim_server.native.orders import parse_order
+from quadriga.tables import Table
+
+THROUGH = ("bridges", "no bridges")
 
 
 def test_faults_by_name_in_the_order_of_the_table() -> None:
@@ -46,29 +51,52 @@ def row(fault: str, seed: int, **fields: Any) -> dict[str, Any]:
     }
 
 
-def text_of(table: Any) -> str:
-    out = StringIO()
-    Console(file=out, width=300).print(table)
-    return out.getvalue()
+def cells(table: Table, name: str) -> dict[str, str]:
+    """The row of this name, by heading."""
+    return next(
+        dict(zip(table.columns, line, strict=True)) for line in table.rows if line[0] == name
+    )
 
 
-def cells(text: str, first: str) -> list[str]:
-    line = next(line for line in text.splitlines() if first in line)
-    return [cell.strip() for cell in line.strip("│").split("│")]
+ON = "stop: end of world.seconds; late ticks: r1 5"
+OUTCOMES = (
+    ("walked on", {"end": ON, "said": {"r1": ["walking", "lying-down"]}, "rest_ms": {"r1": 8000}}),
+    ("lay down", {"end": "none", "said": {"r1": ["lying-down"]}, "rest_ms": {"r1": 3000}}),
+    ("damped", {"end": ON, "said": {"r1": ["walking"]}, "rest_ms": {"r1": 70}}),
+    ("still driven", {"end": "none", "said": {"r1": ["walking"]}, "rest_ms": {"r1": None}}),
+)
+
+
+@pytest.mark.parametrize(("outcome", "fields"), OUTCOMES, ids=[name for name, _ in OUTCOMES])
+def test_what_became_of_a_robot(outcome: str, fields: dict[str, Any]) -> None:
+    assert outcome_of(row("agent-killed", 1, **fields), "r1") == outcome
 
 
 def test_faults_summed_up() -> None:
-    stopped = {"r2": ["walking", "stopped command-late:51 ms"], "r1": ["walking", "limp"]}
+    said = {
+        "r2": ["walking", "stopped command-late:51 ms"],
+        "r1": ["walking", "lying-down", "limp"],
+    }
+    end = {"end": "stop: fall of r2"}
+    rests = [{"r1": 4000, "r2": 52}, {"r1": 4000, "r2": 54}]
     rows = [
-        row("agent-killed", 1, robot="r2", fell=["r1"], rest_ms={"r2": 52}, said=stopped),
-        row("agent-killed", 2, robot="r2", rest_ms={"r2": 54}, said=stopped),
+        row("agent-killed", 1, robot="r2", fell=["r1"], rest_ms=rests[0], said=said, **end),
+        row("agent-killed", 2, robot="r2", rest_ms=rests[1], said=said, **end),
         row("agent-killed", 3, error="the team: got nothing"),
         row("none", 4, robot="r1", said={}),
     ]
-    text = text_of(build_fault_table(rows))
-    expected = ["agent-killed", "3", "1", "0", "1", "2", "53", "54"]
-    assert cells(text, "agent-killed") == [*expected, "stopped command-late (2)"]
-    assert "none" not in text
+    table = build_fault_table(rows)
+    assert len(table.rows) == 1
+    found = cells(table, "agent-killed")
+    assert (found["tries"], found["no walk"], found["damped"], found["fell"]) == (
+        "3",
+        "1",
+        "2",
+        "0",
+    )
+    assert (found["ms to damping p50"], found["max"]) == ("53", "54")
+    assert (found["others lay down"], found["others fell"]) == ("2", "1")
+    assert found["its bridge's last word"] == "stopped command-late (2)"
 
 
 def test_walks_summed_up_beside_those_without_bridges() -> None:
@@ -78,13 +106,29 @@ def test_walks_summed_up_beside_those_without_bridges() -> None:
     said = {"r1": ["walking", "stopped speed:RL"]}
     rows = [
         row("none", 1, figures={"r1": figures}, late={"r1": answers}, said=said),
+        row("none", 2, figures={"r1": answers}, late={"r1": ages}, fell=["r1"], kept=0.97),
         row("without-bridges", 1, figures={"r1": figures}, late={"r1": ages}),
     ]
-    text = text_of(build_walk_table(rows))
-    assert cells(text, "│ bridges")[1:5] == ["1", "0", "0", "1"]
-    assert cells(text, "│ bridges")[5:10] == ["0.500", "10.0", "20.0", "3.00", "4.00"]
-    assert cells(text, "│ bridges")[10:] == ["1.00", "2.00", "3.00", "10.0"]
-    assert cells(text, "no bridges")[10:] == ["0.00", "1.00", "2.00", "0.0"]
+    table = build_walk_table(rows, "2 A1: ")
+    bridged, direct = (list(cells(table, f"2 A1: {name}").values()) for name in THROUGH)
+    assert bridged[1:6] == ["2", "0", "1 (1 fell)", "0", "1"]
+    assert bridged[6:11] == ["0.500", "10.0", "20.0", "3.00", "4.00"]
+    assert bridged[11:] == ["1.00", "2.00", "3.00", "10.0"]
+    assert direct[11:] == ["0.00", "1.00", "2.00", "0.0"]
+
+
+def test_a_folder_holds_walks_of_one_configuration(tmp_path: Path) -> None:
+    config = load(SOURCE / "deploy" / "desk.toml")
+    keep_config(config, tmp_path)
+    keep_config(replace(config, world=replace(config.world, seed=9)), tmp_path)
+    rough = replace(config, world=replace(config.world, terrain="boxes"))
+    with pytest.raises(ConfigError, match=r"world.terrain = 'flat', not 'boxes', expected a new"):
+        keep_config(rough, tmp_path)
+
+
+def test_the_page_is_in_step_with_the_published_rows() -> None:
+    page = SOURCE / "docs" / "desk.md"
+    assert page.read_text(encoding="utf-8") == to_markdown(SOURCE / PUBLISHED)
 
 
 def test_rows_are_kept_for_later(tmp_path: Path) -> None:

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadriga.desk.outcome import describe_walk, read_truth, time_to_rest, traces_of
+from quadriga.desk.outcome import describe_walk, read_truth, time_kept, time_to_rest, traces_of
 from quadriga.desk.robots import Said
 from quadriga.shared.wire.messages import Truth
+from quadriga.sim_server.native.news import LOST
 from quadriga.sim_server.native.truth_log import TruthLog
 
 NAMES = ("r1", "r2")
@@ -48,6 +49,13 @@ def test_the_file_of_truth_and_a_recorded_truth_are_the_same_traces(
     for read, recorded in zip(read_truth(path, NAMES).values(), traces_of(truths), strict=True):
         for field in ("ms", "xyz", "rpy", "velocity"):
             np.testing.assert_allclose(getattr(read, field), getattr(recorded, field), atol=1e-5)
+
+
+def test_the_share_of_real_time_that_was_kept() -> None:
+    said = [Said(s, f"{ms} ms {LOST}") for s, ms in ((1000, 500), (3000, 25), (5000, 75))]
+    assert time_kept(said, 1500, 2500) == pytest.approx(1000 / 1025, abs=1e-4)
+    assert time_kept(said, 3500, 3900) == 1.0
+    assert time_kept(said, 2000, 4900) == pytest.approx(2900 / 3000, abs=1e-4)
 
 
 def test_figures_of_a_steady_walk(truths: list[Truth]) -> None:

@@ -12,7 +12,8 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.recordings.check import check, format_findings
-from quadriga.recordings.checks.finding import Finding
+from quadriga.recordings.checks.finding import CheckedMessage, Finding
+from quadriga.recordings.checks.sequence import Order
 from quadriga.shared.config.sections import (
     Config,
     IdentificationConfig,
@@ -166,6 +167,21 @@ def test_every_broken_rule_is_found_at_its_message(
     assert got in first.got
     assert limit in first.limit
     assert any(first.got in line and "FAIL" not in line for line in format_findings(findings))
+
+
+@pytest.mark.parametrize("plants", ["one", "each"])
+def test_events_of_robots_with_plants_of_their_own_are_in_order_each(plants: str) -> None:
+    order = Order(replace(SHORT, team=replace(SHORT.team, plants=plants)))
+    for tick, robot in ((20, "r1"), (15, "r2"), (30, "r2")):
+        event = msg.Event.of(tick, "bridge-mode", robot, "walking")
+        order.look(CheckedMessage("team/sim/event", "", "sim/event", event))
+    assert order.finding.passed == (plants == "each")
+    order.look(
+        CheckedMessage(
+            "team/sim/event", "", "sim/event", msg.Event.of(25, "bridge-mode", "r2", "stopped")
+        )
+    )
+    assert not order.finding.passed
 
 
 def test_tolerances_are_a_millionth_of_a_newton(write_run: WriteRun) -> None:

@@ -14,7 +14,9 @@ from quadriga.sim_server.native.news import (
     DAMPED,
     DRIVEN,
     LASTS_MS,
+    LOST,
     OFF,
+    LostTime,
     MotorNews,
     News,
     PostureNews,
@@ -48,6 +50,16 @@ def test_torque_or_stiffness_drives_them() -> None:
     assert describe_motors(command(tau=0.1 * one), still) == DRIVEN
     assert describe_motors(command(tau=5.0 * one, kd=ONES - one), still) == DRIVEN
     assert describe_motors(command(kd=ONES - one), still) == DAMPED
+
+
+def test_a_slow_computer_is_told_of_once_a_second() -> None:
+    news = LostTime()
+    lost = {1500: 0.02, 2999: 0.05, 4000: 0.06}
+    told, now_lost = list[str](), 0.0
+    for now in range(1, 6001):
+        now_lost = lost.get(now, now_lost)
+        told += [line] if (line := news.look(now, now_lost)) else []
+    assert told == [f"2000 ms: 20 ms {LOST}", f"3000 ms: 30 ms {LOST}", f"4000 ms: 10 ms {LOST}"]
 
 
 def test_what_lasts_is_told_with_the_tick_at_which_it_began() -> None:
