@@ -30,7 +30,7 @@ the same seeds walked in the simulated world itself, in real time. "answer" is t
 arrival of a report to the command that the agent made of it: the median of the walks' medians, the
 worst p99 and the worst of all; without bridges, the age of a command in whole milliseconds. "late
 %" is the share of ticks at which the motors followed a command of an earlier tick. "too slow" are
-walks in which the simulated robots kept less than 98 % of real time, which no real one does: they
+walks in which the simulated robots kept less than 99 % of real time, which no real one does: they
 are left out of all else."""
 _FAULT_NOTE: Final = """\
 Each fault came at a random moment 2 to 4 s into a walk, at one robot. "walked on": to the end of

@@ -23,7 +23,7 @@ _FIGURES: Final = (
 WALKED_ON, LAY_DOWN, DAMPED, DRIVEN = "walked on", "lay down", "damped", "still driven"
 _END_OF_WALK: Final = "end of world.seconds"  # as the plant says that a walk is over
 _STOPPED: Final = "stopped"
-ENOUGH: Final = 0.98  # share of real time that simulated robots must keep to be like real ones
+ENOUGH: Final = 0.99  # share of real time that simulated robots must keep to be like real ones
 
 
 def build_walk_table(rows: Sequence[dict[str, Any]], name: str = "") -> Table:

@@ -49,7 +49,7 @@ class BridgeConfig:
         high=1.5,
     )
     speed_ms: int = key(
-        30, "ms", "for how long a joint may be too fast before the robot stops", low=0, high=100
+        50, "ms", "for how long a joint may be too fast before the robot stops", low=0, high=100
     )
     power_max: float = key(
         900.0,
