@@ -113,8 +113,10 @@ class _Trial:
         if early := [name for name in self._names if self._modes(name)[-1] != _WALKS]:
             raise ProcessError("the team", f"{self._modes(early[0])[-1]} of {early[0]}", "a walk")
         pids = [pid for what in self._fault.processes for pid in self._pids(what)]
-        for pid in pids:
-            os.kill(pid, self._fault.signal)
+        # Frozen first: none may see that another is gone before it goes itself.
+        for sent in (signal.SIGSTOP, self._fault.signal):
+            for pid in pids:
+                os.kill(pid, sent)
         for order in self._fault.orders:
             self._since = self._robots.order(f"{self._patient} {order}")
         longest = self._config.world.seconds + self._config.bridge.stand_s + _AFTER_S
