@@ -96,7 +96,8 @@ def keep_config(config: Config, folder: Path) -> None:
         return
     changed = {name: (new, old) for name, new, old, _ in departures(config, load(path))}
     changed.pop(_SEED, None)
-    for name, (new, old) in changed.items():
+    if changed:
+        name, (new, old) = next(iter(changed.items()))
         raise ConfigError(
             f"--out {folder}",
             f"walks with {name} = {old!r}, not {new!r}",

@@ -23,6 +23,10 @@ What simulated robots did that were reached through bridges and their own protoc
 `quadriga desk` walked, with the configuration and the rows that are in a folder each of
 `docs/results/desk`. This page is generated: `python -m quadriga.desk.page > docs/desk.md`.
 
+A computer of two cores had to be the robots and the team. Walks were made one at a time, with the
+kernel's throttling of real-time processes switched off (`kernel.sched_rt_runtime_us = -1`), which
+else stops a bridge for 50 ms when a core is full.
+
 """
 _WALK_NOTE: Final = """\
 Figures are means over robots and walks from the fourth second on; where a row says "no bridges",
@@ -37,7 +41,8 @@ Each fault came at a random moment 2 to 4 s into a walk, at one robot. "walked o
 the walk; "lay down": its bridge folded the legs; "damped": its motors were damped or off without
 that, and "ms to damping" tells how long after the fault; "still driven": nobody could reach the
 motors any more. "fell": its trunk was tilted by more than 0.8 rad. The last word is that of most
-tries."""
+tries. An A1 says nothing of its battery, and over UDP nobody tells of a second writer: its bridge
+cannot see these two."""
 
 
 def to_markdown(published: Path = PUBLISHED) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from quadriga.desk.faults import BY_NAME, NO_FAULT
 from quadriga.desk.trial import WITHOUT
+from quadriga.shared.wire.codes import TIME_OVER, code_of
 from quadriga.tables import NOTHING, Table
 
 # Figure, its name, its factor and digits.
@@ -21,7 +22,6 @@ _FIGURES: Final = (
     ("pitch_rms", "pitch mrad", 1e3, 2),
 )
 WALKED_ON, LAY_DOWN, DAMPED, DRIVEN = "walked on", "lay down", "damped", "still driven"
-_END_OF_WALK: Final = "end of world.seconds"  # as the plant says that a walk is over
 _STOPPED: Final = "stopped"
 ENOUGH: Final = 0.99  # share of real time that simulated robots must keep to be like real ones
 
@@ -139,7 +139,7 @@ def outcome_of(row: dict[str, Any], robot: str) -> str:
     """
     said = row["said"][robot]
     if any(mode.startswith("lying-down") for mode in said):
-        return WALKED_ON if _END_OF_WALK in row["end"] else LAY_DOWN
+        return WALKED_ON if code_of(row["end"]) == TIME_OVER else LAY_DOWN
     return DRIVEN if row["rest_ms"][robot] is None else DAMPED
 
 

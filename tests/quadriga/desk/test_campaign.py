@@ -58,7 +58,7 @@ def cells(table: Table, name: str) -> dict[str, str]:
     )
 
 
-ON = "stop: end of world.seconds; late ticks: r1 5"
+ON = "time-over: end of world.seconds; late ticks: r1 5"
 OUTCOMES = (
     ("walked on", {"end": ON, "said": {"r1": ["walking", "lying-down"]}, "rest_ms": {"r1": 8000}}),
     ("lay down", {"end": "none", "said": {"r1": ["lying-down"]}, "rest_ms": {"r1": 3000}}),
@@ -77,7 +77,7 @@ def test_faults_summed_up() -> None:
         "r2": ["walking", "stopped command-late:51 ms"],
         "r1": ["walking", "lying-down", "limp"],
     }
-    end = {"end": "stop: fall of r2"}
+    end = {"end": "fallen: fall of r2"}
     rests = [{"r1": 4000, "r2": 52}, {"r1": 4000, "r2": 54}]
     rows = [
         row("agent-killed", 1, robot="r2", fell=["r1"], rest_ms=rests[0], said=said, **end),
