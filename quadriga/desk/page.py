@@ -37,14 +37,14 @@ worst p99 and the worst of all; without bridges, the age of a command in whole m
 walks in which the simulated robots kept less than 99 % of real time, which no real one does: they
 are left out of all else."""
 _FAULT_NOTE: Final = """\
-Each fault came at a random moment 2 to 4 s into a walk, at one robot. "no walk": a robot was
-stopped before the fault came, by its own bridge or by its neighbour's, or the team did not begin;
-its row has the reason, most often that a bridge or an agent was late on the full computer. "walked
-on": to the end of the walk; "lay down": its bridge folded the legs; "damped": its motors were
-damped or off without that, and "ms to damping" tells how long after the fault; "still driven":
-nobody could reach the motors any more. "fell": its trunk was tilted by more than 0.8 rad. The last
-word is that of most tries. An A1 says nothing of its battery, and over UDP nobody tells of a second
-writer: its bridge cannot see these two."""
+Each fault came at a random moment 2 to 4 s into a walk, at one robot, and was tried until 20 tries
+counted. "no walk": a robot was stopped before the fault came, by its own bridge or by its
+neighbour's, or the team did not begin; its row has the reason, most often that a bridge or an agent
+was late on the full computer. "walked on": to the end of the walk; "lay down": its bridge folded
+the legs; "damped": its motors were damped or off without that, and "ms to damping" tells how long
+after the fault; "still driven": nobody could reach the motors any more. "fell": its trunk was
+tilted by more than 0.8 rad. The last word is that of most tries. An A1 says nothing of its battery,
+and over UDP nobody tells of a second writer: its bridge cannot see these two."""
 
 
 def to_markdown(published: Path = PUBLISHED) -> str:

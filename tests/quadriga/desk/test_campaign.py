@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,9 @@ from typing import Any
 import pytest
 
 from quadriga.desk.campaign import ROWS, has_failed, keep_config, named_faults, read_rows
-from quadriga.desk.faults import FAULTS, NO_FAULT
+from quadriga.desk.faults import BY_NAME, FAULTS, NO_FAULT
 from quadriga.desk.page import PUBLISHED, to_markdown
-from quadriga.desk.tables import build_fault_table, build_walk_table, outcome_of
+from quadriga.desk.tables import build_fault_table, build_walk_table, is_too_slow, outcome_of
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import robot_names
@@ -129,6 +130,15 @@ def test_a_folder_holds_walks_of_one_configuration(tmp_path: Path) -> None:
 def test_the_page_is_in_step_with_the_published_rows() -> None:
     page = SOURCE / "docs" / "desk.md"
     assert page.read_text(encoding="utf-8") == to_markdown(SOURCE / PUBLISHED)
+
+
+def test_the_page_is_true_that_20_tries_of_each_fault_count() -> None:
+    counted = Counter[tuple[str, str]]()
+    for folder in ("faults-2-a1", "faults-2-go2"):
+        for found in read_rows(SOURCE / PUBLISHED / folder):
+            counted[folder, found["fault"]] += "error" not in found and not is_too_slow(found)
+    assert {fault for folder, fault in counted if folder == "faults-2-a1"} == set(BY_NAME)
+    assert set(counted.values()) == {20}
 
 
 def test_rows_are_kept_for_later(tmp_path: Path) -> None:
