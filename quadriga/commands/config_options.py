@@ -23,6 +23,7 @@ KEYS: Final = {
     "payload": "world.payload",
     "payload-on": "world.payload_on",
     "push": "world.push",
+    "faults": "world.faults",
     "vx": "reference.vx",
     "vy": "reference.vy",
     "wz": "reference.wz",

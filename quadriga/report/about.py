@@ -72,6 +72,8 @@ def list_facts(run: Run) -> Iterator[tuple[str, str]]:
             "pushes in turn",
             f"{world.push_force:g} N for {world.push_duration:g} s every {world.push_every:g} s",
         )
+    if world.faults:
+        yield "faults", world.faults
     if world.weak_motor:
         yield "weak motors", f"{world.weak_motor} at {100 * world.weak_share:g} %"
     asked = config.reference

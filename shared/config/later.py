@@ -32,6 +32,7 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "world.stairs_count": 8,
         "world.leg_collisions": False,
         "world.friction_of": "",
+        "world.faults": "",
         "motors.preset": "ideal",
         "motors.torque_speed": False,
         "motors.friction": 0.0,

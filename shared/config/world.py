@@ -109,6 +109,12 @@ class WorldConfig:
     weak_share: float = key(
         0.6, "1", "share of its torque that a weak motor still gives", low=0.0, high=1.0
     )
+    faults: str = key(
+        "",
+        "-",
+        "faulty sensors and motors, 'robot/component kind start[s] [duration[s]]' separated by "
+        "commas, as 'r2/imu stuck 4 2'; docs/world.md has the components and kinds",
+    )
     command_timeout: float = key(
         10.0,
         "s wall",

@@ -25,6 +25,8 @@ PAYLOAD: Final = "payload"
 PUSH: Final = "push"
 FALL: Final = "fall"
 WEAK_MOTOR: Final = "weak-motor"
+FAULT_BEGINS: Final = "fault-begins"
+FAULT_ENDS: Final = "fault-ends"
 SILENT: Final = "silent"
 GONE: Final = "gone"
 BACK: Final = "back"
@@ -45,6 +47,8 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         PUSH: EventCode("push", "a push of a robot begins"),
         FALL: EventCode("fall", "a robot fell"),
         WEAK_MOTOR: EventCode("fault", "a motor gives less torque from now on"),
+        FAULT_BEGINS: EventCode("fault", "a sensor or motor is made faulty on purpose"),
+        FAULT_ENDS: EventCode("fault", "it is sound again"),
         SILENT: EventCode("fault", "a robot did not answer in time: the world waits no longer"),
         GONE: EventCode("fault", "a robot left the bus: the world waits no longer"),
         BACK: EventCode("fault", "a robot answers again: the world waits for it"),

@@ -16,6 +16,7 @@ from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.messages import Command, Event, State, Truth
 from quadriga.sim_server.terrain.relief import FOLLOW_MS
 from quadriga.sim_server.world import layout
+from quadriga.sim_server.world.faults.injection import Injection
 from quadriga.sim_server.world.motors import Motors
 from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.sim_server.world.sensors import Sensors
@@ -56,8 +57,9 @@ class World(Plant):
             all of the team.
 
     Raises:
-        ConfigError: the payload, a push, a weak motor or `world.friction_of` names no robot or does
-            not parse, the reference's trace is no trace, or the robot's URDF is missing.
+        ConfigError: the payload, a push, a weak motor, a fault or `world.friction_of` names no
+            robot or does not parse, the reference's trace is no trace, or the robot's URDF is
+            missing.
     """
 
     def __init__(self, config: Config, names: Sequence[str] = ()) -> None:
@@ -69,7 +71,9 @@ class World(Plant):
         self._scenario = build_scenario(config, self.team.payload)
         self._push_changes = self._scenario.changes()
         self._weakenings = self._scenario.weakenings()
-        events = [e for e in self._scenario.events if e.robot in ("", *self.names)]
+        self._injection = Injection(config, self.names)
+        announced = (*self._scenario.events, *self._injection.events())
+        events = [e for e in announced if e.robot in ("", *self.names)]
         self._events = {
             tick: tuple(event for event in events if event.tick == tick)
             for tick in {event.tick for event in events}
@@ -122,6 +126,7 @@ class World(Plant):
         if self.tick in self._weakenings:
             self._strength = self._scenario.strength(self.tick)[self._indices]
         rows = [commands.get(name, _DAMPED).row for name in self.names]
+        rows = self._injection.distort_commands(self.tick, rows)
         self.motors.drive(self.motors.send(rows), self._q, self._v, self._strength)
         self._applied[:] = self.motors.joint_torque
         if not self._settled:  # and so nobody has asked for the truth of this tick
@@ -171,7 +176,10 @@ class World(Plant):
         return self._down
 
     def _measure(self) -> dict[str, State]:
-        return self._sensors.measure(self.tick, self._q, self._v, self.motors.torque, self._sensed)
+        states = self._sensors.measure(
+            self.tick, self._q, self._v, self.motors.torque, self._sensed
+        )
+        return self._injection.distort_states(states)
 
     def _read_yoke_force(self) -> Array:
         """Force of each yoke on its two robots, positive when it pushes them apart, N. Shape (k,).
