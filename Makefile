@@ -8,7 +8,7 @@ TOOLS := $(VENV)/.tools
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install walk test lint fuzz drops format docs figures clip acceptance bench bench-planner bench-recorder
+.PHONY: install walk test lint fuzz drops starts endurance format docs figures clip acceptance bench bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -47,6 +47,14 @@ fuzz: $(TOOLS)
 # Each kind of robot, dropped 50 times from random joint angles: does its bridge get it to stand?
 drops: $(TOOLS)
 	$(BIN)/python -m tests.bridges.dropped $(ARGS)
+
+# 200 walks that are started and stopped at random moments: does any process outlive its walk?
+starts: $(TOOLS)
+	$(BIN)/python -m tests.runtime.starts $(ARGS)
+
+# Half an hour of two robots in real time: does memory grow, is anything lost?
+endurance: $(STAMP)
+	$(BIN)/python -m benchmarks.endurance $(ARGS)
 
 format: $(TOOLS)
 	$(BIN)/ruff check --fix .

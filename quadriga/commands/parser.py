@@ -20,6 +20,7 @@ from quadriga.commands import (
     estop,
     experiments,
     export,
+    fault,
     fit,
     hz,
     info,
@@ -51,10 +52,10 @@ INTERRUPTED: Final = 130
 
 # In the order of `quadriga --help`.
 _COMMANDS: Final = (
-    walk.add, scenarios.add, sim.add, bridge.add, desk.add, agent.add, plan.add, record.add,
-    report.add, play.add, resim.add, export.add, info.add, recover.add, check.add, echo.add, hz.add,
-    replay.add, router.add, prepare.add, operate.add, collect.add, fit.add, probe.add, campaign.add,
-    experiments.add, tune.add, estop.add, config.add, version.add,
+    walk.add, scenarios.add, sim.add, bridge.add, desk.add, fault.add, agent.add, plan.add,
+    record.add, report.add, play.add, resim.add, export.add, info.add, recover.add, check.add,
+    echo.add, hz.add, replay.add, router.add, prepare.add, operate.add, collect.add, fit.add,
+    probe.add, campaign.add, experiments.add, tune.add, estop.add, config.add, version.add,
 )  # fmt: skip
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,16 +13,12 @@ from quadriga.desk.faults import BY_NAME, NO_FAULT, Fault
 from quadriga.desk.tables import is_too_slow
 from quadriga.desk.trial import WITHOUT, run_trial, walk_without_bridges
 from quadriga.identification.predictors import ensure_predictor
-from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.write import departures, to_toml
-from quadriga.shared.errors import ConfigError, ProcessError, did_you_mean, name_file_errors
+from quadriga.shared.errors import ConfigError, ProcessError, did_you_mean
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.team.run_folder import CONFIG
+from quadriga.team.trial_rows import append_row, open_rows
 from quadriga.warm_up import warm_up
 
-ROWS: Final = "rows.jsonl"
-_SEED: Final = "world.seed"  # differs from walk to walk
 ALL: Final = "all"
 
 
@@ -66,10 +60,7 @@ def run_campaign(
     Raises:
         ConfigError: the folder cannot be written to, or holds walks of another configuration.
     """
-    with _written_to(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        rows = read_rows(folder)
-        keep_config(config, folder)
+    rows = open_rows(config, folder)
     known = {(row["fault"], row["seed"]) for row in rows}
     warm_up(config, console)
     if find_kind(config.planner.kind).needs_predictor:
@@ -78,35 +69,9 @@ def run_campaign(
     for number, (name, seed, fault) in enumerate(todo, start=1):
         row = _walk(config, name, seed, fault, folder / f"{name}-{seed}")
         rows.append(row)
-        with _written_to(folder), (folder / ROWS).open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row, ensure_ascii=False) + "\n")
+        append_row(row, folder)
         console.print(f"{number}/{len(todo)} {name} {seed}: {describe_row(row)}", markup=False)
     return rows
-
-
-def keep_config(config: Config, folder: Path) -> None:
-    """Write down what all walks in a folder have in common.
-
-    Raises:
-        ConfigError: what has been walked there was configured otherwise.
-    """
-    path = folder / CONFIG
-    if not path.is_file():
-        path.write_text(to_toml(config, without=(_SEED,)), encoding="utf-8")
-        return
-    changed = {name: (new, old) for name, new, old, _ in departures(config, load(path))}
-    changed.pop(_SEED, None)
-    if changed:
-        name, (new, old) = next(iter(changed.items()))
-        raise ConfigError(
-            f"--out {folder}",
-            f"walks with {name} = {old!r}, not {new!r}",
-            "a new folder, or the same configuration",
-        )
-
-
-def _written_to(folder: Path) -> AbstractContextManager[None]:
-    return name_file_errors(ConfigError, f"--out {folder}", "a folder that can be written to")
 
 
 def _trials(
@@ -129,14 +94,6 @@ def _walk(
     except ProcessError as error:
         # Rows are published, and where they were walked is nobody's business.
         return {"fault": name, "seed": seed, "error": str(error).replace(f"{folder}/", "")}
-
-
-def read_rows(folder: Path) -> list[dict[str, Any]]:
-    """What has been walked already."""
-    path = folder / ROWS
-    if not path.is_file():
-        return []
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
 def has_failed(row: dict[str, Any]) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from quadriga.desk.campaign import read_rows
 from quadriga.desk.faults import BY_NAME, FAULTS, NO_FAULT
 from quadriga.desk.tables import build_fault_table, build_walk_table
 from quadriga.desk.trial import WITHOUT
@@ -14,6 +13,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.robots import ROBOTS
 from quadriga.tables import Table
 from quadriga.team.run_folder import CONFIG
+from quadriga.team.trial_rows import read_rows
 
 PUBLISHED: Final = Path("docs/results/desk")
 _HEAD: Final = """\

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from quadriga.desk.campaign import ROWS, has_failed, keep_config, named_faults, read_rows
+from quadriga.desk.campaign import has_failed, named_faults
 from quadriga.desk.faults import BY_NAME, FAULTS, NO_FAULT
 from quadriga.desk.page import PUBLISHED, to_markdown
 from quadriga.desk.tables import build_fault_table, build_walk_table, is_too_slow, outcome_of
@@ -20,6 +20,7 @@ from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.places import SOURCE
 from quadriga.sim_server.native.orders import parse_order
 from quadriga.tables import Table
+from quadriga.team.trial_rows import ROWS, keep_config, read_rows
 
 THROUGH = ("bridges", "no bridges")
 

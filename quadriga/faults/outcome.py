@@ -1,0 +1,122 @@
+"""What came of a fault, from the recording of the walk alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+from quadriga.recordings.gaps import missing_ticks
+from quadriga.recordings.traces import Traces
+from quadriga.shared.config.sections import Config
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.wire import codes
+from quadriga.shared.wire.messages import Status
+from quadriga.shared.wire.topics import STATE
+
+_WALKS: Final = "walk"
+_STANDS: Final = ("stand", "damping", "estop")  # a robot that walks no more
+_ANNOUNCED: Final = (codes.FAULT_BEGINS, codes.FAULT_ENDS)
+
+
+class Moment(NamedTuple):
+    """When a fault came.
+
+    Attributes:
+        robot: the robot that the seed has drawn.
+        tick: world time, ms; of a process what the clock showed last.
+        wall_ns: ns since 1970, of a process; 0 of a component, whose `tick` is exact.
+    """
+
+    robot: str
+    tick: int
+    wall_ns: int = 0
+
+
+def describe_outcome(
+    config: Config, traces: Traces, recording: Recording, moment: Moment
+) -> dict[str, Any]:
+    """The row of a trial.
+
+    `detect_ms` is the time from the fault until an agent no longer walks, or the world announces
+    that a robot is silent or gone; None if nobody ever noticed. `stand_ms` is the time until all
+    others stand, or are damped; None if they walked on. `lost_messages` counts what the recording
+    lacks of the other robots, and the states and commands of all robots that it lacks before the
+    fault because it ends too early.
+
+    Args:
+        config: of the walk.
+        traces: of its recording.
+        recording: it.
+        moment: of the fault.
+    """
+    tick = moment.tick
+    if moment.wall_ns:
+        tick = max(tick, tick_at(recording, moment.wall_ns))
+    fallen = sorted({e.robot for e in traces.events if e.code == codes.FALL})
+    others = [name for name in traces.robots if name != moment.robot]
+    end = next((e for e in reversed(traces.events) if e.kind == "stop"), None)
+    last = {name: s[-1] for name, s in traces.statuses.items() if s}
+    return {
+        "robot": moment.robot,
+        "tick": tick,
+        "mode": config.world.mode,
+        "robots": config.team.robots,
+        "falls": fallen,
+        "falls_of_others": sum(name in fallen for name in others),
+        "detect_ms": _after(tick, _first_notice(traces, tick)),
+        "stand_ms": _after(tick, _all_stand(traces.statuses, others, tick)),
+        "lost_messages": _count_lost(config, traces, moment),
+        "status": {name: f"{s.mode} {s.reason}".strip() for name, s in last.items()},
+        "end": "none recorded" if end is None else f"{end.code}: {end.detail}",
+    }
+
+
+def tick_at(recording: Recording, wall_ns: int) -> int:
+    """World time at a moment of the recorder's clock: the newest state that had arrived."""
+    newest = 0
+    for entry in recording.entries({STATE.name}):
+        if entry.log_time_ns > wall_ns:
+            break
+        newest = max(newest, entry.tick)
+    return newest
+
+
+def _first_notice(traces: Traces, tick: int) -> int | None:
+    noticed = [
+        status.tick
+        for statuses in traces.statuses.values()
+        for status in statuses
+        if status.tick >= tick and status.mode != _WALKS
+    ]
+    noticed += [
+        event.tick
+        for event in traces.events
+        if event.kind == "fault" and event.code not in _ANNOUNCED and event.tick >= tick
+    ]
+    return min(noticed, default=None)
+
+
+def _all_stand(
+    statuses: Mapping[str, tuple[Status, ...]], others: list[str], tick: int
+) -> int | None:
+    """When the last of the others stood that walked at the fault; None if one walked on."""
+    ticks = list[int]()
+    for name in others:
+        still = [s.tick for s in statuses[name] if s.tick >= tick and s.mode in _STANDS]
+        if not still:
+            return None
+        ticks.append(still[0])
+    return max(ticks, default=None)
+
+
+def _after(tick: int, later: int | None) -> int | None:
+    return None if later is None else later - tick
+
+
+def _count_lost(config: Config, traces: Traces, moment: Moment) -> int:
+    own = STATE.key(config.team.name, moment.robot).removesuffix(STATE.name)
+    missing = missing_ticks(config, traces.ticks)
+    lost = sum(count for key, count in missing.items() if not key.startswith(own))
+    states = [traces.ticks.get(STATE.key(config.team.name, name)) for name in traces.robots]
+    newest = max((int(found.max()) for found in states if found is not None), default=0)
+    return lost + 2 * len(traces.robots) * max(0, moment.tick - newest)

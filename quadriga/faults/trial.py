@@ -1,0 +1,144 @@
+"""SHELL of one walk with one fault: everything started, the fault made, all taken down."""
+
+from __future__ import annotations
+
+import os
+import signal
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from quadriga.faults.catalogue import OWN, TeamFault
+from quadriga.faults.outcome import Moment, describe_outcome
+from quadriga.recordings.summary import RECORDING
+from quadriga.recordings.traces import read_traces
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.errors import MessageError, ProcessError, RecordingError
+from quadriga.shared.members import LAUNCHER, ROUTER, has_lead
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Clock
+from quadriga.shared.wire.topics import CLOCK
+from quadriga.team.endpoint import free_endpoint
+from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec, process_table
+from quadriga.team.run_folder import CONFIG
+
+_EARLIEST_S, _LATEST_S = 1.5, 4.0  # from the begin of a walk until something goes wrong
+_AFTER_S: Final = 4.0  # world time that is walked at least after it
+_START_S: Final = 120.0  # for the team to start
+_LEAVE_S: Final = 25.0  # wall time for the others to leave after the world
+_SLACK_S: Final = 60.0  # wall time for the walk beyond that of the world
+_LOOK: Final = 0.005  # s
+
+
+def run_fault_trial(
+    config: Config, fault: TeamFault, seed: int, folder: Path, predictor: Path | None
+) -> dict[str, Any]:
+    """Walk once with a fault; a row of the table.
+
+    Args:
+        config: of a simulated world.
+        fault: what goes wrong, at a moment and at a robot that the seed decides.
+        seed: of the world.
+        folder: gets configuration, logs and recording.
+        predictor: its file; None without one.
+
+    Raises:
+        ProcessError: the team did not begin to walk.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    chance = np.random.default_rng((seed, 1))
+    names = robot_names(config.team.robots)
+    robot = names[chance.integers(len(names))]
+    tick = config.gait.stand_ms + round(1000 * chance.uniform(_EARLIEST_S, _LATEST_S))
+    config = _with_fault(config, fault, seed, robot, tick)
+    (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
+    rows = process_table(config, folder, predictor, "")
+    if fault.process == ROUTER:
+        command = (*QUADRIGA, "router", "--listen", config.bus.endpoint)
+        rows = (ProcessSpec(ROUTER, (*command, "--config", str(folder / CONFIG)), 5.0), *rows)
+    with Launch(rows, folder / "logs") as launch:
+        trial = _FaultTrial(config, fault, robot, tick, launch)
+        moment = trial.run()
+    return {"fault": fault.name, "seed": seed} | _describe(config, moment, folder)
+
+
+def _with_fault(config: Config, fault: TeamFault, seed: int, robot: str, tick: int) -> Config:
+    seconds = 1e-3 * tick + (fault.seconds or 0.0) + _AFTER_S
+    world = replace(
+        config.world,
+        seed=seed,
+        mode="realtime" if fault.realtime else "lockstep",
+        seconds=max(config.world.seconds, seconds),
+    )
+    if fault.component:
+        text = f"{robot}/{fault.component} {1e-3 * tick:g}"
+        text += "" if fault.seconds is None else f" {fault.seconds:g}"
+        world = replace(world, faults=text)
+    mode = "client" if fault.process == ROUTER else config.bus.mode
+    bus = replace(config.bus, endpoint=free_endpoint(), mode=mode)
+    return replace(config, world=world, bus=bus, recorder=replace(config.recorder, enabled=True))
+
+
+class _FaultTrial:
+    def __init__(
+        self, config: Config, fault: TeamFault, robot: str, tick: int, launch: Launch
+    ) -> None:
+        self._config, self._fault, self._launch = config, fault, launch
+        self._robot, self._tick = robot, tick
+        self._patient = robot if fault.process == OWN else fault.process
+
+    def run(self) -> Moment:
+        """Wait for the moment, let the fault happen, and wait until the walk is over."""
+        if not self._fault.process:
+            self._await_end()
+            return Moment(self._robot, self._tick)
+        with Bus.open(self._config.bus, self._config.team.name, LAUNCHER, lambda: False) as bus:
+            bus.subscribe(CLOCK.key(bus.team))
+            clock = self._await_tick(bus)
+        pid, begun, at = self._launch.pids[self._patient], monotonic(), wall_ns()
+        for number, after in self._fault.signals:
+            sleep(begun + after - monotonic())
+            os.kill(pid, number)
+        self._await_end()
+        with suppress(OSError):  # one that stands still could not be told to leave
+            os.kill(pid, signal.SIGKILL)
+        return Moment(self._robot, clock, at)
+
+    def _await_tick(self, bus: Bus) -> int:
+        """Wait until the world's clock has come to the moment of the fault; what it shows then."""
+        deadline = monotonic() + _START_S + 1e-3 * self._tick
+        while monotonic() < deadline and has_lead(self._launch.alive):
+            for _, payload in bus.drain():
+                with suppress(MessageError):
+                    tick = decode(payload, Clock).tick
+                    if tick >= self._tick:
+                        return tick
+            sleep(_LOOK)
+        raise ProcessError("the team", "no walk", f"one that comes to {1e-3 * self._tick:g} s")
+
+    def _await_end(self) -> None:
+        deadline = monotonic() + _START_S + self._config.world.seconds + _SLACK_S
+        while has_lead(self._launch.alive) and monotonic() < deadline:
+            sleep(10 * _LOOK)
+        # All others leave by themselves once the world has ended.
+        deadline = monotonic() + _LEAVE_S
+        while self._launch.alive - {self._patient, ROUTER} and monotonic() < deadline:
+            sleep(10 * _LOOK)
+
+
+def _describe(config: Config, moment: Moment, folder: Path) -> dict[str, Any]:
+    """What the recording says of it, as far as it can be read."""
+    try:
+        recording = Recording(folder / RECORDING)
+        return describe_outcome(config, read_traces(recording), recording, moment)
+    except RecordingError as error:
+        # Rows are published, and where they were walked is nobody's business.
+        return {"robot": moment.robot, "error": str(error).replace(f"{folder}/", "")}

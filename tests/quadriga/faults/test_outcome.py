@@ -1,0 +1,110 @@
+"""A walk of which everything is known, with a fault at 3 s."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from quadriga.faults.outcome import Moment, describe_outcome, tick_at
+from quadriga.recordings.traces import read_traces
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.wire import codes
+from quadriga.shared.wire.messages import Event, Message, State, Status
+from tests.quadriga.conftest import WALL, WALL_0, WriteRun, run_config
+
+FAULT = 3000  # tick
+CONFIG = run_config(robots=3, seconds=6.0)
+
+
+def outcome(folder: Path, moment: Moment) -> dict[str, Any]:
+    recording = Recording(folder / "run.mcap")
+    return describe_outcome(CONFIG, read_traces(recording), recording, moment)
+
+
+def stop_from(tick: int, mode: str, reason: str, robots: tuple[str, ...]) -> Any:
+    """A change of the run: these robots are in this mode from a tick on."""
+
+    def change(key: str, message: Message) -> Message:
+        _, robot, *_ = key.split("/")
+        if isinstance(message, Status) and robot in robots and message.tick >= tick:
+            return replace(message, mode=mode, reason=reason)
+        return message
+
+    return change
+
+
+def wall(tick: int) -> int:
+    return WALL_0 + round(WALL * 1_000_000 * tick)
+
+
+def test_nobody_notices_what_harms_nobody(write_run: WriteRun) -> None:
+    row = outcome(write_run(CONFIG), Moment("r2", FAULT))
+    assert (row["tick"], row["robots"], row["mode"]) == (FAULT, 3, "lockstep")
+    assert row["falls"] == []
+    assert row["falls_of_others"] == row["lost_messages"] == 0
+    assert row["detect_ms"] is row["stand_ms"] is None
+    assert row["status"] == {"r1": "walk", "r2": "walk", "r3": "walk"}
+    assert row["end"] == "none recorded"
+
+
+def test_when_others_notice_and_stand(write_run: WriteRun) -> None:
+    change = stop_from(3400, "stand", "peer-lost:r2", ("r1", "r3"))
+    row = outcome(write_run(CONFIG, change=change), Moment("r2", FAULT))
+    assert (row["detect_ms"], row["stand_ms"]) == (400, 400)
+    assert row["status"]["r1"] == "stand peer-lost:r2"
+
+
+def test_who_only_slows_down_has_noticed_and_does_not_stand(write_run: WriteRun) -> None:
+    change = stop_from(3400, "stopping", "peer-lost:r2", ("r1", "r3"))
+    row = outcome(write_run(CONFIG, change=change), Moment("r2", FAULT))
+    assert (row["detect_ms"], row["stand_ms"]) == (400, None)
+
+
+def test_what_the_world_announces_is_a_notice_and_the_fault_itself_is_not(
+    write_run: WriteRun,
+) -> None:
+    events = [
+        Event.of(FAULT, codes.FAULT_BEGINS, "r2", "imu stuck"),
+        Event.of(FAULT + 70, codes.GONE, "r2", "gone"),
+        Event.of(FAULT + 900, codes.FALL, "r2", "tilt"),
+        Event.of(FAULT + 950, codes.FALL, "r3", "tilt"),
+    ]
+    folder = write_run(CONFIG, extra=[("team/sim/event", event) for event in events])
+    row = outcome(folder, Moment("r2", FAULT))
+    assert row["detect_ms"] == 70
+    assert row["falls"] == ["r2", "r3"]
+    assert row["falls_of_others"] == 1
+
+
+def test_the_tick_of_a_signal_is_that_of_the_newest_state_by_then(write_run: WriteRun) -> None:
+    folder = write_run(CONFIG)
+    recording = Recording(folder / "run.mcap")
+    assert tick_at(recording, wall(FAULT)) == FAULT
+    assert tick_at(recording, wall(FAULT) - 1) == FAULT - 1
+    # The clock was read 7 ms before the signal was sent.
+    assert outcome(folder, Moment("r2", FAULT - 7, wall(FAULT)))["tick"] == FAULT
+
+
+@pytest.mark.parametrize(("robot", "lost"), [("r1", 100), ("r2", 0)])
+def test_messages_of_the_faulty_robot_are_not_missed(
+    write_run: WriteRun, robot: str, lost: int
+) -> None:
+    def lose(key: str, message: Message) -> Message | None:
+        gone = isinstance(message, State) and 4000 <= message.tick < 4100
+        return None if gone and key == f"team/{robot}/state" else message
+
+    row = outcome(write_run(CONFIG, change=lose), Moment("r2", FAULT))
+    assert row["lost_messages"] == lost
+
+
+def test_a_recording_that_ends_before_the_fault_has_lost_what_came_after(
+    write_run: WriteRun,
+) -> None:
+    def cut(_key: str, message: Message) -> Message | None:
+        return message if message.tick < FAULT - 50 else None
+
+    row = outcome(write_run(CONFIG, change=cut), Moment("r2", FAULT, wall(FAULT)))
+    assert row["lost_messages"] == 2 * 3 * 51

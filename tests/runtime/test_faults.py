@@ -1,0 +1,37 @@
+"""`quadriga fault` with real processes: what it makes go wrong does, and its row says so."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from quadriga.commands.parser import main
+from tests.runtime.conftest import DATA
+
+ARGUMENTS = (
+    *("--planner", "none", "--seconds", "1", "--robots", "2"),
+    *(word for name, value in DATA.items() for word in ("--set", f"{name}={value:g}")),
+)
+
+
+@pytest.mark.usefixtures("_compiled")
+def test_a_killed_agent_and_a_dead_knee(tmp_path: Path) -> None:
+    rows_file, folder = tmp_path / "rows.json", tmp_path / "out"
+    faults = ("agent-killed", "knee-off")
+    main(["fault", *faults, *ARGUMENTS, "--json", str(rows_file), "--out", str(folder)])
+    rows = {row["fault"]: row for row in json.loads(rows_file.read_text(encoding="utf-8"))}
+    assert set(rows) == set(faults)
+    killed, knee = rows["agent-killed"], rows["knee-off"]
+    assert (killed["mode"], knee["mode"]) == ("realtime", "lockstep")
+    for row in rows.values():
+        assert row["tick"] >= 1500
+        assert not {"error"} & row.keys(), row
+    assert killed["status"].keys() >= {"r1", "r2"}
+    # Half a second without a knee: the robot falls, or limps on; nobody else is touched by it.
+    assert set(knee["falls"]) <= {knee["robot"]}
+    # What has been walked is not walked again.
+    before = (folder / "rows.jsonl").read_text(encoding="utf-8")
+    main(["fault", *faults, *ARGUMENTS, "--out", str(folder)])
+    assert (folder / "rows.jsonl").read_text(encoding="utf-8") == before
