@@ -131,12 +131,33 @@ def test_nobody_is_root_in_the_image() -> None:
 
 
 def test_one_image_on_a_base_of_ones_choice() -> None:
-    assert DOCKERFILE.index("ARG BASE=python:3.11-slim") < DOCKERFILE.index("FROM ")
+    (base,) = re.findall(r"^ARG BASE=(\S+)$", DOCKERFILE, re.M)
+    assert re.fullmatch(r"python:3\.11-\S+@sha256:[0-9a-f]{64}", base), "by version and digest"
     assert {line.split()[1] for line in re.findall(r"^FROM .*$", DOCKERFILE, re.M)} == {"${BASE}"}
     built = {name for name, service in SERVICES.items() if "build" in service}
     assert built == {"prepare"}
-    assert SERVICES["prepare"]["build"]["args"] == {"BASE": "${BASE:-python:3.11-slim}"}
+    assert SERVICES["prepare"]["build"]["args"] == {"BASE": f"${{BASE:-{base}}}"}
     assert len({service["image"] for service in SERVICES.values()}) == 1
+
+
+def test_no_service_pulls_an_image_that_somebody_else_could_have_made() -> None:
+    policies = {name: service["pull_policy"] for name, service in SERVICES.items()}
+    assert policies.pop("prepare") == "build"
+    assert set(policies.values()) == {"never"}
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_a_service_takes_no_more_of_the_machine_than_its_share(service: str) -> None:
+    found = SERVICES[service]
+    assert 0.0 < found["cpus"] <= 2.0, "more than a small machine has is refused"
+    assert re.fullmatch(r"[1-4]g", found["mem_limit"])
+    assert 0 < found["pids_limit"] <= 400
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_a_service_reaches_nobody_but_the_team(service: str) -> None:
+    assert SERVICES[service]["networks"] == ["team"]
+    assert COMPOSE["networks"] == {"team": {"internal": True}}
 
 
 def test_the_build_gets_every_package_and_the_scenarios() -> None:
