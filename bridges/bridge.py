@@ -12,6 +12,7 @@ from quadriga.bridges.robot_plant import RobotPlant
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.printable import printable_line
 
 
 def build_bridge(config: Config, names: tuple[str, ...], *, armed: bool = False) -> RobotPlant:
@@ -65,4 +66,4 @@ def bridge_of(config: Config, name: str) -> BridgeConfig:
 
 
 def _say(text: str) -> None:
-    print(f"bridge: {text}", file=sys.stderr, flush=True)
+    print(printable_line(f"bridge: {text}"), file=sys.stderr, flush=True)

@@ -10,11 +10,12 @@ def main() -> int:
     """Run the command line; a signal that comes while it is being imported waits until then."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     from quadriga.shared.errors import QuadrigaError
+    from quadriga.shared.printable import printable_line
 
     try:
         from quadriga.commands.parser import main as command_line
     except QuadrigaError as error:  # of a package that adds to this one
-        print(f"quadriga: {error}", file=sys.stderr)
+        print(printable_line(f"quadriga: {error}"), file=sys.stderr)
         return 2
 
     return command_line()

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
-from unicodedata import category
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table as RichTable
 
+from quadriga.shared.printable import printable, printable_line
 from quadriga.shared.robot.conventions import OUTPUTS
 
 NOTHING: Final = "–"
@@ -99,7 +99,7 @@ def align_columns(
         right: columns that are flush right, as numbers are.
         indent: what each line begins with.
     """
-    cells = [tuple(printable(cell).replace("\n", " ") for cell in row) for row in rows]
+    cells = [tuple(printable_line(cell) for cell in row) for row in rows]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     lines = []
     for row in cells:
@@ -109,13 +109,6 @@ def align_columns(
         ]
         lines.append((indent + "  ".join(padded)).rstrip())
     return lines
-
-
-def printable(text: str) -> str:
-    """Text that comes from elsewhere, without what a terminal would obey."""
-    return "".join(
-        "\N{REPLACEMENT CHARACTER}" if category(c) == "Cc" and c != "\n" else c for c in text
-    )
 
 
 def _row(cells: Sequence[str]) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.printable import printable_line
 
 Given = dict[str, Any]
 """The keys that were given explicitly, by section and key."""
@@ -25,7 +26,7 @@ AddCommand = Callable[[str, Run, str], argparse.ArgumentParser]
 
 def say(text: str) -> None:
     """Tell the user something beside a command's output."""
-    print(f"quadriga: {text}", file=sys.stderr, flush=True)
+    print(f"quadriga: {printable_line(text)}", file=sys.stderr, flush=True)
 
 
 def refuse_configuration(given: Given) -> None:

@@ -44,6 +44,7 @@ from quadriga.commands import (
 from quadriga.commands.command import Run
 from quadriga.commands.config_options import build_config_options, read_config
 from quadriga.shared.errors import ConfigError, ProcessError, QuadrigaError, system_reason
+from quadriga.shared.printable import printable, printable_line
 from quadriga.shared.runtime.signals import die_with_parent, interrupt_on_sigterm
 
 FAILED: Final = 1  # a robot fell or a process failed
@@ -112,5 +113,8 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def _complain(error: QuadrigaError, status: int) -> int:
-    print(f"quadriga: {error}", file=sys.stderr)
+    shown = (
+        printable if isinstance(error, ProcessError) else printable_line
+    )  # with a log's last lines
+    print(shown(f"quadriga: {error}"), file=sys.stderr)
     return status

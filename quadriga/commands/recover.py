@@ -8,6 +8,7 @@ from pathlib import Path
 from quadriga.commands.command import AddCommand, Given
 from quadriga.commands.options import add_file
 from quadriga.shared.config.sections import Config
+from quadriga.shared.printable import printable
 
 
 def add(add_command: AddCommand) -> None:
@@ -31,5 +32,5 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
         print(f"{arguments.file} is whole: nothing to recover")
         return 0
     print(f"damaged: {recovery.error.got}")
-    print("\n".join(format_recovery(recovery)))
+    print(printable("\n".join(format_recovery(recovery))))
     return 0

@@ -9,6 +9,7 @@ from quadriga.commands.command import AddCommand, Given
 from quadriga.commands.options import add_file
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.printable import printable
 
 
 def add(add_command: AddCommand) -> None:
@@ -64,10 +65,10 @@ def run(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
     else:
         outcomes = [replay_to_breakpoint(path, robot, *options, arguments.stop_at)]
     for outcome in outcomes:
-        print(format_outcome(outcome))
+        print(printable(format_outcome(outcome)))
     recording, failed = Recording(path), any(outcome.failed for outcome in outcomes)
     others = differing_versions(recording.metadata) if failed else ""
     if others:
-        print(f"recorded with other versions, which may be why: {others}")
+        print(printable(f"recorded with other versions, which may be why: {others}"))
     recording.require_whole()
     return int(failed)

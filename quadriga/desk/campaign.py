@@ -16,6 +16,7 @@ from quadriga.identification.predictors import ensure_predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, ProcessError, did_you_mean
 from quadriga.shared.planner_kinds import find_kind
+from quadriga.shared.printable import printable_line
 from quadriga.team.trial_rows import append_row, open_rows
 from quadriga.warm_up import warm_up
 
@@ -70,7 +71,8 @@ def run_campaign(
         row = _walk(config, name, seed, fault, folder / f"{name}-{seed}")
         rows.append(row)
         append_row(row, folder)
-        console.print(f"{number}/{len(todo)} {name} {seed}: {describe_row(row)}", markup=False)
+        line = f"{number}/{len(todo)} {name} {seed}: {describe_row(row)}"
+        console.print(printable_line(line), markup=False)
     return rows
 
 

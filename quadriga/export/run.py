@@ -16,6 +16,7 @@ from quadriga.export.columns import TickReached
 from quadriga.export.source import Source
 from quadriga.progress import build_progress
 from quadriga.shared.errors import ConfigError, RecordingError
+from quadriga.shared.printable import printable
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic
 
@@ -69,7 +70,7 @@ def run(path: Path, form: str, out: Path | None, console: Console) -> None:
         for key, many in sorted(source.left_out.items())
     ]
     for line in lines:
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+        console.print(printable(line), markup=False, highlight=False, soft_wrap=True)
 
 
 def _write(write: _Writer, source: Source, out: Path, console: Console) -> list[Path]:

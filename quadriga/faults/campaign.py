@@ -15,6 +15,7 @@ from quadriga.identification.predictors import ensure_predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, ProcessError
 from quadriga.shared.planner_kinds import find_kind
+from quadriga.shared.printable import printable_line
 from quadriga.team.trial_rows import append_row, open_rows
 from quadriga.warm_up import warm_up
 
@@ -56,7 +57,7 @@ def run_fault_campaign(
         rows.append(row)
         append_row(row, folder)
         line = f"{number}/{len(todo)} {name}: {describe_row(row)}"
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+        console.print(printable_line(line), markup=False, highlight=False, soft_wrap=True)
     return rows
 
 

@@ -9,8 +9,10 @@ from quadriga.recordings.checks.delay import Delay
 from quadriga.recordings.checks.finding import Check, CheckedMessage, Finding
 from quadriga.recordings.checks.limits import Friction, Torques
 from quadriga.recordings.checks.sequence import Ages, Gaps, Order
+from quadriga.recordings.metadata import read_counts
 from quadriga.recordings.readable import open_readable
 from quadriga.shared.errors import MessageError, RecordingError
+from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
 from quadriga.shared.recording.reader import Recording
@@ -59,7 +61,8 @@ def format_findings(findings: list[Finding]) -> list[str]:
         lines.append(line)
         for first in finding.first:
             where = f"tick {first.tick} {first.key}: " if first.key else ""
-            lines.append(f"      {where}got {first.got}, expected {first.limit}")
+            text = f"{where}got {first.got}, expected {first.limit}"
+            lines.append(f"      {printable_line(text)}")
     return lines
 
 
@@ -100,8 +103,7 @@ def _check_whole(
     """Whether the file is as it was written."""
     whole = Finding("whole", "messages", messages)
     notes = source.notes
-    written = notes.get(COUNTS, {}).get("messages", str(messages))
-    missing = max(int(written) - messages, 0) if written.isdecimal() else 0
+    missing = max(read_counts(notes).get("messages", messages) - messages, 0)
     whole.looked += missing
     for damage in source.damages:
         whole.add_objection(-1, "", str(damage), "a readable file", 0)

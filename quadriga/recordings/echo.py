@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.shared.errors import MessageError
+from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.topics import topic_of
@@ -20,7 +21,7 @@ _ENVELOPE: Final = ("tick", "stamp_ns")
 def format_entry(entry: ChunkEntry, *, full: bool = False) -> str:
     """World time, key and every field; long arrays are cut unless `full`."""
     when = f"{entry.tick / 1000:9.3f} s" if entry.tick >= 0 else f"{'–':>9}  "
-    return f"{when}  {entry.key}  {_format_content(entry, full)}"
+    return printable_line(f"{when}  {entry.key}  {_format_content(entry, full)}")
 
 
 def _format_content(entry: ChunkEntry, full: bool) -> str:

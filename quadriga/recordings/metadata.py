@@ -16,7 +16,9 @@ from typing import Any, Final
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.planner_kinds import installed_kinds, plugin_origin
+from quadriga.shared.recording.writer import COUNTS
 
+_DIGITS: Final = 18  # of a number of messages that can be meant
 # What a run's figures depend on.
 _PACKAGES: Final = (
     "quadriga",
@@ -95,3 +97,13 @@ def _parse_json(metadata: Mapping[str, str], name: str) -> Any:
         return json.loads(metadata.get(name, "null"))
     except (ValueError, RecursionError):  # the latter for what nests too deeply
         return None
+
+
+def read_counts(notes: Mapping[str, Mapping[str, str]]) -> dict[str, int]:
+    """What the writer counted, by name, from the notes of a recording; {} if it was killed."""
+    counts = notes.get(COUNTS, {})
+    return {
+        name: int(text)
+        for name, text in counts.items()
+        if text.isdecimal() and len(text) <= _DIGITS
+    }

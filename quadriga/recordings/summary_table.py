@@ -10,7 +10,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from quadriga.tables import error_text, format_number, printable
+from quadriga.shared.printable import printable
+from quadriga.tables import error_text, format_number
 
 # Unit and factor of each of `quadriga.recordings.traces.ERRORS`.
 _ERRORS = {

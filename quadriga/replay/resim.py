@@ -10,6 +10,7 @@ from rich.console import Console
 from quadriga.progress import build_progress
 from quadriga.recordings.metadata import differing_versions
 from quadriga.replay.world_replay import WorldComparison, replay_world
+from quadriga.shared.printable import printable
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic
@@ -55,4 +56,4 @@ def _print_verdict(
         if others:
             lines.append(f"recorded with other versions, which may be why: {others}")
     for line in lines:
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+        console.print(printable(line), markup=False, highlight=False, soft_wrap=True)

@@ -12,6 +12,7 @@ from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import LAUNCHER
+from quadriga.shared.printable import printable_line
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.codes import DOWN
@@ -58,10 +59,8 @@ class WalkProgress:
         if event.code in DOWN:
             self.fallen.append(event.robot)
         if event.kind in ("fall", "fault", "push"):
-            self._bar.console.print(
-                f"{event.tick / 1000:.2f} s: {event.kind} {event.robot} {event.detail}",
-                markup=False,
-            )
+            line = f"{event.tick / 1000:.2f} s: {event.kind} {event.robot} {event.detail}"
+            self._bar.console.print(printable_line(line), markup=False)
 
     def _show_time(self, seconds: float) -> None:
         now = monotonic()

@@ -16,6 +16,7 @@ from quadriga.report.figure_files import write_figures
 from quadriga.report.page import PAGE, write_page
 from quadriga.report.run import build_run, read_run
 from quadriga.shared.errors import ProcessError
+from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.wire.codes import PLANT_GONE, SIGNAL
 
@@ -70,7 +71,7 @@ def report_file(path: Path, page: Path | None, *, console: Console) -> dict[str,
     written = write_page(run, page or path.with_suffix(".html"))
     print_summary(dict(run.summary), console)
     for missing in describe_missing(run):
-        console.print(missing, style="yellow", markup=False, highlight=False)
+        console.print(printable_line(missing), style="yellow", markup=False, highlight=False)
     console.print(f"page: {written}", markup=False, highlight=False)
     return dict(run.summary)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.shared.config.sections import Config
+from quadriga.shared.printable import printable_line
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.runtime.collector import end_collection
@@ -120,4 +121,4 @@ def _serve(served: _Served, config: Config, stopped: Callable[[], bool]) -> None
 
 
 def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
+    print(printable_line(text), file=sys.stderr, flush=True)

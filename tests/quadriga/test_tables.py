@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from quadriga.tables import Table, align_columns, print_tables, printable
+from quadriga.tables import Table, align_columns, print_tables
 
 
 def test_control_characters_do_not_reach_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
@@ -20,8 +20,3 @@ def test_a_row_of_columns_is_one_line_that_a_terminal_only_shows() -> None:
         "  a     x\N{REPLACEMENT CHARACTER}[31m y",
         "  long  z",
     ]
-
-
-def test_all_else_stays() -> None:
-    text = "r2: 0.5 m · τ ≤ 33 N·m,\N{NO-BREAK SPACE}– \n next"
-    assert printable(text) == text

@@ -5,9 +5,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
+import pytest
+
 from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.wire import messages as msg
+from quadriga.shared.wire.codec import encode
 from tests.quadriga.commands.conftest import CONFIG, RunCommand
 from tests.quadriga.conftest import write
 
@@ -60,3 +64,26 @@ def test_hz_knows_rates_intervals_and_gaps(tmp_path: Path, run_command: RunComma
     assert rows["team/r1/state"][1:] == ["596", "991.7", "1 – 6", "495.8", "2.0 – 12.0", "5"]
     assert rows["team/sim/truth"][1:] == ["61", "100.0", "10 – 10", "50.0", "20.0 – 20.0", "0"]
     assert "team/r2/state" not in rows
+
+
+@pytest.mark.parametrize("verb", ["echo", "hz", "info", "check"])
+def test_nothing_that_was_recorded_steers_the_terminal(
+    tmp_path: Path, run_command: RunCommand, verb: str
+) -> None:
+    """Keys, names of robots and of counters, and prose, with sequences and lines of their own."""
+    steer, path = "\x1b[2J\x9b31m\u202e\nquadriga: harmless", tmp_path / "run.mcap"
+    none = np.zeros(0)
+    with RecordingWriter(path, build_metadata(CONFIG, "")) as writer:
+        for key, message in (
+            (f"team/{steer}", msg.Clock(1, 1)),
+            (f"team/{steer}/status", msg.Status(1, 1, steer, steer, "", {}, {}, none, none)),
+            ("team/r1/status", msg.Status(1, 1, steer, steer, "", {}, {steer: 1}, none, none)),
+            ("team/sim/event", msg.Event(1, 1, steer, steer, steer, steer)),
+            ("team/r1/inputs", msg.Consumed(1, 1, 0, 0, (steer,), (steer,))),
+        ):
+            writer.write(key, encode(message), 5)
+    options = ("**", "--file") if verb == "echo" else ("--file",) if verb == "hz" else ()
+    _, lines, err = run_command(verb, *options, path)
+    assert lines
+    assert not re.search("[\x1b\x9b\u202e]", "".join(lines) + err)
+    assert not [line for line in lines if line.startswith("quadriga: harmless")]

@@ -13,8 +13,8 @@ from quadriga.shared.config.load import load
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Clock, Truth
-from quadriga.shared.wire.topics import CLOCK, TRUTH
+from quadriga.shared.wire.messages import Clock, Event, Truth
+from quadriga.shared.wire.topics import CLOCK, EVENT, TRUTH
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.progress import WalkProgress
 
@@ -40,3 +40,19 @@ def test_time_is_the_clock_s_and_speed_the_truth_s(known: bool) -> None:
                 sleep(0.05)
                 progress.update()
     assert ("0.50 m/s" in text.getvalue()) == known
+
+
+def test_an_event_that_would_steer_the_terminal_is_only_shown() -> None:
+    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint(), "world.seconds": 8.0})
+    text = io.StringIO()
+    console = Console(file=text, force_terminal=False, width=120)
+    with Bus.open(config.bus, "team", SIM) as sim, WalkProgress(config, console) as progress:
+        put, deadline = sim.publisher(EVENT.key("team")), monotonic() + WAIT
+        while "harmless" not in text.getvalue():
+            assert monotonic() < deadline, text.getvalue()
+            detail = "\x1b]0;mine\x07\x1b[2J\nquadriga: harmless"
+            put(encode(Event(500, 0, "fault", "r1\x1b[8m", detail, "malformed")))
+            sleep(0.05)
+            progress.update()
+    assert "\x1b" not in text.getvalue()
+    assert "\nquadriga: harmless" not in text.getvalue()
