@@ -8,14 +8,13 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quadriga.plant.command_limits import MOST_KD, MOST_KP
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.robot.conventions import N_JOINTS, Array
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.unitree.packets import MotorTargets
 
-MOST_KP: Final = 500.0  # N·m/rad
-MOST_KD: Final = 30.0  # N·m·s/rad
 TOO_FAST: Final = 2.0  # times a joint's greatest speed: no joint moves so
 TOO_FAR: Final = 1.0  # rad beyond its range: no joint is there
 LIMITS: Final = (

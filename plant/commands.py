@@ -8,15 +8,20 @@ from typing import Final
 
 import numpy as np
 
+from quadriga.plant.command_limits import command_limits, describe_excess
 from quadriga.shared.errors import MessageError
 from quadriga.shared.robot.conventions import N_JOINTS
+from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command
 from quadriga.shared.wire.topics import COMMAND
 
 MALFORMED: Final = "malformed"
+IMPLAUSIBLE: Final = "implausible"
+CONTRADICTED: Final = "contradicted"
 STALE: Final = "stale"
 FOREIGN: Final = "foreign"
+_INVALID: Final = (MALFORMED, IMPLAUSIBLE, CONTRADICTED)  # no process of this project sends such
 
 
 class CommandBox:
@@ -24,23 +29,26 @@ class CommandBox:
 
     Attributes:
         latest: by robot, in no particular order.
-        refused: number of refused messages by reason (`MALFORMED`, `STALE`, `FOREIGN`) and robot,
-            "" for a robot of no or another team.
-        last_error: the latest malformed message's error text, or "".
+        refused: number of refused messages by reason (`MALFORMED`, `IMPLAUSIBLE`, `CONTRADICTED`,
+            `STALE`, `FOREIGN`) and robot, "" for a robot of no or another team.
+        last_error: what was wrong with the latest that no process of this project sends, or "".
     """
 
-    def __init__(self, team: str, names: Iterable[str]) -> None:
+    def __init__(self, team: str, names: Iterable[str], robot: RobotSpec) -> None:
+        """Of the robots `names` of a team, all of the kind `robot`."""
         self._robots = {COMMAND.key(team, name): name for name in names}
+        self._limits = command_limits(robot)
         self.latest: dict[str, Command] = {}
         self.refused: Counter[tuple[str, str]] = Counter()
         self.last_error = ""
-        # The first one read compiles or loads the reader, which is not for the first tick.
-        decode(encode(Command(0, 0, *np.zeros((5, N_JOINTS)))), Command)
+        # The first one read compiles or loads what reads it, which is not for the first tick.
+        first = decode(encode(Command(0, 0, *np.zeros((5, N_JOINTS)))), Command)
+        describe_excess(first, self._limits)
 
     @property
-    def malformed(self) -> int:
-        """Number of packets that were not a valid command."""
-        return sum(n for (reason, _), n in self.refused.items() if reason == MALFORMED)
+    def invalid(self) -> int:
+        """Number of packets that were no valid command, or one that nobody can mean."""
+        return sum(n for (reason, _), n in self.refused.items() if reason in _INVALID)
 
     def tick_of(self, robot: str) -> int:
         """Tick of the robot's newest command, −1 before the first."""
@@ -48,9 +56,12 @@ class CommandBox:
         return -1 if known is None else known.tick
 
     def take(self, key: str, payload: bytes, tick: int, oldest: int) -> str:
-        """Take in a packet at world time `tick`; the robot's name if its command is now newer.
+        """Take in a packet; the robot's name if its command is now newer.
 
-        A command of the future, or of before `oldest`, is refused as stale.
+        Refused are a command with numbers beyond `command_limits`, and as stale one of a tick
+        before `oldest` or after `tick`, the newest of which the robots' states are published. Of
+        two commands of one tick the first counts: the plant cannot know which of them is meant.
+        That they differ is told.
         """
         robot = self._robots.get(key)
         if robot is None:
@@ -59,11 +70,23 @@ class CommandBox:
         try:
             command = decode(payload, Command)
         except MessageError as error:
-            self.refused[MALFORMED, robot] += 1
-            self.last_error = str(error)
-            return ""
+            return self._refuse(MALFORMED, robot, str(error))
+        known = self.latest.get(robot)
+        if known is not None and command.tick == known.tick:
+            if command.row.tobytes() == known.row.tobytes():
+                return self._refuse(STALE, robot)
+            differ = f"command: got two of tick {command.tick} for {robot}, expected one"
+            return self._refuse(CONTRADICTED, robot, f"{differ} (does someone else command it?)")
         if not oldest <= command.tick <= tick or command.tick <= self.tick_of(robot):
-            self.refused[STALE, robot] += 1
-            return ""
+            return self._refuse(STALE, robot)
+        excess = describe_excess(command, self._limits)
+        if excess:
+            return self._refuse(IMPLAUSIBLE, robot, excess)
         self.latest[robot] = command
         return robot
+
+    def _refuse(self, reason: str, robot: str, error: str = "") -> str:
+        """Count a packet; no robot has a newer command by it."""
+        self.refused[reason, robot] += 1
+        self.last_error = error or self.last_error
+        return ""

@@ -14,6 +14,7 @@ from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.members import SIM
+from quadriga.shared.printable import printable_line
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import encode, truncate_text
@@ -44,7 +45,7 @@ class PlantServer:
         team, realtime = config.team.name, config.world.mode == "realtime"
         self.config, self.plant, self.bus = config, plant, bus
         self.time = time or TeamTime()
-        self.commands = CommandBox(team, plant.names)
+        self.commands = CommandBox(team, plant.names, config.robot)
         self.silent: set[str] = set()
         self._put_state = {
             name: bus.publisher(STATE.key(team, name), droppable=realtime) for name in plant.names
@@ -61,7 +62,9 @@ class PlantServer:
         self._periods = periods(config)
         self._last_tick = round(config.world.seconds * 1000)
         self._fallen: set[str] = set()
-        self._malformed = 0
+        self._invalid = 0
+        self._published = -1  # newest tick whose states are out
+        self._realtime = realtime
 
     def publish(self) -> None:
         """Send the present tick's clock and truth, when due, and every robot's state.
@@ -69,6 +72,7 @@ class PlantServer:
         The truth is the whole team's: a plant of one robot among several does not know it.
         """
         plant = self.plant
+        self._take_early()
         if self.time.drives and plant.tick % self._periods[CLOCK.name] == 0:
             self._put_clock(encode(Clock(plant.tick, plant.tick * 1_000_000)))
         if self.time.alone and plant.tick % self._periods[TRUTH.name] == 0:
@@ -78,18 +82,28 @@ class PlantServer:
         for name, state in plant.states().items():
             put = self._put_silent if name in self.silent else self._put_state
             put[name](encode(state))
+        self._published = plant.tick
         plant.settle()
 
     def take(self, key: str, payload: bytes, oldest: int) -> str:
         """Take in a packet; the robot's name if its command is now newer.
 
-        A command of the future, or of before tick `oldest`, is refused.
+        A command of a tick whose states are not out yet, or of before tick `oldest`, is refused.
         """
-        tick = self.plant.tick
         if key not in self.time.keys:
-            return self.commands.take(key, payload, tick=tick, oldest=oldest)
-        self.time.take(key, payload, tick)
+            return self.commands.take(key, payload, tick=self._published, oldest=oldest)
+        self.time.take(key, payload, self.plant.tick)
         return ""
+
+    def _take_early(self) -> None:
+        """Take in what has come before the states of this tick are out.
+
+        No command of this tick can be among it. Taken in later, a forged one would come before the
+        robot's own.
+        """
+        oldest = 0 if self._realtime else self.plant.tick
+        for packet in self.bus.drain():
+            self.take(*packet, oldest)
 
     def announce(self, code: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""
@@ -101,7 +115,7 @@ class PlantServer:
 
     def step(self, commands: Mapping[str, Command]) -> End | None:
         """Advance the plant by one tick; why the walk ends, if it does."""
-        self._report_malformed()
+        self._report_invalid()
         for event in self.plant.step(commands):
             if event.robot or self.time.drives:  # what concerns all is announced once
                 self._send(event)
@@ -112,7 +126,7 @@ class PlantServer:
             return self.time.end
         if self.plant.tick < self._last_tick:
             return None
-        self._report_malformed(at_once=True)
+        self._report_invalid(at_once=True)
         fallen = [name for name in robot_names(self.config.team.robots) if name in self._fallen]
         if fallen:
             return End(codes.FALLEN, f"fall of {', '.join(fallen)}")
@@ -125,19 +139,16 @@ class PlantServer:
             linger = FALL_LINGER_MS if event.code == codes.FALL else 0
             self._last_tick = min(self._last_tick, event.tick + linger)
 
-    def _report_malformed(self, *, at_once: bool = False) -> None:
-        """Announce malformed commands, once in a second of world time at most unless `at_once`."""
-        count = self.commands.malformed
-        if count != self._malformed and (at_once or self.plant.tick % 1000 == 0):
-            self._malformed = count
+    def _report_invalid(self, *, at_once: bool = False) -> None:
+        """Announce invalid commands, once in a second of world time at most unless `at_once`."""
+        count = self.commands.invalid
+        if count != self._invalid and (at_once or self.plant.tick % 1000 == 0):
+            self._invalid = count
             detail = f"{count} commands dropped: {self.commands.last_error}"
             self.announce(codes.MALFORMED, "", detail)
 
     def _send(self, event: Event) -> None:
         put = self._put_stop if event.kind == "stop" else self._put_event
         put(encode(event))
-        print(
-            f"{event.tick} ms: {event.kind} {event.robot} {event.detail}",
-            file=sys.stderr,
-            flush=True,
-        )
+        line = f"{event.tick} ms: {event.kind} {event.robot} {event.detail}"
+        print(printable_line(line), file=sys.stderr, flush=True)

@@ -52,7 +52,7 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         SILENT: EventCode("fault", "a robot did not answer in time: the world waits no longer"),
         GONE: EventCode("fault", "a robot left the bus: the world waits no longer"),
         BACK: EventCode("fault", "a robot answers again: the world waits for it"),
-        MALFORMED: EventCode("fault", "commands did not decode"),
+        MALFORMED: EventCode("fault", "commands that are none, or that nobody can mean"),
         BRIDGE_MODE: EventCode("bridge", "a bridge's robot begins to stand up, walk or lie down"),
         ROBOT_STOPPED: EventCode("fault", "a bridge has stopped its robot: damped, then limp"),
         CLOCK: EventCode("fault", "how well a plant knows the team's clock crosses 1 ms"),

@@ -52,7 +52,11 @@ def test_limits_of_both_qps_are_met(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(
     "what",
-    ['rehearse(config, Agent(config, "r1", None))', 'CommandBox("team", ["r1"])', "World(config)"],
+    [
+        'rehearse(config, Agent(config, "r1", None))',
+        'CommandBox("team", ["r1"], config.robot)',
+        "World(config)",
+    ],
     ids=["agent", "commands", "world"],
 )
 def test_nothing_of_the_first_tick_is_left_to_compile(what: str) -> None:

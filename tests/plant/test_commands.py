@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from quadriga.plant.commands import FOREIGN, STALE, CommandBox
+from quadriga.plant.command_limits import command_limits
+from quadriga.plant.commands import CONTRADICTED, FOREIGN, IMPLAUSIBLE, STALE, CommandBox
+from quadriga.shared.config.sections import TeamConfig
+from quadriga.shared.robot.a1 import A1
+from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.wire.codec import MAX_TICK, encode
 from quadriga.shared.wire.messages import Command, Event
+from quadriga.sim_server.world.world import World
+from tests.sim_server.standing import configured
 
 KEY = "team/r1/command"
 
@@ -17,9 +27,17 @@ def command(tick: int, tau: float = 0.0) -> bytes:
     return encode(Command(tick, tick * 1_000_000, array, array, array, array, array))
 
 
+def command_of(**values: float) -> bytes:
+    """A command of tick 5, zero but for the last joint's numbers."""
+    row = np.zeros(60)
+    for name, value in values.items():
+        row[Command.CUTS[name].stop - 1] = value
+    return encode(Command.from_row(5, 5_000_000, row))
+
+
 @pytest.fixture
 def box() -> CommandBox:
-    return CommandBox("team", ("r1", "r2"))
+    return CommandBox("team", ("r1", "r2"), A1)
 
 
 def test_the_command_of_the_tick_is_taken(box: CommandBox) -> None:
@@ -38,8 +56,20 @@ def test_lock_step_discards_other_ticks(box: CommandBox, wrong: int) -> None:
 
 def test_a_repeated_command_does_not_count_twice(box: CommandBox) -> None:
     assert box.take(KEY, command(5, 1.0), tick=5, oldest=5) == "r1"
-    assert box.take(KEY, command(5, 9.0), tick=5, oldest=5) == ""
+    assert box.take(KEY, command(5, 1.0), tick=5, oldest=5) == ""
+    assert box.refused == {(STALE, "r1"): 1}
+    assert (box.invalid, box.last_error) == (0, "")
+
+
+def test_two_commands_of_one_tick_are_told(box: CommandBox) -> None:
+    """Nobody can know which of them is the robot's own agent's."""
+    assert box.take(KEY, command(5, 1.0), tick=5, oldest=5) == "r1"
+    for tick in (5, 6):  # in lock-step, too, once the world has gone on
+        assert box.take(KEY, command(5, 1.5), tick=tick, oldest=tick) == ""
     assert box.latest["r1"].tau[0] == 1.0
+    assert box.refused == {(CONTRADICTED, "r1"): 2}
+    assert box.invalid == 2
+    assert "two of tick 5 for r1" in box.last_error
 
 
 def test_real_time_takes_older_ones_but_never_goes_back(box: CommandBox) -> None:
@@ -61,9 +91,72 @@ def test_real_time_takes_older_ones_but_never_goes_back(box: CommandBox) -> None
 )
 def test_what_is_malformed_is_dropped_and_counted(box: CommandBox, payload: bytes) -> None:
     assert box.take(KEY, payload, tick=5, oldest=5) == ""
-    assert box.malformed == 1
+    assert box.invalid == 1
     assert box.last_error.startswith("command")
     assert box.latest == {}
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"kp": 1e300},
+        {"kd": 1e300},
+        {"q_des": -1e300, "kp": 80.0},
+        {"v_des": 1e300, "kd": 3.0},
+        {"tau": 70.0},
+        {"kp": 501.0},
+        {"kp": -1.0},
+        {"kd": -0.1},
+        {"q_des": 4.0},
+        {"v_des": -43.0},
+    ],
+    ids=str,
+)
+def test_what_no_motor_can_be_meant_to_do_is_dropped_and_counted(
+    box: CommandBox, wrong: dict[str, float]
+) -> None:
+    assert box.take(KEY, command_of(**wrong), tick=5, oldest=5) == ""
+    assert box.refused == {(IMPLAUSIBLE, "r1"): 1}
+    assert box.invalid == 1
+    assert box.last_error.startswith(f"command.{next(iter(wrong))}: got ")
+    assert box.latest == {}
+    assert box.take(KEY, command(5, 1.0), tick=5, oldest=5) == "r1", "the robot's own still counts"
+
+
+@pytest.mark.parametrize("robot", ROBOTS.values(), ids=list(ROBOTS))
+def test_what_agents_and_plants_send_is_within_the_limits(robot: RobotSpec) -> None:
+    least, most = command_limits(robot)
+    for name, array in (
+        ("tau", robot.torque_limit),
+        ("tau", -robot.torque_limit),
+        ("q_des", np.array(robot.lower)),
+        ("q_des", np.array(robot.upper)),
+        ("q_des", np.zeros(12)),  # of a command of torques alone
+        ("v_des", np.tile(robot.speed, 4)),
+    ):
+        cut = Command.CUTS[name]
+        assert (least[cut] < array).all()
+        assert (array < most[cut]).all()
+
+
+@pytest.mark.parametrize("kind", ROBOTS)
+def test_no_command_that_is_taken_makes_the_world_lose_its_numbers(kind: str) -> None:
+    """The worst of them, one after the other: all at their limits, with the signs of a tick."""
+    config = replace(configured(), team=TeamConfig(robots=1, robot=kind))
+    random = np.random.default_rng(3)
+    world = World(config)
+    box, (least, most) = CommandBox("team", ("r1",), config.robot), command_limits(config.robot)
+    for tick in range(400):
+        signs = random.random(60) < 0.5 if tick % 2 else np.full(60, tick % 4 == 0)
+        worst = Command.from_row(tick, 0, np.where(signs, least, most))
+        assert box.take(KEY, encode(worst), tick=tick, oldest=tick) == "r1"
+        world.step(box.latest)
+        state = world.states()["r1"]
+        assert np.isfinite(state.row).all(), tick
+    truth: Any = world.truth()
+    assert np.isfinite(truth.base_pos).all()
+    assert np.isfinite(world.physics.qacc).all()
+    assert np.abs(world.motors.torque).max() <= max(config.robot.torque)
 
 
 def test_a_robot_of_another_team_or_none_is_foreign(box: CommandBox) -> None:

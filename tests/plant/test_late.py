@@ -14,6 +14,7 @@ from quadriga.plant.late import DAMP, FRESH, HOLD, grade, hold_joints
 from quadriga.plant.realtime import _Motors
 from quadriga.plant.server import PlantServer
 from quadriga.shared.config.sections import Config, TeamConfig
+from quadriga.shared.robot.a1 import A1
 from quadriga.sim_server.world.world import World
 
 
@@ -39,7 +40,7 @@ def test_holding_keeps_a_standing_robot_up_and_damping_does_not() -> None:
 def test_a_robot_that_was_damped_is_not_drawn_back_to_where_it_was_held() -> None:
     """Silent for 400 ms it is held, then damped and sinks; then a command comes, 100 ms old."""
     world = World(replace(Config(), team=TeamConfig(robots=1)))
-    box = CommandBox("team", world.names)
+    box = CommandBox("team", world.names, A1)
     motors = _Motors(cast(PlantServer, SimpleNamespace(plant=world, commands=box, config=Config())))
     box.latest["r1"] = hold_joints(world.states()["r1"])
     poses = {}

@@ -13,7 +13,7 @@ from quadriga.plant.protocol import Plant
 from quadriga.plant.server import FALL_LINGER_MS, PlantServer
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import MAX_TEXT, decode
+from quadriga.shared.wire.codec import MAX_TEXT, decode, encode
 from quadriga.shared.wire.messages import Clock, Command, Event, State
 from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, STATE, TRUTH
 from quadriga.sim_server.world.world import World
@@ -21,13 +21,18 @@ from tests.sim_server.standing import configured
 
 
 class Listener:
-    """A bus that keeps what is published: key, whether it may be dropped, payload."""
+    """A bus that brings `arrived`, and keeps what is published: key, whether droppable, payload."""
 
     def __init__(self) -> None:
         self.packets: list[tuple[str, bool, bytes]] = []
+        self.arrived: list[tuple[str, bytes]] = []
 
     def publisher(self, key: str, *, droppable: bool = False) -> Callable[[bytes], None]:
         return lambda payload: self.packets.append((key, droppable, payload))
+
+    def drain(self) -> list[tuple[str, bytes]]:
+        arrived, self.arrived = self.arrived, []
+        return arrived
 
     def events(self) -> list[Event]:
         return [
@@ -119,3 +124,28 @@ def test_any_plant_is_served(down: str, last: int) -> None:
     fallen, over = (codes.FALLEN, "fall of r1"), (codes.TIME_OVER, "end of world.seconds")
     assert end == (fallen if down else over)
     assert server.plant.tick == last
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_no_command_of_a_tick_counts_that_came_before_the_robot_s_state_of_it(mode: str) -> None:
+    """A forged one that waits in the inbox would count before the agent's own."""
+    server, listener = served(mode=mode)
+    key, zero = COMMAND.key("team", "r1"), np.zeros((4, 12))
+    own, forged = (encode(Command(1, 10**6, np.full(12, tau), *zero)) for tau in (1.0, 9.0))
+    server.publish()
+    assert server.take(key, forged, oldest=0) == "", "the state of tick 1 is not out yet"
+    server.step({})
+    listener.arrived.append((key, forged))
+    server.publish()
+    assert server.take(key, own, oldest=0) == "r1"
+    assert server.commands.latest["r1"].tau[0] == 1.0
+
+
+def test_what_is_forged_in_an_event_does_not_reach_the_terminal(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    server, _ = served()
+    server.announce(codes.MALFORMED, "", "1 commands dropped: \x1b[2J\nstop")
+    said = capsys.readouterr().err
+    assert "\x1b" not in said
+    assert said.count("\n") == 1
