@@ -7,16 +7,24 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from quadriga.agents.agent import Inputs
+from quadriga.agents.inbox.reference_slew import ReferenceSlew
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.planning.operator_references import AHEAD_MS
-from quadriga.agents.plausibility import is_orientation, is_within_limits
+from quadriga.agents.plausibility import (
+    is_measurable,
+    is_orientation,
+    is_within_limits,
+    measured_limits,
+)
 from quadriga.agents.time_grid import step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import OPERATOR, PLANNER, SIM
 from quadriga.shared.planner_kinds import find_kind
+from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import EStop, Event, Message, Plan, Reference, State, Truth
+from quadriga.shared.wire.tick_gate import TickGate
 from quadriga.shared.wire.topics import (
     ESTOP,
     EVENT,
@@ -35,7 +43,8 @@ Due = tuple[Source, Order]  # a message of a source, and all before it
 UNREADABLE: Final = "unreadable"  # reason of a stop whose message does not decode
 _NEVER: Final = (-1, 0)
 _HELD: Final = 256  # messages of one source beyond those of the stand; more can only be a flood
-_JUMP_MS: Final = 5000  # from one state to the next; longer than any silence the team survives
+_GAP_MS: Final = 100  # from one state to the next; a longer jump must be confirmed by one more
+_JUMP_MS: Final = 5000  # longer than any silence that the team survives
 
 
 class Inbox:
@@ -88,7 +97,9 @@ class Inbox:
         # In lock-step nobody asks for what peers measure while they stand until they walk.
         self._most = _HELD + config.gait.stand_ms // SAMPLE_MS
         self._step_ms = step_ms(config)
-        self._now = -1  # tick of the newest state
+        self._gate = state_gate()
+        self._slew = ReferenceSlew(config)
+        self._measurable = measured_limits(config.robot)
         self._state: State | None = None
         self._sample_end: State | None = None  # older than `_state`
         self._estop: EStop | None = None
@@ -106,15 +117,12 @@ class Inbox:
             return
         topic, sender = row
         message = decode_packet(topic, payload)
-        if message is None or not _is_believable(message, self._robot):
+        if message is None or not _is_believable(message, self._robot, self._measurable):
             self.counters[f"dropped_{topic.name}"] += 1
             return
-        if topic not in (ESTOP, EVENT) and self._is_ahead(message):
+        if topic not in (STATE, ESTOP, EVENT) and self._is_ahead(message):
             self.counters[f"ahead_{topic.name}"] += 1
-            if topic is STATE:
-                self.misfits += 1
-            else:
-                self.refused = True
+            self.refused = True
             return
         self.received[topic.name, sender] += 1
         self._keep(topic, sender, message)
@@ -122,13 +130,10 @@ class Inbox:
     def _is_ahead(self, message: Message) -> bool:
         """Whether a message is of a time that nobody in the team can have reached.
 
-        It would be held until then, and real messages would be late behind it. The first state is
-        believed: it tells the time.
+        It would be held until then, and real messages would be late behind it.
         """
-        if isinstance(message, State):
-            return self._now >= 0 and message.tick > self._now + _JUMP_MS
         tick = message.step * self._step_ms if isinstance(message, Plan) else message.tick
-        return tick > max(self._now, 0) + AHEAD_MS
+        return tick > max(self._gate.newest, 0) + AHEAD_MS
 
     def _keep(self, topic: Topic, sender: str, message: Message) -> None:
         if isinstance(message, State):
@@ -148,8 +153,9 @@ class Inbox:
             self._newest[source] = max(self._newest.get(source, _NEVER), order_of(message))
 
     def _keep_newest(self, state: State) -> None:
-        if state.tick <= self._now:
-            self.counters["states_passed_over"] += 1
+        late = state.tick <= self._gate.newest
+        if not self._gate.take(state.tick):
+            self.counters["states_passed_over" if late else f"ahead_{STATE.name}"] += 1
             self.misfits += 1
             return
         passed = self._state
@@ -157,7 +163,11 @@ class Inbox:
             passed, self._sample_end = self._sample_end, passed
         if passed is not None:
             self.counters["states_passed_over"] += 1
-        self._state, self._now, self.misfits = state, state.tick, 0
+        self._state, self.misfits = state, 0
+
+    def trust_state(self, tick: int) -> None:
+        """Believe the state of `tick`, however far ahead: a replay knows that it was answered."""
+        self._gate.trust(tick)
 
     @property
     def has_state(self) -> bool:
@@ -208,7 +218,7 @@ class Inbox:
             state,
             tuple(measurements),
             tuple(plans),
-            tuple(ref for _, ref in references),
+            tuple(self._slew.limit(reference) for _, reference in references),
             estop,
             truths[-1][1] if truths else None,
         )
@@ -227,6 +237,11 @@ class Inbox:
         return sorted(due, key=lambda item: (item[0], order_of(item[1])))
 
 
+def state_gate() -> TickGate:
+    """Which states are believed by their ticks."""
+    return TickGate(_GAP_MS, _JUMP_MS)
+
+
 def decode_packet(topic: Topic, payload: bytes) -> Message | None:
     """The message in a packet, or None; whatever comes as an emergency stop is one."""
     try:
@@ -235,13 +250,14 @@ def decode_packet(topic: Topic, payload: bytes) -> Message | None:
         return EStop(0, 0, UNREADABLE) if topic is ESTOP else None
 
 
-def _is_believable(message: Message, robot: str) -> bool:
+def _is_believable(message: Message, robot: str, measurable: Array) -> bool:
     """Whether finite numbers can be meant, and for this robot.
 
-    Orientations must be of unit length, references within limits, and the truth of this robot.
+    Sensors must be able to say what a state says, orientations be of unit length, references be
+    within limits, and the truth be of this robot.
     """
     if isinstance(message, State):
-        return is_orientation(message.imu_quat_wxyz)
+        return is_measurable(message, measurable) and is_orientation(message.imu_quat_wxyz)
     if isinstance(message, Truth):
         names, quats = message.robots, message.base_quat_wxyz
         if robot not in names or len(names) != len(quats):

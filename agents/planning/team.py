@@ -10,6 +10,7 @@ from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.team_planner import TeamPlanner
 from quadriga.agents.planning.operator_references import AHEAD_MS, remember_references
 from quadriga.agents.planning.window import build_planner_inputs
+from quadriga.agents.plausibility import is_plausible
 from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import robot_names
@@ -28,7 +29,7 @@ class CentralState:
         windows: each robot's last samples, ascending, at most T_ini + those of one step.
         references: what the operator asked for lately.
         claimed: by robot, tick of a sample that was not believed, until one is.
-        refused: messages of a time too far ahead so far.
+        refused: messages of a time too far ahead, or with implausible numbers, so far.
         step: the last step planned; −1 before the first.
     """
 
@@ -93,14 +94,17 @@ class Central:
     ) -> CentralState:
         """Add what has arrived; what is repeated, late or of no robot here is passed over.
 
-        Refused and counted is what is far ahead of the team's time, which is the median of its
-        robots' newest samples: behind it all that is real would be late. After a silence of all
-        the team's time goes on when most have spoken again.
+        Refused and counted is what nobody can mean, and what is far ahead of the team's time, which
+        is the median of its robots' newest samples: behind it all that is real would be late.
+        After a silence of all the team's time goes on when most have spoken again.
         """
         windows, claimed, refused = dict(state.windows), dict(state.claimed), state.refused
         for name, sample in measurements:
             newer = sample.tick > self._newest(windows, name)
             if name not in self._names or not newer or sample.tick % SAMPLE_MS:
+                continue
+            if not is_plausible(self._config, sample.u, sample.y):
+                refused += 1
                 continue
             if sample.tick > self._team_time(windows, claimed) + _AHEAD_MS:
                 claimed[name] = sample.tick

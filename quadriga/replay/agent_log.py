@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.inbox.inbox import Inbox, Order, Source, decode_packet, order_of
+from quadriga.agents.inbox.inbox import Inbox, Order, Source, decode_packet, order_of, state_gate
 from quadriga.agents.inbox.intake_log import ANYONE
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
@@ -39,6 +39,7 @@ class AgentLog:
 
     Attributes:
         states: own sensors by tick, all payloads of a tick in the order of the file.
+        early: likewise, those that were ahead of all that the agent believed.
         received: everything else it may have taken in: packets of each source by order.
         records: what it reported that it took in, by tick.
         sent: commands, measurements and own plans by topic and order, payloads as above.
@@ -47,6 +48,7 @@ class AgentLog:
     """
 
     states: dict[int, list[bytes]] = field(default_factory=lambda: defaultdict(list))
+    early: dict[int, list[bytes]] = field(default_factory=lambda: defaultdict(list))
     received: dict[Source, dict[Order, list[Packet]]] = field(
         default_factory=lambda: defaultdict(lambda: defaultdict(list))
     )
@@ -83,6 +85,8 @@ def read_agent_log(
             handlers[entry.key](entry)
         if count % _REPORT_AFTER == 0:
             progress(entry.tick)
+    for tick, payloads in log.early.items():  # the agent answered what came in time, if it did
+        log.states[tick] += payloads
     # A forged tick must not ask for years of steps.
     log.last = min(log.last, max(log.states, default=-1))
     _check_complete(log, recording, config, agent.robot)
@@ -94,9 +98,6 @@ def _build_handlers(
 ) -> Mapping[str, Callable[[ChunkEntry], None]]:
     """What to do with an entry, by its key."""
     team, robot = config.team.name, agent.robot
-
-    def keep_state(entry: ChunkEntry) -> None:
-        log.states[entry.tick].append(entry.payload)
 
     def keep_command(entry: ChunkEntry) -> None:
         log.sent[COMMAND.name, entry.tick, 0].append(entry.payload)
@@ -112,7 +113,7 @@ def _build_handlers(
     for key, (topic, sender) in inbox.topics.items():
         if topic not in (STATE, EVENT):
             handlers[key] = _keep_received(log, topic, ANYONE if topic is ESTOP else sender)
-    handlers[STATE.key(team, robot)] = keep_state
+    handlers[STATE.key(team, robot)] = _keep_states(log)
     handlers[COMMAND.key(team, robot)] = keep_command
     handlers[INPUTS.key(team, robot)] = keep_record
     handlers[MEASUREMENT.key(team, robot)] = _keep_sent(log, MEASUREMENT)
@@ -121,6 +122,16 @@ def _build_handlers(
     for peer in agent.peers:
         handlers[COMMAND.key(team, peer)] = _keep_ticks(log.peers_awake[peer])
     return handlers
+
+
+def _keep_states(log: AgentLog) -> Callable[[ChunkEntry], None]:
+    gate = state_gate()
+
+    def keep(entry: ChunkEntry) -> None:
+        in_time = entry.tick <= gate.newest or gate.take(entry.tick)
+        (log.states if in_time else log.early)[entry.tick].append(entry.payload)
+
+    return keep
 
 
 def _keep_received(log: AgentLog, topic: Topic, sender: str) -> Callable[[ChunkEntry], None]:

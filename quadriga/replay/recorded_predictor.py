@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
-import zipfile
 from pathlib import Path
 from typing import Final
-
-import numpy as np
 
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256, read
@@ -16,6 +13,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, RecordingError, name_file_errors
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.npz import UNREADABLE, open_npz
 from quadriga.shared.runtime.places import cache_dir, cache_files
 
 PREDICTOR: Final = "predictor.npz"  # its name in a run folder
@@ -76,7 +74,7 @@ def find_predictor(
 def _read_digest(path: Path) -> str:
     """The digest that is written in a predictor file; "" if it is none."""
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        with open_npz(path) as archive:
             return str(json.loads(str(archive["document"]))["sha256"])
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
+    except UNREADABLE:
         return ""

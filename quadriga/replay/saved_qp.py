@@ -14,7 +14,6 @@ or `python -m quadriga.replay.saved_qp FILE`, which does just that and says how 
 from __future__ import annotations
 
 import sys
-import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -26,6 +25,7 @@ from quadriga.agents.agent import Agent, AgentState, Inputs, StepProblems
 from quadriga.agents.planner.qp_solver import SolvedQp
 from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.robot.conventions import Array
+from quadriga.shared.runtime.npz import UNREADABLE, open_npz
 
 WHOLE_BODY: Final = "command"  # the topic that is made of it
 PLANNER: Final = "plan"
@@ -76,10 +76,10 @@ def load(path: Path) -> SavedQp:
         RecordingError: no such file, or not a problem.
     """
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        with open_npz(path) as archive:
             arrays = {name: archive[name] for name in ("H", "f", "A", "lower", "upper", "x")}
             return SavedQp(**arrays, about=str(archive["about"]))
-    except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise RecordingError(str(path), str(error) or "another file", "a saved problem") from None
 
 

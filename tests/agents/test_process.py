@@ -59,7 +59,7 @@ def walk(monkeypatch: pytest.MonkeyPatch, ticks: Iterable[int | None]) -> Line:
 
 @pytest.mark.parametrize(
     ("first", "then"),
-    [([0, 4000], 0), ([1 << 41], 0), ([0], 10**6)],
+    [([0, 4000, 4001], 0), ([1 << 41, (1 << 41) + 1], 0), ([0], 10**6)],
     ids=["restarted", "forged", "set ahead"],
 )
 def test_a_clock_that_has_been_set_ends_the_process_with_a_word(
@@ -82,3 +82,13 @@ def test_one_state_again_is_no_reason_however_long_the_world_stands_still(
 ) -> None:
     line = walk(monkeypatch, [0, 1, 1, *[None] * 50, 2])
     assert line.answered == [0, 1, 2]
+
+
+@pytest.mark.parametrize("forged", [4990, 101, 1 << 41])
+def test_a_forged_state_far_ahead_stops_no_answer(
+    monkeypatch: pytest.MonkeyPatch, forged: int
+) -> None:
+    line = walk(monkeypatch, [0, 1, 2, 2 + forged, *range(3, 50)])
+    assert line.answered == [*range(50)]
+    line = walk(monkeypatch, [forged, *range(50)])
+    assert line.answered == [*range(50)], "nor as the first of all"

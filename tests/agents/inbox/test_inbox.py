@@ -118,18 +118,29 @@ def test_of_states_in_any_order_the_newest_counts_and_none_before_it() -> None:
         assert box.misfits == 2 + (order[-1] != 6) + (order[0] == 6)
 
 
-def test_a_state_of_years_ahead_does_not_make_the_real_ones_late() -> None:
+def test_a_state_far_ahead_does_not_make_the_real_ones_late() -> None:
     box = arrivals()
-    for tick, wrong in ((7, 1 << 41), (8, 8 + 5001)):
+    for tick, wrong in ((7, 1 << 41), (8, 8 + 4990), (9, 9 + 101)):
         feed(box, ("r2/state", standing(tick)), ("r2/state", standing(wrong)))
         state = box.pop_state()
         assert state is not None
         assert state.tick == tick
         assert box.misfits == 1
-    assert box.counters["ahead_state"] == 2
-    feed(box, ("r2/state", standing(8 + 5000)))
-    assert box.pop_state() is not None, "a process may have been stopped for so long"
+    assert box.counters["ahead_state"] == 3
+    assert box.pop_state() is None
+
+
+def test_a_jump_is_believed_once_the_next_state_goes_on_from_it() -> None:
+    """A process may have been stopped for so long."""
+    box = arrivals("realtime")
+    feed(box, *(("r2/state", standing(tick)) for tick in (8, 5006, 5007)))
+    state = box.pop_state()
+    assert state is not None
+    assert state.tick == 5007
     assert box.misfits == 0
+    feed(box, ("r2/state", standing(5007 + 5001)), ("r2/state", standing(5007 + 5002)))
+    assert box.pop_state() is None, "no silence lasts so long"
+    assert box.misfits == 2
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
@@ -138,7 +149,8 @@ def test_what_is_of_a_time_far_ahead_is_refused_and_nobody_is_taken_to_have_spok
     mode: str, lead: int
 ) -> None:
     box, step = arrivals(mode, estimator="truth"), -(-(2000 + lead) // 40)
-    feed(box, ("r2/state", standing(2000)))
+    feed(box, ("r2/state", standing(1999)), ("r2/state", standing(2000)))
+    del box.counters["ahead_state"]
     early: list[tuple[str, Message]] = [
         ("r1/plan", plan(step)), ("r1/plan", replace(plan(step), tick=2000)),
         ("r3/measurement", measurement(2000 + lead)), ("reference", reference(2000 + lead)),
@@ -257,7 +269,7 @@ def test_an_emergency_stop_and_the_end_are_never_held_back() -> None:
 
 def test_a_flood_is_bounded_and_counted() -> None:
     box = arrivals()
-    feed(box, ("r2/state", standing(20_000)))
+    feed(box, ("r2/state", standing(19_999)), ("r2/state", standing(20_000)))
     feed(box, *(("r1/measurement", measurement(10 * k)) for k in range(1000)))
     most = 256 + 300 // 10  # what is measured while the team stands belongs to no flood
     assert box.counters["flooded_measurement"] == 1000 - most
@@ -276,7 +288,7 @@ def test_nothing_that_is_measured_during_the_stand_is_refused(robots: int, stand
     config = load(None, {"team.robots": robots, "gait.stand_ms": stand_ms})
     peers = [f"r{k}" for k in range(2, robots + 1)]
     box, last = Inbox(config, "r1", peers), stand_ms + 10
-    feed(box, ("r1/state", standing(last)))
+    feed(box, ("r1/state", standing(last - 1)), ("r1/state", standing(last)))
     for peer in peers:
         feed(box, *((f"{peer}/measurement", measurement(t)) for t in range(10, last + 1, 10)))
     assert not box.refused
@@ -337,3 +349,27 @@ def test_a_state_with_an_orientation_that_is_none_is_dropped(quat: Array) -> Non
     feed(box, ("r2/state", replace(standing(5), imu_quat_wxyz=quat)))
     assert box.pop_state() is None
     assert box.counters["dropped_state"] == 1
+
+
+@pytest.mark.parametrize(
+    ("field", "number"),
+    [
+        ("q_joint", 1e300),
+        ("q_joint", -8.0),
+        ("v_joint", 3500.0),
+        ("tau_joint", 400.0),
+        ("imu_gyro", -3500.0),
+        ("imu_accel", 2e4),
+        ("foot_force", 1e5),
+    ],
+)
+def test_a_state_that_no_sensor_can_tell_is_dropped(field: str, number: float) -> None:
+    box, good = arrivals(), standing(5)
+    numbers = getattr(good, field).copy()
+    numbers[-1] = number
+    changed: Any = {field: numbers}
+    feed(box, ("r2/state", replace(good, **changed)))
+    assert box.pop_state() is None
+    assert box.counters["dropped_state"] == 1
+    feed(box, ("r2/state", good))
+    assert box.pop_state() is not None, "the robot's own still counts"

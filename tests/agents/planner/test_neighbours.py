@@ -193,6 +193,16 @@ def test_numbers_that_no_robot_can_mean_are_refused_and_counted(absurd: float) -
     assert memory.peers == NEIGHBOURS.initial().peers
 
 
+@pytest.mark.parametrize("force", [1200.0, -1200.0, 600.0])
+def test_forces_that_no_leg_can_carry_are_refused(force: float) -> None:
+    good, sample = plan("r2", 20), measurement("r2", 40 * 20)
+    u, one = good.u.copy(), sample.u.copy()
+    u[3, 2] = one[2] = force
+    bad_plan, bad_sample = ("r2", replace(good, u=u)), ("r2", replace(sample, u=one))
+    memory = NEIGHBOURS.remember(NEIGHBOURS.initial(), 800, [bad_sample], [bad_plan])
+    assert memory.refused == 2
+
+
 def test_the_largest_forces_that_may_be_planned_are_taken() -> None:
     strong = replace(CONFIG, planner=replace(PLANNER, deviation_max=(20.0, 20.0, 5e3)))
     good = plan("r2", 20)

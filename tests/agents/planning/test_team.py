@@ -194,3 +194,12 @@ def test_when_one_robot_has_stopped_the_other_does_not_go_on(mode: Mode) -> None
         if outputs.mode != "walk":
             break
     assert (outputs.mode, outputs.reason) == ("stopping", "planner-lost")
+
+
+@pytest.mark.parametrize("force", [1e300, -1200.0])
+def test_a_sample_of_forces_that_no_leg_can_carry_is_refused(force: float) -> None:
+    name, good = sample("r2", 320)
+    forged = name, replace(good, u=np.full(12, force))
+    state = CENTRAL.remember(heard(310), [forged, sample("r1", 320), (name, good)], ())
+    assert state.refused == 1
+    assert CENTRAL.due(state) == 8, "the robot's own still counts"
