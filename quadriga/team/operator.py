@@ -18,10 +18,14 @@ from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import decode, encode, truncate_text
 from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.messages import Clock, EStop, Event, Reference
+from quadriga.shared.wire.tick_gate import TickGate
 from quadriga.shared.wire.topics import CLOCK, ESTOP, REFERENCE, topics_for
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 
 _AHEAD: Final = 4  # epochs; agents in lock-step wait for the one in force
+# Of the clock's tick against the newest; a longer jump must be confirmed. References of such a lead
+# are still believed: see `agents.planning.operator_references.AHEAD_MS`.
+_GAP_MS: Final = 500
 _ESTOP_WAIT: Final = 5.0  # s, longest search for the team
 _LONGEST_REASON: Final = 200  # characters; it becomes part of every agent's status
 
@@ -72,37 +76,73 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
         if not meet(bus, config, stopped):
             return
         take_priority(config.runtime.priority)  # without a reference the robots stop
-        tick, epoch, over = 0, 0, False
-        while True:
-            while EPOCH_MS * epoch <= tick + EPOCH_MS * _AHEAD:
+        time, epoch = TeamTicks(bus, round(1000 * config.world.seconds)), 0
+        while not stopped():
+            if EPOCH_MS * epoch <= time.tick + EPOCH_MS * _AHEAD:
                 put(encode(reference_at(config, EPOCH_MS * epoch)))
                 epoch += 1
-            if over or stopped():
-                leave_priority()
-                return
-            bus.declare(READY)
-            tick, over = _next_tick(bus, tick)
-
-
-def _next_tick(bus: Bus, tick: int) -> tuple[int, bool]:
-    """The team's time as far as it has come, and whether the walk is over.
-
-    A walk ends at the same tick for an operator who is behind: equal walks have equal references.
-    """
-    packet = bus.get(POLL)
-    if packet is None:
-        return tick, not members.has_lead(bus.members_at(HERE))
-    for key, payload in (packet, *bus.drain()):
-        try:
-            if key == CLOCK.key(bus.team):
-                tick = max(tick, decode(payload, Clock).tick)
                 continue
-            event = decode(payload, Event)
-        except MessageError:
-            continue  # not for the operator to count: the recorder keeps it
-        if event.kind == "stop":
-            return max(tick, event.tick - 1), True
-    return tick, False
+            if time.over:
+                break
+            bus.declare(READY)
+            time.follow()
+        leave_priority()
+
+
+class TeamTicks:
+    """The team's time, as whoever drives it tells it.
+
+    Anybody might have sent what is heard: a tick that the walk never comes to is not believed, nor
+    one that jumps, unless another goes on from it.
+
+    Args:
+        bus: subscribed to the clock and to events.
+        last: tick of the end of the walk.
+
+    Attributes:
+        over: whether the walk is over.
+    """
+
+    def __init__(self, bus: Bus, last: int) -> None:
+        self._bus, self._last = bus, last
+        self._gate = TickGate(_GAP_MS, last)
+        self.over = False
+
+    @property
+    def tick(self) -> int:
+        """As far as time has come."""
+        return max(self._gate.newest, 0)
+
+    def follow(self) -> None:
+        """Take in what has come.
+
+        A walk ends at the same tick for an operator who is behind: equal walks have equal
+        references.
+        """
+        packet = self._bus.get(POLL)
+        if packet is None:
+            self.over = not members.has_lead(self._bus.members_at(HERE))
+            return
+        for key, payload in (packet, *self._bus.drain()):
+            try:
+                if key == CLOCK.key(self._bus.team):
+                    self._take_tick(decode(payload, Clock).tick)
+                else:
+                    self._take_event(decode(payload, Event))
+            except MessageError:
+                continue  # not for the operator to count: the recorder keeps it
+            if self.over:
+                return
+
+    def _take_tick(self, tick: int) -> None:
+        if tick <= self._last:
+            self._gate.take(tick)
+
+    def _take_event(self, event: Event) -> None:
+        """The end, if the team can have come to its tick."""
+        if event.kind == "stop" and event.tick <= min(self._last, self.tick + _GAP_MS):
+            self._take_tick(event.tick - 1)
+            self.over = True
 
 
 def stop_team(config: Config, reason: str) -> None:

@@ -5,19 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from threading import Event as Flag
 from threading import Thread
+from typing import cast
 
 import pytest
 
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus, Packet
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.members import OPERATOR, SIM
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.wire.codec import MAX_TEXT, MAX_TICK, decode, encode
-from quadriga.shared.wire.messages import Clock, EStop, Event
-from quadriga.shared.wire.topics import CLOCK, ESTOP, EVENT
+from quadriga.shared.wire.messages import Clock, EStop, Event, Message, Reference
+from quadriga.shared.wire.topics import CLOCK, ESTOP, EVENT, REFERENCE
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.operator import _next_tick, reference_at, stop_team
+from quadriga.team.operator import TeamTicks, reference_at, run, stop_team
 
 
 def test_stand_then_ramp_then_full_speed() -> None:
@@ -60,19 +61,95 @@ def test_a_walk_ends_at_the_same_tick_for_who_is_behind(late: bool) -> None:
         sim.declare(HERE)
         assert operator.wait_for(HERE, {SIM}, 10.0, lambda: False)
         clock, event = sim.publisher(CLOCK.key("team")), sim.publisher(EVENT.key("team"))
-        newest = 0
+        time = TeamTicks(operator, 20_000)
         for tick in range(0, 800, 10):
             clock(encode(Clock(tick, tick * 10**6)))
-            while not late and newest < tick:
-                newest, over = _next_tick(operator, newest)
-                assert not over
+            while not late and time.tick < tick:
+                time.follow()
+                assert not time.over
         event(encode(Event(800, 800 * 10**6, "stop", "", "end of world.seconds", "time-over")))
         if late:
             sim.close()  # it leaves once all has arrived
-        over = False
-        while not over:
-            newest, over = _next_tick(operator, newest)
-        assert newest == 799
+        while not time.over:
+            time.follow()
+        assert time.tick == 799
+
+
+class Said:
+    """A bus that brings these packets, and then nothing; nobody is there."""
+
+    team = "team"
+
+    def __init__(self, *messages: Message) -> None:
+        keys = {Clock: CLOCK.key("team"), Event: EVENT.key("team")}
+        self._packets = [(keys[type(message)], encode(message)) for message in messages]
+
+    def get(self, timeout: float) -> Packet | None:
+        return self._packets.pop(0) if self._packets else None
+
+    def drain(self) -> list[Packet]:
+        packets, self._packets = self._packets, []
+        return packets
+
+    def members_at(self, stage: str) -> frozenset[str]:
+        return frozenset({SIM})
+
+
+def followed(*messages: Message) -> TeamTicks:
+    """The team's time after these, of a walk of 8 s."""
+    time = TeamTicks(cast("Bus", Said(*messages)), 8000)
+    time.follow()
+    return time
+
+
+def stop_at(tick: int) -> Event:
+    return Event(tick, 10**6 * tick, "stop", "", "", "signal")
+
+
+@pytest.mark.parametrize("tick", [501, 8001, 1 << 41])
+def test_a_time_that_the_team_cannot_have_come_to_is_not_followed(tick: int) -> None:
+    time = followed(Clock(0, 0), Clock(tick, 0), Clock(10, 0), stop_at(tick + 10), Clock(20, 0))
+    assert (time.tick, time.over) == (20, False)
+    time = followed(Clock(1 << 41, 0), Clock((1 << 41) + 10, 0))
+    assert time.tick == 0, "however often it is said"
+
+
+def test_an_operator_who_missed_something_catches_up() -> None:
+    time = followed(Clock(0, 0), Clock(4000, 0), Clock(4010, 0), stop_at(4200))
+    assert (time.tick, time.over) == (4199, True)
+
+
+@pytest.mark.parametrize("forged", [Clock(1 << 41, 0), stop_at(1 << 41), Clock(7990, 0)])
+def test_an_operator_whom_forged_times_reach_leaves_when_it_is_told_to(forged: Message) -> None:
+    config = load(
+        None,
+        {"team.robots": 1, "planner.kind": "none", "recorder.enabled": False}
+        | {"bus.endpoint": free_endpoint(), "world.seconds": 8.0, "runtime.priority": "ordinary"},
+    )
+    told = Flag()
+    thread = Thread(target=run, args=(config, told.is_set))
+    with Bus.open(config.bus, "team", SIM) as sim, Bus.open(config.bus, "team", "r1") as r1:
+        sim.subscribe(REFERENCE.key("team"))
+        sim.declare(HERE)
+        r1.declare(HERE)
+        thread.start()
+        try:
+            assert sim.wait_for(READY, {OPERATOR}, 10.0, lambda: False)
+            topic = CLOCK if isinstance(forged, Clock) else EVENT
+            clock, put = sim.publisher(CLOCK.key("team")), sim.publisher(topic.key("team"))
+            put(encode(forged))
+            clock(encode(Clock(0, 0)))
+            clock(encode(Clock(100, 0)))
+            ticks = []
+            while 500 not in ticks:  # 400 ms ahead of the clock
+                packet = sim.get(10.0)
+                assert packet is not None
+                ticks.append(decode(packet[1], Reference).tick)
+        finally:
+            told.set()
+            thread.join(10.0)
+    assert not thread.is_alive()
+    assert ticks == [*range(0, 501, 100)], "no reference that nobody is waiting for"
 
 
 def said_stop(reason: str, tick: int) -> EStop:
