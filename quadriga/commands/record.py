@@ -13,6 +13,8 @@ from quadriga.commands.fitted_predictor import fitted_sha256
 from quadriga.commands.options import KEY_HELP, add_no_render, add_wait
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.printable import printable, printable_line
+from quadriga.shared.recording.admission import describe_refused
 from quadriga.shared.runtime.signals import stop_flag
 
 if TYPE_CHECKING:
@@ -75,13 +77,17 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     elif arguments.report and path.name != RECORDING:
         raise ConfigError("--output", str(path), f"DIR/{RECORDING}", "--report fills its folder")
     sha256 = arguments.predictor_sha256 or fitted_sha256(config, arguments.wait)
-    say = Console(stderr=True, markup=False, highlight=False, soft_wrap=True).print
+    console = Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
+
+    def say(text: str) -> None:
+        console.print(printable_line(text))
+
     with stop_flag() as stopped:
         files = process.run(
             config, path, predictor_sha256=sha256, stopped=stopped, selection=selection, say=say
         )
         if stopped() or not arguments.report:
-            print(_format_files(files))
+            print(printable(_format_files(files)))
             return 0
     arguments.run, arguments.html = path.parent, None
     return report.run(arguments, config, given)
@@ -108,11 +114,12 @@ def _selection(arguments: argparse.Namespace) -> Selection:
 
 
 def _format_files(files: RecordedFiles) -> str:
-    """Which files were written, how many messages they hold, and what is missing of which key."""
+    """Which files were written, how many messages they hold, and what is missing or left out."""
     names = str(files.paths[0])
     if len(files.paths) > 1:
         names += f" … {files.paths[-1].name} ({len(files.paths)} files)"
     lines = [f"recorded to {names}: {files.messages:,} messages, {sum(files.lost.values()):,} lost"]
     worst = sorted(files.lost.items(), key=lambda item: -item[1])[:_NAMED]
     lines += [f"  {key}: {count:,} lost" for key, count in worst]
+    lines += [f"  not stored: {text}" for text in describe_refused(files.refused)]
     return "\n".join(lines)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final, Self
 
 from quadriga.shared.errors import RecordingError
+from quadriga.shared.recording.admission import Admission
 from quadriga.shared.recording.sequence import lost_by_key
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.runtime.clock import monotonic
@@ -36,6 +37,7 @@ class Parts:
     Attributes:
         paths: the files so far.
         messages: how many were written to all of them.
+        admission: what is not written to any.
     """
 
     def __init__(
@@ -46,6 +48,7 @@ class Parts:
         periods: Mapping[str, int],
         limits: Limits = Limits(),
         now: Callable[[], float] = monotonic,
+        admission: Admission | None = None,
     ) -> None:
         """Create the first file.
 
@@ -54,6 +57,7 @@ class Parts:
         """
         self._metadata, self._chunk_kib, self._periods = dict(metadata), chunk_kib, periods
         self._path, self._limits, self._now = path, limits, now
+        self.admission = admission or Admission()
         self._split = limits != Limits()
         if self._split:
             self._refuse_later(path)
@@ -121,7 +125,14 @@ class Parts:
         stem = f"{self._path.stem}-{number}" if number else self._path.stem
         path = self._path.with_name(stem + self._path.suffix)
         about = self._metadata | ({"part": str(number)} if self._split else {})
-        writer = RecordingWriter(path, about, self._chunk_kib, periods=self._periods, after=after)
+        writer = RecordingWriter(
+            path,
+            about,
+            self._chunk_kib,
+            periods=self._periods,
+            after=after,
+            admission=self.admission,
+        )
         self.paths.append(path)
         return writer
 

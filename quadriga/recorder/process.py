@@ -17,6 +17,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import RecordingError, system_reason
 from quadriga.shared.members import RECORDER, has_lead
+from quadriga.shared.recording.admission import LARGEST, Admission
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.signals import stop_on_signals
 
@@ -27,11 +28,19 @@ LATE: Final = "late"
 
 @dataclass(frozen=True, slots=True)
 class RecordedFiles:
-    """What has been recorded: the files, the number of messages, and by key how many are lost."""
+    """What has been recorded.
+
+    Attributes:
+        paths: the files.
+        messages: how many are in them.
+        lost: by key, messages that did not come.
+        refused: by reason, messages that were not stored, see `Admission`.
+    """
 
     paths: tuple[Path, ...]
     messages: int
     lost: Mapping[str, int]
+    refused: Mapping[str, int]
 
 
 def run(
@@ -69,10 +78,15 @@ def run(
     try:
         with Bus.open(config.bus, config.team.name, RECORDER, stopped) as bus:
             with Parts(
-                path, metadata, config.recorder.chunk_kib, periods(config), selection.limits
+                path,
+                metadata,
+                config.recorder.chunk_kib,
+                periods(config),
+                selection.limits,
+                admission=Admission(keys.own.__contains__),
             ) as parts:
                 paths = parts.paths
-                bus.subscribe(keys.expression)
+                bus.subscribe(keys.expression, largest=LARGEST)
                 session = Session(bus, parts, keys, config.team.robots, stopped, say)
                 role = _join(bus, config, stopped, at_once=selection.at_once)
                 if role == MEMBER:
@@ -80,7 +94,7 @@ def run(
                 if role:
                     session.record(late=role == LATE, seen=not selection.at_once)
                 session.drain()
-            return RecordedFiles(tuple(parts.paths), parts.messages, parts.count_lost())
+            return _list_files(parts)
     except OSError as error:
         raise RecordingError(
             str(paths[-1]),
@@ -88,6 +102,12 @@ def run(
             "room for the recording",
             "`quadriga recover` makes a whole file of what is there",
         ) from None
+
+
+def _list_files(parts: Parts) -> RecordedFiles:
+    return RecordedFiles(
+        tuple(parts.paths), parts.messages, parts.count_lost(), parts.admission.refused
+    )
 
 
 def _join(bus: Bus, config: Config, stopped: Callable[[], bool], *, at_once: bool) -> str:

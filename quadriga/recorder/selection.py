@@ -7,7 +7,10 @@ from dataclasses import dataclass, field
 
 from quadriga.recorder.parts import Limits
 from quadriga.recordings.key_patterns import key_patterns
-from quadriga.shared.recording.writer import MAX_CHANNELS
+from quadriga.shared.config.sections import TeamConfig
+from quadriga.shared.members import PLANNER, plant_name
+from quadriga.shared.recording.admission import LONGEST_KEY, MAX_FOREIGN_KEYS
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.topics import TABLE
 
 
@@ -34,11 +37,22 @@ class Selection:
         return {name: json.dumps(texts) for name, texts in patterns.items() if texts}
 
 
+def own_keys(team: str) -> frozenset[str]:
+    """Every key of a team of any size: who records it may not have its configuration."""
+    most = TeamConfig.__dataclass_fields__["robots"].metadata["high"]
+    robots = robot_names(most)
+    names = (*robots, *map(plant_name, ("", *robots)), PLANNER)
+    return frozenset(
+        topic.key(team, name) for topic in TABLE for name in (names if topic.per_robot else ("",))
+    )
+
+
 class KeyFilter:
     """Which keys are recorded.
 
     Attributes:
         expression: what to subscribe to.
+        own: the team's keys.
         all: whether nothing is left out.
     """
 
@@ -50,14 +64,18 @@ class KeyFilter:
         alone = self._topics[0].expression if len(self._topics) == 1 else ""
         self.expression = alone or f"{team}/**"  # two subscriptions would hear a message twice
         self.all = not (self._topics or self._exclude)
-        self._known: dict[str, bool] = {}
+        self.own = own_keys(team)
+        self._known = {key: self._matches(key) for key in self.own}
 
     def __call__(self, key: str) -> bool:
         """Whether a key is recorded."""
         known = self._known.get(key)
         if known is None:
-            known = not self._topics or any(p.matches(key) for p in self._topics)
-            known = known and not any(p.matches(key) for p in self._exclude)
-            if len(self._known) < MAX_CHANNELS:
+            known = self._matches(key)
+            if len(self._known) < MAX_FOREIGN_KEYS and len(key) <= LONGEST_KEY:
                 self._known[key] = known
         return known
+
+    def _matches(self, key: str) -> bool:
+        asked = not self._topics or any(p.matches(key) for p in self._topics)
+        return asked and not any(p.matches(key) for p in self._exclude)

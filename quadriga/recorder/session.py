@@ -9,6 +9,7 @@ from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.members import PLANNER, has_lead, plant_name
+from quadriga.shared.recording.admission import OVERSIZED
 from quadriga.shared.recording.mcap_chunk import name_of
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
@@ -20,6 +21,7 @@ DRAIN_LIMIT: Final = 5.0  # s wall, longest drain of a team that does not fall s
 _GATHER: Final = 0.004  # s wall, pause between looks at the inbox: one wake-up for many messages
 _SLICE: Final = 500  # messages that are written at most before a look at the clock
 _LOOK: Final = 1.0  # s wall after which a late recorder reports what it has
+_NAMED: Final = 10  # robots of another team that are named; whoever publishes names them
 
 
 class Session:
@@ -76,8 +78,10 @@ class Session:
         known = robot_names(self._robots)
         strangers = robots - {*known, *map(plant_name, ("", *known)), PLANNER}
         if strangers:
+            shown = sorted(strangers)[:_NAMED]
+            more = f" and {len(strangers) - len(shown)} more" if len(strangers) > len(shown) else ""
             self._say(
-                f"{', '.join(sorted(strangers))} walk too, but the configuration that is stored is "
+                f"{', '.join(shown)}{more} walk too, but the configuration that is stored is "
                 f"of {', '.join(known)}: give the team's with --config"
             )
 
@@ -86,6 +90,7 @@ class Session:
         limit = monotonic() + DRAIN_LIMIT
         while self._take(QUIET) and monotonic() < limit:
             pass
+        self._parts.admission.refused[OVERSIZED] += self._bus.oversized
 
     def _take(self, timeout: float) -> bool:
         """Write all that has arrived; False if nothing came within `timeout` seconds."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from datetime import UTC, datetime
 
-from quadriga.recordings.metadata import recorded_patterns, recorded_versions
+from quadriga.recordings.metadata import read_counts, recorded_patterns, recorded_versions
 from quadriga.recordings.survey import Survey, type_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import departures
+from quadriga.shared.recording.admission import describe_refused
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.tables import NOTHING, align_columns
 
@@ -40,6 +41,8 @@ def _about(s: Survey) -> Iterator[tuple[str, str]]:
         yield "recorded", f"{start:%Y-%m-%d %H:%M:%S %Z}, {(last - first) / 1e9:.2f} s wall time"
     lost = sum(track.lost for track in s.tracks.values())
     yield "messages", f"{sum(t.count for t in s.tracks.values()):,}, {lost:,} lost"
+    for text in describe_refused(read_counts(s.notes)):
+        yield "not stored", text
     begin = min((t.first for k, t in s.tracks.items() if k.endswith("/state")), default=-1)
     late = (
         f", joined at {begin / 1000:.3f} s"

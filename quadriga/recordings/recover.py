@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from quadriga.recordings.metadata import read_counts
 from quadriga.recordings.readable import config_or_default, open_readable
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import RecordingError, name_file_errors
+from quadriga.shared.recording.admission import Admission
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.salvage import Damage, Salvage
 from quadriga.shared.recording.sequence import TickTrack
-from quadriga.shared.recording.writer import COUNTS, LOST, PROFILE, RecordingWriter
+from quadriga.shared.recording.writer import LOST, PROFILE, RecordingWriter
 from quadriga.shared.runtime.clock import wall_ns
 from quadriga.tables import align_columns
 
@@ -70,22 +73,28 @@ def recover(path: Path, out: Path | None) -> Recovery | None:
     expected = periods(config_or_default(source))
     with (
         name_file_errors(RecordingError, out, "room for the recovered file"),
-        RecordingWriter(out, source.metadata, periods=expected) as writer,
+        RecordingWriter(
+            out, source.metadata, periods=expected, admission=Admission(_all, sys.maxsize)
+        ) as writer,
     ):
         for entry in source.entries():
             writer.write(entry.key, entry.payload, entry.log_time_ns)
         writer.note(RECOVERED, _describe_source(source, path))
-    counts = source.notes.get(COUNTS, {}).get("messages", "")
     return Recovery(
         out=out,
         messages=writer.messages,
-        expected=int(counts) if counts.isdecimal() else None,
+        expected=read_counts(source.notes).get("messages"),
         damages=tuple(source.damages),
         tracks=writer.tracks,
         never_came=source.notes.get(LOST, {}),
         has_metadata=bool(source.metadata),
         error=error,
     )
+
+
+def _all(_key: str) -> bool:
+    """All that was stored once is kept."""
+    return True
 
 
 def format_recovery(recovery: Recovery) -> list[str]:

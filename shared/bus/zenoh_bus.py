@@ -54,6 +54,7 @@ class Bus:
         self._session = session
         self._me = str(session.info.zid())
         self._inbox: SimpleQueue[zenoh.Sample] = SimpleQueue()
+        self._oversized: SimpleQueue[None] = SimpleQueue()  # counts what several threads drop
         self._presence = Presence(self._me)
         self._declared: dict[str, zenoh.LivelinessToken] = {}
         self._closed = False
@@ -151,13 +152,33 @@ class Bus:
         put: Callable[[bytes], None] = publisher.put
         return put
 
-    def subscribe(self, key: str) -> None:
-        """Feed what others publish on `key` (may hold `*` and `**`) into the inbox."""
+    def subscribe(self, key: str, *, largest: int = 0) -> None:
+        """Feed what others publish on `key` (may hold `*` and `**`) into the inbox.
+
+        Args:
+            key: of the team.
+            largest: payloads of more bytes are dropped as they arrive, before anybody has looked
+                at the inbox, and counted in `oversized`; 0: none are.
+        """
+
+        def put(sample: zenoh.Sample) -> None:
+            if len(sample.payload) > largest:
+                self._oversized.put(None)
+            else:
+                self._inbox.put(sample)
+
         self._declarations.append(
             self._session.declare_subscriber(
-                key, _direct(self._inbox.put), allowed_origin=zenoh.Locality.REMOTE
+                key,
+                _direct(put if largest else self._inbox.put),
+                allowed_origin=zenoh.Locality.REMOTE,
             )
         )
+
+    @property
+    def oversized(self) -> int:
+        """Payloads that were dropped because of their size so far."""
+        return self._oversized.qsize()
 
     def collect(self, key: str) -> Callable[[], list[Arrival]]:
         """Keep what others publish on `key` apart from the inbox, each with when it arrived.

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.shared.errors import RecordingError, system_reason
+from quadriga.shared.recording.admission import Admission
 from quadriga.shared.recording.mcap_file import McapFile
 from quadriga.shared.recording.seal import seal
 from quadriga.shared.recording.sequence import TickTrack, lost_by_key
@@ -19,7 +20,6 @@ PROFILE: Final = "quadriga"
 COUNTS: Final = f"{PROFILE}.counts"  # written at the end: what the writer counted
 LOST: Final = f"{PROFILE}.lost"  # by key, messages that did not come
 SINCE: Final = f"{PROFILE}.since"  # by key, tick of its first message
-MAX_CHANNELS: Final = 4096  # a foreign publisher must not fill the file with keys of its own
 _UNKNOWN: Final = f"{PROFILE}.unknown"
 
 
@@ -30,9 +30,9 @@ class RecordingWriter:
     publish time, and counted.
 
     Attributes:
+        admission: what is not written, and how much of that there was.
         messages: how many were written.
         unreadable: how many of them carry no readable tick and stamp.
-        refused: how many were not written because their keys exceed `MAX_CHANNELS`.
     """
 
     def __init__(
@@ -43,6 +43,7 @@ class RecordingWriter:
         *,
         periods: Mapping[str, int] | None = None,
         after: Mapping[str, int] | None = None,
+        admission: Admission | None = None,
     ) -> None:
         """Create the file.
 
@@ -53,11 +54,13 @@ class RecordingWriter:
             periods: by a topic's name, ms between its messages, see
                 `quadriga.shared.config.timing`; without them nothing is counted as lost.
             after: by key, tick of the last message in the file before this one.
+            admission: what is written; by default all of the table of topics, and some of the rest.
 
         Raises:
             RecordingError: the file exists or cannot be created.
         """
-        self.messages = self.unreadable = self.refused = 0
+        self.admission = admission or Admission()
+        self.messages = self.unreadable = 0
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("xb")
@@ -75,7 +78,7 @@ class RecordingWriter:
             _UNKNOWN, '{"description":"a key outside the table of topics"}'
         )
         self._end_size = 1024 + sum(len(k) + len(v) + 8 for k, v in self._metadata.items())
-        self._channels: dict[str, tuple[int, TickTrack]] = {}
+        self._channels: dict[str, tuple[int, TickTrack, bool]] = {}  # the last: of the team
         self._periods, self._after = periods or {}, after or {}
         self._file.flush()
 
@@ -87,17 +90,18 @@ class RecordingWriter:
     @property
     def tracks(self) -> dict[str, TickTrack]:
         """Ticks by key."""
-        return {key: track for key, (_, track) in self._channels.items()}
+        return {key: track for key, (_, track, _) in self._channels.items()}
 
     def write(self, key: str, payload: bytes, log_time_ns: int) -> None:
         """Append one message as sent; `log_time_ns` is the wall clock at its reception."""
         row = self._channels.get(key)
         if row is None:
-            if len(self._channels) >= MAX_CHANNELS:
-                self.refused += 1
+            if not self.admission.admits_key(key, len(self._channels)):
                 return
             row = self._channels[key] = self._channel(key)
-        channel, track = row
+        channel, track, own = row
+        if not self.admission.admits_payload(len(payload), own=own):
+            return
         tick, publish_time = envelope(payload) or (-1, log_time_ns)
         if tick < 0:
             self.unreadable += 1
@@ -122,7 +126,8 @@ class RecordingWriter:
             return
         tracks = self.tracks
         since = {key: track.first for key, track in sorted(tracks.items())}
-        counts = {"messages": self.messages, "unreadable": self.unreadable, "refused": self.refused}
+        counts = {"messages": self.messages, "unreadable": self.unreadable}
+        counts |= self.admission.refused
         with self._file:  # closed also if the disk is full
             self._mcap.flush()
             for name, values in ((COUNTS, counts), (LOST, lost_by_key(tracks)), (SINCE, since)):
@@ -140,7 +145,7 @@ class RecordingWriter:
         text = json.dumps(json_schema(topic.type), ensure_ascii=False)
         return self._mcap.schema(f"{PROFILE}.{topic.type.__name__}", text)
 
-    def _channel(self, key: str) -> tuple[int, TickTrack]:
+    def _channel(self, key: str) -> tuple[int, TickTrack, bool]:
         topic, _ = find_topic(key)
         if topic is None:
             name, schema, encoding = "", self._unknown, "application/octet-stream"
@@ -148,4 +153,4 @@ class RecordingWriter:
             name, schema, encoding = topic.name, self._schemas[topic.name], "msgpack"
         self._end_size += 2 * len(key) + 64  # of what is noted of it at the end
         track = TickTrack(self._periods.get(name, 0), self._after.get(key, -1))
-        return self._mcap.channel(key, encoding, schema), track
+        return self._mcap.channel(key, encoding, schema), track, self.admission.is_own(key)

@@ -15,7 +15,9 @@ from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig, Config, TeamConfig
 from quadriga.shared.config.write import config_sha256, to_toml
 from quadriga.shared.members import OPERATOR, SIM
+from quadriga.shared.recording.admission import MAX_FOREIGN_KEYS, OVERSIZED, REFUSED
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.writer import COUNTS
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import EStop
 from quadriga.team.endpoint import free_endpoint
@@ -196,3 +198,35 @@ def test_a_recording_is_never_overwritten(config: Config, tmp_path: Path) -> Non
     assert recorder.returncode == 1
     assert "never overwritten" in text
     assert (tmp_path / "run.mcap").read_bytes() == b"precious"
+
+
+def test_what_others_send_neither_keeps_own_traffic_out_nor_fills_the_memory(
+    config: Config, others: dict[str, Bus], tmp_path: Path
+) -> None:
+    """4,200 keys before the start, and payloads of 50 MB."""
+    recorder = start(config, tmp_path)
+    others[SIM].wait_for(READY, {"recorder"}, WAIT, lambda: False)
+    stranger = others[OPERATOR]
+    await_listener(stranger, "band/r1/state")
+    for k in range(4200):
+        stranger.publisher(f"band/flood/{k}")(b"")
+    for _ in range(4):
+        stranger.publisher("band/r1/plan")(bytes(50_000_000))
+    sent = send(others["r1"], 300)
+    own = by_key(sent)["band/r1/state"]
+    await_recorded(tmp_path, MAX_FOREIGN_KEYS + 200)
+    peak = peak_mb(recorder.pid)
+    others[SIM].close()
+    finished(recorder)
+    recording = Recording(tmp_path / "run.mcap")
+    assert by_key([(e.key, e.payload) for e in recording.entries()])["band/r1/state"] == own
+    assert recording.notes[COUNTS][OVERSIZED] == "4"
+    assert int(recording.notes[COUNTS][REFUSED]) >= 4200 - MAX_FOREIGN_KEYS
+    assert peak < 400.0, "one payload under way, not all of them"
+
+
+def peak_mb(pid: int) -> float:
+    """Greatest resident memory of a process so far, MB."""
+    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
+    line = next(line for line in status.splitlines() if line.startswith("VmHWM"))
+    return int(line.split()[1]) / 1000
