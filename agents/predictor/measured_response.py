@@ -6,7 +6,6 @@ With it a planner knows the coupling as well as anybody can: what a simulator al
 from __future__ import annotations
 
 import json
-import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -22,6 +21,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorFileError
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.atomic import atomic_write
+from quadriga.shared.runtime.npz import UNREADABLE, open_npz
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 # What a true response depends on, as far as a predictor's meta says it.
@@ -95,10 +95,10 @@ def read_pulse_responses(path: Path) -> PulseResponses:
         PredictorFileError: no such file, or not one of responses.
     """
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        with open_npz(path) as archive:
             team = json.loads(str(archive["team"]))
             return PulseResponses(archive["ticks"], archive["u"], archive["y"], team)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise PredictorFileError(
             f"identification.response {path}",
             "no such file" if isinstance(error, FileNotFoundError) else type(error).__name__,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib import metadata
@@ -20,6 +19,7 @@ from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.errors import PredictorFileError, name_file_errors
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.atomic import atomic_write
+from quadriga.shared.runtime.npz import UNREADABLE, open_npz
 
 FORMAT: Final = 2
 _PACKAGES: Final = ("quadriga", "numpy", "scipy", "mujoco", "pin", "daqp")
@@ -107,8 +107,7 @@ def read(path: Path) -> tuple[Predictor, Provenance]:
         PredictorFileError: no such file, not a predictor, or corrupt.
     """
     try:
-        # An own handle: numpy leaves its open when the archive turns out to be broken.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        with open_npz(path) as archive:
             document = json.loads(str(archive["document"]))
             names = FACTORS if "response" in archive.files else ("G",)
             arrays = {name: np.asarray(archive[name], dtype=np.float64) for name in names}
@@ -119,24 +118,17 @@ def read(path: Path) -> tuple[Predictor, Provenance]:
         meta = PredictorMeta.from_dict(document["meta"])
         provenance = Provenance.from_dict(document["provenance"])
         predictor = _build(meta, arrays, provenance.gates.condition)
+        unchanged = document["sha256"] == predictor_sha256(predictor)
     except FileNotFoundError:
         raise PredictorFileError(f"predictor {path}", "no such file", "a file", REMEDY) from None
-    except (
-        OSError,
-        ValueError,
-        TypeError,
-        KeyError,
-        AttributeError,
-        EOFError,
-        zipfile.BadZipFile,
-    ) as error:
+    except UNREADABLE as error:
         raise PredictorFileError(
             f"predictor {path}",
             f"something else ({type(error).__name__})",
             "a predictor that quadriga wrote",
             f"truncated or not a predictor: delete it; {REMEDY}",
         ) from None
-    if document["sha256"] != predictor_sha256(predictor):
+    if not unchanged:
         raise PredictorFileError(
             f"predictor {path}",
             "content that its digest does not match",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
 from quadriga.shared.robot.conventions import N_FORCES, Array
 from quadriga.shared.runtime.atomic import atomic_write
+from quadriga.shared.runtime.npz import UNREADABLE, open_npz
 
 _FIELDS: Final = (*SIGNALS, "first_tick")
 
@@ -77,14 +77,14 @@ def read_data(path: Path) -> Dataset:
         PredictorFileError: no such file, or not a file of collected data.
     """
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        with open_npz(path) as archive:
             arrays = {name: archive[name] for name in archive.files}
         parts: dict[str, tuple[Episode, ...]] = {}
         for part in ("training", "held_out"):
             count = len({name.split(".")[1] for name in arrays if name.startswith(part)})
             parts[part] = tuple(_episode(arrays, f"{part}.{k}") for k in range(count))
         seeds = tuple(arrays["seeds"].tolist())
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise PredictorFileError(
             f"data {path}",
             str(error) or type(error).__name__,

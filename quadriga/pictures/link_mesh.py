@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from quadriga.shared.errors import MeshError
 from quadriga.shared.runtime.atomic import atomic_write
+from quadriga.shared.runtime.npz import UNREADABLE, open_npz
 
 Rgba = tuple[float, float, float, float]
 
@@ -78,14 +78,14 @@ def read_meshes(path: Path) -> LinkMeshes:
         MeshError: no such file, or not a file of meshes.
     """
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        with open_npz(path) as archive:
             arrays = {name: archive[name] for name in archive.files}
         meshes: dict[str, list[LinkMesh]] = {}
         for name in arrays:
             link, _, field = name.rsplit(".", 2)
             if field == "vertices":
                 meshes.setdefault(link, []).append(_mesh(arrays, name.removesuffix(field)))
-    except (OSError, ValueError, LookupError, EOFError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise MeshError(
             f"meshes {path}", str(error) or type(error).__name__, "a whole file of meshes"
         ) from None

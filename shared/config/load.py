@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import Field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from quadriga.shared.config.check import check
 from quadriga.shared.config.presets import PRESETS, preset_keys
@@ -16,6 +16,9 @@ from quadriga.shared.config.renamed import RENAMED, current_value
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean, name_file_errors
 from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.wire.codec import truncate_text
+
+_SHOWN: Final = 200  # characters of a value that is wrong
 
 
 def load(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
@@ -82,7 +85,9 @@ def build(given: Mapping[str, Any]) -> Config:
         keys = given.get(section, {})
         if isinstance(keys, dict):
             keys = {key: current_value(f"{section}.{key}", value) for key, value in keys.items()}
-            given = {**given, section: {**presets.get(str(keys.get("preset")), {}), **keys}}
+            preset = keys.get("preset")
+            beneath = presets.get(preset, {}) if isinstance(preset, str) else {}
+            given = {**given, section: {**beneath, **keys}}
     given = _with_robots_values(given)
     known = {item.name: item for item in fields(Config)}
     for section in given.keys() - known.keys():
@@ -117,9 +122,9 @@ def parse_assignment(text: str, option: str = "--set") -> tuple[str, Any]:
     """
     name, separator, value = text.partition("=")
     if not separator:
-        raise ConfigError(option, repr(text), "section.key=value")
+        raise ConfigError(option, _describe(text), "section.key=value")
     try:
-        return name.strip(), tomllib.loads(f"value = {value}")["value"]
+        return name.strip(), _parse_toml(name.strip(), f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         return name.strip(), value.strip()
 
@@ -142,15 +147,34 @@ def read_toml(path: Path) -> dict[str, Any]:
     with name_file_errors(ConfigError, path, "a readable TOML file"):
         text = path.read_text(encoding="utf-8")
     try:
-        return tomllib.loads(text)
+        return _parse_toml(str(path), text)
     except tomllib.TOMLDecodeError as error:
-        raise ConfigError(str(path), str(error), "TOML") from None
+        raise ConfigError(str(path), truncate_text(str(error), _SHOWN), "TOML") from None
+
+
+def _parse_toml(name: str, text: str) -> dict[str, Any]:
+    """What a text says.
+
+    Raises:
+        ConfigError: it is TOML, but nests too deeply or has a number of too many digits.
+        tomllib.TOMLDecodeError: it is none.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        raise
+    except RecursionError:
+        raise ConfigError(name, "values nested in values", "sections of keys") from None
+    except ValueError:
+        raise ConfigError(
+            name, "a number of thousands of digits", "one that a key can have"
+        ) from None
 
 
 def _build_section(item: Field[Any], given: Any) -> Any:
     kind = item.default_factory
     if not isinstance(given, dict):
-        raise ConfigError(item.name, repr(given), f"a section, written [{item.name}]")
+        raise ConfigError(item.name, _describe(given), f"a section, written [{item.name}]")
     known = {key.name: key for key in fields(kind)}  # type: ignore[arg-type]
     for name in given.keys() - known.keys():
         raise _unknown_name(f"{item.name}.{name}", [f"{item.name}.{key}" for key in known], "a key")
@@ -165,11 +189,11 @@ def _check_value(name: str, key: Field[Any], value: Any) -> Any:
     default, meta = key.default, key.metadata
     if isinstance(default, tuple):
         if not isinstance(value, (list, tuple)) or len(value) != len(default):
-            raise ConfigError(name, repr(value), f"{len(default)} numbers{_unit(meta)}")
+            raise ConfigError(name, _describe(value), f"{len(default)} numbers{_unit(meta)}")
         return tuple(_check_number(f"{name}[{i}]", meta, float, v) for i, v in enumerate(value))
     if isinstance(default, bool):
         if not isinstance(value, bool):
-            raise ConfigError(name, repr(value), "true or false")
+            raise ConfigError(name, _describe(value), "true or false")
         return value
     if isinstance(default, str):
         return _check_text(name, meta, value)
@@ -179,11 +203,20 @@ def _check_value(name: str, key: Field[Any], value: Any) -> Any:
 def _check_text(name: str, meta: Mapping[str, Any], value: Any) -> str:
     choices: tuple[str, ...] = meta["choices"]
     if choices and value not in choices and not meta["more"]:
-        hint = "; ".join(filter(None, (meta["hint"], did_you_mean(value, choices))))
-        raise ConfigError(name, repr(value), f"one of {', '.join(choices)}", hint)
+        meant = did_you_mean(value, choices) if isinstance(value, str) else ""
+        hint = "; ".join(filter(None, (meta["hint"], meant)))
+        raise ConfigError(name, _describe(value), f"one of {', '.join(choices)}", hint)
     if not isinstance(value, str) or not value.isprintable():
-        raise ConfigError(name, repr(value), "text without control characters")
+        raise ConfigError(name, _describe(value), "text without control characters")
     return value
+
+
+def _describe(value: Any) -> str:
+    """A value in a few words; what nests deeply or has thousands of digits has no other text."""
+    try:
+        return truncate_text(repr(value), _SHOWN)
+    except (ValueError, RecursionError):
+        return f"a {type(value).__name__} that is too large to show"
 
 
 def _is_finite(value: float) -> bool:
@@ -203,9 +236,9 @@ def _check_number(name: str, meta: Mapping[str, Any], kind: type, value: Any) ->
     what += _unit(meta)
     right_type = type(value) is int or (kind is float and type(value) is float)
     if not right_type or not _is_finite(value):
-        raise ConfigError(name, repr(value), what)
+        raise ConfigError(name, _describe(value), what)
     if (low is not None and value < low) or (high is not None and value > high):
-        raise ConfigError(name, f"{value!r}", what, "out of range")
+        raise ConfigError(name, _describe(value), what, "out of range")
     return kind(value)
 
 

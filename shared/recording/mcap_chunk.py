@@ -9,7 +9,6 @@ from io import BytesIO
 from typing import Final, NamedTuple
 
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
@@ -20,11 +19,6 @@ from quadriga.shared.wire.topics import TABLE, find_topic
 RECORD: Final = struct.Struct("<BQ")  # opcode, length
 _MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
 _KNOWN: Final = {f"quadriga.{topic.type.__name__}": topic.type.SCHEMA for topic in TABLE}
-
-# What the MCAP library and LZ4 raise on bytes that are no record.
-CORRUPT: Final = (
-    McapError, struct.error, ValueError, RuntimeError, IndexError, EOFError, MemoryError,
-)  # fmt: skip
 
 
 class ChunkEntry(NamedTuple):

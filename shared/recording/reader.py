@@ -7,18 +7,19 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Container, Iterator
+from contextlib import suppress
 from io import SEEK_END
 from pathlib import Path
 from typing import BinaryIO, Final, TypeVar
 
 from mcap.opcode import Opcode
 from mcap.records import Chunk, DataEnd, Footer, Metadata
-from mcap.stream_reader import get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.recording.mcap_chunk import CORRUPT, RECORD, ChunkEntry, messages_of, stream
+from quadriga.shared.recording.mcap_chunk import RECORD, ChunkEntry, messages_of, stream
 from quadriga.shared.recording.seal import unseal
+from quadriga.shared.recording.unpacking import CORRUPT, content_of
 from quadriga.shared.recording.writer import PROFILE
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Message
@@ -131,9 +132,10 @@ class Recording:
         notes: dict[str, dict[str, str]] = {}
         for opcode, content in self._records():
             if opcode == Opcode.METADATA:
-                record = Metadata.read(stream(content))
-                if record.name != PROFILE:
-                    notes[record.name] = dict(record.metadata)
+                with suppress(*CORRUPT):  # of another program: its checksum is right
+                    record = Metadata.read(stream(content))
+                    if record.name != PROFILE:
+                        notes[record.name] = dict(record.metadata)
         return notes
 
     def _damage_error(self, got: str) -> RecordingError:
@@ -162,12 +164,11 @@ class Recording:
         for opcode, content in self._records():
             if opcode == Opcode.CHUNK:
                 try:
-                    chunk = Chunk.read(stream(content))
-                    inside, length = get_chunk_data_stream(chunk, validate_crc=True)
-                    yield inside.read(length)
+                    inside = content_of(Chunk.read(stream(content)))
                 except CORRUPT as error:
                     self.cut = f"a chunk of {len(content)} bytes is corrupt ({error})"
                     return
+                yield inside
 
     def _metadata(self) -> dict[str, str]:
         for opcode, content in self._records():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 import mmap
 import struct
 import zlib
@@ -10,27 +11,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import lz4.frame
 from mcap.opcode import Opcode
 from mcap.records import Channel, Footer, Metadata
 from mcap.writer import MCAP0_MAGIC
 
 from quadriga.shared.errors import NewerRecordingError, RecordingError, system_reason
-from quadriga.shared.recording.mcap_chunk import (
-    CORRUPT,
-    RECORD,
-    ChunkEntry,
-    messages_of,
-    name_of,
-    stream,
-)
+from quadriga.shared.recording.mcap_chunk import RECORD, ChunkEntry, messages_of, name_of, stream
 from quadriga.shared.recording.seal import unseal
+from quadriga.shared.recording.unpacking import CORRUPT, UNPACK
 from quadriga.shared.recording.writer import COUNTS, LOST, PROFILE, SINCE
 
-# A chunk record: opcode, length, first and last log time, size, checksum, "lz4", packed size.
-_CHUNK: Final = struct.Struct("<BQQQQII3sQ")
-_PACKING: Final = struct.pack("<I3s", 3, b"lz4")
-_PACKING_AT: Final = 37  # bytes from the record's begin to `_PACKING`
+# How a chunk record begins: opcode, length, first and last log time, size, checksum. Then come the
+# name of its packing, with its length, the packed size, and what is packed.
+_CHUNK: Final = struct.Struct("<BQQQQI")
+_PACKED_SIZE: Final = struct.Struct("<Q")
 _FOOTER_SIZE: Final = RECORD.size + 20
 _CUT: Final = "the file ends in the middle"
 _HEADER: Final = 64  # bytes within which a file's header names the program that wrote it
@@ -116,38 +110,42 @@ class Salvage:
             self.chunks += 1
             try:
                 yield from messages_of(content, keys, str(self.path))
-            except CORRUPT as error:  # of another program that writes LZ4 chunks as we do
+            except CORRUPT as error:  # of another program: its checksum is right
                 self.damages.append(Damage(at, end - at, f"a foreign chunk ({error})"))
             anchor = end
         self._explain(anchor, len(self._file))
 
     def _intact(self) -> Iterator[tuple[int, int, bytes]]:
         """Begin, end and content of every chunk that passes its checksum."""
-        position, file = 0, self._file
-        while (position := file.find(_PACKING, position)) >= 0:
-            at = position - _PACKING_AT
-            content = self._content(at) if at >= 0 else None
-            if content is None:
-                position += 1
-                continue
-            end = at + _CHUNK.size + _CHUNK.unpack_from(file, at)[-1]
-            yield at, end, content
-            position = end
+        behind = 0  # the last one
+        for position, packing in heapq.merge(*map(self._find_tags, UNPACK)):
+            at = position - _CHUNK.size
+            found = self._content(at, packing) if at >= behind else None
+            if found is not None:
+                behind, content = found
+                yield at, behind, content
 
-    def _content(self, at: int) -> bytes | None:
-        """Content of the chunk at a byte, None if it is none or damaged."""
+    def _find_tags(self, packing: str) -> Iterator[tuple[int, str]]:
+        """Where the name of a packing stands as it does in a chunk."""
+        tag, at = _tag(packing), -1
+        while (at := self._file.find(tag, at + 1)) >= 0:
+            yield at, packing
+
+    def _content(self, at: int, packing: str) -> tuple[int, bytes] | None:
+        """End and content of the chunk at a byte, None if it is none or damaged."""
         file = self._file
-        if at + _CHUNK.size > len(file):
+        begin = at + _CHUNK.size + len(_tag(packing)) + _PACKED_SIZE.size
+        if begin > len(file):
             return None
-        *_, size, crc, _, _, packed = _CHUNK.unpack_from(file, at)
-        begin = at + _CHUNK.size
-        if begin + packed > len(file):
+        *_, size, crc = _CHUNK.unpack_from(file, at)
+        end = begin + _PACKED_SIZE.unpack_from(file, begin - _PACKED_SIZE.size)[0]
+        if end > len(file):
             return None
         try:
-            content: bytes = lz4.frame.decompress(file[begin : begin + packed])
+            content = UNPACK[packing](file[begin:end], size)
         except CORRUPT:
             return None
-        return content if len(content) == size and zlib.crc32(content) == crc else None
+        return (end, content) if zlib.crc32(content) == crc else None
 
     def _explain(self, at: int, end: int) -> None:
         """Name what of the bytes between two intact chunks is damaged."""

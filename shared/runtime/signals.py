@@ -11,6 +11,8 @@ from types import FrameType
 from typing import Final
 
 _STOPS: Final = (signal.SIGINT, signal.SIGTERM)
+_IMPORTS: Final = "<frozen importlib"  # how the files begin whose functions import
+_AGAIN: Final = 0.02  # s, after which an interrupt in the midst of an import is tried again
 _PR_SET_PDEATHSIG: Final = 1  # linux/prctl.h
 
 
@@ -55,11 +57,24 @@ def stop_flag() -> Iterator[StopFlag]:
 def interrupt_on_sigterm() -> None:
     """Have SIGTERM raise KeyboardInterrupt, as SIGINT does, so that `with` blocks clean up.
 
-    Both are let through from now on; one that was held back raises here.
+    Both are let through from now on; one that was held back raises here. One that comes while a
+    module is imported raises once that is over: what is half set up would show a traceback of its
+    own, or swallow it.
     """
+    signal.signal(signal.SIGALRM, lambda _number, _frame: signal.raise_signal(signal.SIGINT))
     for number in _STOPS:  # SIGINT too: a script's background job is started with it ignored
-        signal.signal(number, signal.default_int_handler)
+        signal.signal(number, _interrupt)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
+
+
+def _interrupt(_number: int, frame: FrameType | None) -> None:
+    """Raise KeyboardInterrupt, or try again in a while if a module is being imported."""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith(_IMPORTS):
+            signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+            return
+        frame = frame.f_back
+    raise KeyboardInterrupt
 
 
 def die_with_parent(parent: int) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from quadriga.shared.errors import PredictorFileError
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.atomic import atomic_write
+from quadriga.shared.runtime.npz import UNREADABLE, open_npz
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +91,9 @@ def read_repetition(path: Path) -> Repetition:
         PredictorFileError: no such file, or not one of measured responses.
     """
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        with open_npz(path) as archive:
             return Repetition(int(archive["seed"]), archive["ticks"], archive["u"], archive["y"])
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise PredictorFileError(
             f"responses {path}",
             str(error) or type(error).__name__,

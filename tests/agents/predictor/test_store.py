@@ -5,16 +5,20 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, predictor_sha256, read, save
 from quadriga.shared.errors import PredictorError
+from quadriga.shared.runtime import npz
 
 
 def test_what_is_saved_is_read(stored: Path, fitted: tuple[Predictor, Provenance]) -> None:
@@ -122,3 +126,68 @@ def test_keys_of_the_controller_keep_their_first_names_in_the_file(
     assert "mu_least" in body["controller"]
     assert "mu_min" not in body["controller"]
     assert PredictorMeta.from_dict(body) == meta
+
+
+@pytest.mark.parametrize(
+    ("header", "body"),
+    [
+        ("{'descr': '<f8', 'fortran_order': False, 'shape': (1 << 40, 8), }", b""),
+        ("{'descr': '<f8', 'fortran_order': False, 'shape': (1099511627776, 8), }", b""),
+        ("{'descr': '<f8', 'fortran_order': False, 'shape': (9223372036854775807, 8), }", b""),
+        ("{'descr': '<f8', 'fortran_order': False, 'shape': (2, 2L), }", bytes(32)),
+        ("{'descr': '<f8', 'fortran_order': False, 'shape': (3, ", b""),
+        ("{'descr': '|O', 'fortran_order': False, 'shape': (1,), }", b""),
+        ("(" * 3000, b""),
+    ],
+    ids=["shift", "8 TiB", "overflow", "python 2", "cut", "objects", "deep"],
+)
+def test_an_array_that_declares_what_it_is_not(stored: Path, header: str, body: bytes) -> None:
+    text = header.encode() + b"\n"
+    damaged = b"\x93NUMPY\x02\x00" + len(text).to_bytes(4, "little") + text + body
+    with zipfile.ZipFile(stored) as archive:
+        document = archive.read("document.npy")
+    with zipfile.ZipFile(stored, "w") as archive:
+        archive.writestr("document.npy", document)
+        archive.writestr("G.npy", damaged)
+    with pytest.raises(PredictorError, match="expected a predictor that quadriga wrote"):
+        read(stored)
+
+
+def test_a_document_that_nests_too_deeply(stored: Path) -> None:
+    with np.load(stored) as archive:
+        G = archive["G"]
+    for text in ("[" * 100_000, '{"a":' * 100_000, "9" * 5000):
+        np.savez(stored, G=G, document=np.array(text))
+        with pytest.raises(PredictorError, match="expected a predictor that quadriga wrote"):
+            read(stored)
+
+
+def test_a_document_without_a_digest(stored: Path) -> None:
+    path = rewritten(stored, lambda document: document.pop("sha256"))
+    with pytest.raises(PredictorError, match="expected a predictor that quadriga wrote"):
+        read(path)
+
+
+def test_an_archive_of_more_than_any_predictor_holds(
+    stored: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(npz, "_LARGEST", 10_000_000)
+    read(stored)
+    with zipfile.ZipFile(stored, "a", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("A.npy", bytes(10_000_000))
+    with pytest.raises(PredictorError, match="expected a predictor that quadriga wrote"):
+        read(stored)
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(at=st.integers(0, 1 << 20), bit=st.integers(0, 7))
+def test_no_flipped_bit_makes_the_reader_fall_over(stored: Path, at: int, bit: int) -> None:
+    whole = stored.read_bytes()
+    content = bytearray(whole)
+    # Half of the tries among what tells what the arrays are, at the file's ends.
+    at = at % len(content) if at % 2 else (at % 400) - 200
+    content[at] ^= 1 << bit
+    path = stored.with_name("flipped.npz")
+    path.write_bytes(content)
+    with suppress(PredictorError):
+        read(path)

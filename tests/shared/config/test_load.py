@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from quadriga.shared.config.load import load, parse_assignment
+from quadriga.shared.config.load import build, load, parse_assignment
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256, to_markdown, to_toml
 from quadriga.shared.errors import ConfigError
@@ -202,3 +202,33 @@ def test_a_robots_own_values_stand_beneath_what_is_given() -> None:
 def test_a_team_of_different_robots_is_refused_with_the_reason() -> None:
     with pytest.raises(ConfigError, match=r"'a1,go2'.*one of a1, go1, go2.*of one kind"):
         load(None, {"team.robot": "a1,go2"})
+
+
+NINES = "9" * 5000
+
+
+@pytest.mark.parametrize(
+    "value",
+    [NINES, "[" * 3000 + "]" * 3000, "{a=" * 3000 + "1" + "}" * 3000, "0x" + "f" * 5000],
+    ids=["digits", "brackets", "tables", "hexadecimal"],
+)
+@pytest.mark.parametrize("key", ["world.seed", "planner.Q", "team.name", "controller.preset"])
+def test_a_value_without_end_is_one_short_error(tmp_path: Path, key: str, value: str) -> None:
+    section, _, name = key.partition(".")
+    with pytest.raises(ConfigError) as typed:
+        load(None, dict([parse_assignment(f"{key}={value}")]))
+    with pytest.raises(ConfigError) as written:
+        load(write(tmp_path, f"[{section}]\n{name} = {value}\n"))
+    for error in (typed.value, written.value):
+        assert len(str(error)) < 700
+        assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize(
+    "value", [int(NINES[:4000]) ** 2, [[[0] * 3] * 3] * 90], ids=["digits", "lists"]
+)
+def test_a_value_of_a_recording_without_end_is_one_short_error(value: object) -> None:
+    for section in ({"seed": value}, value):
+        with pytest.raises(ConfigError) as caught:
+            build({"world": section})
+        assert len(str(caught.value)) < 700

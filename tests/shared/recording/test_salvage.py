@@ -7,15 +7,20 @@ from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 
+import lz4.frame
 import pytest
+import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap.writer import CompressionType, Writer
 
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.salvage import Salvage
-from quadriga.shared.recording.writer import RecordingWriter
+from quadriga.shared.recording.seal import seal
+from quadriga.shared.recording.unpacking import CORRUPT, UNPACK
+from quadriga.shared.recording.writer import PROFILE, RecordingWriter
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Reference
 from tests.shared.recording.test_reader import METADATA, command, state
@@ -141,3 +146,56 @@ def test_what_is_no_recording_is_refused(original: Path, tmp_path: Path) -> None
             Recording(path)
     with pytest.raises(RecordingError, match="No such file"):
         Salvage(tmp_path / "no.mcap")
+
+
+@pytest.fixture(scope="module")
+def foreign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording in chunks that Zstandard packs, as other writers make them."""
+    path = tmp_path_factory.mktemp("foreign") / "run.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=20_000, compression=CompressionType.ZSTD)
+        writer.start(PROFILE)
+        writer.add_metadata(PROFILE, seal(METADATA))
+        channel = writer.register_channel("team/r1/state", "msgpack", 0)
+        for tick in range(200):
+            writer.add_message(channel, tick, encode(state(tick)), tick)
+        writer.finish()
+    return path
+
+
+def test_what_others_pack_is_recovered_too(foreign: Path) -> None:
+    whole = foreign.read_bytes()
+    assert [entry.tick for entry in entries_of(foreign)] == list(range(200))
+    at = whole.index(b"\x04\0\0\0zstd", len(whole) // 3) + 200
+    content = whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :]
+    salvage = Salvage(damaged(foreign, content))
+    found = [entry.tick for entry in salvage.entries()]
+    assert 100 < len(found) < 200
+    assert found[-1] == 199
+    assert [damage.what for damage in salvage.damages] == ["a chunk that fails its checksum"]
+    assert salvage.metadata == METADATA
+
+
+@settings(max_examples=60)
+@given(at=st.integers(0, 1 << 20), bit=st.integers(0, 7))
+def test_no_bit_of_what_others_pack_makes_a_reader_fall_over(
+    foreign: Path, at: int, bit: int
+) -> None:
+    content = bytearray(foreign.read_bytes())
+    content[at % len(content)] ^= 1 << bit
+    path, before = damaged(foreign, bytes(content)), entries_of(foreign)
+    with suppress(RecordingError):
+        assert not Counter(Recording(path).entries()) - Counter(before)
+    with suppress(RecordingError):
+        assert not Counter(Salvage(path).entries()) - Counter(before)
+
+
+@pytest.mark.parametrize("packing", UNPACK)
+def test_no_more_is_unpacked_than_a_chunk_states(packing: str) -> None:
+    """A bomb: much of nothing in a few bytes."""
+    pack = {"lz4": lz4.frame.compress, "zstd": zstandard.compress}[packing]
+    bomb: bytes = pack(bytes(10_000_000))
+    assert UNPACK[packing](bomb, 10_000_000) == bytes(10_000_000)
+    for size in (0, 1000, 9_999_999, 10_000_001, 1 << 40, (1 << 63) - 1):
+        with pytest.raises(CORRUPT):
+            UNPACK[packing](bomb, size)

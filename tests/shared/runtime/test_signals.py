@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -91,3 +92,47 @@ def test_an_interrupt_comes_after_the_block(from_a_thread: bool) -> None:
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+LIBRARY = """
+import os, signal
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+    for _ in range(1000):
+        pass
+except BaseException as error:
+    raise ImportError("half set up") from error
+ready = True
+"""
+PROGRAM = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from quadriga.commands import version
+
+def run(*_):
+    import library
+    assert library.ready
+    print("imported", flush=True)
+    while True:
+        pass
+
+version.run = run
+from quadriga.commands import parser
+sys.argv = ["quadriga", "version"]
+from quadriga.__main__ import main
+sys.exit(main())
+"""
+
+
+def test_an_interrupt_in_the_midst_of_an_import_is_one_line(tmp_path: Path) -> None:
+    """As a library in C does, this one makes an error of its own of it."""
+    (tmp_path / "library.py").write_text(LIBRARY, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(tmp_path)],
+        capture_output=True,
+        text=True,
+        timeout=60.0,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (130, "quadriga: interrupted\n")
+    assert done.stdout == "imported\n"
