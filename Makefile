@@ -8,7 +8,7 @@ TOOLS := $(VENV)/.tools
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install walk test lint fuzz drops starts endurance format docs figures clip acceptance bench bench-planner bench-recorder
+.PHONY: install walk test lint fuzz fuzz-readers drops starts endurance format docs figures clip acceptance bench bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -43,6 +43,10 @@ lint: $(TOOLS)
 # A million damaged packets through the bridges of every kind of robot; some six minutes.
 fuzz: $(TOOLS)
 	$(BIN)/python -m tests.bridges.fuzz $(ARGS)
+
+# 100,000 damaged messages, configurations, predictors and recordings each through their readers.
+fuzz-readers: $(TOOLS)
+	$(BIN)/python -m tests.fuzz $(ARGS)
 
 # Each kind of robot, dropped 50 times from random joint angles: does its bridge get it to stand?
 drops: $(TOOLS)
