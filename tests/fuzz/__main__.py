@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+from math import inf
 from pathlib import Path
 
 from tests.fuzz.run import fuzz
@@ -19,13 +20,15 @@ from tests.fuzz.targets import targets
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--inputs", type=int, default=100_000, help="of each kind")
+    parser.add_argument("--seconds", type=float, default=inf, help="for each kind, at most")
     parser.add_argument("--only", default="", help="one kind")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder, targets(Path(folder)) as known:
         for name, target in known.items():
             if arguments.only in ("", name):
-                print(f"{name}: {fuzz(target, arguments.inputs, arguments.seed)}", flush=True)
+                tally = fuzz(target, arguments.inputs, arguments.seed, arguments.seconds)
+                print(f"{name}: {tally}", flush=True)
     return 0
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import resource
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -42,15 +43,19 @@ class Tally:
         )
 
 
-def fuzz(target: Target, inputs: int, seed: int) -> Tally:
-    """Read inputs; each depends on the seed and its number alone.
+def fuzz(target: Target, inputs: int, seed: int, seconds: float = inf) -> Tally:
+    """Read inputs until they, or so many seconds, are over; each depends on its number alone.
 
     Raises:
         AssertionError: one raised something that is no error of the tree; it is named.
     """
     begun, before = monotonic(), _peak_mb()
     refused, longest, slowest_ms, slowest = 0, 0, 0.0, 0
+    read = 0
     for number in range(inputs):
+        if monotonic() - begun > seconds:
+            break
+        read += 1
         content = target.make(np.random.default_rng([seed, number]))
         since = monotonic()
         try:
@@ -65,7 +70,7 @@ def fuzz(target: Target, inputs: int, seed: int) -> Tally:
         if took_ms > slowest_ms:
             slowest_ms, slowest = took_ms, number
     took, grown = monotonic() - begun, _peak_mb() - before
-    return Tally(inputs, refused, took, slowest_ms, slowest, grown, longest)
+    return Tally(read, refused, took, slowest_ms, slowest, grown, longest)
 
 
 def _peak_mb() -> float:
