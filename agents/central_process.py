@@ -16,6 +16,7 @@ from quadriga.agents.plausibility import is_within_limits
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.agents.time_grid import step_ms
 from quadriga.shared.bus.barrier import meet
+from quadriga.shared.bus.introduction import Introduction
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
@@ -35,13 +36,19 @@ from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 _WORKING: Final = "plan"
 
 
-def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None = None) -> None:
+def run(
+    config: Config,
+    planner: TeamPlanner,
+    stopped: Callable[[], bool] | None = None,
+    predictor_sha256: str = "",
+) -> None:
     """Plan for the whole team until the walk ends, who drives time leaves, or it is stopped.
 
     Args:
         config: the team's configuration.
         planner: the team's planner.
         stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
+        predictor_sha256: digest of the predictor that it plans with, told to the others.
 
     Raises:
         BusError: the bus cannot be opened, or the team is not complete in time.
@@ -55,7 +62,7 @@ def run(config: Config, planner: TeamPlanner, stopped: Callable[[], bool] | None
             bus.subscribe(MEASUREMENT.key(team, name))
         bus.subscribe(REFERENCE.key(team))
         bus.subscribe(EVENT.key(team))
-        if not meet(bus, config, stopped):
+        if not meet(bus, config, stopped, Introduction(bus, config, predictor_sha256)):
             return
         rehearse_central(config, Central(config, planner))
         end_collection()

@@ -10,9 +10,11 @@ from quadriga.agents.inbox.inbox import Inbox, Source
 from quadriga.agents.inbox.intake_log import Intake
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.agents.rehearsal import rehearse
 from quadriga.agents.telemetry import Telemetry
 from quadriga.shared.bus.barrier import meet
+from quadriga.shared.bus.introduction import Introduction
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
@@ -44,17 +46,18 @@ def run(
         stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
 
     Raises:
-        BusError: the bus cannot be opened, or the team is not complete in time; or for 3 s no
-            state has come that is newer than those before.
+        BusError: the bus cannot be opened, or the team is not complete in time or has something
+            else in common; or for 3 s no state has come that is newer than those before.
     """
     stopped = stopped or stop_on_signals()
     use_one_blas_thread()
     agent = Agent(config, robot, predictor, monotonic_ns)
     inbox = Inbox(config, robot, agent.peers)
+    sha256 = "" if predictor is None else predictor_sha256(predictor)
     with Bus.open(config.bus, config.team.name, robot, stopped) as bus:
         for key in inbox.keys:
             bus.subscribe(key)
-        if not meet(bus, config, stopped):
+        if not meet(bus, config, stopped, Introduction(bus, config, sha256)):
             return
         rehearse(config, Agent(config, robot, predictor))
         shell = _Shell(config, agent, inbox, bus)

@@ -23,6 +23,7 @@ def add(add_command: AddCommand) -> None:
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Run the planner until the walk is over."""
     from quadriga.agents import central_process
+    from quadriga.agents.predictor.store import predictor_sha256
     from quadriga.identification.central_planner import build_central_planner
 
     kind = find_kind(config.planner.kind)
@@ -34,5 +35,7 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
             "in all other kinds each agent plans for itself",
         )
     predictor = load_predictor(config, arguments) if kind.needs_predictor else None
-    central_process.run(config, build_central_planner(config, predictor))
+    sha256 = "" if predictor is None else predictor_sha256(predictor)
+    planner = build_central_planner(config, predictor)
+    central_process.run(config, planner, predictor_sha256=sha256)
     return 0

@@ -11,7 +11,8 @@ from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter, Selection
 from quadriga.recorder.session import Session
 from quadriga.recordings.metadata import build_metadata
-from quadriga.shared.bus.barrier import meet, members
+from quadriga.shared.bus.barrier import await_members, meet, members
+from quadriga.shared.bus.introduction import Introduction
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
@@ -68,7 +69,8 @@ def run(
 
     Raises:
         RecordingError: the file cannot be written.
-        BusError: the bus cannot be opened, or the team did not assemble in time.
+        BusError: the bus cannot be opened, or the team did not assemble in time or has something
+            else in common.
         ConfigError: a pattern cannot be that of a key.
     """
     stopped, selection = stopped or stop_on_signals(), selection or Selection()
@@ -88,7 +90,8 @@ def run(
                 paths = parts.paths
                 bus.subscribe(keys.expression, largest=LARGEST)
                 session = Session(bus, parts, keys, config.team.robots, stopped, say)
-                role = _join(bus, config, stopped, at_once=selection.at_once)
+                me = None if selection.at_once else Introduction(bus, config, predictor_sha256)
+                role = _join(bus, config, stopped, me)
                 if role == MEMBER:
                     bus.declare(READY)
                 if role:
@@ -110,19 +113,18 @@ def _list_files(parts: Parts) -> RecordedFiles:
     )
 
 
-def _join(bus: Bus, config: Config, stopped: Callable[[], bool], *, at_once: bool) -> str:
+def _join(bus: Bus, config: Config, stopped: Callable[[], bool], me: Introduction | None) -> str:
     """How this recorder takes part: `MEMBER`, `LATE`, or "" if it was stopped before.
 
+    `me` is what it says of itself; None of one that waits for nobody.
+
     Raises:
-        BusError: the team did not assemble in time.
+        BusError: the team did not assemble in time, or has something else in common.
     """
-    if at_once:
+    if me is None:
         return LATE
-    bus.wait_for(
-        HERE,
-        members(config),
-        config.bus.barrier_timeout,
-        lambda: stopped() or has_lead(bus.members_at(HERE)),
+    await_members(
+        bus, config, HERE, members(config), lambda: stopped() or has_lead(bus.members_at(HERE))
     )
     if stopped():
         return ""
@@ -130,4 +132,4 @@ def _join(bus: Bus, config: Config, stopped: Callable[[], bool], *, at_once: boo
     walking, doubled = has_lead(bus.members_at(READY)), RECORDER in bus.members_at(HERE)
     if walking or doubled or not config.recorder.enabled:
         return LATE
-    return MEMBER if meet(bus, config, stopped) else ""
+    return MEMBER if meet(bus, config, stopped, me) else ""

@@ -5,11 +5,8 @@ A recording may come from anybody, so whoever reads it takes nothing of this for
 
 from __future__ import annotations
 
-import importlib.metadata
 import json
-import platform
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import asdict
 from typing import Any, Final
 
@@ -17,20 +14,9 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.planner_kinds import installed_kinds, plugin_origin
 from quadriga.shared.recording.writer import COUNTS
+from quadriga.shared.runtime.installed import package_versions
 
 _DIGITS: Final = 18  # of a number of messages that can be meant
-# What a run's figures depend on.
-_PACKAGES: Final = (
-    "quadriga",
-    "eclipse-zenoh",
-    "mujoco",
-    "pin",
-    "numpy",
-    "daqp",
-    "osqp",
-    "numba",
-    "msgpack",
-)
 
 
 def build_metadata(config: Config, predictor_sha256: str) -> dict[str, str]:
@@ -54,12 +40,8 @@ def installed_versions(planner: str = "none") -> dict[str, str]:
     Raises:
         ConfigError: no installed package has this kind.
     """
-    versions = {"python": platform.python_version(), "machine": platform.machine()}
-    for package in _PACKAGES:
-        with suppress(importlib.metadata.PackageNotFoundError):
-            versions[package] = importlib.metadata.version(package)
     package, _, version = plugin_origin(planner).partition(" ")
-    return versions | ({package: version} if package else {})
+    return package_versions() | ({package: version} if package else {})
 
 
 def recorded_versions(metadata: Mapping[str, str]) -> dict[str, str]:

@@ -1,49 +1,47 @@
-"""The start-up barrier: nobody walks before everybody is there, linked and warmed up."""
+"""The start-up barrier: nobody walks before everybody is there, linked and warmed up.
+
+Nor before all have said that they have the same version, configuration and predictor.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
+from quadriga.shared.bus.inquiry import Pause, check_oneself, check_others, pause
+from quadriga.shared.bus.introduction import Introduction
+from quadriga.shared.bus.roster import lead as lead
+from quadriga.shared.bus.roster import members as members
+from quadriga.shared.bus.roster import processes as processes
+from quadriga.shared.bus.watch import Watch, say
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
-from quadriga.shared.members import LEADS, SIM, Member, has_lead, team_members
-from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.members import LEADS, SIM, has_lead
 
 
-def processes(config: Config) -> tuple[Member, ...]:
-    """All processes of a team, in the order of the table of processes."""
-    return team_members(
-        robot_names(config.team.robots),
-        central=find_kind(config.planner.kind).central,
-        recorded=config.recorder.enabled,
-        plant_each=config.team.plants == "each",
-    )
-
-
-def members(config: Config) -> frozenset[str]:
-    """Names of all processes of a team."""
-    return frozenset(member.name for member in processes(config))
-
-
-def lead(config: Config) -> str:
-    """Name of the process that drives the team's time, with which all others leave."""
-    return next(member.name for member in processes(config) if member.name in LEADS)
-
-
-def meet(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
+def meet(
+    bus: Bus, config: Config, stopped: Callable[[], bool], me: Introduction | None = None
+) -> bool:
     """Announce this process, whose subscribers are declared, and wait until all others are here.
 
     A token is seen over the link its process uses for everything else, behind its subscriptions:
     whoever is seen will receive what is published from now on. False if `stopped()` came first.
 
+    Args:
+        bus: this process's.
+        config: the team's configuration.
+        stopped: asked often whether to stop.
+        me: what this process says of itself; by default that it has no predictor.
+
     Raises:
-        BusError: some did not come in time, the team walks already, or has such a member already.
+        BusError: some did not come in time, the team walks already, has such a member already, or
+            has another version, configuration or predictor.
     """
+    me = me or Introduction(bus, config)
     bus.declare(HERE)
-    present = bus.wait_for(HERE, members(config), config.bus.barrier_timeout, stopped)
-    if present and has_lead(bus.members_at(READY)):
+    if not await_members(bus, config, HERE, members(config), stopped):
+        return False
+    if has_lead(bus.members_at(READY)):
         raise BusError(
             f"team {bus.team!r} at {config.bus.endpoint}",
             "a team that walks already",
@@ -51,7 +49,30 @@ def meet(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
             "another team.name or bus.endpoint is needed",
         )
     _check_single(bus, config)
-    return present
+    check_oneself(bus, config, me.about, say)
+    me.met = True
+    return True
+
+
+def await_members(
+    bus: Bus,
+    config: Config,
+    stage: str,
+    names: Collection[str],
+    stopped: Callable[[], bool],
+    wait: Pause = pause,
+) -> bool:
+    """Wait until all `names` are at `stage`; False if `stopped()` came first.
+
+    When that takes long this says on stderr who is awaited and why. Meanwhile `wait()` is called
+    all the time.
+
+    Raises:
+        BusError: some were not there in time; the message says why of each.
+    """
+    watch = Watch(bus, config, stage, names, wait)
+    timeout = config.bus.barrier_timeout
+    return bus.wait_for(stage, names, timeout, stopped, watch.pause, watch.explain)
 
 
 def await_agents(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
@@ -60,28 +81,34 @@ def await_agents(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
     False if `stopped()` came first.
 
     Raises:
-        BusError: some were not ready in time.
+        BusError: some were not ready in time, or do not belong to this team.
     """
     names = {member.name for member in processes(config) if member.role.name != SIM}
-    return bus.wait_for(READY, names, config.bus.barrier_timeout, stopped)
+    if not await_members(bus, config, READY, names, stopped):
+        return False
+    check_others(bus, config, names)
+    return True
 
 
 def start_together(
-    bus: Bus, config: Config, stopped: Callable[[], bool], pause: Callable[[], None] | None = None
+    bus: Bus, config: Config, stopped: Callable[[], bool], wait: Pause | None = None
 ) -> bool:
     """A plant's wait until all others are ready; the one that drives time starts the team.
 
-    False if `stopped()` came first. While it waits, `pause()` is called all the time.
+    False if `stopped()` came first. While it waits, `wait()` is called all the time.
 
     Raises:
-        BusError: some were not ready in time, or two carry one name.
+        BusError: some were not ready in time, two carry one name, or some do not belong to this
+            team.
     """
+    wait, names = wait or pause, members(config)
     if bus.name not in LEADS:
         bus.declare(READY)
-    waiting = {} if pause is None else {"pause": pause}
-    if not bus.wait_for(READY, members(config), config.bus.barrier_timeout, stopped, **waiting):
+    if not await_members(bus, config, READY, names, stopped, wait):
         return False
     _check_single(bus, config)
+    if bus.name in LEADS:
+        check_others(bus, config, names, wait)
     bus.declare(READY)
     return True
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import json
+import sys
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from queue import Empty, SimpleQueue
@@ -11,6 +12,7 @@ from typing import Any, Final, Self
 
 import zenoh
 
+from quadriga.shared.bus.answers import Answers
 from quadriga.shared.bus.presence import Presence
 from quadriga.shared.bus.zenoh_settings import (
     NO_LINK,
@@ -21,17 +23,18 @@ from quadriga.shared.bus.zenoh_settings import (
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import ROUTER
-from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
+from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep, wall_ns
+from quadriga.shared.wire.about import HERE as HERE
+from quadriga.shared.wire.about import READY as READY
 
 Packet = tuple[str, bytes]  # key, payload as received
 Arrival = tuple[int, str, bytes]  # when, ns of `monotonic_ns`, and the packet
 
-HERE: Final = "here"  # a process has declared its subscribers
-READY: Final = "ready"  # it has also warmed up: the world may start
 POLL: Final = 0.1  # s, longest wait before a loop looks at its stop flag
 _ACK: Final = "received"  # key of the question whether everything before it has arrived
 _ACK_TIMEOUT: Final = 2.0  # s
 _LINK_TIMEOUT: Final = 5.0  # s
+_QUIET: Final = 5.0  # s without a router that need no word
 
 
 def _pause() -> None:
@@ -80,7 +83,7 @@ class Bus:
         In peer mode the process that drives time listens on `bus.endpoint`; all others connect,
         now or when it appears, and learn of each other through it, so that links are direct.
         In client mode the router must be there, or appear within `bus.barrier_timeout` if
-        `stopped` is given.
+        `stopped` is given; when that takes long this says so on stderr.
 
         Raises:
             BusError: the endpoint is malformed, cannot be bound, or is already in use; or there
@@ -88,7 +91,8 @@ class Bus:
             KeyboardInterrupt: `stopped()` came before the router.
         """
         settings = member_settings(bus, name)
-        deadline = monotonic() + (bus.barrier_timeout if stopped else 0.0)
+        begun, quiet = monotonic(), True
+        deadline = begun + (bus.barrier_timeout if stopped else 0.0)
         while True:
             try:
                 return cls(_open(settings, name), team, name)
@@ -97,6 +101,10 @@ class Bus:
                     raise
             if stopped and stopped():
                 raise KeyboardInterrupt
+            if quiet and monotonic() - begun > _QUIET:
+                quiet = False
+                said = f"quadriga: {name} waits for a router at {bus.endpoint}"
+                print(said, file=sys.stderr, flush=True)
             sleep(POLL)
 
     @classmethod
@@ -205,6 +213,37 @@ class Bus:
 
         return take
 
+    def answer(self, key: str, call: Callable[[], bytes]) -> None:
+        """Answer whoever asks on `key` with what `call()` gives.
+
+        The thread that receives messages calls it, so it must be quick and never raise.
+        """
+        self._declarations.append(
+            self._session.declare_queryable(key, _direct(lambda query: query.reply(key, call())))
+        )
+
+    def ask(self, key: str, timeout: float) -> Answers:
+        """Ask all who answer on `key` (may hold `*`) and do not wait for them.
+
+        Answers come for `timeout` seconds at most; who is frozen gives none. This process answers
+        its own question, too.
+        """
+        answers = Answers(wall_ns())
+
+        def note(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                answers.note(wall_ns(), str(reply.ok.key_expr), reply.ok.payload.to_bytes())
+
+        self._session.get(
+            key,
+            zenoh.handlers.Callback(note, answers.end, indirect=False),
+            target=zenoh.QueryTarget.ALL,
+            timeout=timeout,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            express=True,
+        )
+        return answers
+
     def get(self, timeout: float) -> Packet | None:
         """The oldest packet of the inbox, waiting at most `timeout` seconds for one."""
         try:
@@ -233,6 +272,11 @@ class Bus:
         while self._declared:
             self._declared.popitem()[1].undeclare()  # type: ignore[no-untyped-call]
 
+    @property
+    def reached(self) -> frozenset[str]:
+        """The stages that this process has declared."""
+        return frozenset(self._declared)
+
     def members_at(self, stage: str) -> frozenset[str]:
         """Names of the other processes that are at `stage` now."""
         return self._presence.at(stage)
@@ -248,10 +292,12 @@ class Bus:
         timeout: float,
         stopped: Callable[[], bool],
         pause: Callable[[], None] = _pause,
+        explain: Callable[[frozenset[str]], str] | None = None,
     ) -> bool:
         """Wait until all `names` are at `stage`; False if `stopped()` came first.
 
-        Between two looks `pause()` is called, which takes some milliseconds.
+        Between two looks `pause()` is called, which takes some milliseconds. `explain()` tells at
+        the end why some are absent.
 
         Raises:
             BusError: some were still absent after `timeout` seconds; the message names them.
@@ -266,9 +312,7 @@ class Bus:
                     f"barrier of team {self.team!r}, seen by {self.name}",
                     f"no {', '.join(sorted(absent))} at stage {stage!r} after {timeout:g} s",
                     f"{', '.join(sorted(wanted))}",
-                    "not started, failed to start, or another bus.endpoint or team.name"
-                    if self.linked
-                    else "no link to anyone: is bus.endpoint right and reachable?",
+                    explain(absent) if explain else self._likely_cause(),
                 )
             pause()
         return True
@@ -296,6 +340,11 @@ class Bus:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _likely_cause(self) -> str:
+        if self.linked:
+            return "not started, failed to start, or another bus.endpoint or team.name"
+        return "no link to anyone: is bus.endpoint right and reachable?"
 
     def _flush(self) -> bool:
         """Wait until all others have received what was published so far; whether they have.

@@ -47,3 +47,8 @@ def leave_priority() -> None:
         for thread in Path("/proc/self/task").iterdir():
             with suppress(ProcessLookupError):
                 os.sched_setscheduler(int(thread.name), os.SCHED_OTHER, os.sched_param(0))
+
+
+def has_priority() -> bool:
+    """Whether the first thread of this process is scheduled in real time."""
+    return os.sched_getscheduler(os.getpid()) in (os.SCHED_RR, os.SCHED_FIFO)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import fields
 
+from quadriga.shared.wire.about import QUESTIONS
 from quadriga.shared.wire.messages import Message
 from quadriga.shared.wire.topic import CONFIGURED, Topic
 from quadriga.shared.wire.topics import TABLE
@@ -23,11 +24,29 @@ This page is generated: `python -m quadriga.shared.wire.markdown > docs/messages
 |---|---|---|---|---|---|---|---|
 """
 
+_QUESTIONS = """\
+
+# Questions
+
+What each process answers when it is asked (a query of Zenoh) on `<team>/<process>/<question>`,
+before the walk and during it. Nothing of it is recorded.
+
+| question | answer | asked by |
+|---|---|---|
+"""
+
 
 def to_markdown() -> str:
-    """The page: the table of topics, then a table for each message."""
+    """The page: the table of topics, then a table for each message; the same of questions."""
     rows = "".join(f"| {' | '.join(_row(topic))} |\n" for topic in TABLE)
-    return _HEAD + rows + "".join(_section(topic.type) for topic in TABLE)
+    messages = "".join(_section(topic.type) for topic in TABLE)
+    questions = "".join(
+        f"| `{item.name}` | [{item.type.__name__}](#{item.type.__name__.lower()}) "
+        f"| {', '.join(item.askers)} |\n"
+        for item in QUESTIONS
+    )
+    answers = "".join(_section(item.type) for item in QUESTIONS)
+    return _HEAD + rows + messages + _QUESTIONS + questions + answers
 
 
 def _row(topic: Topic) -> Iterator[str]:

@@ -11,6 +11,7 @@ from contextlib import ExitStack
 
 import pytest
 
+from quadriga.shared.bus import zenoh_bus
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
@@ -298,6 +299,17 @@ def test_where_a_process_connects_is_not_where_it_listens(endpoint: str) -> None
 def test_without_a_router_a_client_cannot_start(opened: Open) -> None:
     with pytest.raises(BusError, match="no router there"):
         opened("r1", mode="client")
+
+
+def test_who_waits_for_a_router_says_so_once(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(zenoh_bus, "_QUIET", 0.0)
+    looks = iter([False, False, False, True])
+    config = BusConfig(mode="client", endpoint=endpoint)
+    with pytest.raises(KeyboardInterrupt):
+        Bus.open(config, "team", "r1", lambda: next(looks))
+    assert capsys.readouterr().err == f"quadriga: r1 waits for a router at {endpoint}\n"
 
 
 def test_two_teams_at_one_router_do_not_mix(opened: Open, endpoint: str) -> None:

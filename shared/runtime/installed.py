@@ -1,0 +1,53 @@
+"""What is installed here: this project's version and files, and the libraries it computes by."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import os
+import platform
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import quadriga
+
+PROJECT: Final = "quadriga"
+# What a run's figures depend on.
+LIBRARIES: Final = ("eclipse-zenoh", "mujoco", "pin", "numpy", "daqp", "osqp", "numba", "msgpack")
+
+
+def project_version() -> str:
+    """This project's version; "" in a source folder that is not installed."""
+    return _version(PROJECT)
+
+
+def package_versions() -> dict[str, str]:
+    """Versions by name: Python, the machine's kind, this project, libraries that are installed."""
+    found = {"python": platform.python_version(), "machine": platform.machine()}
+    versions = {name: _version(name) for name in (PROJECT, *LIBRARIES)}
+    return found | {name: version for name, version in versions.items() if version}
+
+
+@cache
+def code_digest() -> str:
+    """Digest of this project's source files, wherever they lie; 16 hexadecimal digits."""
+    folder, digest = Path(quadriga.__file__).parent, hashlib.sha256()
+    for path in sorted(_sources(folder), key=lambda path: path.relative_to(folder).as_posix()):
+        digest.update(f"\0{path.relative_to(folder).as_posix()}\0".encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _sources(folder: Path) -> Iterator[Path]:
+    """Python files below a folder; in a checkout some of its folders are links."""
+    for parent, _, names in os.walk(folder, followlinks=True):
+        yield from (Path(parent, name) for name in names if name.endswith(".py"))
+
+
+@cache
+def _version(package: str) -> str:
+    with suppress(importlib.metadata.PackageNotFoundError):
+        return importlib.metadata.version(package)
+    return ""

@@ -1,0 +1,144 @@
+"""Why a member is not there, out of tokens and answers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from quadriga.shared.bus.absence import TeamView, describe_absent, diagnose
+from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE
+from quadriga.shared.members import Member, team_members
+from quadriga.shared.wire.about import About
+from tests.shared.bus.abouts import NAMES, SIM, about, answer, view
+
+MEMBERS = {m.name: m for m in team_members(("r1", "r2"), central=False, recorded=False)}
+R1, R2 = MEMBERS["r1"], MEMBERS["r2"]
+EVERYBODY = (SIM, about("r1"), about("r2"))
+
+
+def codes(member: Member, seen: TeamView) -> list[tuple[str, str]]:
+    return [(item.code, item.verdict) for item in diagnose(member, seen)]
+
+
+def of_r2(**changes: Any) -> list[tuple[str, str]]:
+    return codes(R2, view(SIM, about("r1"), about("r2", **changes)))
+
+
+def test_who_is_ready_and_agrees_is_well() -> None:
+    for member in (R1, R2, MEMBERS["sim"]):
+        assert codes(member, view(*EVERYBODY)) == [("ready", GOOD)]
+
+
+@pytest.mark.parametrize(
+    ("seen", "code", "words"),
+    [
+        (view(SIM, about("r1"), here=NAMES), "not-answering", "here, but does not answer"),
+        (
+            view(SIM, about("r1", sees=("sim",)), here=frozenset({"sim", "r1"})),
+            "not-reachable",
+            "seen by sim, but not from here",
+        ),
+        (
+            view(about("r1", sees=("sim",)), here=frozenset({"r1"})),
+            "not-started",
+            "not on the bus: not started",
+        ),
+        (view(here=frozenset(), linked=False), "no-link", "no link to anyone"),
+        (
+            view(*EVERYBODY, answers={"r2": [answer(None)]}),
+            "unreadable",
+            "says what this version cannot read",
+        ),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_silence_has_a_reason(seen: TeamView, code: str, words: str) -> None:
+    (item,) = diagnose(R2, seen)
+    assert (item.code, item.verdict) == (code, BAD)
+    assert item.text.startswith(words)
+    assert bool(item.remedy) == (code != "no-link")
+
+
+def test_who_is_not_started_is_told_with_the_command_that_starts_it() -> None:
+    (item,) = diagnose(R2, view(SIM, about("r1", sees=("sim",)), here=frozenset({"sim", "r1"})))
+    assert item.code == "not-reachable"
+    alone = view(about("r1", sees=()), here=frozenset({"r1"}))
+    assert "`quadriga agent --robot r2`" in diagnose(R2, alone)[0].remedy
+    assert "`quadriga sim`" in diagnose(MEMBERS["sim"], alone)[0].remedy
+
+
+@pytest.mark.parametrize(
+    ("stage", "sees", "text"),
+    [
+        ("started", (), "on the bus, has not announced itself yet"),
+        ("here", ("sim",), "here, waits for r1"),
+        ("warming-up", ("r1", "sim"), "still warming up"),
+    ],
+)
+def test_how_far_a_process_is(stage: str, sees: tuple[str, ...], text: str) -> None:
+    seen = view(SIM, about("r2", stage=stage, sees=sees), here=frozenset({"sim", "r2"}))
+    (item,) = diagnose(R2, seen)
+    assert (item.code, item.verdict, item.text) == (stage, NOTE, text)
+
+
+def test_who_does_not_see_another_that_is_here_is_told() -> None:
+    assert of_r2(sees=("sim",)) == [("ready", GOOD), ("not-seen", BAD)]
+    assert of_r2(sees=(), stage="started") == [("started", NOTE)], "it has not looked yet"
+
+
+def test_differences_that_no_team_walks_with_are_bad_and_others_are_notes() -> None:
+    assert of_r2(config=("world.seed=4",), predictor="xyz", code="other") == [
+        ("ready", GOOD),
+        ("other-configuration", BAD),
+        ("other-predictor", BAD),
+        ("other-code", NOTE),
+    ]
+    assert ("other-version", BAD) in of_r2(version="9")
+    assert of_r2(predictor="abc") == [("ready", GOOD)]
+    seen = view(*EVERYBODY[:2], about("r2", version="9"), norm=None)
+    assert codes(R2, seen) == [("ready", GOOD)], "nobody knows what would be right"
+
+
+@pytest.mark.parametrize(
+    ("ahead_ns", "took_ns", "text"),
+    [
+        (90_000_000, 0, ""),
+        (3_000_000_000, 10**6, "its wall clock is 3 s ahead"),
+        (-3_000_000_000, 10**6, "its wall clock is 3 s behind"),
+        (300_000_000, 500_000_000, ""),  # it may be right: the answer took long
+    ],
+)
+def test_a_clock_is_off_by_more_than_what_the_question_took(
+    ahead_ns: int, took_ns: int, text: str
+) -> None:
+    said = answer(about("r2", wall_ns=10**18 + ahead_ns), took_ns)
+    found = diagnose(R2, view(*EVERYBODY, answers={"r2": [said]}))
+    assert [item.text for item in found if item.code == "clock-off"] == [text] * bool(text)
+
+
+def test_who_does_not_get_real_time_scheduling_is_told() -> None:
+    assert of_r2(scheduling="refused") == [("ready", GOOD), ("not-realtime", BAD)]
+    assert of_r2(scheduling="ordinary") == of_r2(scheduling="realtime") == [("ready", GOOD)]
+
+
+def test_two_of_a_name_are_told_with_their_places() -> None:
+    other = about("r2", host="laptop", pid=9, stage="here")
+    first, *rest = diagnose(R2, view(*EVERYBODY, other, doubled=frozenset({"r2"})))
+    assert (first.code, first.verdict) == ("two-of-a-name", BAD)
+    assert first.text == "two processes of this name, lab:7 and laptop:9"
+    assert [item.code for item in rest] == ["ready"]
+    assert codes(R2, view(SIM, about("r1"), doubled=frozenset({"r2"})))[0][0] == "two-of-a-name"
+
+
+def test_a_recorder_beside_another_is_no_second_one() -> None:
+    late = about("r2", stage="started", pid=9)
+    assert codes(R2, view(*EVERYBODY, late)) == [("ready", GOOD)]
+
+
+def test_the_absent_are_named_together_with_those_of_the_same_reason() -> None:
+    others: list[About] = [about("r1", sees=(), stage="warming-up")]
+    seen = view(*others, here=frozenset({"r1"}), names=NAMES)
+    text = describe_absent([MEMBERS["sim"], R1, R2, MEMBERS["operator"]], seen)
+    nobody = "not on the bus: not started, failed, or another bus.endpoint or team.name"
+    assert text == f"sim, r2, operator: {nobody}; r1: still warming up"
