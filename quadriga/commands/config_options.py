@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from quadriga.commands.command import Given
 from quadriga.shared.config.load import build, layers, parse_assignment
 from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError
 
 # Options that set one key of the configuration each; the key's own documentation is their help.
 KEYS: Final = {
@@ -35,6 +37,10 @@ KEYS: Final = {
 }
 # What some of them mean for one command alone.
 KEYS_OF: Final = {"bridge": {"interface": "bridge.interface"}}
+# Commands that take a place on a bus, and `--connect`: reach it through a router elsewhere.
+_CONNECTING: Final = frozenset(
+    ("sim", "bridge", "agent", "plan", "operate", "record", "estop", "doctor", "echo", "hz", "play")
+)
 
 
 def build_config_options(command: str) -> argparse.ArgumentParser:
@@ -57,6 +63,12 @@ def build_config_options(command: str) -> argparse.ArgumentParser:
         dest="assignments",
         help="set any key; may be repeated",
     )
+    if command in _CONNECTING:
+        group.add_argument(
+            "--connect",
+            metavar="ENDPOINT",
+            help="through the router at tcp/HOST:PORT: sets bus.mode to client, and bus.endpoint",
+        )
     defaults = Config()
     for option, name in (KEYS | KEYS_OF.get(command, {})).items():
         section, _, key = name.partition(".")
@@ -86,6 +98,7 @@ def read_config(arguments: argparse.Namespace) -> tuple[Config, Given]:
     for name, value in vars(arguments).items():
         if "." in name and value is not None:
             overrides[name] = value
+    overrides |= _connection(arguments, overrides)
     arguments.overrides = overrides
     scenario = arguments.scenario
     if scenario is None:
@@ -96,3 +109,20 @@ def read_config(arguments: argparse.Namespace) -> tuple[Config, Given]:
         labelled = {LABEL: label(scenario)} | overrides
         given = layers(arguments.config, labelled, beneath=path(scenario))
     return build(given), given
+
+
+def _connection(arguments: argparse.Namespace, overrides: Mapping[str, Any]) -> dict[str, str]:
+    """The keys that `--connect` sets.
+
+    Raises:
+        ConfigError: one of them is given beside it.
+    """
+    endpoint = getattr(arguments, "connect", None)
+    if endpoint is None:
+        return {}
+    connection = {"bus.mode": "client", "bus.endpoint": endpoint}
+    given = sorted(connection.keys() & overrides.keys())
+    if given:
+        cause = "it sets bus.mode and bus.endpoint"
+        raise ConfigError("--connect", f"{given[0]} beside it", "one of the two", cause)
+    return connection

@@ -49,6 +49,10 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
         ),
         (["walk", "--set", "team.plant=mujoko"], "team.plant: got 'mujoko'"),
         (["agent", "--robot", "r4"], "--robot: got 'r4', expected one of r1, r2, r3"),
+        (
+            ["agent", "--robot", "r1", "--connect", "tcp/x:1", "--endpoint", "tcp/y:1"],
+            "--connect: got bus.endpoint beside it, expected one of the two",
+        ),
         (["agent", "--robot", "r1", "--predictor", "/nowhere/p.npz"], "/nowhere/p.npz"),
         (
             ["agent", "--robot", "r1", "--wait", "0.1", "--predictor", "/nowhere/p.npz"],
@@ -131,6 +135,19 @@ def test_options_win_over_the_file(capsys: pytest.CaptureFixture[str], tmp_path:
     assert "seed = 4\n" in out
     assert "seconds = 9.0\n" in out
     assert "vx = -0.2\n" in out
+
+
+@pytest.mark.parametrize(
+    "command", [["agent", "--robot", "r2"], ["bridge", "--robot", "r2"], ["sim"], ["operate"]]
+)
+def test_a_process_joins_through_a_router_elsewhere(command: list[str], tmp_path: Path) -> None:
+    """Whatever the file says of the bus; its other keys stay."""
+    file = tmp_path / "team.toml"
+    file.write_text("[bus]\nmode = 'peer'\nbarrier_timeout = 7.0\n", encoding="utf-8")
+    words = [*command, "--config", str(file), "--connect", "tcp/lab:7447"]
+    config, _ = read_config(build_parser().parse_args(words))
+    assert (config.bus.mode, config.bus.endpoint) == ("client", "tcp/lab:7447")
+    assert config.bus.barrier_timeout == 7.0
 
 
 def test_every_option_names_a_key() -> None:
