@@ -1,0 +1,120 @@
+"""SHELL: asks the processes of a team how they are, and looks at this computer."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from quadriga.doctor.machine import check_machine, need_of
+from quadriga.doctor.readings import read_machine
+from quadriga.doctor.report import DoctorReport, MemberReport
+from quadriga.shared.bus.absence import DIFFERS, TeamView, diagnose
+from quadriga.shared.bus.agreement import REFUSED as DECISIVE
+from quadriga.shared.bus.agreement import disagreements
+from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
+from quadriga.shared.bus.inquiry import ask, pause, view_of
+from quadriga.shared.bus.introduction import describe_process
+from quadriga.shared.bus.reach import OPEN, REFUSED, UNTRIED, Reach, is_loopback, try_endpoint
+from quadriga.shared.bus.roster import members, processes
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import BusError
+from quadriga.shared.members import DOCTOR
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.runtime.installed import project_version
+from quadriga.shared.wire.about import About
+
+LINK: Final = "link"
+_LINK_TIMEOUT: Final = 2.0  # s, in which a link to those that are there has come about
+_SETTLE: Final = 1.0  # s more, in which the presence of all of them becomes known
+
+
+def examine(config: Config, *, here: bool) -> DoctorReport:
+    """Look at the team of a configuration and at this computer; nothing is changed.
+
+    Args:
+        config: the team's configuration, as this computer has it.
+        here: look at this computer alone.
+
+    Raises:
+        BusError: the endpoint is malformed.
+    """
+    endpoint, team = config.bus.endpoint, config.team.name
+    need = need_of(config, spread=not is_loopback(endpoint))
+    machine = check_machine(read_machine(), need)
+    if here:
+        link = _judge_reach(try_endpoint(endpoint), waiting=True)
+        return DoctorReport(team, endpoint, project_version(), link, machine)
+    me = describe_process(config, DOCTOR)
+    view, link = _look_at_team(config, me)
+    differs = tuple(_own_differences(me, view))
+    found = tuple(
+        MemberReport(member.name, view.answers.get(member.name, ()), diagnose(member, view))
+        for member in processes(config)
+    )
+    return DoctorReport(team, endpoint, me.version, link, (*differs, *machine), found)
+
+
+def _look_at_team(config: Config, me: About) -> tuple[TeamView, Diagnosis]:
+    """What is seen of a team without being one of it, and how it is reached."""
+    try:
+        bus = Bus.open(config.bus, config.team.name, DOCTOR)
+    except BusError:
+        reach = try_endpoint(config.bus.endpoint)
+        if reach.code == UNTRIED:
+            raise
+        nobody = frozenset[str]()
+        return TeamView(False, nobody, nobody, members(config)), _judge_reach(reach, waiting=False)
+    with bus:
+        deadline = monotonic() + _LINK_TIMEOUT
+        while not bus.linked and monotonic() < deadline:
+            pause()
+        deadline = monotonic() + _SETTLE
+        while bus.linked and not members(config) <= bus.members_at(HERE):
+            if monotonic() > deadline:
+                break
+            pause()
+        view = view_of(bus, config, ask(bus), me)
+    if view.linked:
+        return view, Diagnosis(LINK, GOOD, f"linked by {config.bus.endpoint}")
+    return view, _judge_reach(try_endpoint(config.bus.endpoint), waiting=False)
+
+
+def _judge_reach(reach: Reach, *, waiting: bool) -> Diagnosis:
+    """What an attempt to connect says of the way to a team.
+
+    Why a TLS endpoint that is open gives no link, only a handshake tells: its reason belongs here.
+
+    Args:
+        reach: what came of it.
+        waiting: whether it is enough that the way is open, or would be if somebody listened.
+    """
+    remedy = (
+        "start who drives time (sim, or the bridge of r1), or the router; is bus.endpoint right?"
+    )
+    if reach.code == UNTRIED:
+        return Diagnosis(LINK, UNKNOWN, reach.text)
+    if reach.code == REFUSED:
+        return Diagnosis(LINK, NOTE if waiting else BAD, reach.text, remedy)
+    if reach.code != OPEN:
+        return Diagnosis(
+            LINK, BAD, reach.text, "are both in one network, and is bus.endpoint right?"
+        )
+    if waiting:
+        return Diagnosis(LINK, GOOD, reach.text)
+    text = f"{reach.text}, but there is no link"
+    return Diagnosis(LINK, BAD, text, "another program, or with tls/ one side is not trusted")
+
+
+def _own_differences(me: About, view: TeamView) -> list[Diagnosis]:
+    """In what this computer differs from who drives time."""
+    if view.norm is None:
+        return []
+    return [
+        Diagnosis(
+            f"{DIFFERS}{item.of}",
+            BAD if item.of in DECISIVE else NOTE,
+            f"here {item.got}, {item.owner} has {item.wanted}",
+            "give the team's file with --config" if item.of == "configuration" else "",
+        )
+        for item in disagreements(me, view.norm)
+    ]

@@ -1,0 +1,98 @@
+"""SHELL: what can be read of this computer. What cannot be read is None."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import shutil
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Final, TypeVar
+
+from quadriga.doctor.machine import MachineReadings
+from quadriga.doctor.packages import split_requirement
+from quadriga.shared.runtime.installed import PROJECT
+from quadriga.shared.runtime.places import cache_dir
+from quadriga.shared.runtime.system_clock import system_clock_error_ns
+from quadriga.team.run_folder import RUNS
+
+T = TypeVar("T")
+
+_CORES: Final = Path("/sys/devices/system/cpu")
+_CGROUP: Final = Path("/sys/fs/cgroup")
+_UNLIMITED: Final = "max"
+
+
+def read_machine() -> MachineReadings:
+    """Look at this computer, as this user and in this folder; nothing is changed."""
+    requirements = _read(_requirements)
+    names = [split_requirement(line)[0] for line in requirements or ()]
+    versions = {name: _read(partial(importlib.metadata.version, name)) for name in names}
+    return MachineReadings(
+        realtime=_read(_may_take_realtime),
+        governors=_read(_governors),
+        cores=_read(_cores),
+        memory=_read(_free_memory),
+        disk=_read(lambda: shutil.disk_usage(_existing(RUNS)).free),
+        cache=str(cache_dir()),
+        cache_writable=_read(lambda: os.access(_existing(cache_dir()), os.W_OK | os.X_OK)),
+        clock_error=_read(lambda: 1e-9 * system_clock_error_ns()),
+        requirements=requirements,
+        installed={name: version for name, version in versions.items() if version},
+    )
+
+
+def _read(call: Callable[[], T]) -> T | None:
+    try:
+        return call()
+    except (OSError, ValueError, importlib.metadata.PackageNotFoundError):
+        return None
+
+
+def _may_take_realtime() -> bool:
+    """Whether the system lets this user do it: by doing it for a moment."""
+    before, priority = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
+    except PermissionError:
+        return False
+    os.sched_setscheduler(0, before, priority)
+    return True
+
+
+def _governors() -> tuple[str, ...] | None:
+    files = _CORES.glob("cpu[0-9]*/cpufreq/scaling_governor")
+    return tuple(sorted({file.read_text(encoding="ascii").strip() for file in files})) or None
+
+
+def _cores() -> float:
+    permitted = float(len(os.sched_getaffinity(0)))
+    quota, _, period = (_read_limit("cpu.max") or _UNLIMITED).partition(" ")
+    return permitted if quota == _UNLIMITED else min(permitted, int(quota) / int(period))
+
+
+def _free_memory() -> int:
+    lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    kib = next(line.split()[1] for line in lines if line.startswith("MemAvailable:"))
+    limit = _read_limit("memory.max") or _UNLIMITED
+    if limit == _UNLIMITED:
+        return 1024 * int(kib)
+    return min(1024 * int(kib), int(limit) - int(_read_limit("memory.current")))
+
+
+def _read_limit(name: str) -> str:
+    """What limits this process's container; "" where it has none of its own."""
+    file = _CGROUP / name
+    return file.read_text(encoding="ascii").strip() if file.is_file() else ""
+
+
+def _existing(folder: Path) -> Path:
+    """The folder, or the one above it in which it would be made."""
+    return next(path for path in (folder, *folder.resolve().parents) if path.exists())
+
+
+def _requirements() -> tuple[str, ...]:
+    """What this project asks for, without its extras."""
+    lines = importlib.metadata.requires(PROJECT) or []
+    return tuple(line for line in lines if ";" not in line)

@@ -1,0 +1,117 @@
+"""Is a computer fit? Decided over readings; what is not read is unknown, never good."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+import pytest
+
+from quadriga.doctor.machine import MachineNeed, MachineReadings, check_machine, need_of
+from quadriga.doctor.packages import check_packages
+from quadriga.doctor.readings import read_machine
+from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, UNKNOWN
+from quadriga.shared.config.load import load
+
+FIT = MachineReadings(
+    realtime=True,
+    governors=("performance",),
+    cores=8.0,
+    memory=16 * 10**9,
+    disk=100 * 10**9,
+    cache="/home/u/.cache/quadriga",
+    cache_writable=True,
+    clock_error=0.001,
+    requirements=("numpy>=2.0",),
+    installed={"numpy": "2.4.0"},
+)
+WALK = MachineNeed(realtime=True, spread=True, busy=4, count=6, recorded=10**8)
+LOCKSTEP = replace(WALK, realtime=False, spread=False)
+
+
+def verdicts(need: MachineNeed = WALK, **changes: Any) -> dict[str, str]:
+    """What is not good, by code."""
+    found = check_machine(replace(FIT, **changes), need)
+    assert all(item.remedy for item in found if item.verdict in (BAD, NOTE))
+    return {item.code: item.verdict for item in found if item.verdict != GOOD}
+
+
+def test_a_fit_computer_is_good_at_everything() -> None:
+    assert verdicts() == {}
+    assert len(check_machine(FIT, WALK)) == 8
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "in_lockstep"),
+    [
+        ({"realtime": False}, "realtime", NOTE),
+        ({"governors": ("performance", "powersave")}, "governor", NOTE),
+        ({"cores": 3.9}, "cores", NOTE),
+        ({"memory": 10**9}, "memory", BAD),
+        ({"disk": 10**8}, "disk", BAD),
+        ({"cache_writable": False}, "cache", BAD),
+        ({"clock_error": 0.0}, "clock", NOTE),
+        ({"clock_error": 0.2}, "clock", NOTE),
+        ({"installed": {}}, "packages", BAD),
+    ],
+)
+def test_each_lack_is_found_and_judged_by_what_the_walk_needs(
+    changes: dict[str, Any], code: str, in_lockstep: str
+) -> None:
+    assert verdicts(**changes) == {code: BAD}
+    assert verdicts(LOCKSTEP, **changes) == {code: in_lockstep}
+
+
+def test_what_cannot_be_read_is_unknown() -> None:
+    nothing: dict[str, Any] = dict.fromkeys(f.name for f in fields(FIT))
+    nothing |= {"cache": "", "installed": {}}
+    found = check_machine(replace(FIT, **nothing), WALK)
+    assert {item.verdict for item in found} == {UNKNOWN}
+    assert len({item.text for item in found}) == 8
+
+
+def test_a_team_at_a_loopback_address_runs_here_as_a_whole() -> None:
+    config = load(None, {"team.robots": 5, "world.seconds": 10.0, "world.mode": "realtime"})
+    whole, part = need_of(config, spread=False), need_of(config, spread=True)
+    assert (whole.busy, whole.count, whole.realtime) == (6, 8, True)
+    assert (part.busy, part.count) == (2, 2)
+    assert whole.recorded == 5 * 10 * 400_000
+
+
+@pytest.mark.parametrize(
+    ("requirement", "version", "verdict"),
+    [
+        ("numpy>=2.0", "2.0", GOOD),
+        ("numpy>=2.0", "1.26.4", BAD),
+        ("mujoco>=4.0,<5", "4.10.1", GOOD),
+        ("mujoco<5,>=4.0", "5.0", BAD),
+        ("mujoco (>=4.0,<5)", "3.9.9", BAD),
+        ("pin==4.1", "4.1.0", GOOD),
+        ("pin==4.1", "4.1.1", BAD),
+        ("pin>=4.1", "4.2.0rc1", GOOD),
+        ("pin~=4.1", "4.2.0", UNKNOWN),
+        ("pin>=4.1", "unknown", UNKNOWN),
+        ("pin", "1", GOOD),
+        ("Some-Name[extra]>=1", "2", GOOD),
+    ],
+)
+def test_a_version_is_held_against_its_bounds(requirement: str, version: str, verdict: str) -> None:
+    name = requirement.split("[")[0].split(">")[0].split("<")[0].split("=")[0].split("~")[0]
+    found = check_packages((requirement,), {name.split(" ")[0]: version})
+    assert found.verdict == verdict
+
+
+def test_a_package_that_is_wrong_is_named() -> None:
+    found = check_packages(("numpy>=2.0,<3", "osqp>=1.1"), {"numpy": "1.26"})
+    assert found.text == "numpy is 1.26, not >=2.0,<3; osqp is not installed"
+
+
+def test_this_computer_is_read_and_has_the_packages_that_it_is_tested_with() -> None:
+    readings = read_machine()
+    assert readings.cores is not None
+    assert readings.cores > 0
+    assert readings.memory is not None
+    assert readings.disk is not None
+    assert readings.cache.endswith("/quadriga")
+    packages = check_packages(readings.requirements, readings.installed)
+    assert packages.verdict == GOOD, packages.text
