@@ -8,10 +8,11 @@ import numpy as np
 from rich.console import Console
 
 from quadriga.progress import build_progress
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.roster import members
+from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
-from quadriga.shared.members import LAUNCHER
+from quadriga.shared.members import LAUNCHER, LEADS
 from quadriga.shared.printable import printable_line
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import decode
@@ -54,6 +55,8 @@ class WalkProgress:
                 continue  # the recorder keeps it
         if clock is not None:
             self._show_time(clock.tick / 1000)
+        elif not self._begun:
+            self._show_absent()
 
     def _show_event(self, event: Event) -> None:
         if event.code in DOWN:
@@ -61,6 +64,12 @@ class WalkProgress:
         if event.kind in ("fall", "fault", "push"):
             line = f"{event.tick / 1000:.2f} s: {event.kind} {event.robot} {event.detail}"
             self._bar.console.print(printable_line(line), markup=False)
+
+    def _show_absent(self) -> None:
+        team = members(self._config)
+        absent = team - self._bus.members_at(HERE) or team - LEADS - self._bus.members_at(READY)
+        text = f"waiting for {', '.join(sorted(absent))}" if absent else ""
+        self._bar.update(self._task, text=text)
 
     def _show_time(self, seconds: float) -> None:
         now = monotonic()

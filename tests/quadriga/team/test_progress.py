@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import io
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
 from rich.console import Console
 
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
@@ -56,3 +57,29 @@ def test_an_event_that_would_steer_the_terminal_is_only_shown() -> None:
             progress.update()
     assert "\x1b" not in text.getvalue()
     assert "\nquadriga: harmless" not in text.getvalue()
+
+
+def test_before_the_walk_those_who_are_awaited_are_named() -> None:
+    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint()})
+    text = io.StringIO()
+    console = Console(file=text, force_terminal=True, width=120)
+
+    def await_text(wanted: str) -> None:
+        deadline = monotonic() + WAIT
+        while wanted not in text.getvalue():
+            assert monotonic() < deadline, text.getvalue()
+            progress.update()
+            sleep(0.05)
+
+    with ExitStack() as stack:
+        names = (SIM, "r1", "operator", "recorder")
+        buses = {n: stack.enter_context(Bus.open(config.bus, "team", n)) for n in names}
+        progress = stack.enter_context(WalkProgress(config, console))
+        for name in (SIM, "operator"):
+            buses[name].declare(HERE)
+        await_text("waiting for r1, recorder")
+        for name in ("r1", "recorder"):
+            buses[name].declare(HERE)
+        for name in ("r1", "recorder"):
+            buses[name].declare(READY)
+        await_text("waiting for operator")
