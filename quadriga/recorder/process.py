@@ -74,19 +74,11 @@ def run(
         ConfigError: a pattern cannot be that of a key.
     """
     stopped, selection = stopped or stop_on_signals(), selection or Selection()
-    metadata = build_metadata(config, predictor_sha256) | selection.metadata()
     keys = KeyFilter(config.team.name, selection)
     paths = [path]
     try:
         with Bus.open(config.bus, config.team.name, RECORDER, stopped) as bus:
-            with Parts(
-                path,
-                metadata,
-                config.recorder.chunk_kib,
-                periods(config),
-                selection.limits,
-                admission=Admission(keys.own.__contains__),
-            ) as parts:
+            with _open_parts(config, path, predictor_sha256, selection, keys) as parts:
                 paths = parts.paths
                 bus.subscribe(keys.expression, largest=LARGEST)
                 session = Session(bus, parts, keys, config.team.robots, stopped, say)
@@ -105,6 +97,19 @@ def run(
             "room for the recording",
             "`quadriga recover` makes a whole file of what is there",
         ) from None
+
+
+def _open_parts(
+    config: Config, path: Path, predictor_sha256: str, selection: Selection, keys: KeyFilter
+) -> Parts:
+    return Parts(
+        path,
+        build_metadata(config, predictor_sha256) | selection.metadata(),
+        config.recorder.chunk_kib,
+        periods(config),
+        selection.limits,
+        admission=Admission(keys.own.__contains__),
+    )
 
 
 def _list_files(parts: Parts) -> RecordedFiles:
