@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.bridges.postures import Motion
 from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
+from quadriga.shared.robot.motions import Motion
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.unitree.packets import MotorTargets
 

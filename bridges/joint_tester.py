@@ -10,12 +10,12 @@ from quadriga.bridges.guard import Guard
 from quadriga.bridges.joint_motion import moving_joint
 from quadriga.bridges.joint_verdicts import JointSample, JointVerdict, judge_joints
 from quadriga.bridges.modes import BridgeMode, Wish
-from quadriga.bridges.postures import Motion
 from quadriga.bridges.robot_loop import TICK, RobotLoop
 from quadriga.bridges.supervisor import Supervised
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError
 from quadriga.shared.robot.conventions import JOINT_NAMES, Array
+from quadriga.shared.robot.motions import Motion
 from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.unitree.packets import MotorTargets, RobotReport
 

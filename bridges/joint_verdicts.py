@@ -8,9 +8,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.bridges.joint_motion import WAY
-from quadriga.bridges.postures import Motion
 from quadriga.shared.errors import CheckError
 from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
+from quadriga.shared.robot.motions import Motion
 
 _MOVED: Final = 0.5  # of the way that is asked for: with less a joint has not moved
 _STILL: Final = 0.25  # likewise, that another joint may move

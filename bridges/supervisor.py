@@ -18,11 +18,9 @@ from quadriga.bridges.limits import JointReading, joint_limits, limit_targets, s
 from quadriga.bridges.modes import BY_ITSELF, BY_WISH, BridgeMode, Wish
 from quadriga.bridges.postures import (
     SINKING,
-    Motion,
     damped,
     lie_down,
     passive,
-    posture_at,
     press_by_diagonals,
     stand_up,
     stay,
@@ -30,6 +28,7 @@ from quadriga.bridges.postures import (
 )
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
+from quadriga.shared.robot.motions import Motion, posture_at
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.runtime.record import record
 from quadriga.shared.unitree.packets import PROTECTED, MotorTargets, RobotReport

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.bridges.limits import joint_limits
-from quadriga.bridges.postures import lie_down, posture_at, stand_up
+from quadriga.bridges.postures import lie_down, stand_up
+from quadriga.shared.robot.motions import posture_at
 from quadriga.shared.robot.robots import ROBOTS
 from tests.bridges.robots import config_of
 
