@@ -20,9 +20,11 @@ from quadriga.agents.controller.whole_body.problem import (
     WholeBodyProblem,
     WholeBodySolution,
 )
+from quadriga.agents.healing import Healing, has_lost_input, may_resume, ramp, step_healing
 from quadriga.agents.modes import (
     DAMPING,
     ESTOP,
+    REFERENCE_LOST,
     STAND,
     STOPPING,
     WALK,
@@ -42,14 +44,22 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import code_of, with_detail
-from quadriga.shared.wire.messages import Command, EStop, Measurement, Plan, Reference, State, Truth
+from quadriga.shared.wire.messages import (
+    Command,
+    EStop,
+    Measurement,
+    Plan,
+    Reference,
+    Resume,
+    State,
+    Truth,
+)
 from quadriga.shared.wire.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
 
 _TRUTH_AGE_MS: Final = 20  # of the simulator's truth, where it stands in for an estimator
 _LONGEST_DT: Final = 0.02  # s, after a gap in the ticks the filters advance by no more than this
 NO_ESTIMATE: Final = "no-estimate"  # stop: the orientation is not a number
 FALL: Final = "fall"  # stop: the trunk is tilted beyond `controller.fall_tilt`
-REFERENCE_LOST: Final = "reference-lost"  # stop: the operator is silent
 
 
 @record
@@ -62,6 +72,7 @@ class Inputs:
         plans: plans of peers, or of whoever plans for the robot, with the sender's name.
         references: of the operator.
         estop: an emergency stop, if one came.
+        resume: the operator's word to go on, if it came.
         truth: of the simulator, only for the estimator "truth".
         excitation: force deviation to add, (12,), N, yaw frame; data collection only.
     """
@@ -73,12 +84,14 @@ class Inputs:
     estop: EStop | None = None
     truth: Truth | None = None
     excitation: Array | None = None
+    resume: Resume | None = None
 
     @property
     def bare(self) -> bool:
         """Whether nothing but the state has come."""
         others = self.measurements or self.plans or self.references
-        return not others and self.estop is None and self.truth is None
+        words = self.estop is not None or self.resume is not None
+        return not (others or words) and self.truth is None
 
 
 @record
@@ -110,6 +123,7 @@ class AgentState:
     last_tau: Array = field(default_factory=lambda: np.zeros(12))
     failures: int = 0
     counters: Mapping[str, int] = field(default_factory=dict)
+    healing: Healing = field(default_factory=Healing)
 
 
 @record
@@ -158,6 +172,7 @@ class Agent:
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
         self._damping = config.controller.damping
         self._max_failures = config.controller.max_failures
+        self._auto_resume = config.team.auto_resume
 
     @property
     def peers(self) -> tuple[str, ...]:
@@ -197,9 +212,10 @@ class Agent:
         references = state.references
         if inputs.references:
             references = remember_references(references, inputs.references, tick)
-        reference, reference_age = reference_at(references, tick, self._height)
+        course, healing = self._course(state, tick)
+        followed = ramp(references, healing, tick)
+        reference, reference_age = reference_at(followed, tick, self._height)
 
-        course = state.mode if state.mode.name == WALK else self._course(state, tick)
         stops = _stops_on_arrival(inputs.estop, course, reference_age)
         mode = resolve_stops(course, tick, stops) if stops else course
         schedule = self._schedules.at(tick, mode)
@@ -208,11 +224,9 @@ class Agent:
             stops.append(Stop(DAMPING, NO_ESTIMATE if math.isnan(sensed.upright) else FALL))
             mode = resolve_stops(course, tick, stops)
 
-        measurement = (
-            self._sample_measurement(state, tick, sensed) if tick % SAMPLE_MS == 0 else None
-        )
+        measurement = self._sample_measurement(state, tick, sensed)
         planning_inputs = PlanningInputs(
-            tick, mode, references, measurement, inputs.measurements, inputs.plans
+            tick, mode, followed, measurement, inputs.measurements, inputs.plans
         )
         planning, planned = self._planning.step(state.planning, planning_inputs)
         if planned.stop_reason:
@@ -234,7 +248,6 @@ class Agent:
         tau = solution.tau if not failures else state.last_tau  # the QP's, or the last good ones
         command = self._command(tick, tau, mode, solved=not failures)
         counters = _count(state.counters, planned, solution)
-        ages_ms = {"reference": float(reference_age), **planned.ages_ms}
         outputs = Outputs(
             command,
             measurement,
@@ -242,17 +255,37 @@ class Agent:
             mode.name,
             mode.reason,
             counters,
-            ages_ms,
+            {"reference": float(reference_age), **planned.ages_ms},
             planned.planner_ns,
         )
-        new = AgentState(tick, mode, planning, acted.memory, references, tau, failures, counters)
+        healing = self._heal(healing, mode, reference_age, planning, inputs)
+        new = AgentState(
+            tick, mode, planning, acted.memory, references, tau, failures, counters, healing
+        )
         return new, outputs, (sensed, planning_inputs, acted)
 
-    def _course(self, state: AgentState, tick: int) -> Mode:
-        """The mode of a robot that does not walk, if nothing stops it at this tick."""
+    def _heal(
+        self, healing: Healing, mode: Mode, reference_age: int, planning: Any, inputs: Inputs
+    ) -> Healing:
+        """The way back from a loss after a tick; nothing is looked at while nothing is lost."""
+        tick, whole_from = inputs.state.tick, None
+        stands = mode.name == STAND and has_lost_input(mode)
+        hears = stands and reference_age <= REFERENCE.max_age_ms
+        if hears and self._planning.is_whole(planning, tick):
+            whole_from = tick + self._stance_ms - (tick - self._stand_ms) % self._stance_ms
+        word = inputs.resume is not None
+        return step_healing(healing, mode, tick, whole_from=whole_from, word=word)
+
+    def _course(self, state: AgentState, tick: int) -> tuple[Mode, Healing]:
+        """The mode if nothing stops the robot at this tick, and its way back from a loss."""
+        mode, healing = state.mode, state.healing
+        if mode.name == WALK:
+            return mode, healing
         stand_ms, stance_ms = self._stand_ms, self._stance_ms
         ends = (state.tick - stand_ms) // stance_ms != (tick - stand_ms) // stance_ms
-        return step_mode(state.mode, tick, stand_ms, ends)
+        if ends and may_resume(healing, mode, tick, auto=self._auto_resume):
+            return Mode(WALK, tick), replace(healing, resumed=tick)
+        return step_mode(mode, tick, stand_ms, ends), healing
 
     def _sense(self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float) -> Sensed:
         truth = inputs.truth
@@ -273,12 +306,14 @@ class Agent:
     ) -> Measurement | None:
         """The 100 Hz sample that ends at `tick`: mean planned force, outputs at its last tick.
 
+        None at a tick at which none ends.
+
         Where states were passed over, the mean is over those of its ticks at which the agent
         stepped: a window without the sample would be of no use. None if its end was passed over,
         or all of it: nobody knows what was applied in it.
         """
         begun = tick - SAMPLE_MS
-        if begun < 0 or begun > state.tick:
+        if tick % SAMPLE_MS or begun < 0 or begun > state.tick:
             return None
         stance = self._schedules.at(begun, state.mode).stance
         return Measurement(tick, tick * 1_000_000, sensed.memory.mean_force, sensed.outputs, stance)

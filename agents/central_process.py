@@ -17,10 +17,11 @@ from quadriga.agents.rehearsal import rehearse_central
 from quadriga.agents.time_grid import step_ms
 from quadriga.shared.bus.barrier import meet
 from quadriga.shared.bus.introduction import Introduction
-from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
+from quadriga.shared.bus.lead_watch import LeadWatch
+from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
-from quadriga.shared.members import PLANNER, has_lead
+from quadriga.shared.members import PLANNER
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
@@ -42,7 +43,7 @@ def run(
     stopped: Callable[[], bool] | None = None,
     predictor_sha256: str = "",
 ) -> None:
-    """Plan for the whole team until the walk ends, who drives time leaves, or it is stopped.
+    """Plan for the whole team until the walk ends or it is stopped.
 
     Args:
         config: the team's configuration.
@@ -52,6 +53,7 @@ def run(
 
     Raises:
         BusError: the bus cannot be opened, or the team is not complete in time.
+        ProcessError: who drives time, or the link to the router, has vanished.
     """
     stopped = stopped or stop_on_signals()
     use_one_blas_thread()
@@ -66,10 +68,12 @@ def run(
             return
         rehearse_central(config, Central(config, planner))
         end_collection()
-        take_priority(config.runtime.priority)
+        take_priority(config.runtime.priority, config.world.mode)
         bus.declare(READY)
-        shell.work(stopped)
-        leave_priority()
+        try:
+            shell.work(stopped)
+        finally:
+            leave_priority()
 
 
 class _CentralShell:
@@ -84,6 +88,7 @@ class _CentralShell:
             for name in self._robots.values()
         }
         self._tell = bus.publisher(STATUS.key(team, PLANNER), droppable=realtime)
+        self._lead = LeadWatch(bus, config)
         self._lockstep = not realtime
         self._references: list[Reference] = []
         self._measurements: list[tuple[str, Measurement]] = []
@@ -95,8 +100,8 @@ class _CentralShell:
         state, since = CentralState(), monotonic()
         while not (stopped() or self._ended):
             packet = self._bus.get(POLL)
-            if packet is None and not has_lead(self._bus.members_at(HERE)):
-                return
+            if packet is None:
+                self._lead.look(state.step * step_ms(self._config))
             for key, payload in (packet, *self._bus.drain()) if packet else ():
                 self._take(key, payload)
             state = self._central.remember(state, self._measurements, self._references)

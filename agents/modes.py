@@ -17,9 +17,17 @@ STOPPING: Final = "stopping"
 DAMPING: Final = "damping"
 ESTOP: Final = "estop"
 
+# Reasons for a safe stop that are losses of inputs, as a mode's reason begins.
+REFERENCE_LOST: Final = "reference-lost"  # the operator is silent
+WINDOW_LOST: Final = "window-lost"  # no plan of its own for as long as a peer may be silent
+PEER_LOST: Final = "peer-lost"  # no plan of a peer for that long
+PLANNER_LOST: Final = "planner-lost"  # no plan came for as long as a team waits for one
+LOSSES: Final = frozenset((REFERENCE_LOST, WINDOW_LOST, PEER_LOST, PLANNER_LOST))
+
 PRECEDENCE: Final = (ESTOP, DAMPING, STOPPING)  # of the stops of one tick, the gravest first
 REASON_MOST: Final = 200  # characters of a reason; beyond 4096 no status could be read
 SLOW_DOWN_MS: Final = 500  # of a safe stop: speed goes to zero while the trot goes on
+WHOLE_MS: Final = 1000  # for which lost inputs must be there again before a robot goes on
 
 
 @record

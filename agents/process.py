@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
+from quadriga.agents.healing import change_event
 from quadriga.agents.inbox.inbox import Inbox, Source
 from quadriga.agents.inbox.intake_log import Intake
 from quadriga.agents.planning.interface import NOTHING, Expected
@@ -15,10 +16,10 @@ from quadriga.agents.rehearsal import rehearse
 from quadriga.agents.telemetry import Telemetry
 from quadriga.shared.bus.barrier import meet
 from quadriga.shared.bus.introduction import Introduction
+from quadriga.shared.bus.lead_watch import LeadWatch
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
-from quadriga.shared.members import has_lead
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.collector import end_collection
@@ -26,7 +27,15 @@ from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import State
-from quadriga.shared.wire.topics import COMMAND, INPUTS, MEASUREMENT, PLAN, STATE, STATUS
+from quadriga.shared.wire.topics import (
+    AGENT_EVENT,
+    COMMAND,
+    INPUTS,
+    MEASUREMENT,
+    PLAN,
+    STATE,
+    STATUS,
+)
 
 _PATIENCE: Final = 3.0  # s of states none of which is newer; long before, the joints are damped
 
@@ -37,7 +46,7 @@ def run(
     predictor: Predictor | None,
     stopped: Callable[[], bool] | None = None,
 ) -> None:
-    """Walk one robot until the walk ends, who drives time leaves, or it is stopped.
+    """Walk one robot until the walk ends or it is stopped.
 
     Args:
         config: the team's configuration.
@@ -48,6 +57,7 @@ def run(
     Raises:
         BusError: the bus cannot be opened, or the team is not complete in time or has something
             else in common; or for 3 s no state has come that is newer than those before.
+        ProcessError: who drives time, or the link to the router, has vanished.
     """
     stopped = stopped or stop_on_signals()
     use_one_blas_thread()
@@ -62,10 +72,12 @@ def run(
         rehearse(config, Agent(config, robot, predictor))
         shell = _Shell(config, agent, inbox, bus)
         end_collection()
-        take_priority(config.runtime.priority)
+        take_priority(config.runtime.priority, config.world.mode)
         bus.declare(READY)
-        shell.walk(stopped)
-        leave_priority()
+        try:
+            shell.walk(stopped)
+        finally:
+            leave_priority()
 
 
 class _Shell:
@@ -77,10 +89,11 @@ class _Shell:
         self._lockstep = not realtime
         self._put = {
             topic: bus.publisher(topic.key(team, agent.robot), droppable=realtime)
-            for topic in (COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS)
+            for topic in (COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, AGENT_EVENT)
         }
         self._telemetry = Telemetry(config.estimator.kind, paced=realtime)
         self._intake = Intake(config, inbox)
+        self._lead = LeadWatch(bus, config)
         # Since the last answer: how many misfits there were when first noticed, and when.
         self._misfits: tuple[int, float] | None = None
         self._given_up: dict[Source, int] = {}  # messages received of a source when given up
@@ -94,9 +107,8 @@ class _Shell:
             if state is not None:
                 memory = self._answer(memory, state)
                 self._misfits = None
-            elif not has_lead(self._bus.members_at(HERE)):
-                return
             else:
+                self._lead.look(memory.tick)
                 self._check_clock(memory.tick)
 
     def _check_clock(self, tick: int) -> None:
@@ -129,12 +141,15 @@ class _Shell:
         self._telemetry.note_state(state.tick, begun)
         expected = self._agent.expected(state.tick)
         inputs = self._gather_inputs(state, expected)
-        last = memory.tick
-        memory, outputs = self._agent.step(memory, inputs)
+        before = memory
+        memory, outputs = self._agent.step(before, inputs)
         self._put[COMMAND](encode(outputs.command))
         self._telemetry.note_step(outputs, monotonic_ns() - begun)
         self._publish_rest(state.tick, outputs)
-        self._publish_intake(last, inputs, expected)
+        self._publish_intake(before.tick, inputs, expected)
+        event = change_event(before.mode, memory.mode, state.tick, self._agent.robot)
+        if event is not None:
+            self._put[AGENT_EVENT](encode(event))
         return memory
 
     def _publish_rest(self, tick: int, outputs: Outputs) -> None:

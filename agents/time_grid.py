@@ -70,6 +70,15 @@ def first_step(config: Config, begun: int = 0) -> int:
     return -(-ready_ms // step_ms(config))
 
 
+def owed_from(config: Config, since: int) -> int:
+    """The step from which on a robot owes plans and is owed them, which walks since a tick.
+
+    Who begins in the midst of a walk owes and is owed nothing till its window is whole.
+    """
+    first = first_step(config)
+    return max(first, first_step(config, since)) if since > config.gait.stand_ms else first
+
+
 def patience(config: Config) -> int:
     """Planning steps for which a team does without a plan that ought to be there."""
     return config.planner.max_peer_age + config.planner.hold_steps

@@ -14,6 +14,8 @@ FRESH: Final = "fresh"
 HOLD: Final = "hold"
 DAMP: Final = "damp"
 
+PROMPT_TICKS: Final = 10  # for which a command must be prompt after one was late
+MOTOR_DAMPING: Final = 2.0  # N·m·s/rad, damping of a motor without a command
 _HOLD_KP: Final = 80.0  # N·m/rad, carries a standing robot
 _HOLD_KD: Final = 3.0  # N·m·s/rad
 
@@ -25,8 +27,46 @@ def grade(age_ms: int, world: WorldConfig) -> str:
     return HOLD if age_ms <= world.command_damp_ms else DAMP
 
 
+class Lateness:
+    """What applies to one robot tick by tick: once late, its commands must be prompt again.
+
+    Over a link that takes about as long as a command may be old, its age dithers about that limit.
+    The motors would change to and fro between holding a posture and torques that belong to another
+    one. So they hold until commands have been younger than half the limit for some ticks.
+
+    Args:
+        world: the limits.
+    """
+
+    def __init__(self, world: WorldConfig) -> None:
+        self._world = world
+        self._prompt = PROMPT_TICKS  # ticks in a row with a prompt command, up to as many
+
+    def grade(self, age_ms: int) -> str:
+        """Which of the three applies at the next tick, with a command of this age."""
+        now = grade(age_ms, self._world)
+        if now != FRESH:
+            self._prompt = 0
+            return now
+        if self._prompt < PROMPT_TICKS:
+            is_prompt = 2 * age_ms <= self._world.command_hold_ms
+            self._prompt = self._prompt + 1 if is_prompt else 0
+        return FRESH if self._prompt == PROMPT_TICKS else HOLD
+
+
 def hold_joints(state: State) -> Command:
     """The command that holds the joints where they are measured in `state`."""
     zero = np.zeros(N_JOINTS)
     kp, kd = np.full(N_JOINTS, _HOLD_KP), np.full(N_JOINTS, _HOLD_KD)
     return Command(state.tick, state.stamp_ns, zero, state.q_joint, zero, kp, kd)
+
+
+def damp_joints(tick: int, damping: float = MOTOR_DAMPING) -> Command:
+    """The command that damps all joints, by default as motors without a command are damped.
+
+    Args:
+        tick: of the command.
+        damping: N·m·s/rad.
+    """
+    zero = np.zeros(N_JOINTS)
+    return Command(tick, tick * 1_000_000, zero, zero, zero, zero, np.full(N_JOINTS, damping))

@@ -41,6 +41,9 @@ def _commands(server: PlantServer, stopped: Callable[[], bool]) -> dict[str, Com
             break
         packet = bus.get(min(left, POLL))
         if packet is None:
+            server.look_at_link()
+            if server.time.end is not None:
+                break
             server.time.look(bus.members_at(HERE))
             gone = waiting - bus.members_at(HERE)
             _give_up(server, gone, codes.GONE, "gone")
@@ -66,6 +69,7 @@ def _await_plants(server: PlantServer, stopped: Callable[[], bool]) -> End | Non
         elif monotonic() > deadline:
             time.end = plant_gone(sorted(waiting), f"silent for {patience:g} s")
         else:
+            server.look_at_link()
             time.look(bus.members_at(HERE))
     return time.end
 
@@ -73,4 +77,4 @@ def _await_plants(server: PlantServer, stopped: Callable[[], bool]) -> End | Non
 def _give_up(server: PlantServer, robots: set[str], code: str, why: str) -> None:
     for robot in sorted(robots):
         server.silent.add(robot)
-        server.announce(code, robot, f"{why}: its joints are damped, the world goes on")
+        server.announce(code, robot, f"{why}: the world goes on without its commands")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from quadriga.plant.end import End
+from quadriga.plant.end import TOLD_TO_STOP, End
 from quadriga.plant.lockstep import run_lockstep
 from quadriga.plant.protocol import Plant
 from quadriga.plant.realtime import run_realtime
@@ -13,9 +13,10 @@ from quadriga.plant.server import PlantServer
 from quadriga.plant.team_pace import TeamPace, team_pace
 from quadriga.plant.team_time import team_time
 from quadriga.shared.bus.barrier import await_agents, meet, start_together
+from quadriga.shared.bus.lead_watch import Loss, loss_error
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import BusError, MessageError
+from quadriga.shared.errors import MessageError, ProcessError
 from quadriga.shared.members import plant_name
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import sleep
@@ -48,8 +49,8 @@ def run(
 
     Raises:
         ConfigError: the plant cannot be built from the configuration.
-        BusError: the bus cannot be opened, the team is not complete in time, or another plant
-            left while the team walked.
+        BusError: the bus cannot be opened, or the team is not complete in time.
+        ProcessError: another plant, or the link to the router, vanished while the team walked.
     """
     stopped = stopped or stop_on_signals()
     team, name, time = config.team.name, plant_name(robot), team_time(config, robot)
@@ -57,25 +58,38 @@ def run(
     with Bus.open(config.bus, team, name, stopped) as bus:
         for key in sorted({*time.keys, *(COMMAND.key(team, own) for own in plant.names)}):
             bus.subscribe(key)
+        estops = _estops(bus)
         if plant.is_robot:
-            plant.listen(_estops(bus))
+            plant.listen(estops)
         pace = team_pace(bus, config, robot, is_robot=plant.is_robot)
         server = PlantServer(config, plant, bus, time, name)
+        if not plant.is_robot:
+            server.estops = estops
         if not meet(bus, config, stopped):
             return
         end_collection()
-        take_priority(config.runtime.priority)
+        take_priority(config.runtime.priority, config.world.mode)
         try:
-            if not _start(server, pace, stopped):
-                return
-            realtime = config.world.mode == "realtime"
-            end = run_realtime(server, stopped, pace) if realtime else run_lockstep(server, stopped)
+            end = _walk(server, pace, stopped)
             if time.drives:
                 server.announce(end.code, "", end.detail)
+        except Exception as error:
+            if time.drives:  # then the others need not find out by themselves
+                server.announce(codes.PLANT_FAILED, "", f"{type(error).__name__}: {error}")
+            raise
         finally:
             plant.finish()
             leave_priority()
-    _check_end(time.end, team)
+    _check_end(time.end, team, plant.tick)
+
+
+def _walk(server: PlantServer, pace: TeamPace | None, stopped: Callable[[], bool]) -> End:
+    """Start the team and walk; why the walk is over."""
+    if not _start(server, pace, stopped):
+        return TOLD_TO_STOP
+    if server.config.world.mode == "realtime":
+        return run_realtime(server, stopped, pace)
+    return run_lockstep(server, stopped)
 
 
 def _start(server: PlantServer, pace: TeamPace | None, stopped: Callable[[], bool]) -> bool:
@@ -110,14 +124,18 @@ def _pause() -> None:
     sleep(_PAUSE)
 
 
-def _check_end(end: End | None, team: str) -> None:
-    """Complain if another plant has left.
+def _check_end(end: End | None, team: str, tick: int) -> None:
+    """Complain if the walk was over for this plant because something vanished.
 
     Raises:
-        BusError: it did, while the team walked.
+        ProcessError: another plant, or the link to the router.
     """
-    if end is not None and end.code == codes.PLANT_GONE:
-        raise BusError(
+    if end is None:
+        return
+    if end.code == codes.LINK_LOST:
+        raise loss_error(Loss(*end), tick)
+    if end.code == codes.PLANT_GONE:
+        raise ProcessError(
             f"team {team!r}",
             end.detail,
             "the plants of all robots until the end",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Protocol
 
 from quadriga.shared.wire.messages import Command, Event, State, Status, Truth
@@ -33,7 +33,8 @@ class Plant(Protocol):
     def listen(self, estops: Callable[[], str]) -> None:
         """Ask `estops()` from now on why the team's emergency stop was pressed; "" if it was not.
 
-        Agents hear it, too. A robot must not depend on them.
+        Agents hear it, too. A robot must not depend on them. For plants that are no robots the
+        plant server sees to it.
         """
         return
 
@@ -59,6 +60,10 @@ class Plant(Protocol):
         A robot without a command damps its joints.
         """
         ...
+
+    def expect_down(self, names: Collection[str]) -> None:
+        """Hear which robots are led to the ground, since their commands are lost: no falls."""
+        return
 
     def truth(self) -> Truth | None:
         """The true state at this tick; None of a plant that does not know it."""

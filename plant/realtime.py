@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from quadriga.plant.attendance import note_absences
 from quadriga.plant.deadlines import DAMPED, HELD, PERIOD_MS, Deadlines
 from quadriga.plant.end import TOLD_TO_STOP, End
-from quadriga.plant.late import FRESH, HOLD, grade, hold_joints
+from quadriga.plant.late import FRESH, HOLD, Lateness, hold_joints
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_pace import TeamPace
 from quadriga.shared.bus.zenoh_bus import HERE
@@ -17,6 +18,7 @@ from quadriga.shared.wire.messages import Command, Status
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 TICK: Final = 1e-3  # s
+_LOOK_MS: Final = 100  # between two looks at the link to the router
 _SLACK: Final = 3.0  # ticks that the plant of all robots makes up for
 
 
@@ -38,8 +40,7 @@ def run_realtime(
         motors.deadlines.note_lateness(rate.wait())  # meanwhile the agents answer
         for packet in server.bus.drain():
             server.take(*packet, oldest=0)
-        if pace is not None:
-            _look_at_others(server, pace)
+        _look_at_others(server, pace)
         end = server.step(motors.commands())
         if server.plant.tick % PERIOD_MS == 0 or end is not None:
             status = motors.deadlines.status(server.plant.tick, rate.overruns)
@@ -51,10 +52,15 @@ def run_realtime(
     return End(code, f"{detail}; late ticks: {late}; overruns of the world: {rate.overruns}")
 
 
-def _look_at_others(server: PlantServer, pace: TeamPace) -> None:
-    """See whether the other plants are still there."""
-    time = server.time
-    if server.plant.tick % SAMPLE_MS == 0:
+def _look_at_others(server: PlantServer, pace: TeamPace | None) -> None:
+    """See whether agents, the other plants and the link to the router are still there."""
+    time, tick = server.time, server.plant.tick
+    if tick % _LOOK_MS == 0:
+        server.look_at_link()
+    if tick % SAMPLE_MS:
+        return
+    note_absences(server)
+    if pace is not None:
         time.look(server.bus.members_at(HERE))
         time.end = time.end or pace.look()
 
@@ -72,6 +78,7 @@ class _Motors:
     def __init__(self, server: PlantServer) -> None:
         self._server = server
         self._held: dict[str, Command] = {}
+        self._lateness = {name: Lateness(server.config.world) for name in server.plant.names}
         self.deadlines = Deadlines(server.plant.names)
 
     def commands(self) -> dict[str, Command]:
@@ -81,13 +88,13 @@ class _Motors:
         for name in server.plant.names:
             command = server.commands.latest.get(name)
             age = tick - server.commands.tick_of(name)
-            state = grade(age, server.config.world)
             if tick % server.plant.period_ms == 0:
                 self.deadlines.note_age(name, age)
             if server.plant.is_robot:
                 if command is not None:
                     chosen[name] = command
                 continue
+            state = self._lateness[name].grade(age)
             if command is not None and state == FRESH:
                 chosen[name] = command
                 self._held.pop(name, None)

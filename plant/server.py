@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from quadriga.plant.commands import CommandBox
 from quadriga.plant.end import End
+from quadriga.plant.late import damp_joints
+from quadriga.plant.lost import LostCommands
 from quadriga.plant.protocol import Plant
 from quadriga.plant.team_time import TeamTime
+from quadriga.shared.bus.lead_watch import find_lost_link
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
@@ -35,6 +38,8 @@ class PlantServer:
         name: of this process.
 
     Attributes:
+        estops: tells why the team's emergency stop was pressed; "" if it was not. For a robot,
+            which sees to it itself, nobody presses it.
         commands: the newest command of every robot of the plant.
         silent: robots that are not waited for.
     """
@@ -47,6 +52,9 @@ class PlantServer:
         self.time = time or TeamTime()
         self.commands = CommandBox(team, plant.names, config.robot)
         self.silent: set[str] = set()
+        self._lost, self._lowered = LostCommands(config), frozenset[str]()
+        self.estops: Callable[[], str] = lambda: ""
+        self._stopped = False
         self._put_state = {
             name: bus.publisher(STATE.key(team, name), droppable=realtime) for name in plant.names
         }
@@ -105,6 +113,12 @@ class PlantServer:
         for packet in self.bus.drain():
             self.take(*packet, oldest)
 
+    def look_at_link(self) -> None:
+        """Set the end of this plant's walk if its link to the router is gone: nobody hears it."""
+        loss = find_lost_link(self.bus, self.config)
+        if loss is not None and self.time.end is None:
+            self.time.end = End(*loss)
+
     def announce(self, code: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""
         self._send(Event.of(self.plant.tick, code, robot, truncate_text(detail)))
@@ -116,7 +130,7 @@ class PlantServer:
     def step(self, commands: Mapping[str, Command]) -> End | None:
         """Advance the plant by one tick; why the walk ends, if it does."""
         self._report_invalid()
-        for event in self.plant.step(commands):
+        for event in self.plant.step(self._final_commands(commands)):
             if event.robot or self.time.drives:  # what concerns all is announced once
                 self._send(event)
             self._note_fall(event)
@@ -131,6 +145,23 @@ class PlantServer:
         if fallen:
             return End(codes.FALLEN, f"fall of {', '.join(fallen)}")
         return End(codes.TIME_OVER, "end of world.seconds")
+
+    def _final_commands(self, commands: Mapping[str, Command]) -> Mapping[str, Command]:
+        """What the motors get: the commands, unless the team is stopped or some are lost."""
+        plant = self.plant
+        if not self._stopped and (reason := self.estops()):
+            self._stopped = True
+            robot = "" if self.time.alone else plant.names[0]
+            self.announce(codes.ESTOPPED, robot, f"{reason}: every joint is damped")
+        if self._stopped:
+            return {name: damp_joints(plant.tick) for name in plant.names}
+        filled = self._lost.fill(plant.tick, plant.names, commands, plant.states)
+        if self._lost.lowered != self._lowered:
+            for name in sorted(self._lost.lowered - self._lowered):
+                self.announce(codes.LOWERED, name, "no command: its joints are led down")
+            self._lowered = self._lost.lowered
+            plant.expect_down(self._lowered)
+        return filled
 
     def _note_fall(self, event: Event) -> None:
         if event.code in codes.DOWN:

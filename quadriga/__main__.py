@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import signal
 import sys
+from typing import Final
+
+_STOP: Final = "estop"
 
 
 def main() -> int:
@@ -11,6 +14,10 @@ def main() -> int:
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     from quadriga.shared.errors import QuadrigaError
     from quadriga.shared.printable import printable_line
+    from quadriga.shared.runtime.scheduling import go_first
+
+    if sys.argv[1:2] == [_STOP]:  # what it imports must not wait for those that it stops
+        go_first()
 
     try:
         from quadriga.commands.parser import main as command_line

@@ -68,7 +68,7 @@ class CheckError(QuadrigaError):
 
 
 class ProcessError(QuadrigaError):
-    """A process of the team failed or did not start."""
+    """A process of the team failed, did not start, or has vanished while the team walked."""
 
 
 @contextmanager

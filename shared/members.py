@@ -19,6 +19,7 @@ AGENT: Final = "agent"  # one for each robot, whose name it has: r1 … rn
 ROUTER: Final = "router"
 LAUNCHER: Final = "launcher"  # shows how far the walk has come
 ESTOP: Final = "estop"  # stops the team once
+RESUME: Final = "resume"  # has a team that stands go on, once
 DOCTOR: Final = "doctor"  # asks everybody how they are
 
 # Who drives time, by name: the only plant, or that of the first robot. The others leave with it.

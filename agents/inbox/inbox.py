@@ -23,7 +23,16 @@ from quadriga.shared.members import OPERATOR, PLANNER, SIM
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import EStop, Event, Message, Plan, Reference, State, Truth
+from quadriga.shared.wire.messages import (
+    EStop,
+    Event,
+    Message,
+    Plan,
+    Reference,
+    Resume,
+    State,
+    Truth,
+)
 from quadriga.shared.wire.tick_gate import TickGate
 from quadriga.shared.wire.topics import (
     ESTOP,
@@ -31,6 +40,7 @@ from quadriga.shared.wire.topics import (
     MEASUREMENT,
     PLAN,
     REFERENCE,
+    RESUME,
     SAMPLE_MS,
     STATE,
     TRUTH,
@@ -78,6 +88,7 @@ class Inbox:
             STATE.key(team, robot): (STATE, robot),
             REFERENCE.key(team): (REFERENCE, OPERATOR),
             ESTOP.key(team): (ESTOP, ""),
+            RESUME.key(team): (RESUME, ""),
             EVENT.key(team): (EVENT, SIM),
         }
         if config.estimator.kind == "truth":
@@ -103,6 +114,7 @@ class Inbox:
         self._state: State | None = None
         self._sample_end: State | None = None  # older than `_state`
         self._estop: EStop | None = None
+        self._resume: Resume | None = None
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -120,7 +132,7 @@ class Inbox:
         if message is None or not _is_believable(message, self._robot, self._measurable):
             self.counters[f"dropped_{topic.name}"] += 1
             return
-        if topic not in (STATE, ESTOP, EVENT) and self._is_ahead(message):
+        if topic not in (STATE, ESTOP, EVENT, RESUME) and self._is_ahead(message):
             self.counters[f"ahead_{topic.name}"] += 1
             self.refused = True
             return
@@ -140,6 +152,8 @@ class Inbox:
             self._keep_newest(message)
         elif isinstance(message, EStop):
             self._estop = message
+        elif isinstance(message, Resume):
+            self._resume = message
         elif isinstance(message, Event):
             self.ended = self.ended or message.kind == "stop"
         else:
@@ -207,13 +221,15 @@ class Inbox:
 
     def pop_inputs(self, state: State, expected: Expected) -> Inputs:
         """All that is due at the step of `state`, sorted by robot, then tick; it is removed."""
-        if self._lockstep and expected is NOTHING and self._estop is None:
+        words = self._estop is not None or self._resume is not None
+        if self._lockstep and expected is NOTHING and not words:
             return Inputs(state)
         plans = self._pop_due(PLAN, expected.plan)
         measurements = self._pop_due(MEASUREMENT, _tick(expected.measurement_tick))
         references = self._pop_due(REFERENCE, _tick(expected.reference_tick))
         truths = self._pop_due(TRUTH, _tick(state.tick if expected.truth else None))
         estop, self._estop = self._estop, None
+        resume, self._resume = self._resume, None
         return Inputs(
             state,
             tuple(measurements),
@@ -221,6 +237,7 @@ class Inbox:
             tuple(self._slew.limit(reference) for _, reference in references),
             estop,
             truths[-1][1] if truths else None,
+            resume=resume,
         )
 
     def _pop_due(self, topic: Topic, limit: Order | None) -> list[tuple[str, Any]]:

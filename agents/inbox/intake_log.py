@@ -17,10 +17,11 @@ from quadriga.shared.wire.topics import (
     PLAN,
     REFERENCE,
     REFERENCE_EPOCH_MS,
+    RESUME,
     TRUTH,
 )
 
-ANYONE: Final = "anyone"  # who sent an emergency stop
+ANYONE: Final = "anyone"  # who sent an emergency stop, or the word to go on
 _FIRST: Final = (-1, 0)
 
 
@@ -86,12 +87,12 @@ class Intake:
 def has_rule(source: Source, order: Order) -> bool:
     """Whether the rules of lock-step speak of such a message.
 
-    They know nothing of an emergency stop, nor of a second operator's words between those of the
-    first.
+    They know nothing of an emergency stop, of the word to go on, nor of a second operator's words
+    between those of the first.
     """
     if source[0] == REFERENCE.name:
         return order[0] % REFERENCE_EPOCH_MS == 0
-    return source[0] != ESTOP.name
+    return source[0] not in (ESTOP.name, RESUME.name)
 
 
 def list_messages(inputs: Inputs) -> list[tuple[Source, Order]]:
@@ -103,6 +104,8 @@ def list_messages(inputs: Inputs) -> list[tuple[Source, Order]]:
     ]
     if inputs.estop is not None:
         messages.append((ESTOP.name, ANYONE, inputs.estop))
+    if inputs.resume is not None:
+        messages.append((RESUME.name, ANYONE, inputs.resume))
     if inputs.truth is not None:
         messages.append((TRUTH.name, SIM, inputs.truth))
     return [((topic, sender), order_of(message)) for topic, sender, message in messages]

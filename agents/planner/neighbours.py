@@ -8,6 +8,7 @@ Pure: messages in, selection out; lost, repeated, late and foreign messages are 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -20,7 +21,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array, robot_names
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.messages import Measurement, Plan
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.wire.topics import MEASUREMENT, SAMPLE_MS
 
 FRESH: Final = "fresh"  # the newest plan that may be used: that of step k−1
 SHIFTED: Final = "shifted"  # an older one, shifted by its age
@@ -117,6 +118,24 @@ class Neighbours:
     ) -> PeerMemory:
         """See `peer_memory.remember`."""
         return remember(self._config, memory, tick, measurements, plans)
+
+    def are_ready(self, memory: PeerMemory, tick: int) -> bool:
+        """Whether the samples of all peers come at `tick`, and each stands or plans."""
+        recent = tick - patience(self._config) * step_ms(self._config)
+        return all(
+            history.measurements
+            and tick - history.measurements[-1].tick <= MEASUREMENT.max_age_ms
+            and (_stands(history) or (history.plans and history.plans[-1].tick >= recent))
+            for history in memory.peers.values()
+        )
+
+    def forget_plans(self, memory: PeerMemory, before: int) -> PeerMemory:
+        """The memory without plans of before a tick."""
+        peers = {
+            name: replace(history, plans=tuple(p for p in history.plans if p.tick >= before))
+            for name, history in memory.peers.items()
+        }
+        return replace(memory, peers=peers)
 
     def is_complete(self, memory: PeerMemory, serial: tuple[int, int]) -> bool:
         """Whether every peer's plan of this step and exchange is there, and its window before it.
@@ -226,6 +245,11 @@ class Neighbours:
                     du[place], y[place] = plan.u[ahead] - nominal[k], plan.y[ahead]
                     break
         return known, du, y
+
+
+def _stands(history: PeerHistory) -> bool:
+    """Whether a peer stood on all four feet when it was last heard."""
+    return bool((history.measurements[-1].stance > 0.5).all())
 
 
 def _deviations(samples: Collection[Measurement], weight: float) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces, nominal_table
+from quadriga.agents.modes import PEER_LOST
 from quadriga.agents.planner.cooperation import (
     build_team_problem,
     is_cooperative,
@@ -37,7 +38,6 @@ from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import with_detail
 
-PEER_LOST: Final = "peer-lost"
 IMPLAUSIBLE: Final = "implausible"
 
 

@@ -102,6 +102,10 @@ class PlanningInterface(Protocol[S]):
         """Take in what arrived, plan if it is time to, say what to apply now."""
         ...
 
+    def is_whole(self, state: S, tick: int) -> bool:
+        """Whether all that planning takes in is there, of a robot that stands for lack of it."""
+        return True
+
     def problem_of(self, state: S, inputs: PlanningInputs) -> SolvedQp | None:
         """The QP that `step` solves for these arguments; None if it solves none."""
         return None

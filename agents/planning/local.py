@@ -8,12 +8,12 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.modes import WALK
+from quadriga.agents.modes import PEER_LOST, WALK, WINDOW_LOST, Mode
 from quadriga.agents.planner.cooperation import brings_forward, is_cooperative, relevant_peers
 from quadriga.agents.planner.neighbours import Neighbours
 from quadriga.agents.planner.peer_memory import PeerMemory
 from quadriga.agents.planner.peer_terms import PeerTerms
-from quadriga.agents.planner.planner import PEER_LOST, Planner, PlannerInputs, PlannerState
+from quadriga.agents.planner.planner import Planner, PlannerInputs, PlannerState
 from quadriga.agents.planner.qp_solver import SolvedQp
 from quadriga.agents.planning.active_plan import ActivePlan, add_plan, setpoint_at
 from quadriga.agents.planning.adaptation import Adapter
@@ -29,15 +29,15 @@ from quadriga.agents.planning.operator_references import base_of_window
 from quadriga.agents.planning.window import build_planner_inputs, is_gapless
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.recursive import Correction
-from quadriga.agents.time_grid import exchange_ms, first_step, patience, step_ms
+from quadriga.agents.time_grid import exchange_ms, first_step, owed_from, patience, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import with_detail
 from quadriga.shared.wire.messages import Measurement, Reference
+from quadriga.shared.wire.topics import SAMPLE_MS
 
-WINDOW_LOST: Final = "window-lost"  # stop: no plan of its own for as long as a peer may be silent
 WINDOW_GAP: Final = "window_gap"  # counter: no plan, a sample of the robot's own is missing
 UNLEARNT: Final = "window_not_learnt"  # counter: an agent that adapts refused a window
 
@@ -55,6 +55,7 @@ class LocalState:
         inputs: what the plan of the present step was made of.
         planner: what the planner remembers.
         correction: how the plant differs from the predictor's, if the agent adapts.
+        begun: tick at which the robot began to walk, if that was not with its team; −1 else.
     """
 
     peers: PeerMemory
@@ -66,6 +67,7 @@ class LocalState:
     inputs: PlannerInputs | None = None
     planner: PlannerState = field(default_factory=PlannerState)
     correction: Correction | None = None
+    begun: int = -1
 
 
 @record
@@ -124,6 +126,7 @@ class LocalPlanning:
 
     def step(self, state: LocalState, inputs: PlanningInputs) -> tuple[LocalState, PlanningOutputs]:
         """Take in what arrived; plan, or answer the peers' plans, if it is time to."""
+        state = self._begin_again(state, inputs.mode)
         state, request, unusual = self._take_in(state, inputs)
         if inputs.mode.name != WALK:
             return state, PlanningOutputs(unusual=unusual)
@@ -135,11 +138,32 @@ class LocalPlanning:
 
     def problem_of(self, state: LocalState, inputs: PlanningInputs) -> SolvedQp | None:
         """The QP that `step` solves for these arguments; None if it solves none."""
+        state = self._begin_again(state, inputs.mode)
         state, request, _ = self._take_in(state, inputs)
         if request is None:
             return None
         G_ii = self._own_block(state.correction, request.inputs.step)
         return self._planner.problem_of(state.planner, request.inputs, request.terms, G_ii)
+
+    def is_whole(self, state: LocalState, tick: int) -> bool:
+        """Whether its own window is whole, and its peers are heard and do not slow down."""
+        own, T_ini = state.own, self._config.planner.T_ini
+        if not own or tick - own[-1].tick >= SAMPLE_MS or not is_gapless(own, T_ini, own[-1].tick):
+            return False
+        return self._neighbours.are_ready(state.peers, tick)
+
+    def _begin_again(self, state: LocalState, mode: Mode) -> LocalState:
+        """The state without what was planned before the robot stopped, once it walks again."""
+        since = mode.since
+        if mode.name != WALK or since <= self._config.gait.stand_ms or since == state.begun:
+            return state
+        recent = since - patience(self._config) * self._step_ms
+        peers = self._neighbours.forget_plans(state.peers, recent)
+        return replace(state, peers=peers, plans=(), terms=PeerTerms(), terms_step=-1, begun=since)
+
+    def _first(self, state: LocalState) -> int:
+        """The first planning step: the team's, or that of a robot which began to walk later."""
+        return max(self._first_step, -(-state.begun // self._step_ms))
 
     def _take_in(
         self, state: LocalState, inputs: PlanningInputs
@@ -208,7 +232,7 @@ class LocalPlanning:
         (step, turn), own = serial, state.inputs
         if own is None or own.step != step or not self._has_all(state, (step, turn - 1)):
             return None
-        selection = self._neighbours.select(state.peers, step, self._first_step)
+        selection = self._neighbours.select(state.peers, step, self._first(state))
         base = base_of_window(self._config, step * self._step_ms, references)
         terms = self._planner.peer_terms(state.terms, selection, step, base)
         return _Request(serial, own, terms)
@@ -220,7 +244,7 @@ class LocalPlanning:
         """The peers' terms of a planning step, made of what they sent up to the step before."""
         end = step if brings_forward(self._config) else step - 1
         selection = self._neighbours.select(
-            state.peers, step - 1, self._first_step, window_step=end
+            state.peers, step - 1, self._first(state), window_step=end
         )
         # The base of samples to come is the command of now, whenever this is computed.
         now = (step - 1) * self._step_ms
@@ -268,10 +292,7 @@ class LocalPlanning:
         Asked at every tick: the one of the planning step may itself be missing.
         """
         step = inputs.tick // self._step_ms
-        first, since = self._first_step, inputs.mode.since
-        if since > self._config.gait.stand_ms:
-            # Who begins in the midst of a walk owes and is owed nothing till its window is whole.
-            first = max(first, first_step(self._config, since))
+        first = owed_from(self._config, inputs.mode.since)
         age = step - max(state.newest[0], first - 1)
         if age <= 0:
             return ""

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.gait import nominal_forces
-from quadriga.agents.modes import WALK
+from quadriga.agents.modes import PLANNER_LOST, WALK
 from quadriga.agents.planning.active_plan import ActivePlan, add_plan, setpoint_at
 from quadriga.agents.planning.fade import FADED, fade_factor
 from quadriga.agents.planning.interface import (
@@ -23,14 +23,13 @@ from quadriga.agents.planning.interface import (
 from quadriga.agents.planning.operator_references import reference_at
 from quadriga.agents.predictor.episode import commanded_outputs
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import first_step, horizon_stance, patience, step_ms
+from quadriga.agents.time_grid import first_step, horizon_stance, owed_from, patience, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import N_LEGS, Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.messages import Measurement, Plan
 from quadriga.shared.wire.topics import SAMPLE_MS
 
-LOST: Final = "planner-lost"  # stop: no plan came for as long as a team waits for one
 # A planner's own plans keep to deviation_max: the share and N on top are for its solver.
 # With forces far beyond it a single message would drive all joints to their limits.
 _SHARE: Final = 1.5
@@ -95,14 +94,19 @@ class RemotePlanning(PlanningInterface[RemoteState]):
             return state, PlanningOutputs(unusual=tuple(unusual))
         newest_step = state.newest[0]
         due = (tick - self._latency) // self._step_ms
-        age = due - max(newest_step, self._first_step - 1)
+        age = due - max(newest_step, owed_from(self._config, inputs.mode.since) - 1)
         plan_tick = self._step_ms * newest_step
         return state, PlanningOutputs(
             setpoint=setpoint_at(state.plans, tick),
-            stop_reason=LOST if age > patience(self._config) else "",
+            stop_reason=PLANNER_LOST if age > patience(self._config) else "",
             ages_ms={"plan": float(tick - plan_tick)} if newest_step >= 0 else {},
             unusual=tuple(unusual),
         )
+
+    def is_whole(self, state: RemoteState, tick: int) -> bool:
+        """Whether its own samples come; the planner does not plan while robots stand."""
+        sample = state.newest_sample
+        return sample is not None and tick - sample.tick < SAMPLE_MS
 
     def _is_usable(self, plan: Plan, tick: int) -> bool:
         """Whether a plan is one of this team's at this time: else it is foreign, or forged."""

@@ -35,6 +35,7 @@ from quadriga.commands import (
     replay,
     report,
     resim,
+    resume,
     router,
     scenarios,
     sim,
@@ -57,7 +58,8 @@ _COMMANDS: Final = (
     walk.add, scenarios.add, sim.add, bridge.add, desk.add, fault.add, agent.add, plan.add,
     record.add, report.add, play.add, resim.add, export.add, info.add, recover.add, check.add,
     echo.add, hz.add, replay.add, router.add, doctor.add, prepare.add, operate.add, collect.add,
-    fit.add, probe.add, campaign.add, experiments.add, tune.add, estop.add, config.add, version.add,
+    fit.add, probe.add, campaign.add, experiments.add, tune.add, estop.add, resume.add, config.add,
+    version.add,
 )  # fmt: skip
 
 

@@ -63,7 +63,11 @@ def add(add_command: AddCommand) -> None:
 
 
 def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
-    """Record until the walk is over or a signal comes, then show its report if asked to."""
+    """Record until the walk is over or a signal comes, then show its report if asked to.
+
+    Raises:
+        ProcessError: who drives time, or the link to the router, vanished while the team walked.
+    """
     from rich.console import Console
 
     from quadriga.recorder import process
@@ -87,7 +91,9 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
             config, path, predictor_sha256=sha256, stopped=stopped, selection=selection, say=say
         )
         if stopped() or not arguments.report:
-            print(printable(_format_files(files)))
+            print(printable(_format_files(files)), flush=True)
+            if files.error is not None:
+                raise files.error
             return 0
     arguments.run, arguments.html = path.parent, None
     return report.run(arguments, config, given)

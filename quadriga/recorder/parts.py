@@ -11,9 +11,11 @@ from typing import Final, Self
 
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.admission import Admission
+from quadriga.shared.recording.mcap_chunk import name_of
 from quadriga.shared.recording.sequence import lost_by_key
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.wire.topics import STATE
 
 _RECORD: Final = 64  # bytes that a message takes at most in a file beside its payload
 
@@ -75,6 +77,10 @@ class Parts:
             self._begin_next()
         self._writer.write(key, payload, log_time_ns)
 
+    def note(self, name: str, values: Mapping[str, str]) -> None:
+        """Write down something about the recording in the file that is open."""
+        self._writer.note(name, values)
+
     def flush(self) -> None:
         """Let what was written so far survive a kill; begin a new file if it is time to."""
         seconds = self._limits.seconds
@@ -99,6 +105,11 @@ class Parts:
     def first_ticks(self) -> dict[str, int]:
         """Tick of the first message of each key."""
         return self._first_of_part() | self._first
+
+    def last_tick(self) -> int:
+        """Of the newest state of any robot; −1 without one."""
+        ticks = {**self._last, **{key: track.last for key, track in self._writer.tracks.items()}}
+        return max((tick for key, tick in ticks.items() if name_of(key) == STATE.name), default=-1)
 
     def __enter__(self) -> Self:
         return self

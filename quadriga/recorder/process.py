@@ -13,14 +13,17 @@ from quadriga.recorder.session import Session
 from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.bus.barrier import await_members, meet, members
 from quadriga.shared.bus.introduction import Introduction
+from quadriga.shared.bus.lead_watch import Loss, loss_error
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
-from quadriga.shared.errors import RecordingError, system_reason
+from quadriga.shared.errors import ProcessError, RecordingError, system_reason
 from quadriga.shared.members import RECORDER, has_lead
 from quadriga.shared.recording.admission import LARGEST, Admission
+from quadriga.shared.recording.writer import END
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.signals import stop_on_signals
+from quadriga.shared.wire.topics import EVENT
 
 _SETTLE: Final = 0.2  # s wall, in which the presence of all who are there becomes known
 MEMBER: Final = "member"
@@ -36,12 +39,15 @@ class RecordedFiles:
         messages: how many are in them.
         lost: by key, messages that did not come.
         refused: by reason, messages that were not stored, see `Admission`.
+        error: what vanished while the team walked; None: the walk's end was announced, or the team
+            walks on without this recorder.
     """
 
     paths: tuple[Path, ...]
     messages: int
     lost: Mapping[str, int]
     refused: Mapping[str, int]
+    error: ProcessError | None = None
 
 
 def run(
@@ -81,7 +87,9 @@ def run(
             with _open_parts(config, path, predictor_sha256, selection, keys) as parts:
                 paths = parts.paths
                 bus.subscribe(keys.expression, largest=LARGEST)
-                session = Session(bus, parts, keys, config.team.robots, stopped, say)
+                if not keys(EVENT.key(config.team.name)):  # which announces the end of the walk
+                    bus.subscribe(EVENT.key(config.team.name), largest=LARGEST)
+                session = Session(bus, parts, keys, config, stopped, say)
                 me = None if selection.at_once else Introduction(bus, config, predictor_sha256)
                 role = _join(bus, config, stopped, me)
                 if role == MEMBER:
@@ -89,7 +97,8 @@ def run(
                 if role:
                     session.record(late=role == LATE, seen=not selection.at_once)
                 session.drain()
-            return _list_files(parts)
+                ending = _note_end(parts, session.find_unannounced())
+            return _list_files(parts, ending)
     except OSError as error:
         raise RecordingError(
             str(paths[-1]),
@@ -112,10 +121,21 @@ def _open_parts(
     )
 
 
-def _list_files(parts: Parts) -> RecordedFiles:
+def _list_files(parts: Parts, ending: ProcessError | None) -> RecordedFiles:
     return RecordedFiles(
-        tuple(parts.paths), parts.messages, parts.count_lost(), parts.admission.refused
+        tuple(parts.paths), parts.messages, parts.count_lost(), parts.admission.refused, ending
     )
+
+
+def _note_end(parts: Parts, loss: Loss | None) -> ProcessError | None:
+    """Write down in the file why it ends, if nobody has announced it; likewise as an error."""
+    if loss is None:
+        return None
+    tick = max(parts.last_tick(), 0)
+    error = loss_error(loss, tick)
+    detail = f"{error.name}: {error.got}"
+    parts.note(END, {"code": loss.code, "detail": detail, "tick": str(tick)})
+    return error
 
 
 def _join(bus: Bus, config: Config, stopped: Callable[[], bool], me: Introduction | None) -> str:

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Final
 
 from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
-from quadriga.shared.members import PLANNER, has_lead, plant_name
+from quadriga.shared.bus.lead_watch import LAST_WORDS, Loss, find_loss
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import MessageError
+from quadriga.shared.members import PLANNER, plant_name
 from quadriga.shared.recording.admission import OVERSIZED
 from quadriga.shared.recording.mcap_chunk import name_of
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
-from quadriga.shared.wire.topics import find_topic
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Event
+from quadriga.shared.wire.topics import EVENT, find_topic
 
 FLUSH: Final = 0.05  # s wall between two flushes: a kill loses what has come since the last
 QUIET: Final = 0.2  # s wall without a message after which nothing more is under way
@@ -31,7 +37,7 @@ class Session:
         bus: the team's, subscribed to what is recorded.
         parts: the files.
         keys: which of the keys heard are recorded.
-        robots: how many the configuration that is stored knows.
+        config: the configuration that is stored.
         stopped: asked often whether to stop.
         say: called with what a user should know at once.
     """
@@ -41,15 +47,15 @@ class Session:
         bus: Bus,
         parts: Parts,
         keys: KeyFilter,
-        robots: int,
+        config: Config,
         stopped: Callable[[], bool],
         say: Callable[[str], None],
     ) -> None:
-        self._robots = robots
+        self._config, self._event_key = config, EVENT.key(bus.team)
         self._bus, self._parts, self._keys, self._stopped = bus, parts, keys, stopped
         self._say = say
         self._flushed = self._begun = monotonic()
-        self._ended = self._seen = False
+        self._ended = self._seen = self._announced = False
 
     def record(self, *, late: bool, seen: bool) -> None:
         """Record until the end; a late recorder reports what it has once it knows.
@@ -75,7 +81,7 @@ class Session:
         if missed:
             self._say(missed)
         robots = {find_topic(key)[1] for key in first_ticks} - {""}
-        known = robot_names(self._robots)
+        known = robot_names(self._config.team.robots)
         strangers = robots - {*known, *map(plant_name, ("", *known)), PLANNER}
         if strangers:
             shown = sorted(strangers)[:_NAMED]
@@ -86,11 +92,20 @@ class Session:
             )
 
     def drain(self) -> None:
-        """Record what is still under way when the end is noticed."""
-        limit = monotonic() + DRAIN_LIMIT
-        while self._take(QUIET) and monotonic() < limit:
-            pass
+        """Record what is still under way when the end is noticed.
+
+        If who drives time is gone, its last words are waited for, which announce the end.
+        """
+        begun = monotonic()
+        while monotonic() < begun + DRAIN_LIMIT:
+            some = self._take(QUIET)
+            if not some and (self.find_unannounced() is None or monotonic() > begun + LAST_WORDS):
+                break
         self._parts.admission.refused[OVERSIZED] += self._bus.oversized
+
+    def find_unannounced(self) -> Loss | None:
+        """What has vanished without an announced end of the walk; None if nothing has."""
+        return find_loss(self._bus, self._config) if self._seen and not self._announced else None
 
     def _take(self, timeout: float) -> bool:
         """Write all that has arrived; False if nothing came within `timeout` seconds."""
@@ -102,9 +117,15 @@ class Session:
             for key, payload in packets[begin : begin + _SLICE]:
                 if every or recorded(key):
                     write(key, payload, now)
+                if key == self._event_key:
+                    self._note_event(payload)
             self._tend()
         self._tend()
         return bool(packets)
+
+    def _note_event(self, payload: bytes) -> None:
+        with suppress(MessageError):
+            self._announced = self._announced or decode(payload, Event).kind == "stop"
 
     def _tend(self) -> None:
         """Flush when it is time to, and see whether the team is still there."""
@@ -112,7 +133,7 @@ class Session:
             return
         self._parts.flush()
         self._flushed = monotonic()
-        there = has_lead(self._bus.members_at(HERE))
+        there = find_loss(self._bus, self._config) is None
         self._ended = self._seen and not there
         self._seen = self._seen or there
 

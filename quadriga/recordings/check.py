@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from quadriga.recordings.checks.delay import Delay
+from quadriga.recordings.checks.ending import Ending
 from quadriga.recordings.checks.finding import Check, CheckedMessage, Finding
 from quadriga.recordings.checks.limits import Friction, Torques
 from quadriga.recordings.checks.sequence import Ages, Gaps, Order
@@ -42,6 +43,7 @@ def check(path: Path) -> list[Finding]:
         Friction(config),
         Torques(config),
         Ages(config),
+        Ending(source.notes),
     )
     times = Finding("log times", "messages")
     for item in _decode_valid(source.entries(), schema, times):

@@ -11,6 +11,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import departures
 from quadriga.shared.recording.admission import describe_refused
 from quadriga.shared.recording.sequence import TickTrack
+from quadriga.shared.recording.writer import END
 from quadriga.tables import NOTHING, align_columns
 
 _EVENTS = 40  # as many are shown
@@ -66,7 +67,8 @@ def _about(s: Survey) -> Iterator[tuple[str, str]]:
         )
         yield "planner", c.planner.kind
     yield "falls", ", ".join(e.robot for e in s.events if e.kind == "fall") or "none"
-    yield "end", next((e.detail for e in reversed(s.events) if e.kind == "stop"), NOTHING)
+    vanished = s.notes.get(END, {}).get("detail", NOTHING)
+    yield "end", next((e.detail for e in reversed(s.events) if e.kind == "stop"), vanished)
     for robot, status in s.statuses.items():
         if status.reason:
             yield f"{robot} stopped", status.reason

@@ -16,7 +16,7 @@ from quadriga.shared.recording.admission import Admission
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.salvage import Damage, Salvage
 from quadriga.shared.recording.sequence import TickTrack
-from quadriga.shared.recording.writer import LOST, PROFILE, RecordingWriter
+from quadriga.shared.recording.writer import END, LOST, PROFILE, RecordingWriter
 from quadriga.shared.runtime.clock import wall_ns
 from quadriga.tables import align_columns
 
@@ -80,6 +80,8 @@ def recover(path: Path, out: Path | None) -> Recovery | None:
         for entry in source.entries():
             writer.write(entry.key, entry.payload, entry.log_time_ns)
         writer.note(RECOVERED, _describe_source(source, path))
+        if END in source.notes:
+            writer.note(END, source.notes[END])
     return Recovery(
         out=out,
         messages=writer.messages,

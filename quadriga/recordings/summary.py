@@ -26,9 +26,10 @@ from quadriga.recordings.traces import (
 )
 from quadriga.recordings.truth import distance
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.writer import END
 from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.shared.runtime.histogram import QUANTILES
-from quadriga.shared.wire.codes import FALL, code_of
+from quadriga.shared.wire.codes import FALL, LOWERED, code_of
 from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import STATE
 
@@ -96,8 +97,7 @@ def steady_from(traces: Traces) -> int:
 
 
 def _world(traces: Traces) -> dict[str, Any]:
-    truth = traces.truth
-    seen = {traces.robots[i] for i in np.flatnonzero(truth.down.any(axis=0))}
+    truth, seen = traces.truth, _seen_down(traces)
     reported = {event.robot for event in traces.events if event.code == FALL}
     if not len(truth.tick):  # then the robots' own word must do
         reported |= {
@@ -106,18 +106,32 @@ def _world(traces: Traces) -> dict[str, Any]:
             if any(code_of(s.reason) == FALL for s in statuses)
         }
     end = next((event for event in reversed(traces.events) if event.kind == "stop"), None)
+    vanished = traces.notes.get(END, {})
     return {
         "fell": bool(seen | reported),
         "fallen": sorted(seen | reported),
         "distance": distance(truth, 2 * traces.config.gait.stance_ms),
-        "end": end.detail if end is not None else "",
-        "end_code": end.code if end is not None else "",
+        "end": end.detail if end is not None else vanished.get("detail", ""),
+        "end_code": end.code if end is not None else vanished.get("code", ""),
         "yoke_drift_max": float(np.abs(truth.yoke_error).max(initial=0.0)),
         "events": [
             {"tick": e.tick, "kind": e.kind, "code": e.code, "robot": e.robot, "detail": e.detail}
             for e in traces.events
         ],
     }
+
+
+def _seen_down(traces: Traces) -> set[str]:
+    """Robots that lay on the ground, those aside that the plant had led there."""
+    truth, seen = traces.truth, set[str]()
+    led_down = {e.robot: e.tick for e in reversed(traces.events) if e.code == LOWERED}
+    for i, robot in enumerate(traces.robots):
+        down = truth.down[:, i]
+        if robot in led_down:
+            down = np.where(truth.tick < led_down[robot], down, truth.tilted[:, i])
+        if down.any():
+            seen.add(robot)
+    return seen
 
 
 def _tracking(traces: Traces) -> dict[str, Any]:

@@ -63,6 +63,7 @@ class Traces:
         references: ticks (R,) and values vx, vy, wz, height (R, 4), sorted.
         plants: what each robot's plant, in real time, says of itself (`quadriga.plant.deadlines`);
             one world says the same of all its robots.
+        notes: what the recorder noted at the end, see `Recording.notes`.
     """
 
     config: Config
@@ -80,6 +81,7 @@ class Traces:
     statuses: Mapping[str, tuple[Status, ...]]
     events: tuple[Event, ...]
     plants: Mapping[str, tuple[Status, ...]] = field(default_factory=dict)
+    notes: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
 def read_traces(recording: Recording, names: Container[str] | None = None) -> Traces:
@@ -118,10 +120,7 @@ def read_traces(recording: Recording, names: Container[str] | None = None) -> Tr
         elif topic is STATE:
             log_times = (log_time if log_times is None else log_times[0], log_time)
         ticks[key].append(tick)
-    if not counts:
-        raise RecordingError(
-            str(recording.path), "a recording without messages", "a walk", recording.cut
-        )
+    _refuse_empty(recording, counts)
     return Traces(
         config=config,
         metadata=recording.metadata,
@@ -136,12 +135,20 @@ def read_traces(recording: Recording, names: Container[str] | None = None) -> Tr
         measurements={robot: _measurements(decoded[Measurement, robot]) for robot in robots},
         plans={robot: tuple(decoded[Plan, robot]) for robot in robots},
         statuses={name: tuple(decoded[Status, name]) for name in (*robots, PLANNER)},
-        events=tuple(decoded[Event, ""]),
+        events=_events(decoded[Event, ""], [decoded[Event, robot] for robot in robots]),
         plants={
             robot: tuple(decoded[Status, SIM] or decoded[Status, plant_name(robot)])
             for robot in robots
         },
+        notes=recording.notes,
     )
+
+
+def _refuse_empty(recording: Recording, counts: Mapping[str, int]) -> None:
+    if not counts:
+        raise RecordingError(
+            str(recording.path), "a recording without messages", "a walk", recording.cut
+        )
 
 
 def _decode_valid(payload: bytes, topic: Topic, config: Config) -> Message | None:
@@ -223,6 +230,13 @@ def _fits(truth: Truth, config: Config) -> bool:
         and len(truth.base_pos) == team.robots
         and len(truth.yoke_error) == len(yoke_pairs(team.robots, team.yokes))
     )
+
+
+def _events(of_world: Sequence[Event], of_agents: Sequence[Sequence[Event]]) -> tuple[Event, ...]:
+    """All events, by time if agents told of some, too."""
+    # Only who drives time announces the end of a walk.
+    told = [event for events in of_agents for event in events if event.kind != "stop"]
+    return tuple(sorted([*of_world, *told], key=lambda event: event.tick) if told else of_world)
 
 
 def _references(messages: Sequence[Reference]) -> tuple[Ticks, Array]:

@@ -47,9 +47,14 @@ class TruthTrace:
     tilt: Array
 
     @property
+    def tilted(self) -> NDArray[np.bool_]:
+        """Whether a robot lies on its side or its back, shape (T, n)."""
+        return self.tilt > _FALL_TILT
+
+    @property
     def down(self) -> NDArray[np.bool_]:
         """Whether a robot lies on the ground, shape (T, n)."""
-        return (self.tilt > _FALL_TILT) | (self.y[..., 0] < _FALL_HEIGHT)
+        return self.tilted | (self.y[..., 0] < _FALL_HEIGHT)
 
 
 def build_truth_trace(messages: Sequence[Truth], config: Config) -> TruthTrace:

@@ -23,6 +23,7 @@ from quadriga.shared.wire.topics import (
     INPUTS,
     MEASUREMENT,
     PLAN,
+    RESUME,
     SAMPLE_MS,
     STATE,
     Topic,
@@ -112,7 +113,8 @@ def _build_handlers(
     handlers: dict[str, Callable[[ChunkEntry], None]] = {}
     for key, (topic, sender) in inbox.topics.items():
         if topic not in (STATE, EVENT):
-            handlers[key] = _keep_received(log, topic, ANYONE if topic is ESTOP else sender)
+            sent_by = ANYONE if topic in (ESTOP, RESUME) else sender
+            handlers[key] = _keep_received(log, topic, sent_by)
     handlers[STATE.key(team, robot)] = _keep_states(log)
     handlers[COMMAND.key(team, robot)] = keep_command
     handlers[INPUTS.key(team, robot)] = keep_record

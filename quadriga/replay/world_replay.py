@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
+from quadriga.plant.late import damp_joints
+from quadriga.plant.lost import LostCommands
 from quadriga.recordings.by_tick import by_tick
 from quadriga.replay.difference import Difference, find_difference
 from quadriga.shared.config.sections import Config
@@ -44,13 +46,13 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
     """Recompute the world tick by tick; the last value is the outcome.
 
     A robot that the world had given up on at a tick, by the recorded events, is silent at
-    that tick again, even if its late command was recorded.
+    that tick again, even if its late command was recorded. An emergency stop damps all again.
 
     Raises:
         RecordingError: not of a lock-step world, or with commands missing from the file.
     """
     config = _computable_config(recording)
-    world, silent = World(config), set[str]()
+    world, heard, lost_commands = World(config), _Heard(), LostCommands(config)
     keys = {
         name: (STATE.key(config.team.name, name), COMMAND.key(config.team.name, name))
         for name in world.names
@@ -74,13 +76,15 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
             yield WorldComparison(tick, compared, difference=result)
             return
         compared += result
-        _update_silent(silent, config.team.name, entries)
-        commands = _choose_commands(keys, entries, silent)
-        absent = [name for name in world.names if name not in {*commands, *silent}]
-        if absent:
+        heard.take(config.team.name, entries)
+        commands = _choose_commands(keys, entries, heard.silent)
+        absent = [name for name in world.names if name not in {*commands, *heard.silent}]
+        if heard.estop:
+            world.step({name: damp_joints(tick) for name in world.names})
+        elif absent:
             lost = f"no command of {', '.join(absent)} at tick {tick}"
         else:
-            world.step(commands)
+            world.step(lost_commands.fill(tick, world.names, commands, world.states))
         yield WorldComparison(tick + 1, compared)
     if compared and recording.cut:
         yield WorldComparison(tick + 1, compared, recording.cut)
@@ -116,13 +120,26 @@ def _computable_config(recording: Recording) -> Config:
     return config
 
 
-def _update_silent(silent: set[str], team: str, entries: Iterable[ChunkEntry]) -> None:
-    """Take down the robots that the world no longer waits for, or waits for again."""
-    for _, event in _decode_valid(Event, EVENT.key(team), entries):
-        if event.code == codes.BACK:
-            silent.discard(event.robot)
-        elif event.code in (codes.SILENT, codes.GONE):
-            silent.add(event.robot)
+@dataclass(slots=True)
+class _Heard:
+    """What the world announced of commands that it did not take.
+
+    Attributes:
+        silent: robots that it does not wait for.
+        estop: whether the emergency stop has been pressed.
+    """
+
+    silent: set[str] = field(default_factory=set)
+    estop: bool = False
+
+    def take(self, team: str, entries: Iterable[ChunkEntry]) -> None:
+        """Take in the events of a tick."""
+        for _, event in _decode_valid(Event, EVENT.key(team), entries):
+            if event.code == codes.BACK:
+                self.silent.discard(event.robot)
+            elif event.code in (codes.SILENT, codes.GONE):
+                self.silent.add(event.robot)
+            self.estop = self.estop or event.code == codes.ESTOPPED
 
 
 def _decode_valid(

@@ -123,8 +123,8 @@ class Launch:
         first_to_leave, left_at = "", 0.0
         early = _EARLY + max(row.rest for row in self._rows.values())
         while has_lead(self._running):
-            for name in list(self._running):
-                if self._reap(name) and name not in LEADS and not first_to_leave:
+            for name in self._reap():
+                if name not in LEADS and not first_to_leave:
                     first_to_leave, left_at = name, monotonic()
             if first_to_leave and monotonic() - left_at > early:
                 got, expected = "an end while the team walked", "to walk until the end"
@@ -139,21 +139,28 @@ class Launch:
     def _await(self, name: str) -> None:
         """Wait for a process that is about to leave by itself."""
         deadline = monotonic() + self._rows[name].grace
-        while not self._reap(name):
+        while name in self._running and name not in self._reap():
             if monotonic() > deadline:
                 raise self._error(name, "no end after the walk", "to leave by itself")
             sleep(_LOOK)
 
-    def _reap(self, name: str) -> bool:
-        """Whether a process has ended; an error if it failed."""
-        status = self._running[name].poll()
-        if status is None:
-            return False
-        del self._running[name]
-        if status:
+    def _reap(self) -> list[str]:
+        """Names of those that have ended since this was asked last.
+
+        Raises:
+            ProcessError: some failed. Of several the first that a signal ended is named, since
+                others may complain that it is gone, else the first of the table.
+        """
+        polled = {name: process.poll() for name, process in self._running.items()}
+        ended = {name: status for name, status in polled.items() if status is not None}
+        for name in ended:
+            del self._running[name]
+        failed = sorted((name for name in ended if ended[name]), key=lambda name: ended[name] > 0)
+        if failed:
+            name, status = failed[0], ended[failed[0]]
             how = f"signal {-status}" if status < 0 else f"exit status {status}"
             raise self._error(name, how, "exit status 0")
-        return True
+        return list(ended)
 
     def _error(self, name: str, got: str, expected: str) -> ProcessError:
         last = f"last words in {self._logs / name}.log:\n{self._last_words(name)}"

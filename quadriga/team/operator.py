@@ -1,4 +1,4 @@
-"""SHELL of the operator: the team's velocity reference ahead of time, and the emergency stop."""
+"""SHELL of the operator: the team's velocity reference ahead of time."""
 
 from __future__ import annotations
 
@@ -7,27 +7,23 @@ from typing import Final
 
 from quadriga.shared import members
 from quadriga.shared.bus.barrier import meet
-from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
+from quadriga.shared.bus.lead_watch import LeadWatch
+from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import BusError, MessageError
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.errors import MessageError
 from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.wire.codec import decode, encode, truncate_text
-from quadriga.shared.wire.envelope import envelope
-from quadriga.shared.wire.messages import Clock, EStop, Event, Reference
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Clock, Event, Reference
 from quadriga.shared.wire.tick_gate import TickGate
-from quadriga.shared.wire.topics import CLOCK, ESTOP, REFERENCE, topics_for
+from quadriga.shared.wire.topics import CLOCK, REFERENCE, topics_for
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 
 _AHEAD: Final = 4  # epochs; agents in lock-step wait for the one in force
 # Of the clock's tick against the newest; a longer jump must be confirmed. References of such a lead
 # are still believed: see `agents.planning.operator_references.AHEAD_MS`.
 _GAP_MS: Final = 500
-_ESTOP_WAIT: Final = 5.0  # s, longest search for the team
-_LONGEST_REASON: Final = 200  # characters; it becomes part of every agent's status
 
 
 def reference_at(config: Config, tick: int) -> Reference:
@@ -66,27 +62,37 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
 
     Raises:
         BusError: the bus cannot be opened, or the team is not complete in time.
+        ProcessError: who drives time, or the link to the router, has vanished.
     """
     stopped = stopped or stop_on_signals()
     team = config.team.name
     with Bus.open(config.bus, team, members.OPERATOR, stopped) as bus:
         for topic in topics_for(members.OPERATOR):
             bus.subscribe(topic.key(team))
-        put = bus.publisher(REFERENCE.key(team))
         if not meet(bus, config, stopped):
             return
-        take_priority(config.runtime.priority)  # without a reference the robots stop
-        time, epoch = TeamTicks(bus, round(1000 * config.world.seconds)), 0
-        while not stopped():
-            if EPOCH_MS * epoch <= time.tick + EPOCH_MS * _AHEAD:
-                put(encode(reference_at(config, EPOCH_MS * epoch)))
-                epoch += 1
-                continue
-            if time.over:
-                break
-            bus.declare(READY)
-            time.follow()
-        leave_priority()
+        # Without a reference the robots stop.
+        take_priority(config.runtime.priority, config.world.mode)
+        try:
+            _operate(config, bus, stopped)
+        finally:
+            leave_priority()
+
+
+def _operate(config: Config, bus: Bus, stopped: Callable[[], bool]) -> None:
+    """Publish the reference of each epoch that the team's time comes near to."""
+    put, watch = bus.publisher(REFERENCE.key(bus.team)), LeadWatch(bus, config)
+    time, epoch = TeamTicks(bus, round(1000 * config.world.seconds)), 0
+    while not stopped():
+        if EPOCH_MS * epoch <= time.tick + EPOCH_MS * _AHEAD:
+            put(encode(reference_at(config, EPOCH_MS * epoch)))
+            epoch += 1
+            continue
+        if time.over:
+            return
+        bus.declare(READY)
+        if not time.follow():
+            watch.look(time.tick)
 
 
 class TeamTicks:
@@ -113,16 +119,15 @@ class TeamTicks:
         """As far as time has come."""
         return max(self._gate.newest, 0)
 
-    def follow(self) -> None:
-        """Take in what has come.
+    def follow(self) -> bool:
+        """Take in what has come; False if for a while nothing has.
 
         A walk ends at the same tick for an operator who is behind: equal walks have equal
         references.
         """
         packet = self._bus.get(POLL)
         if packet is None:
-            self.over = not members.has_lead(self._bus.members_at(HERE))
-            return
+            return False
         for key, payload in (packet, *self._bus.drain()):
             try:
                 if key == CLOCK.key(self._bus.team):
@@ -132,7 +137,8 @@ class TeamTicks:
             except MessageError:
                 continue  # not for the operator to count: the recorder keeps it
             if self.over:
-                return
+                break
+        return True
 
     def _take_tick(self, tick: int) -> None:
         if tick <= self._last:
@@ -143,40 +149,3 @@ class TeamTicks:
         if event.kind == "stop" and event.tick <= min(self._last, self.tick + _GAP_MS):
             self._take_tick(event.tick - 1)
             self.over = True
-
-
-def stop_team(config: Config, reason: str) -> None:
-    """Send one emergency stop to every robot of the team.
-
-    Agents can read it whatever the reason's text is and whoever else publishes a time.
-
-    Raises:
-        BusError: the bus cannot be opened, or some robots were not reached.
-    """
-    team, names = config.team.name, robot_names(config.team.robots)
-    reason = truncate_text(reason, _LONGEST_REASON)
-    with Bus.open(config.bus, team, members.ESTOP) as bus:
-        put = bus.publisher(ESTOP.key(team))
-        for topic in topics_for(members.ESTOP):
-            bus.subscribe(topic.key(team))
-        reached: frozenset[str] = frozenset()
-        tick, stamp_ns, deadline = 0, 0, monotonic() + _ESTOP_WAIT
-        while reached < frozenset(names) and monotonic() < deadline:
-            packet = bus.get(POLL)
-            head = None if packet is None else envelope(packet[1])
-            if head is not None:
-                tick, stamp_ns = head
-            there = frozenset(names) & bus.members_at(HERE)
-            if there > reached:  # at once, whoever is still absent: to hear it twice is no harm
-                put(encode(EStop(tick, stamp_ns, reason)))
-                reached = there
-        absent = [name for name in names if name not in reached]
-        if absent:
-            put(encode(EStop(tick, stamp_ns, reason)))  # for one who is there but does not say so
-            others = ", ".join(sorted(reached)) or "nobody"
-            raise BusError(
-                f"emergency stop of team {team!r}",
-                f"no {', '.join(absent)} on the bus after {_ESTOP_WAIT:g} s",
-                f"all of {', '.join(names)}",
-                f"{others} heard it at once; another bus.endpoint, team.name or team.robots?",
-            )

@@ -18,13 +18,16 @@ from quadriga.report.run import build_run, read_run
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codes import PLANT_GONE, SIGNAL
+from quadriga.shared.wire.codes import LEAD_GONE, LINK_LOST, PLANT_FAILED, PLANT_GONE, SIGNAL
 
 # Of an end that should not be, by the code of its event; "" where none was recorded.
 _CAUSES: Final = {
     "": "the sim server or its link failed",
     SIGNAL: "the sim server was told to stop",
     PLANT_GONE: "one robot's plant failed, left or fell silent",
+    PLANT_FAILED: "the plant failed: its log tells why",
+    LEAD_GONE: "who drives time was killed, failed or was cut off",
+    LINK_LOST: "the router was killed or stopped, or the network failed",
 }
 
 

@@ -17,6 +17,7 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "team.robot": "a1",
         "team.plant": "mujoco",
         "team.plants": "one",
+        "team.auto_resume": False,
         "bus.clock_timeout": 0.5,
         "planner.options": "",
         "planner.cost": "own",
@@ -33,6 +34,7 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "world.leg_collisions": False,
         "world.friction_of": "",
         "world.faults": "",
+        "world.lost_command": "damp",
         "motors.preset": "ideal",
         "motors.torque_speed": False,
         "motors.friction": 0.0,
@@ -63,6 +65,9 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         **{f"bridge.{item.name}": item.default for item in fields(BridgeConfig)},
     }
 )
+# Of these, today's default changes no walk but such in which something fails: like the first value
+# it is left out of what is hashed.
+_UNSEEN: Final[Mapping[str, Any]] = MappingProxyType({"world.lost_command": "lower"})
 
 
 def hashed_sections(sections: Mapping[str, Any]) -> dict[str, Any]:
@@ -106,4 +111,6 @@ def _leave_out(section: str, keys: Any) -> Any:
 
 def _is_as_before(section: str, key: str, value: Any) -> bool:
     name = f"{section}.{key}"
-    return name in LATER_KEYS and bool(value == LATER_KEYS[name])
+    if name not in LATER_KEYS:
+        return False
+    return bool(value == LATER_KEYS[name] or value == _UNSEEN.get(name, LATER_KEYS[name]))

@@ -30,6 +30,12 @@ class TeamConfig:
     )
     spacing: float = key(0.9, "m", "distance between neighbours at the start", low=0.6, high=3.0)
     alternate_phase: bool = key(True, "-", "every second robot trots half a gait period later")
+    auto_resume: bool = key(
+        False,
+        "-",
+        "robots that stand because an input was lost walk again once all have been whole for 1 s; "
+        "false: only once the operator says so (quadriga resume)",
+    )
     plant: str = key(
         SIMULATED,
         "-",
@@ -96,7 +102,8 @@ class RuntimeConfig:
     priority: str = key(
         "realtime",
         "-",
-        "realtime: agents, planner and plants take precedence over ordinary processes "
-        "(SCHED_RR) if the user may do so; ordinary: they do not",
+        "realtime: in world.mode realtime agents, planner and plants take precedence over ordinary "
+        "processes (SCHED_RR) if the user may do so, in lockstep they are a batch (SCHED_BATCH); "
+        "ordinary: as any other",
         choices=("realtime", "ordinary"),
     )

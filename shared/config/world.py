@@ -127,7 +127,18 @@ class WorldConfig:
         20, "ms", "realtime: a command older than this is replaced by holding", low=1, high=1000
     )
     command_damp_ms: int = key(
-        200, "ms", "realtime: a command older than this is replaced by damping", low=1, high=10000
+        200,
+        "ms",
+        "realtime: a command older than this is lost, see lost_command",
+        low=1,
+        high=10000,
+    )
+    lost_command: str = key(
+        "lower",
+        "-",
+        "simulated robots whose commands are lost: lower: led down slowly and then damped, which "
+        "is no fall; damp: damped at once",
+        choices=("lower", "damp"),
     )
 
     @property

@@ -8,7 +8,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Container, Iterator
 from contextlib import suppress
-from io import SEEK_END
+from io import SEEK_CUR, SEEK_END
 from pathlib import Path
 from typing import BinaryIO, Final, TypeVar
 
@@ -128,14 +128,15 @@ class Recording:
 
     @property
     def notes(self) -> dict[str, dict[str, str]]:
-        """What the writer noted at the end, by name: `COUNTS`, `LOST`, `SINCE`; {} after a kill."""
+        """What the writer noted at the end, by name: `COUNTS`, `LOST` …; {} after a kill."""
         notes: dict[str, dict[str, str]] = {}
-        for opcode, content in self._records():
-            if opcode == Opcode.METADATA:
-                with suppress(*CORRUPT):  # of another program: its checksum is right
-                    record = Metadata.read(stream(content))
-                    if record.name != PROFILE:
-                        notes[record.name] = dict(record.metadata)
+        cut = self.cut  # of the chunks, which are not read here
+        for _, content in self._records(only=Opcode.METADATA):
+            with suppress(*CORRUPT):  # of another program: its checksum is right
+                record = Metadata.read(stream(content))
+                if record.name != PROFILE:
+                    notes[record.name] = dict(record.metadata)
+        self.cut = cut
         return notes
 
     def _damage_error(self, got: str) -> RecordingError:
@@ -146,8 +147,11 @@ class Recording:
             f"was the recorder killed, or the disk full? {_RECOVER}",
         )
 
-    def _records(self) -> Iterator[tuple[int, bytes]]:
-        """Opcode and content of the records outside chunks, up to the cut if there is one."""
+    def _records(self, only: Opcode | None = None) -> Iterator[tuple[int, bytes]]:
+        """Opcode and content of the records outside chunks, up to the cut if there is one.
+
+        Those that are not asked for are skipped cheaply.
+        """
         self.cut = ""
         with self.path.open("rb") as file:
             file.seek(len(MCAP0_MAGIC))
@@ -157,7 +161,10 @@ class Recording:
                     return
                 if file.tell() + length > self._size:
                     break
-                yield opcode, file.read(length)
+                if only is None or opcode == only:
+                    yield opcode, file.read(length)
+                else:
+                    file.seek(length, SEEK_CUR)
         self.cut = f"the file ends at byte {self._size} in the middle of a record"
 
     def _chunks(self) -> Iterator[bytes]:

@@ -19,7 +19,7 @@ from quadriga.shared.errors import NewerRecordingError, RecordingError, system_r
 from quadriga.shared.recording.mcap_chunk import RECORD, ChunkEntry, messages_of, name_of, stream
 from quadriga.shared.recording.seal import unseal
 from quadriga.shared.recording.unpacking import CORRUPT, UNPACK
-from quadriga.shared.recording.writer import COUNTS, LOST, PROFILE, SINCE
+from quadriga.shared.recording.writer import COUNTS, END, LOST, PROFILE, SINCE
 
 # How a chunk record begins: opcode, length, first and last log time, size, checksum. Then come the
 # name of its packing, with its length, the packed size, and what is packed.
@@ -202,7 +202,7 @@ class Salvage:
     def _read_metadata(self) -> bool:
         """Find the metadata; whether any trace of them was found."""
         file, any_trace = self._file, False
-        for tag in (_tag(PROFILE), *map(_tag, (COUNTS, LOST, SINCE))):
+        for tag in (_tag(PROFILE), *map(_tag, (COUNTS, LOST, SINCE, END))):
             at = -1
             while (at := file.find(tag, at + 1)) >= RECORD.size:
                 opcode, length = RECORD.unpack_from(file, at - RECORD.size)

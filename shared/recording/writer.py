@@ -20,6 +20,7 @@ PROFILE: Final = "quadriga"
 COUNTS: Final = f"{PROFILE}.counts"  # written at the end: what the writer counted
 LOST: Final = f"{PROFILE}.lost"  # by key, messages that did not come
 SINCE: Final = f"{PROFILE}.since"  # by key, tick of its first message
+END: Final = f"{PROFILE}.end"  # code, detail and tick of an end that nobody announced
 _UNKNOWN: Final = f"{PROFILE}.unknown"
 
 

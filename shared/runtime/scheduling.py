@@ -10,25 +10,30 @@ from typing import Final
 
 REALTIME: Final = "realtime"
 _PRIORITY: Final = 1  # of 99: before every ordinary process, after everything else of the system
+_FIRST: Final = 2  # likewise, before those that walk
 
 
-def take_priority(priority: str) -> bool:
-    """Schedule all threads of this process round robin in real time, if `priority` is `REALTIME`.
+def take_priority(priority: str, mode: str = REALTIME) -> bool:
+    """Schedule all threads of this process as a walk needs it, if `priority` is `REALTIME`.
 
-    So a thread that wakes up does not push out one at work, which costs both their caches, and
-    no other program delays a command. The system keeps a share (5 % on Linux) for ordinary
-    processes; the recorder stays one of them.
+    In real time that is round robin before ordinary processes: no other program delays a command.
+    The system keeps a share (5 % on Linux) for ordinary ones; the recorder stays one of them. In
+    lock-step, where nobody has to be in time, it is as a batch: as in real time a thread that
+    wakes up does not push out one at work, which costs both their caches, but nobody starves.
+
+    Args:
+        priority: `runtime.priority`.
+        mode: `world.mode`.
 
     Returns:
-        Whether it is so now: a user without the right (CAP_SYS_NICE, or an rtprio limit) is not
-        refused, the process merely runs as an ordinary one.
+        Whether it is so now: a user without the right to real time (CAP_SYS_NICE, or an rtprio
+        limit) is not refused, the process merely runs as an ordinary one.
     """
     if priority != REALTIME:
         return False
+    policy, level = (os.SCHED_RR, _PRIORITY) if mode == REALTIME else (os.SCHED_BATCH, 0)
     try:
-        for thread in Path("/proc/self/task").iterdir():
-            with suppress(ProcessLookupError):  # it has ended meanwhile
-                os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(_PRIORITY))
+        _schedule(policy, level)
     except OSError as error:
         print(
             f"no real-time scheduling ({error.strerror}): this process runs as an ordinary one",
@@ -44,11 +49,21 @@ def leave_priority() -> None:
     What it still does, to leave, must not hold up others, such as bridges that lay a robot down.
     """
     with suppress(OSError):
-        for thread in Path("/proc/self/task").iterdir():
-            with suppress(ProcessLookupError):
-                os.sched_setscheduler(int(thread.name), os.SCHED_OTHER, os.sched_param(0))
+        _schedule(os.SCHED_OTHER, 0)
 
 
 def has_priority() -> bool:
     """Whether the first thread of this process is scheduled in real time."""
     return os.sched_getscheduler(os.getpid()) in (os.SCHED_RR, os.SCHED_FIFO)
+
+
+def go_first() -> None:
+    """Schedule this process before those that walk, if the user may do so: it is to stop them."""
+    with suppress(OSError):
+        _schedule(os.SCHED_RR, _FIRST)
+
+
+def _schedule(policy: int, level: int) -> None:
+    for thread in Path("/proc/self/task").iterdir():
+        with suppress(ProcessLookupError):  # it has ended meanwhile
+            os.sched_setscheduler(int(thread.name), policy, os.sched_param(level))

@@ -35,6 +35,13 @@ TIME_OVER: Final = "time-over"
 FALLEN: Final = "fallen"
 SIGNAL: Final = "signal"
 PLANT_GONE: Final = "plant-gone"
+PLANT_FAILED: Final = "plant-failed"
+LINK_LOST: Final = "link-lost"
+LEAD_GONE: Final = "lead-gone"
+ESTOPPED: Final = "estop"
+LOWERED: Final = "lowered"
+INPUT_LOST: Final = "input-lost"
+RESUMED: Final = "resumed"
 BRIDGE_MODE: Final = "bridge-mode"
 ROBOT_STOPPED: Final = "robot-stopped"
 CLOCK: Final = "clock"
@@ -53,6 +60,10 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         GONE: EventCode("fault", "a robot left the bus: the world waits no longer"),
         BACK: EventCode("fault", "a robot answers again: the world waits for it"),
         MALFORMED: EventCode("fault", "commands that are none, or that nobody can mean"),
+        ESTOPPED: EventCode("fault", "the emergency stop: simulated joints are damped from now on"),
+        LOWERED: EventCode("fault", "a simulated robot without commands is led down: no fall"),
+        INPUT_LOST: EventCode("fault", "an agent slows down and stands: it lacks an input"),
+        RESUMED: EventCode("fault", "an agent walks again: its inputs have been whole for 1 s"),
         BRIDGE_MODE: EventCode("bridge", "a bridge's robot begins to stand up, walk or lie down"),
         ROBOT_STOPPED: EventCode("fault", "a bridge has stopped its robot: damped, then limp"),
         CLOCK: EventCode("fault", "how well a plant knows the team's clock crosses 1 ms"),
@@ -60,6 +71,9 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         FALLEN: EventCode("stop", "the walk is over: a robot fell"),
         SIGNAL: EventCode("stop", "the walk is over: the world was told to stop"),
         PLANT_GONE: EventCode("stop", "the walk is over: one of several plants left or is silent"),
+        PLANT_FAILED: EventCode("stop", "the walk is over: the plant failed"),
+        LINK_LOST: EventCode("stop", "the walk is over: the link to the router is gone"),
+        LEAD_GONE: EventCode("stop", "who drives time vanished: as the recorder notes it"),
     }
 )
 DOWN: Final = frozenset((FALL, ROBOT_STOPPED))  # a robot that walks no more: the walk ends

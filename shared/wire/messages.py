@@ -222,6 +222,11 @@ class EStop(Message):
 
 
 @record
+class Resume(Message):
+    """The operator's word to go on, to robots that stand because an input had been lost."""
+
+
+@record
 class Truth(Message):
     """The world as the simulator knows it; no agent may use it outside `--estimator truth`.
 

@@ -46,13 +46,18 @@ REFERENCE: Final = Topic(
     period_ms=REFERENCE_EPOCH_MS, max_age_ms=500, repeats=True,
 )  # fmt: skip
 ESTOP: Final = Topic("estop", msg.EStop, (members.ESTOP,), (AGENT, SIM), period_ms=0)
+RESUME: Final = Topic("resume", msg.Resume, (members.RESUME,), (AGENT,), period_ms=0, repeats=True)
 TRUTH: Final = Topic("sim/truth", msg.Truth, (SIM,), (AGENT, LAUNCHER), period_ms=CONFIGURED)
 EVENT: Final = Topic(
     "sim/event", msg.Event, (SIM,), (*_PLANS, OPERATOR, LAUNCHER, SIM), period_ms=0, repeats=True
 )
+# What an agent tells of itself beside its status; never of the kind `stop`, which ends a walk.
+AGENT_EVENT: Final = Topic(
+    "event", msg.Event, (AGENT,), (LAUNCHER,), per_robot=True, period_ms=0, repeats=True
+)
 # Not recorded: the states of every tick tell the same.
 CLOCK: Final = Topic(
-    "clock", msg.Clock, (SIM,), (OPERATOR, LAUNCHER, members.ESTOP, SIM),
+    "clock", msg.Clock, (SIM,), (OPERATOR, LAUNCHER, members.ESTOP, members.RESUME, SIM),
     period_ms=CONFIGURED, recorded=False,
 )  # fmt: skip
 # In real time between plants of single robots; clocks of computers, so not of a replay. They tell
@@ -65,8 +70,8 @@ CLOCK_ANSWER: Final = Topic(
 )
 
 _OWN: Final = (
-    STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, ESTOP, TRUTH, EVENT, CLOCK,
-    CLOCK_ASK, CLOCK_ANSWER,
+    STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, ESTOP, RESUME, TRUTH, EVENT,
+    AGENT_EVENT, CLOCK, CLOCK_ASK, CLOCK_ANSWER,
 )  # fmt: skip
 TABLE: Final = (*_OWN, *plugin_topics(_OWN))
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 import mujoco
 import numpy as np
 
+from quadriga.plant.late import damp_joints
 from quadriga.plant.protocol import Plant
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, N_LEGS, Array
@@ -22,19 +23,9 @@ from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.sim_server.world.sensors import Sensors
 from quadriga.sim_server.world.team_model import build_team_model
 
-MOTOR_DAMPING: Final = 2.0  # N·m·s/rad, damping of a motor without a command
 _FALL_COSINE: Final = math.cos(1.0)  # of the angle between the trunk's z axis and the vertical
 _FALL_HEIGHT: Final = 0.12  # m, trunk origin above the mean terrain under the hips
-_ZERO: Final = np.zeros(N_JOINTS)
-_DAMPED: Final = Command(
-    tick=0,
-    stamp_ns=0,
-    tau=_ZERO,
-    q_des=_ZERO,
-    v_des=_ZERO,
-    kp=_ZERO,
-    kd=np.full(N_JOINTS, MOTOR_DAMPING),
-)
+_DAMPED: Final = damp_joints(0)
 
 
 class World(Plant):
@@ -90,6 +81,8 @@ class World(Plant):
         self._feet_under_hips = config.robot.feet_under_hips
         self._fallen = [False] * n
         self._down: tuple[str, ...] = ()  # names of these
+        # Names of those that are led down, and with them of those that have not risen since.
+        self._led_down, self._lying = frozenset[str](), frozenset[str]()
         self._surely_up = _FALL_HEIGHT + self.team.terrain.top
         # Compiled functions are compiled, or loaded, now and not in the first tick.
         Motors(config.robot, config.motors, n, _DAMPED).drive(
@@ -117,7 +110,7 @@ class World(Plant):
         """Advance by one tick under the motors' torques and return what happened.
 
         The motors follow the commands as `motors` tells, a weak one with its share of the torque.
-        Those of a robot without a command damp its joints with `MOTOR_DAMPING`.
+        Those of a robot without a command damp its joints, see `quadriga.plant.late`.
         """
         events = list(self._events.get(self.tick, ()))
         if self.tick in self._push_changes:
@@ -175,6 +168,10 @@ class World(Plant):
         """Robots that have fallen so far."""
         return self._down
 
+    def expect_down(self, names: Collection[str]) -> None:
+        self._led_down = frozenset(names)
+        self._lying |= self._led_down
+
     def _measure(self) -> dict[str, State]:
         states = self._sensors.measure(
             self.tick, self._q, self._v, self.motors.torque, self._sensed
@@ -194,8 +191,11 @@ class World(Plant):
         events = []
         for i, (x, y, z, qw, qx, qy, qz) in enumerate(self._q[:, layout.POSE].tolist()):
             cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
-            # With this comparison a state that is not a number counts as a fall too.
-            if (cosine >= _FALL_COSINE and z >= self._surely_up) or self._fallen[i]:
+            if cosine >= _FALL_COSINE and z >= self._surely_up:
+                if self._lying:
+                    self._lying -= {self.names[i]} - self._led_down
+                continue
+            if self._fallen[i]:
                 continue
             yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
             # The mean under the hips, since the trunk may be over a block between the feet.
@@ -204,7 +204,9 @@ class World(Plant):
                     np.array(x), np.array(y), np.array(yaw), self._feet_under_hips
                 )
             )
-            if not (cosine >= _FALL_COSINE and above >= _FALL_HEIGHT):
+            may_stay = above >= _FALL_HEIGHT or self.names[i] in self._lying
+            # With these comparisons a state that is not a number counts as a fall too.
+            if not (cosine >= _FALL_COSINE and may_stay):
                 self._fallen[i] = True
                 pairs = zip(self.names, self._fallen, strict=True)
                 self._down = tuple(name for name, down in pairs if down)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from quadriga.plant.commands import CommandBox
-from quadriga.plant.late import DAMP, FRESH, HOLD, grade, hold_joints
+from quadriga.plant.late import DAMP, FRESH, HOLD, PROMPT_TICKS, Lateness, grade, hold_joints
 from quadriga.plant.realtime import _Motors
 from quadriga.plant.server import PlantServer
 from quadriga.shared.config.sections import Config, TeamConfig
@@ -23,6 +23,22 @@ from quadriga.sim_server.world.world import World
 )
 def test_grades_by_age(age: int, expected: str) -> None:
     assert grade(age, Config().world) == expected
+
+
+def test_an_age_that_dithers_about_the_limit_does_not_change_the_grade_with_it() -> None:
+    lateness = Lateness(Config().world)
+    ages = [19, 20, 20, 21, *(20 + k % 3 - 1 for k in range(300))]
+    grades = [lateness.grade(age) for age in ages]
+    assert grades == [FRESH] * 3 + [HOLD] * 301
+
+
+def test_who_was_late_is_followed_again_once_its_commands_are_prompt() -> None:
+    lateness = Lateness(Config().world)
+    assert [lateness.grade(age) for age in (18, 201, 200, 21)] == [FRESH, DAMP, HOLD, HOLD]
+    assert {lateness.grade(10) for _ in range(PROMPT_TICKS - 1)} == {HOLD}
+    assert lateness.grade(11) == HOLD, "so it begins to count anew"
+    assert {lateness.grade(10) for _ in range(PROMPT_TICKS - 1)} == {HOLD}
+    assert {lateness.grade(age) for age in (10, 20, 1, 19)} == {FRESH}
 
 
 def test_holding_keeps_a_standing_robot_up_and_damping_does_not() -> None:

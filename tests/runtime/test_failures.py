@@ -36,19 +36,20 @@ def test_a_frozen_robot_is_named_and_the_world_goes_on_until_it_returns(
     with team.launch() as running:
         team.await_log("sim", "start")
         freeze(running, watcher(team), "r2", tick=100, ticks=100)
-        team.await_log("sim", f"fault r2 silent for {PATIENCE:g} s: its joints are damped")
+        team.await_log("sim", f"fault r2 silent for {PATIENCE:g} s: the world goes on")
         team.await_log("sim", "fault r2 answers again")
         running.watch(lambda: True)
 
 
 def test_who_is_frozen_to_the_end_is_named_and_nobody_else(make_team: Make) -> None:
-    team = make_team(world__seconds=FOREVER, world__command_timeout=0.5)
+    team = make_team(world__seconds=2.0, world__command_timeout=0.5)
     with team.launch() as running:
         team.await_log("sim", "start")
         os.kill(running.pids["r2"], signal.SIGSTOP)
         with pytest.raises(ProcessError, match="process r2: got no end after the walk"):
             running.watch(never)
-    assert "stop  fall of" in team.log("sim").splitlines()[-1], "and then nothing, no traceback"
+    last = team.log("sim").splitlines()[-1]
+    assert "stop  end of world.seconds" in last, "and then nothing, no traceback"
 
 
 def test_in_real_time_the_world_waits_for_no_frozen_listener(
@@ -154,6 +155,22 @@ def test_an_emergency_stop_damps_every_robot(make_team: Make, watcher: Watcher) 
         running.watch(lambda: True)
 
 
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_the_world_obeys_an_emergency_stop_whatever_the_agents_do(
+    make_team: Make, mode: str
+) -> None:
+    """These stand on: they have never heard of an emergency stop."""
+    team = make_team(world__seconds=FOREVER, world__mode=mode)
+    file = str(team.folder / "config.toml")
+    with team.launch() as running:
+        team.await_log("sim", "start")
+        command = (*launch.QUADRIGA, "estop", "--reason", "smoke", "--config", file)
+        assert run_alone(launch.ProcessSpec("estop", command, 5.0)) == (0, "")
+        team.await_log("sim", "fault  smoke: every joint is damped")
+        team.await_log("sim", "stop  fall of r1, r2")
+        running.watch(never)
+
+
 @pytest.mark.usefixtures("_compiled")
 def test_an_emergency_stop_waits_for_nobody(make_team: Make, watcher: Watcher) -> None:
     """Also where it is meant for a robot that is not there, which then is named."""
@@ -177,7 +194,7 @@ def test_an_emergency_stop_waits_for_nobody(make_team: Make, watcher: Watcher) -
         running.watch(lambda: True)
     assert stop.returncode == 2
     assert "no r3 on the bus after 5 s" in errors
-    assert "r1, r2 heard it at once" in errors
+    assert "r1, r2, sim heard it at once" in errors
 
 
 @pytest.mark.parametrize("verb", [("sim",), ("operate",), ("record", "-o", "RUN")])

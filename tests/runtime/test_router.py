@@ -7,7 +7,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 
@@ -86,29 +85,6 @@ def test_a_port_that_is_taken(make_team: Make) -> None:
     assert process.returncode == 2
     assert "another team or program listens there" in errors
     assert errors.count("\n") == 1
-
-
-def test_the_walk_ends_when_the_router_dies(make_team: Make) -> None:
-    team = make_team(bus__mode="client", world__seconds=60.0)
-    with router(team) as process:
-        await_routing(process)
-        with team.launch() as running:
-            team.await_log("sim", "start")
-            process.kill()
-            deadline = monotonic() + WAIT
-            while running.pids.keys() & {"r1", "r2", "operator"} - left(running.pids):
-                assert monotonic() < deadline, running.pids
-                sleep(0.05)
-
-
-def left(pids: dict[str, int]) -> set[str]:
-    """Names of those that have ended; nobody has waited for them yet."""
-    stats = {name: Path(f"/proc/{pid}/stat") for name, pid in pids.items()}
-    return {
-        name
-        for name, stat in stats.items()
-        if not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] == "Z"
-    }
 
 
 @pytest.mark.parametrize("name", ["sim", "r1", "operator", "recorder"])

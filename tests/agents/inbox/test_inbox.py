@@ -54,7 +54,7 @@ def feed(box: Inbox, *messages: tuple[str, Message]) -> None:
 
 
 def test_subscribes_to_what_it_needs_and_no_more() -> None:
-    alone = {"team/r2/state", "team/reference", "team/estop", "team/sim/event"}
+    alone = {"team/r2/state", "team/reference", "team/estop", "team/resume", "team/sim/event"}
     peers = {f"team/{r}/{t}" for r in ("r1", "r3") for t in ("plan", "measurement")}
     assert {*arrivals(planner="none").keys} == alone
     assert {*arrivals(planner="centralised").keys} == alone | {"team/r2/plan"}

@@ -103,6 +103,7 @@ def test_a_good_recording_passes(known_run: Path, capsys: pytest.CaptureFixture[
             "friction",
             "torques",
             "ages",
+            "end",
         )
     ]
 

@@ -11,14 +11,15 @@ import pytest
 
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus, Packet
 from quadriga.shared.config.load import load
-from quadriga.shared.config.sections import BusConfig, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, SIM
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.wire.codec import MAX_TEXT, MAX_TICK, decode, encode
 from quadriga.shared.wire.messages import Clock, EStop, Event, Message, Reference
 from quadriga.shared.wire.topics import CLOCK, ESTOP, EVENT, REFERENCE
+from quadriga.team.emergency_stop import stop_team
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.operator import TeamTicks, reference_at, run, stop_team
+from quadriga.team.operator import TeamTicks, reference_at, run
 
 
 def test_stand_then_ramp_then_full_speed() -> None:
@@ -52,8 +53,9 @@ def test_a_trace_is_followed_from_the_first_step_on(tmp_path: Path) -> None:
 @pytest.mark.parametrize("late", [False, True])
 def test_a_walk_ends_at_the_same_tick_for_who_is_behind(late: bool) -> None:
     """Else the last references of two equal walks would depend on who was faster."""
-    config = BusConfig(endpoint=free_endpoint())
-    with Bus.open(config, "team", SIM) as sim, Bus.open(config, "team", OPERATOR) as operator:
+    config = load(None, {"bus.endpoint": free_endpoint()})
+    sim, operator = (Bus.open(config.bus, "team", name) for name in (SIM, OPERATOR))
+    with sim, operator:
         for key in (CLOCK.key("team"), EVENT.key("team")):
             operator.subscribe(key)
         operator.declare(HERE)
@@ -170,6 +172,7 @@ def said_stop(reason: str, tick: int) -> EStop:
         try:
             sleep(1.0)  # the tick is heard before anybody is there to stop
             r1.declare(HERE)
+            sim.declare(HERE)
             packet = r1.get(10.0)
         finally:
             over.set()

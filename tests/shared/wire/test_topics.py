@@ -12,7 +12,7 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.runtime.places import SOURCE
 from quadriga.shared.wire.markdown import to_markdown
 from quadriga.shared.wire.messages import Flat, Message
-from quadriga.shared.wire.topics import CONFIGURED, TABLE, Topic, topic_of, topics_for
+from quadriga.shared.wire.topics import AGENT_EVENT, CONFIGURED, TABLE, Topic, topic_of, topics_for
 
 rows = pytest.mark.parametrize("topic", TABLE, ids=lambda topic: topic.name)
 
@@ -28,7 +28,11 @@ def test_a_key_leads_back_to_its_row(topic: Topic, team: str) -> None:
 def test_a_row_is_plausible(topic: Topic) -> None:
     assert topic.period_ms >= 0 or topic.period_ms == CONFIGURED
     assert topic.max_age_ms >= 0 or topic.max_age_ms == CONFIGURED
-    roles = {role.name for role in members.ROLES} | {members.LAUNCHER, members.ESTOP}
+    roles = {role.name for role in members.ROLES} | {
+        members.LAUNCHER,
+        members.ESTOP,
+        members.RESUME,
+    }
     assert topic.senders
     assert {*topic.senders, *topic.receivers} <= roles
 
@@ -65,8 +69,9 @@ def test_the_page_is_in_step_with_the_tables() -> None:
     assert page.read_text(encoding="utf-8") == to_markdown()
 
 
-def test_every_message_type_has_one_row_and_one_name() -> None:
-    types = [topic.type.__name__ for topic in TABLE]
+def test_every_message_type_has_a_row_and_every_row_a_name() -> None:
+    """Events have two rows: those of the plant, which may end a walk, and those of agents."""
+    types = [topic.type.__name__ for topic in TABLE if topic is not AGENT_EVENT]
     kinds = {*Message.__subclasses__(), *Flat.__subclasses__()} - {Flat}
     kinds = {kind for kind in kinds if kind.__module__ == Message.__module__}
     assert sorted(types) == sorted(kind.__name__ for kind in kinds)
@@ -83,8 +88,10 @@ def test_the_keys_are_the_contract_with_other_tools() -> None:
         "team/r1/inputs",
         "team/reference",
         "team/estop",
+        "team/resume",
         "team/sim/truth",
         "team/sim/event",
+        "team/r1/event",
         "team/clock",
         "team/r1/clock_ask",
         "team/r1/clock_answer",

@@ -1,0 +1,97 @@
+"""When a robot that stands because it lacked an input may walk again.
+
+It goes on at the begin of a half cycle, once all its inputs have been whole for a second: by itself
+if the team is configured so, else if the operator has said so lately. The second is counted from
+the begin of a half cycle, so that robots go on together which find their inputs whole a little
+apart. From then on they follow the commanded speed in a ramp. Falls, faults and emergency stops are
+for good.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from quadriga.agents.modes import LOSSES, STAND, STOPPING, WALK, WHOLE_MS, Mode
+from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.codes import INPUT_LOST, RESUMED, code_of
+from quadriga.shared.wire.messages import Event, Reference
+
+WORD_MS: Final = 5000  # for which the operator's word is obeyed
+RAMP_MS: Final = 1000  # from standing to the commanded speed
+_LOOKED_BACK_MS: Final = 4000  # at most, from a tick to the oldest reference that still matters
+
+
+@record
+class Healing:
+    """What an agent remembers of its way back from a loss.
+
+    Attributes:
+        whole_since: tick from which on it counts that its inputs are whole; −1: they are not.
+        word: tick of the operator's word to go on; −1: there is none.
+        resumed: tick at which the robot has begun to walk again; −1: never.
+    """
+
+    whole_since: int = -1
+    word: int = -1
+    resumed: int = -1
+
+
+def has_lost_input(mode: Mode) -> bool:
+    """Whether a robot stands, or slows down, because of a loss of inputs and of nothing graver."""
+    return mode.name in (STAND, STOPPING) and code_of(mode.reason) in LOSSES
+
+
+def step_healing(
+    healing: Healing, mode: Mode, tick: int, *, whole_from: int | None, word: bool
+) -> Healing:
+    """What is remembered after a tick.
+
+    Args:
+        healing: before it.
+        mode: after it.
+        tick: the present one.
+        whole_from: if all inputs are there, the begin of the next half cycle; else None.
+        word: whether the operator's word to go on has come.
+    """
+    if not has_lost_input(mode):
+        idle = healing.whole_since < 0 and healing.word < 0
+        return healing if idle else Healing(resumed=healing.resumed)
+    since = -1
+    if whole_from is not None:
+        since = healing.whole_since if healing.whole_since >= 0 else whole_from
+    return replace(healing, whole_since=since, word=tick if word else healing.word)
+
+
+def may_resume(healing: Healing, mode: Mode, tick: int, *, auto: bool) -> bool:
+    """Whether a robot in `mode` may walk again; `auto`: without the operator's word."""
+    if mode.name != STAND or not has_lost_input(mode) or healing.whole_since < 0:
+        return False
+    told = healing.word >= 0 and tick - healing.word <= WORD_MS
+    return (auto or told) and tick - healing.whole_since >= WHOLE_MS
+
+
+def ramp(references: tuple[Reference, ...], healing: Healing, tick: int) -> tuple[Reference, ...]:
+    """The operator's references as a robot follows them that has begun to walk again.
+
+    Nothing is asked of it for the time before, and then a rising share of the speed.
+    """
+    begun = healing.resumed
+    if begun < 0 or tick - begun > RAMP_MS + _LOOKED_BACK_MS:
+        return references
+    return tuple(_share(item, min(1.0, max(0, item.tick - begun) / RAMP_MS)) for item in references)
+
+
+def _share(item: Reference, share: float) -> Reference:
+    if share == 1.0:
+        return item
+    return replace(item, vx=share * item.vx, vy=share * item.vy, wz=share * item.wz)
+
+
+def change_event(before: Mode, after: Mode, tick: int, robot: str) -> Event | None:
+    """What an agent announces of a change of its mode: a loss of inputs, and its way back."""
+    if has_lost_input(after) and not before.reason:
+        return Event.of(tick, INPUT_LOST, robot, f"slows down and stands: {after.reason}")
+    if after.name == WALK and has_lost_input(before):
+        return Event.of(tick, RESUMED, robot, f"walks again after {before.reason}")
+    return None

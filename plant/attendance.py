@@ -1,0 +1,31 @@
+"""Which robots' agents answer, in real time: who leaves, falls silent or is back is announced."""
+
+from __future__ import annotations
+
+from quadriga.plant.server import PlantServer
+from quadriga.shared.bus.zenoh_bus import HERE
+from quadriga.shared.wire import codes
+
+
+def note_absences(server: PlantServer) -> None:
+    """Announce whose commands are lost since the last look, and who answers again.
+
+    A robot is silent once its motors would be damped.
+    """
+    world, tick = server.config.world, server.plant.tick
+    present = server.bus.members_at(HERE)
+    for name in server.plant.names:
+        age = tick - server.commands.tick_of(name)
+        if name not in server.silent:
+            if name not in present:
+                _announce_loss(server, name, codes.GONE, "gone")
+            elif age > world.command_damp_ms:
+                _announce_loss(server, name, codes.SILENT, f"silent for {age} ms")
+        elif name in present and age <= world.command_hold_ms:
+            server.silent.discard(name)
+            server.announce(codes.BACK, name, "answers again")
+
+
+def _announce_loss(server: PlantServer, name: str, code: str, why: str) -> None:
+    server.silent.add(name)
+    server.announce(code, name, why)

@@ -1,0 +1,89 @@
+"""Who drives the team's time may vanish without a word, and so may the link to the router."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from quadriga.shared.bus.barrier import lead
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ProcessError
+from quadriga.shared.members import has_lead
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.wire.codes import LEAD_GONE, LINK_LOST
+
+LAST_WORDS: Final = 1.0  # s wall, in which what was sent before may still arrive
+
+
+class Loss(NamedTuple):
+    """What has vanished: `LEAD_GONE` or `LINK_LOST`, and its name."""
+
+    code: str
+    what: str
+
+
+def find_lost_link(bus: Bus, config: Config) -> Loss | None:
+    """The link to the router, if there ought to be one and is none at the moment."""
+    if config.bus.mode != "client" or bus.linked:
+        return None
+    return Loss(LINK_LOST, f"link of {bus.name} to the router at {config.bus.endpoint}")
+
+
+def find_loss(bus: Bus, config: Config) -> Loss | None:
+    """What is gone at the moment of that on which a process depends; None if all is there."""
+    link = find_lost_link(bus, config)
+    if link is not None:  # then everybody else seems to be gone, too
+        return link
+    if not has_lead(bus.members_at(HERE)):
+        return Loss(LEAD_GONE, f"process {lead(config)} of team {bus.team!r}, seen by {bus.name}")
+    return None
+
+
+def loss_error(loss: Loss, tick: int) -> ProcessError:
+    """The error of a process that ends because of a loss.
+
+    Args:
+        loss: what has vanished.
+        tick: the team's time as far as this process knows it, ms.
+    """
+    cause = "killed, failed, or cut off: see what it says itself"
+    if loss.code == LINK_LOST:
+        cause = "the router was killed or stopped, or the network is gone"
+    got = f"none any more after {tick / 1000:.3f} s of the walk"
+    return ProcessError(loss.what, got, "it to be there until the walk's announced end", cause)
+
+
+class LeadWatch:
+    """Ends a process whose team is gone, and says what has vanished.
+
+    The last words of who drives time may arrive after its token has vanished, and they announce
+    the end of the walk. So a loss counts after `LAST_WORDS`.
+
+    Args:
+        bus: the process's own, in the midst of a walk.
+        config: the team's configuration.
+    """
+
+    def __init__(self, bus: Bus, config: Config) -> None:
+        self._bus, self._config = bus, config
+        self._since: float | None = None
+
+    def look(self, tick: int) -> None:
+        """See whether the others are there; called while nothing arrives.
+
+        Args:
+            tick: the team's time as far as this process knows it, ms.
+
+        Raises:
+            ProcessError: who drives time, or the link to the router, has been gone for
+                `LAST_WORDS`.
+        """
+        loss = find_loss(self._bus, self._config)
+        if loss is None:
+            self._since = None
+            return
+        now = monotonic()
+        if self._since is None:
+            self._since = now
+        if now - self._since >= LAST_WORDS:
+            raise loss_error(loss, max(tick, 0))

@@ -1,0 +1,103 @@
+"""Who is left alone in the midst of a walk says what has vanished, once last words had time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+
+from quadriga.shared.bus import lead_watch
+from quadriga.shared.bus.lead_watch import LeadWatch, find_loss
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ProcessError
+from quadriga.shared.members import SIM
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.wire.codes import LEAD_GONE, LINK_LOST
+from quadriga.team.endpoint import free_endpoint
+
+WAIT = 20.0  # s
+
+
+@pytest.fixture(autouse=True)
+def _few_last_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lead_watch, "LAST_WORDS", 0.2)
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    deadline = monotonic() + WAIT
+    while not condition():
+        assert monotonic() < deadline
+        sleep(0.005)
+
+
+@contextmanager
+def together(config: Config) -> Iterator[tuple[Bus, Bus]]:
+    """Who drives time, and an agent that sees it."""
+    sim, r1 = (Bus.open(config.bus, "team", name) for name in (SIM, "r1"))
+    with sim, r1:
+        sim.declare(HERE)
+        wait_until(lambda: SIM in r1.members_at(HERE))
+        yield sim, r1
+
+
+def complaint(watch: LeadWatch, tick: int) -> tuple[str, float]:
+    """What is said in the end, and after how many seconds."""
+    begun = monotonic()
+    while monotonic() < begun + WAIT:
+        try:
+            watch.look(tick)
+        except ProcessError as error:
+            return str(error), monotonic() - begun
+        sleep(0.01)
+    pytest.fail("nobody has complained")
+
+
+def test_who_drives_time_is_missed_after_its_last_words() -> None:
+    config = load(None, {"bus.endpoint": free_endpoint()})
+    with together(config) as (sim, r1):
+        watch = LeadWatch(r1, config)
+        watch.look(1)
+        assert find_loss(r1, config) is None
+        sim.close()
+        wait_until(lambda: not r1.members_at(HERE))
+        assert find_loss(r1, config) == (LEAD_GONE, "process sim of team 'team', seen by r1")
+        said, after = complaint(watch, 1234)
+    assert said.startswith(
+        "process sim of team 'team', seen by r1: got none any more after 1.234 s of the walk"
+    )
+    assert after >= 0.2
+
+
+def test_a_link_that_is_gone_is_named_and_not_those_behind_it() -> None:
+    config = load(None, {"bus.endpoint": free_endpoint()})
+    router = Bus.route(config.bus.endpoint, "team")
+    config = replace(config, bus=replace(config.bus, mode="client"))
+    with together(config) as (_, r1):
+        watch = LeadWatch(r1, config)
+        watch.look(1)
+        router.close()
+        wait_until(lambda: find_loss(r1, config) is not None)
+        loss = find_loss(r1, config)
+        said, _ = complaint(watch, 5)
+    assert loss is not None
+    assert loss.code == LINK_LOST
+    assert said.startswith(f"link of r1 to the router at {config.bus.endpoint}: got none any more")
+
+
+def test_who_is_back_in_time_is_not_missed() -> None:
+    config = load(None, {"bus.endpoint": free_endpoint()})
+    with together(config) as (sim, r1):
+        watch = LeadWatch(r1, config)
+        sim.withdraw()
+        wait_until(lambda: not r1.members_at(HERE))
+        watch.look(1)
+        sim.declare(HERE)
+        wait_until(lambda: SIM in r1.members_at(HERE))
+        watch.look(2)
+        sim.withdraw()
+        wait_until(lambda: not r1.members_at(HERE))
+        assert complaint(watch, 3)[1] >= 0.2
