@@ -86,9 +86,7 @@ def run(
         with Bus.open(config.bus, config.team.name, RECORDER, stopped) as bus:
             with _open_parts(config, path, predictor_sha256, selection, keys) as parts:
                 paths = parts.paths
-                bus.subscribe(keys.expression, largest=LARGEST)
-                if not keys(EVENT.key(config.team.name)):  # which announces the end of the walk
-                    bus.subscribe(EVENT.key(config.team.name), largest=LARGEST)
+                _subscribe(bus, keys)
                 session = Session(bus, parts, keys, config, stopped, say)
                 me = None if selection.at_once else Introduction(bus, config, predictor_sha256)
                 role = _join(bus, config, stopped, me)
@@ -119,6 +117,14 @@ def _open_parts(
         selection.limits,
         admission=Admission(keys.own.__contains__),
     )
+
+
+def _subscribe(bus: Bus, keys: KeyFilter) -> None:
+    """Hear what is recorded, and the events, which announce the end of the walk."""
+    bus.subscribe(keys.expression, largest=LARGEST)
+    event = EVENT.key(bus.team)
+    if not keys(event):
+        bus.subscribe(event, largest=LARGEST)
 
 
 def _list_files(parts: Parts, ending: ProcessError | None) -> RecordedFiles:
