@@ -32,7 +32,7 @@ class WalkProgress:
         self._config, self._console = config, console
         self._bus = Bus.open(config.bus, config.team.name, LAUNCHER)
         for topic in topics_for(LAUNCHER):
-            self._bus.subscribe(topic.key(config.team.name))
+            self._bus.subscribe(topic.key(config.team.name, "*"))
         self._bar = build_progress(console, "{task.fields[text]}", hidden=False)
         self._task = self._bar.add_task("starting", total=config.world.seconds, text="")
         self._begun = 0.0
