@@ -67,6 +67,7 @@ format: $(TOOLS)
 docs: $(STAMP)
 	$(BIN)/quadriga config --markdown > docs/configuration.md
 	$(BIN)/python -m quadriga.shared.wire.markdown > docs/messages.md
+	$(BIN)/python -m quadriga.shared.security.markdown
 	$(BIN)/python -m quadriga.desk.page > docs/desk.md
 
 # Every figure and table of results in README and docs, and the clip; two cores walk 30 times a

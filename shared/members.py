@@ -21,6 +21,8 @@ LAUNCHER: Final = "launcher"  # shows how far the walk has come
 ESTOP: Final = "estop"  # stops the team once
 RESUME: Final = "resume"  # has a team that stands go on, once
 DOCTOR: Final = "doctor"  # asks everybody how they are
+OBSERVER: Final = "observer"  # whoever looks on: `echo`, `hz`
+PROBE: Final = "probe"  # asks a router, as it starts, whether its rules are in force
 
 # Who drives time, by name: the only plant, or that of the first robot. The others leave with it.
 LEADS: Final = frozenset((SIM, "plant_r1"))

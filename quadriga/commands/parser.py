@@ -12,6 +12,7 @@ from quadriga.commands import (
     agent,
     bridge,
     campaign,
+    certs,
     check,
     collect,
     config,
@@ -57,8 +58,9 @@ INTERRUPTED: Final = 130
 _COMMANDS: Final = (
     walk.add, scenarios.add, sim.add, bridge.add, desk.add, fault.add, agent.add, plan.add,
     record.add, report.add, play.add, resim.add, export.add, info.add, recover.add, check.add,
-    echo.add, hz.add, replay.add, router.add, doctor.add, prepare.add, operate.add, collect.add,
-    fit.add, probe.add, campaign.add, experiments.add, tune.add, estop.add, resume.add, config.add,
+    echo.add, hz.add, replay.add, router.add, certs.add, doctor.add, prepare.add, operate.add,
+    collect.add, fit.add, probe.add, campaign.add, experiments.add, tune.add, estop.add, resume.add,
+    config.add,
     version.add,
 )  # fmt: skip
 

@@ -19,6 +19,8 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "team.plants": "one",
         "team.auto_resume": False,
         "bus.clock_timeout": 0.5,
+        "bus.certificates": "certs",
+        "bus.plaintext": False,
         "planner.options": "",
         "planner.cost": "own",
         "planner.tracked": "speeds",

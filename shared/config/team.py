@@ -68,10 +68,22 @@ class BusConfig:
     endpoint: str = key(
         "tcp/127.0.0.1:7447",
         "-",
-        "where the sim server, or plant_r1, listens (peer) or the router is (client)",
+        "where the sim server, or plant_r1, listens (peer) or the router is (client); off the "
+        "loopback tls/HOST:PORT",
     )
     listen: str = key(
         "tcp/127.0.0.1:0", "-", "peer mode: where every other process listens; port 0: any free one"
+    )
+    certificates: str = key(
+        "certs",
+        "-",
+        "endpoints tls/HOST:PORT: folder with a folder for each process, see docs/security.md",
+    )
+    plaintext: bool = key(
+        False,
+        "-",
+        "permit endpoints off the loopback without certificates: whoever reaches them commands the "
+        "robots",
     )
     barrier_timeout: float = key(
         60.0, "s", "how long to wait for all processes before giving up", low=0.1, high=3600.0

@@ -10,7 +10,7 @@ from typing import Final
 
 from quadriga.shared import members
 from quadriga.shared.errors import MessageError
-from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, SIM
+from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, ROUTER, SIM
 from quadriga.shared.wire import messages as msg
 from quadriga.shared.wire.plugin_topics import plugin_topics
 from quadriga.shared.wire.topic import CONFIGURED as CONFIGURED
@@ -19,6 +19,7 @@ from quadriga.shared.wire.topic import Topic as Topic
 SAMPLE_MS: Final = 10  # one sample of u and y: forces are means over it, outputs taken at its end
 REFERENCE_EPOCH_MS: Final = 100  # the operator speaks at multiples of this
 STATUS_MS: Final = 100  # so often an agent gives account of itself in lock-step
+RECEIVED: Final = "received"  # ends the key of the question whether all before it has arrived
 
 _PLANS: Final = (AGENT, PLANNER)  # who plans
 
@@ -69,9 +70,12 @@ CLOCK_ANSWER: Final = Topic(
     "clock_answer", msg.ClockAnswer, (SIM,), (SIM,), per_robot=True, period_ms=0, repeats=True
 )
 
+# What a router has refused, if it has rules; the tick is the last of the clock that it heard.
+REFUSED: Final = Topic("refused", msg.Refusal, (ROUTER,), (), period_ms=0, repeats=True)
+
 _OWN: Final = (
     STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, ESTOP, RESUME, TRUTH, EVENT,
-    AGENT_EVENT, CLOCK, CLOCK_ASK, CLOCK_ANSWER,
+    AGENT_EVENT, CLOCK, CLOCK_ASK, CLOCK_ANSWER, REFUSED,
 )  # fmt: skip
 TABLE: Final = (*_OWN, *plugin_topics(_OWN))
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}

@@ -11,12 +11,14 @@ from quadriga.shared.members import AGENT, PLANNER
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Event, Plan, Status
-from quadriga.shared.wire.topics import COMMAND, ESTOP, MEASUREMENT, STATE, TABLE
+from quadriga.shared.wire.topics import COMMAND, ESTOP, MEASUREMENT, REFUSED, STATE, TABLE
 
 _MAY_REPEAT: Final = frozenset(topic.name for topic in TABLE if topic.repeats)
 # What is never passed over, not even in real time: agents and planners skip steps, others do not.
 _WHOLE: Final = frozenset(t.name for t in TABLE if not {AGENT, PLANNER} & {*t.senders})
 _EVERYONE_S: Final = (STATE, COMMAND, MEASUREMENT)
+# Sent by who only hears of the time, if somebody walks at all.
+_UNTIMED: Final = (ESTOP.name, REFUSED.name)
 _TAIL_MS: Final = 20  # a world that was stopped may end in the middle of a sample
 
 
@@ -41,7 +43,7 @@ class Order:
             sequence += f" of {message.robot}"
         last = self._last.get(sequence, (-1, 0))
         self.finding.looked += 1
-        if item.topic != ESTOP.name and (
+        if item.topic not in _UNTIMED and (
             place < last or (place == last and item.topic not in _MAY_REPEAT)
         ):
             what = "step" if isinstance(message, Plan) else "tick"

@@ -28,11 +28,8 @@ def test_a_key_leads_back_to_its_row(topic: Topic, team: str) -> None:
 def test_a_row_is_plausible(topic: Topic) -> None:
     assert topic.period_ms >= 0 or topic.period_ms == CONFIGURED
     assert topic.max_age_ms >= 0 or topic.max_age_ms == CONFIGURED
-    roles = {role.name for role in members.ROLES} | {
-        members.LAUNCHER,
-        members.ESTOP,
-        members.RESUME,
-    }
+    roles = {role.name for role in members.ROLES}
+    roles |= {members.LAUNCHER, members.ESTOP, members.RESUME, members.ROUTER}
     assert topic.senders
     assert {*topic.senders, *topic.receivers} <= roles
 
@@ -95,6 +92,7 @@ def test_the_keys_are_the_contract_with_other_tools() -> None:
         "team/clock",
         "team/r1/clock_ask",
         "team/r1/clock_answer",
+        "team/refused",
     ]
 
 

@@ -1,0 +1,93 @@
+"""`quadriga certs`: the certificates by which the processes of a team know each other."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Final
+
+from quadriga.commands.command import AddCommand, Given, say
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from quadriga.certs.folder import CertificateFolder
+
+_DAYS: Final = 365.0
+_LONGEST: Final = 3650.0  # days, as long as the authority itself is valid
+
+
+def add(add_command: AddCommand) -> None:
+    command = add_command("certs", run, "make, renew, revoke and show a team's certificates")
+    command.add_argument("action", choices=("make", "renew", "revoke", "show"))
+    command.add_argument(
+        "names", nargs="*", metavar="NAME", help="renew: whose (all); revoke: whose"
+    )
+    command.add_argument(
+        "--router",
+        dest="hosts",
+        action="append",
+        default=[],
+        metavar="HOST",
+        help="make, renew: a name or an address by which others reach the router; may be repeated",
+    )
+    command.add_argument(
+        "--days",
+        type=float,
+        default=_DAYS,
+        metavar="D",
+        help=f"make, renew: how long they are valid ({_DAYS:g})",
+    )
+
+
+def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+    """Do one of the four in the folder `bus.certificates`."""
+    from datetime import UTC, datetime
+    from pathlib import Path
+
+    from quadriga.certs.folder import CertificateFolder
+    from quadriga.shared.runtime.clock import wall_ns
+    from quadriga.shared.security.roll import team_roll
+
+    action, names = arguments.action, arguments.names
+    if not 0.0 < arguments.days <= _LONGEST:
+        raise ConfigError("--days", f"{arguments.days:g}", f"above 0 and at most {_LONGEST:g}")
+    if names and action in ("make", "show"):
+        raise ConfigError("NAME", " ".join(names), f"none with {action!r}")
+    if not names and action == "revoke":
+        raise ConfigError("NAME", "none", "whose certificates are to be revoked")
+    identities = [who.name for who in team_roll(config)]
+    folder = CertificateFolder(Path(config.bus.certificates), identities)
+    now = datetime.fromtimestamp(1e-9 * wall_ns(), UTC)
+    if action == "make":
+        made = folder.make(config.team.name, arguments.hosts, now, arguments.days)
+        say(f"{', '.join(made) or 'nobody'} got a certificate in {folder.path}")
+    elif action == "renew":
+        made = folder.renew(names, arguments.hosts, now, arguments.days)
+        say(f"new: {', '.join(made)}; copy their folders to their machines")
+    elif action == "revoke":
+        gone = folder.revoke(names)
+        say(
+            f"revoked: {', '.join(gone) or 'nothing that was valid'}; copy {folder.revoked_file} "
+            "to the router and start it again: until then it knows nothing of it"
+        )
+    _show(folder, now)
+    return 0
+
+
+def _show(folder: CertificateFolder, now: datetime) -> None:
+    """Print who has which certificate, and for how long."""
+    from quadriga.tables import align_columns
+
+    rows = [("identity", "certificate", "days left", "state")]
+    standings = folder.standings()
+    if not standings:
+        cause = "`quadriga certs make` makes it"
+        raise ConfigError(str(folder.path), "no certificate", "the certificates of a team", cause)
+    for standing in standings:
+        held = standing.certificate
+        days = held.days_left(now)
+        state = "revoked" if standing.revoked else "valid" if days > 0.0 else "expired"
+        rows.append((standing.identity, held.name, f"{days:.0f}", state))
+    print("\n".join(align_columns(rows, right=(2,), indent="")))

@@ -1,0 +1,102 @@
+"""Whether an endpoint of mutual TLS is reached and trusted, and trusts us; if not, why.
+
+Zenoh takes a link that is not trusted for one that is not there yet, and tries for ever.
+"""
+
+from __future__ import annotations
+
+import socket
+import ssl
+from dataclasses import dataclass
+from typing import Final
+
+from quadriga.shared.config.endpoints import host_and_port
+from quadriga.shared.errors import ConfigError, system_reason
+from quadriga.shared.security.tls import TlsFiles
+
+TRUSTED: Final = "trusted"
+UNREACHABLE: Final = "unreachable"  # nobody answers there
+EXPIRED: Final = "expired"  # its certificate is
+UNTRUSTED: Final = "untrusted"  # its certificate is of another authority, or for another address
+REFUSED: Final = "refused"  # it does not accept ours
+
+_TIMEOUT: Final = 2.0  # s, for the connection and for each answer
+# s, in which a listener that does not accept our certificate says so: it does that afterwards.
+_VERDICT: Final = 0.3
+_LOOK: Final = 0.02  # s
+_HAS_EXPIRED: Final = (9, 10)  # OpenSSL's: a certificate is not valid yet, or no longer
+CAUSES: Final = {
+    UNREACHABLE: "is the router there (`quadriga router`), and does the name resolve?",
+    EXPIRED: "`quadriga certs renew router`, or a clock that is wrong",
+    UNTRUSTED: "another authority's, or the router was not made for this address: "
+    "`quadriga certs make --router HOST`",
+    REFUSED: "our certificate has expired or is another authority's: `quadriga certs show`",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Handshake:
+    """What came of one: one of the words above, and what the system says of it."""
+
+    outcome: str
+    detail: str = ""
+
+
+def shake_hands(endpoint: str, files: TlsFiles) -> Handshake:
+    """Try an endpoint once, and leave.
+
+    Args:
+        endpoint: `tls/HOST:PORT`.
+        files: what this process shows and trusts.
+
+    Raises:
+        ConfigError: the endpoint is malformed, or the files cannot be used.
+    """
+    host, port = host_and_port(endpoint)
+    context = _context(files)
+    try:
+        with (
+            socket.create_connection((host, port), _TIMEOUT) as link,
+            context.wrap_socket(link, server_hostname=host) as secured,
+        ):
+            return _await_verdict(secured)
+    except ssl.SSLCertVerificationError as error:
+        outcome = EXPIRED if error.verify_code in _HAS_EXPIRED else UNTRUSTED
+        return Handshake(outcome, error.verify_message)
+    except ssl.SSLError as error:
+        return Handshake(REFUSED, (error.reason or str(error)).lower().replace("_", " "))
+    except ConnectionResetError:
+        return Handshake(REFUSED, "it hung up")
+    except OSError as error:
+        return Handshake(UNREACHABLE, system_reason(error))
+
+
+def _context(files: TlsFiles) -> ssl.SSLContext:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    try:
+        context.load_verify_locations(files.authority)
+        context.load_cert_chain(files.certificate, files.key)
+    except OSError as error:  # of ssl's own kind too
+        raise ConfigError(
+            str(files.certificate.parent),
+            system_reason(error),
+            "a certificate, its key and the authority's certificate",
+            "`quadriga certs show`",
+        ) from None
+    return context
+
+
+def _await_verdict(secured: ssl.SSLSocket) -> Handshake:
+    """What the listener says of our certificate once it has seen it; silence is consent."""
+    secured.settimeout(_LOOK)
+    for _ in range(round(_VERDICT / _LOOK)):
+        try:
+            if not secured.recv(1):
+                return Handshake(REFUSED, "it hung up")
+        except TimeoutError:
+            session = secured.session
+            if session is None or not session.has_ticket:
+                continue
+        break
+    return Handshake(TRUSTED)

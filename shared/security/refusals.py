@@ -1,0 +1,107 @@
+"""What a router has refused, whom and why, from the lines of Zenoh's log.
+
+Zenoh tells its verdict on a message and, in the next line of the same thread, that it has dropped
+it. Verdicts alone are no refusal: most say what is permitted, or what would be refused. They name
+the session of a sender; the common name of its certificate comes from the link.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable
+from typing import Final, NamedTuple
+
+DENIED: Final = "denied"  # no rule permits it
+LARGE: Final = "large"  # larger than permitted
+OFTEN: Final = "often"  # sooner after the last than permitted
+UNTRUSTED: Final = "untrusted"  # its certificate, or the lack of one, was not accepted
+FULL: Final = "full"  # there are as many sessions as permitted
+
+# What must be logged so that refusals can be told from it.
+LEVELS: Final = (
+    "error,zenoh::net::routing::interceptor=trace,"
+    "zenoh_transport::unicast::manager=trace,zenoh_link_tls=debug"
+)
+_DROPPED: Final = "Msg intercepted!"
+_NO_SESSION: Final = "Denying new transport"
+_NO_LINK: Final = ". Hint: increase the system open file limit"  # of whatever failed
+MARKERS: Final = (_DROPPED, _NO_SESSION, _NO_LINK)  # of the lines that tell a refusal
+_STRANGER: Final = "somebody"  # whose certificate was not accepted, so that it has no name
+_CONNECT: Final = "connect"
+
+_COLOUR: Final = re.compile(r"\x1b\[[0-9;]*m")
+_THREAD: Final = re.compile(r"ThreadId\((\d+)\)")
+_VERDICT: Final = re.compile(
+    r"(?P<session>[0-9a-f]+)(?: on \S+)? is (?P<un>un)?authorized to "
+    r"(?P<action>[A-Za-z/ ]+?) \((?P<flow>in|e)gress\) on (?P<key>\S+)"
+)
+_OFTEN: Final = re.compile(
+    r"dropped by the downsampling interceptor: \w+\((?P<key>[^()\s]+)\).* "
+    r"from:\S*?/(?P<session>[0-9a-f]+)"
+)
+_ACCEPTED: Final = re.compile(r"Accepted TLS connection .*Common Name: (?P<name>.+?)\.?$")
+_UNACCEPTED: Final = re.compile(r"zenoh_link_tls\S*: (?P<why>.*)" + re.escape(_NO_LINK))
+
+
+class Refused(NamedTuple):
+    """One kind of refusal.
+
+    Attributes:
+        who: session of the sender or its beginning, or the common name of its certificate.
+        action: what it did.
+        key: on which key; "" of a connection.
+        reason: one of the words above.
+    """
+
+    who: str
+    action: str
+    key: str
+    reason: str
+
+
+class RefusalParser:
+    """Turns lines of the log into refusals; lines of several threads may be mixed."""
+
+    def __init__(self) -> None:
+        self._verdicts: dict[str, Refused] = {}  # the last of each thread
+        self._accepted = _STRANGER  # whose link was accepted last
+
+    def take(self, lines: Iterable[str]) -> Counter[Refused]:
+        """The refusals that these lines tell, with how often."""
+        found: Counter[Refused] = Counter()
+        for line in lines:
+            refused = self._take(_COLOUR.sub("", line))
+            if refused is not None:
+                found[refused] += 1
+        return found
+
+    def _take(self, line: str) -> Refused | None:
+        if "::interceptor" in line:
+            return self._take_message(line)
+        accepted = _ACCEPTED.search(line)
+        if accepted:
+            self._accepted = accepted["name"]
+        elif _NO_SESSION in line:
+            return Refused(self._accepted, _CONNECT, "", FULL)
+        elif unaccepted := _UNACCEPTED.search(line):
+            return Refused(_STRANGER, f"{_CONNECT}: {unaccepted['why']}", "", UNTRUSTED)
+        return None
+
+    def _take_message(self, line: str) -> Refused | None:
+        thread = _THREAD.search(line)
+        at = thread[1] if thread else ""
+        if _DROPPED in line:
+            return self._verdicts.pop(at, None)
+        if verdict := _VERDICT.search(line):
+            self._verdicts[at] = _of_verdict(verdict)
+        elif often := _OFTEN.search(line):
+            self._verdicts[at] = Refused(often["session"], "put", often["key"], OFTEN)
+        return None
+
+
+def _of_verdict(verdict: re.Match[str]) -> Refused:
+    """What has been refused if the message is dropped: who may send it, sent too much of it."""
+    reason = DENIED if verdict["un"] else LARGE
+    action = verdict["action"].lower() if verdict["flow"] == "in" else "hear"
+    return Refused(verdict["session"], action, verdict["key"], reason)

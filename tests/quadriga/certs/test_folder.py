@@ -1,0 +1,137 @@
+"""A team's certificates: given once, counted, renewed, revoked, and private."""
+
+from __future__ import annotations
+
+import stat
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from quadriga.certs.certificate import read_certificate
+from quadriga.certs.folder import CertificateFolder
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.security.roll import MOST_VALID, read_numbers
+from quadriga.shared.security.tls import tls_files
+
+NOW = datetime(2026, 3, 1, 12, tzinfo=UTC)
+ROLL = ("r1", "r2", "operator", "probe", "router")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> CertificateFolder:
+    made = CertificateFolder(tmp_path / "certs", ROLL)
+    assert made.make("team", ["router.lab", "10.0.0.1"], NOW, 30.0) == [*ROLL]
+    return made
+
+
+def names(folder: CertificateFolder) -> dict[str, str]:
+    return {each.identity: each.certificate.name for each in folder.standings()}
+
+
+def revoked(folder: CertificateFolder) -> dict[str, int]:
+    return read_numbers(folder.revoked_file.read_text(encoding="utf-8"), "revoked")
+
+
+def test_everybody_gets_what_its_process_needs(folder: CertificateFolder) -> None:
+    assert names(folder) == {name: f"{name}.1" for name in ROLL}
+    for name in ROLL:
+        files = tls_files(str(folder.path), name)
+        assert files.authority.read_bytes() == (folder.path / "authority.pem").read_bytes()
+    assert tls_files(str(folder.path), "probe").key.parent.parent.name == "router"
+
+
+def test_nobody_but_the_owner_reads_a_key(folder: CertificateFolder) -> None:
+    keys = [path for path in folder.path.rglob("*") if path.suffix == ".key" or "key" in path.stem]
+    assert len(keys) == len(ROLL) + 1
+    for path in keys:
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert stat.S_IMODE(folder.path.stat().st_mode) == 0o700
+
+
+def test_a_key_that_others_can_read_is_refused(folder: CertificateFolder) -> None:
+    (folder.path / "r1" / "key.pem").chmod(0o640)
+    with pytest.raises(ConfigError, match=r"r1/key\.pem: got mode 640, expected 600"):
+        tls_files(str(folder.path), "r1")
+
+
+def test_a_certificate_that_is_not_there_is_one_clear_error(folder: CertificateFolder) -> None:
+    with pytest.raises(ConfigError, match=r"no such file.*certificates of r9.*certs make"):
+        tls_files(str(folder.path), "r9")
+
+
+def test_days_are_left_until_it_expires(folder: CertificateFolder) -> None:
+    held = read_certificate(folder.path / "r1" / "certificate.pem")
+    assert held.days_left(NOW) == pytest.approx(30.0)
+    assert held.days_left(NOW + timedelta(days=31)) == pytest.approx(-1.0)
+
+
+def test_only_the_router_has_addresses_and_keeps_them(folder: CertificateFolder) -> None:
+    folder.renew(["router", "r1"], (), NOW, 30.0)
+    hosts = {each.identity: each.certificate.hosts for each in folder.standings()}
+    assert hosts["router"][:2] == ("router.lab", "10.0.0.1")
+    assert {"localhost", "127.0.0.1", "::1"} <= {*hosts["router"]}
+    assert not hosts["r1"]
+    folder.renew(["router"], ["10.0.0.2"], NOW, 30.0)
+    assert folder.standings()[-1].certificate.hosts[0] == "10.0.0.2"
+
+
+def test_made_again_it_gives_only_those_without(folder: CertificateFolder) -> None:
+    larger = CertificateFolder(folder.path, (*ROLL, "r3"))
+    assert larger.make("team", (), NOW, 30.0) == ["r3"]
+    assert names(larger)["r1"] == "r1.1"
+
+
+def test_renewed_a_certificate_has_the_next_number_and_none_is_revoked(
+    folder: CertificateFolder,
+) -> None:
+    assert folder.renew(["r1"], (), NOW, 30.0) == ["r1.2"]
+    assert folder.renew((), (), NOW, 30.0) == ["r1.3", *(f"{name}.2" for name in ROLL[1:])]
+    assert revoked(folder) == {}
+
+
+def test_revoked_are_all_that_were_given_so_far(folder: CertificateFolder) -> None:
+    folder.renew(["r1"], (), NOW, 30.0)
+    assert folder.revoke(["r1"]) == ["r1.1", "r1.2"]
+    assert revoked(folder) == {"r1": 2}
+    assert {each.identity for each in folder.standings() if each.revoked} == {"r1"}
+    assert folder.renew(["r1"], (), NOW, 30.0) == ["r1.3"]
+    assert not any(each.revoked for each in folder.standings())
+    assert folder.revoke(["r1"]) == ["r1.3"]
+
+
+def test_a_number_is_given_once_even_if_its_folder_is_lost(folder: CertificateFolder) -> None:
+    folder.revoke(["r2"])
+    (folder.path / "r2" / "certificate.pem").unlink()
+    folder.make("team", (), NOW, 30.0)
+    assert names(folder)["r2"] == "r2.2"
+
+
+def test_the_router_knows_only_so_many_names(folder: CertificateFolder) -> None:
+    for _ in range(MOST_VALID - 1):
+        folder.renew(["r1"], (), NOW, 30.0)
+    with pytest.raises(ConfigError, match="`quadriga certs revoke r1` first"):
+        folder.renew(["r1"], (), NOW, 30.0)
+
+
+@pytest.mark.parametrize("action", ["renew", "revoke"])
+def test_an_unknown_name_is_refused(folder: CertificateFolder, action: str) -> None:
+    with pytest.raises(ConfigError, match="did you mean 'operator'"):
+        folder.renew(["operater"], (), NOW, 1.0) if action == "renew" else folder.revoke(
+            ["operater"]
+        )
+
+
+def test_the_router_is_not_revoked_by_itself(folder: CertificateFolder) -> None:
+    with pytest.raises(ConfigError, match="who connects to the router"):
+        folder.revoke(["router"])
+
+
+def test_without_the_authority_nothing_is_renewed(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="the authority's key is kept"):
+        CertificateFolder(tmp_path, ROLL).renew(["r1"], (), NOW, 1.0)
+
+
+def test_an_address_that_is_none_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"--router: got 'räuter'"):
+        CertificateFolder(tmp_path / "certs", ROLL).make("team", ["räuter"], NOW, 1.0)

@@ -1,0 +1,94 @@
+"""Lines of Zenoh 1.10's log: which of them tell that somebody was refused something."""
+
+from __future__ import annotations
+
+from quadriga.shared.security.refusals import RefusalParser, Refused
+
+ONE, TWO = "29a8f12d130c0a69d0b4355a58008dfc", "4d6341e01f894aa2fe81b1531d4ab363"
+ACCESS = "zenoh::net::routing::interceptor::access_control"
+
+
+def line(thread: int, text: str, module: str = ACCESS) -> str:
+    return f"2026-11-26T01:17:32.320045Z TRACE  rx-0 ThreadId({thread:02}) {module}: {text}"
+
+
+def verdict(thread: int, session: str, words: str, key: str) -> str:
+    name = f"{session} on CertCommonName(r2.1)+Transport(Tls)+{session}"
+    return line(thread, f"{name} is {words} on {key}")
+
+
+def dropped(thread: int) -> str:
+    return line(thread, "Msg intercepted!", "zenoh::net::routing::interceptor")
+
+
+def take(*lines: str) -> dict[Refused, int]:
+    return dict(RefusalParser().take(lines))
+
+
+def test_a_verdict_is_no_refusal_before_the_message_is_dropped() -> None:
+    words = "unauthorized to Put (ingress)"
+    assert take(verdict(8, ONE, words, "team/r1/command")) == {}
+    assert take(verdict(8, ONE, words, "team/r1/command"), dropped(8)) == {
+        Refused(ONE, "put", "team/r1/command", "denied"): 1
+    }
+
+
+def test_the_last_verdict_before_it_counts() -> None:
+    """Of a key that is declared Zenoh notes beforehand what would be refused."""
+    assert take(
+        verdict(8, ONE, "unauthorized to Query (ingress)", "team/r1/state"),
+        verdict(8, ONE, "unauthorized to Declare/Undeclare Subscriber (ingress)", "team/r1/state"),
+        line(
+            8,
+            f"Using cached result: {ONE} is unauthorized to Declare Subscriber (ingress) "
+            "on team/r1/state",
+        ),
+        dropped(8),
+    ) == {Refused(ONE, "declare subscriber", "team/r1/state", "denied"): 1}
+
+
+def test_threads_are_told_apart_and_one_drop_has_one_verdict() -> None:
+    put = "unauthorized to Put (ingress)"
+    verdicts = verdict(8, ONE, put, "team/a"), verdict(9, TWO, put, "team/b")
+    assert take(*verdicts, dropped(8), dropped(9), dropped(8)) == {
+        Refused(ONE, "put", "team/a", "denied"): 1,
+        Refused(TWO, "put", "team/b", "denied"): 1,
+    }
+
+
+def test_who_may_send_it_but_is_dropped_has_sent_too_much() -> None:
+    cached = f"Using cached result: {ONE} is authorized to Put (ingress) on team/r2/command"
+    assert take(line(8, cached), dropped(8)) == {Refused(ONE, "put", "team/r2/command", "large"): 1}
+
+
+def test_what_comes_too_often_names_the_beginning_of_a_session() -> None:
+    text = (
+        "Message dropped by the downsampling interceptor: Push(team/r2/command) "
+        "from:south:0:client/29a8f12d:2"
+    )
+    module = "zenoh::net::routing::interceptor::downsampling"
+    assert take(line(8, text, module), dropped(8)) == {
+        Refused("29a8f12d", "put", "team/r2/command", "often"): 1
+    }
+
+
+def test_a_link_that_is_not_accepted_is_told_with_its_reason() -> None:
+    hint = "invalid peer certificate: BadSignature. Hint: increase the system open file limit."
+    assert take(line(5, hint, "zenoh_link_tls::unicast")) == {
+        Refused("somebody", "connect: invalid peer certificate: BadSignature", "", "untrusted"): 1
+    }
+
+
+def test_a_session_too_many_is_told_with_whose_certificate_it_has() -> None:
+    accepted = "Accepted TLS connection on 127.0.0.2:7447: 127.0.0.1:53748. Common Name: r1.1."
+    denied = f"Max transports reached (19). Denying new transport with peer: {ONE} at /x.rs:629."
+    assert take(
+        line(5, accepted, "zenoh_link_tls::unicast"),
+        line(5, denied, "zenoh_transport::unicast::manager"),
+    ) == {Refused("r1.1", "connect", "", "full"): 1}
+
+
+def test_colours_do_not_matter() -> None:
+    coloured = dropped(8).replace("TRACE", "\x1b[35mTRACE\x1b[0m")
+    put = verdict(8, ONE, "unauthorized to Put (ingress)", "team/a")
+    assert len(take(put.replace(ACCESS, f"\x1b[2m{ACCESS}\x1b[0m\x1b[2m"), coloured)) == 1
