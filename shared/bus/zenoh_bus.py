@@ -5,15 +5,17 @@ from __future__ import annotations
 import ctypes
 import json
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from queue import Empty, SimpleQueue
+from types import MappingProxyType
 from typing import Any, Final, Self
 
 import zenoh
 
 from quadriga.shared.bus.answers import Answers
 from quadriga.shared.bus.presence import Presence
+from quadriga.shared.bus.trust import check_trust
 from quadriga.shared.bus.zenoh_settings import (
     NO_LINK,
     member_settings,
@@ -26,12 +28,12 @@ from quadriga.shared.members import ROUTER
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep, wall_ns
 from quadriga.shared.wire.about import HERE as HERE
 from quadriga.shared.wire.about import READY as READY
+from quadriga.shared.wire.topics import RECEIVED
 
 Packet = tuple[str, bytes]  # key, payload as received
 Arrival = tuple[int, str, bytes]  # when, ns of `monotonic_ns`, and the packet
 
 POLL: Final = 0.1  # s, longest wait before a loop looks at its stop flag
-_ACK: Final = "received"  # key of the question whether everything before it has arrived
 _ACK_TIMEOUT: Final = 2.0  # s
 _LINK_TIMEOUT: Final = 5.0  # s
 _QUIET: Final = 5.0  # s without a router that need no word
@@ -69,7 +71,7 @@ class Bus:
                 f"{team}/*/*/*", _direct(self._note_token), history=True
             )
         )
-        ack = f"{team}/{name}/{_ACK}"
+        ack = f"{team}/{name}/{RECEIVED}"
         self._declarations.append(
             session.declare_queryable(ack, _direct(lambda query: query.reply(ack, b"")))
         )
@@ -86,8 +88,9 @@ class Bus:
         `stopped` is given; when that takes long this says so on stderr.
 
         Raises:
+            ConfigError: the endpoint is open to others, or a certificate is missing.
             BusError: the endpoint is malformed, cannot be bound, or is already in use; or there
-                is no router.
+                is no router, or it and this process do not trust each other.
             KeyboardInterrupt: `stopped()` came before the router.
         """
         settings = member_settings(bus, name)
@@ -95,6 +98,7 @@ class Bus:
         deadline = begun + (bus.barrier_timeout if stopped else 0.0)
         while True:
             try:
+                check_trust(bus, name)
                 return cls(_open(settings, name), team, name)
             except BusError as error:
                 if NO_LINK not in error.got or monotonic() > deadline:
@@ -128,24 +132,47 @@ class Bus:
         return joined
 
     @classmethod
-    def route(cls, listen: str, team: str) -> Self:
+    def route(
+        cls,
+        listen: str,
+        team: str,
+        bus: BusConfig | None = None,
+        rules: Mapping[str, Any] = MappingProxyType({}),
+    ) -> Self:
         """Be the router through which the processes in client mode reach each other.
 
         It passes on what any team sends, and sees the presence of `team`.
 
         Args:
-            listen: the endpoint they connect to; `tcp/0.0.0.0:PORT` accepts other machines.
+            listen: the endpoint they connect to; `tls/0.0.0.0:PORT` accepts other machines.
             team: the team to look at.
+            bus: the configuration, for its certificates.
+            rules: what it lets through; by default everything.
 
         Raises:
+            ConfigError: the endpoint is open to others, or a certificate is missing.
             BusError: the endpoint is malformed, cannot be bound, or is already in use.
         """
-        return cls(_open(router_settings(listen), ROUTER), team, ROUTER)
+        return cls(_open(router_settings(listen, bus or BusConfig(), rules), ROUTER), team, ROUTER)
 
     @property
     def linked(self) -> bool:
         """Whether anyone is linked to this process at the moment."""
         return bool(self._session.info.links())
+
+    def watch_links(self, note: Callable[[str, str], None]) -> None:
+        """Call `note` for each link that is or comes, with the other side's session and name.
+
+        The name is the common name of its certificate, or else its address.
+        """
+
+        def take(event: zenoh.LinkEvent) -> None:
+            link = event.link
+            note(str(link.zid), link.auth_identifier or link.dst)
+
+        self._declarations.append(
+            self._session.info.declare_link_events_listener(_direct(take), history=True)
+        )
 
     def publisher(self, key: str, *, droppable: bool = False) -> Callable[[bytes], None]:
         """A function that sends a payload on `key`.
@@ -353,7 +380,7 @@ class Bus:
         behind the publications on each link, so its answers say that they have arrived.
         """
         asked = self._session.get(
-            f"{self.team}/*/{_ACK}",
+            f"{self.team}/*/{RECEIVED}",
             target=zenoh.QueryTarget.ALL,
             timeout=_ACK_TIMEOUT,
             consolidation=zenoh.ConsolidationMode.NONE,
@@ -363,6 +390,11 @@ class Bus:
 
     def _note_token(self, sample: zenoh.Sample) -> None:
         self._presence.note(str(sample.key_expr), there=sample.kind == zenoh.SampleKind.PUT)
+
+
+def start_log() -> None:
+    """Have Zenoh write what `RUST_LOG` asks for to the standard output."""
+    zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]
 
 
 def _direct(call: Callable[[Any], None]) -> Any:

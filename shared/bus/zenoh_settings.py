@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final
 
+from quadriga.shared.config.endpoints import check_exposure, is_tls
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
-from quadriga.shared.members import LEADS
+from quadriga.shared.members import LEADS, ROUTER
+from quadriga.shared.security.tls import tls_files, tls_settings
 
 NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
 _COMMON: Final = {
@@ -30,8 +34,15 @@ def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str
         bus: the configuration.
         name: of the process; in peer mode the one that drives time is who they all find.
         hub: be who they find although the name is another.
+
+    Raises:
+        ConfigError: the endpoint is open to others, or a certificate is missing.
     """
     peer = bus.mode == "peer"
+    check_exposure(bus, "bus.endpoint", bus.endpoint)
+    if peer:
+        check_exposure(bus, "bus.listen", bus.listen)
+    secured = is_tls(bus.endpoint)
     hub = peer and (hub or name in LEADS)
     listen = [bus.endpoint] if hub else [bus.listen] if peer else []
     return {
@@ -48,17 +59,31 @@ def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str
         },
         "scouting/gossip/enabled": peer,
         **_COMMON,
+        **(tls_settings(tls_files(bus.certificates, name), listens=False) if secured else {}),
     }
 
 
-def router_settings(listen: str) -> dict[str, Any]:
-    """Settings of the router that clients connect to at endpoint `listen`."""
+def router_settings(listen: str, bus: BusConfig, rules: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of the router that clients connect to at endpoint `listen`.
+
+    Args:
+        listen: where it listens.
+        bus: the configuration.
+        rules: what it lets through, as Zenoh is told it.
+
+    Raises:
+        ConfigError: the endpoint is open to others, or a certificate is missing.
+    """
+    check_exposure(replace(bus, mode="client"), "--listen", listen)
+    secured = is_tls(listen)
     return {
         "mode": "router",
         "connect/endpoints": [],
         "listen/endpoints": [listen],
         "scouting/gossip/enabled": False,
         **_COMMON,
+        **(tls_settings(tls_files(bus.certificates, ROUTER), listens=True) if secured else {}),
+        **rules,
     }
 
 

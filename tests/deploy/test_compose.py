@@ -68,6 +68,9 @@ def test_all_read_the_one_configuration(service: str) -> None:
 
 def test_the_team_meets_at_the_router() -> None:
     assert CONFIG.bus.mode == "client"
+    assert CONFIG.bus.plaintext, (
+        "without certificates, which the endpoint off the loopback must say"
+    )
     _, host, port = re.split("[/:]", CONFIG.bus.endpoint)
     router = arguments_of(host)
     assert router.call is build_parser().parse_args(["router"]).call

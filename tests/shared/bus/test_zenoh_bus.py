@@ -14,7 +14,7 @@ import pytest
 from quadriga.shared.bus import zenoh_bus
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig
-from quadriga.shared.errors import BusError
+from quadriga.shared.errors import BusError, ConfigError
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.team.endpoint import free_endpoint
 
@@ -38,7 +38,7 @@ def opened(endpoint: str) -> Iterator[Open]:
     with ExitStack() as stack:
 
         def open_bus(name: str, team: str = "team", mode: str = "peer") -> Bus:
-            config = BusConfig(mode=mode, endpoint=endpoint)
+            config = BusConfig(mode=mode, endpoint=endpoint, plaintext=True)
             return stack.enter_context(Bus.open(config, team, name))
 
         yield open_bus
@@ -285,7 +285,7 @@ def test_an_endpoint_that_cannot_be_opened(opened: Open, cause: str) -> None:
 def test_where_a_process_listens_is_not_where_it_connects(
     endpoint: str, listen: str, cause: str
 ) -> None:
-    config = BusConfig(endpoint=endpoint, listen=listen)
+    config = BusConfig(endpoint=endpoint, listen=listen, plaintext=True)
     with pytest.raises(BusError, match=rf"^bus\.listen '{listen}' of r1: .*{cause}"):
         Bus.open(config, "team", "r1")
 
@@ -294,6 +294,20 @@ def test_where_a_process_listens_is_not_where_it_connects(
 def test_where_a_process_connects_is_not_where_it_listens(endpoint: str) -> None:
     with pytest.raises(BusError, match=rf"^bus\.endpoint '{endpoint}' of r1: "):
         Bus.open(BusConfig(endpoint=endpoint), "team", "r1")
+
+
+@pytest.mark.parametrize(
+    ("name", "config"),
+    [
+        ("endpoint", BusConfig(endpoint="tcp/203.0.113.1:1")),
+        ("listen", BusConfig(listen="tcp/0.0.0.0:0")),
+    ],
+)
+def test_nobody_is_reached_from_other_machines_unasked(name: str, config: BusConfig) -> None:
+    with pytest.raises(ConfigError, match=rf"bus\.{name}: got .*bus\.plaintext = true"):
+        Bus.open(config, "team", "r1")
+    with pytest.raises(ConfigError, match="--listen: got"):
+        Bus.route("tcp/0.0.0.0:7447", "team")
 
 
 def test_without_a_router_a_client_cannot_start(opened: Open) -> None:
