@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Final
 
 from quadriga.shared.bus.barrier import lead
 from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
+from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
+from quadriga.team.audit import Audit, RefusalLog
+from quadriga.team.router_rules import router_rules
+from quadriga.team.rule_check import check_rules
 
 _STAGES: Final = 3  # waits of the barrier: for the router, for everyone's presence, for readiness
 
@@ -21,6 +26,9 @@ def run(
 ) -> None:
     """Route until SIGINT or SIGTERM, or until one walk is over.
 
+    Where it listens with certificates, it lets through what the team's rights permit, tells what it
+    refuses, and serves only once it has seen that this is so.
+
     Args:
         config: the team's configuration.
         listen: the endpoint the others connect to.
@@ -28,13 +36,34 @@ def run(
         stopped: asked often whether to stop; by default a flag that the two signals raise.
 
     Raises:
-        BusError: the endpoint cannot be opened; or, with `once`, the team did not assemble.
+        ConfigError: the endpoint is open to others, or a certificate is missing.
+        BusError: the endpoint cannot be opened, or its rules are not in force; or, with `once`, the
+            team did not assemble.
     """
     stopped = stopped or stop_on_signals()
-    with Bus.route(listen, config.team.name) as bus:
+    with ExitStack() as stack:
+        bus, tell = _open(stack, config, listen)
         take_priority(config.runtime.priority)  # every command waits for it
         print(f"routing at {listen}", file=sys.stderr, flush=True)
         if once:
-            bus.wait_for(READY, [lead(config)], _STAGES * config.bus.barrier_timeout, stopped)
+            timeout = _STAGES * config.bus.barrier_timeout
+            bus.wait_for(READY, [lead(config)], timeout, stopped, lambda: _pause(tell))
         while not stopped() and (bus.linked or not once):
-            sleep(POLL)
+            _pause(tell)
+
+
+def _open(stack: ExitStack, config: Config, listen: str) -> tuple[Bus, Callable[[], object]]:
+    """The router's bus, and what tells what it has refused since it was called last."""
+    team = config.team.name
+    if not is_tls(listen):
+        return stack.enter_context(Bus.route(listen, team, config.bus)), lambda: None
+    rules, log = router_rules(config), RefusalLog()
+    bus = stack.enter_context(Bus.route(listen, team, config.bus, rules))
+    audit = Audit(bus, log)
+    check_rules(bus, config, listen, audit.tell)
+    return bus, audit.tell
+
+
+def _pause(tell: Callable[[], object]) -> None:
+    tell()
+    sleep(POLL)

@@ -1,0 +1,98 @@
+"""What a router has refused, told to whoever reads its output and to the recording."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from queue import SimpleQueue
+from typing import Final
+
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.zenoh_log import ZenohLog
+from quadriga.shared.security.refusals import LEVELS, MARKERS, RefusalParser, Refused
+from quadriga.shared.wire.codec import encode, truncate_text
+from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.messages import Refusal
+from quadriga.shared.wire.topics import CLOCK, REFUSED
+from quadriga.tables import printable
+
+_MOST: Final = 20  # kinds of refusal that are told at once; a flood of keys must not flood us
+_LONGEST: Final = 200  # characters of a key
+
+
+class RefusalLog:
+    """What Zenoh has refused since this was made, as it comes from its log."""
+
+    def __init__(self) -> None:
+        """Begin; from now on nothing may be printed to the standard output."""
+        self._parser = RefusalParser()
+        self._found: SimpleQueue[Counter[Refused]] = SimpleQueue()
+        self._log = ZenohLog(LEVELS, MARKERS, self._take)
+
+    def take(self) -> Counter[Refused]:
+        """What has come since the last call."""
+        found: Counter[Refused] = Counter()
+        while not self._found.empty():
+            found += self._found.get_nowait()
+        return found
+
+    def _take(self, lines: list[str]) -> None:
+        found = self._parser.take(lines)
+        if found:
+            self._found.put(found)
+
+
+class Audit:
+    """Tells what a router refuses.
+
+    Args:
+        bus: the router's.
+        log: where refusals come from.
+    """
+
+    def __init__(self, bus: Bus, log: RefusalLog) -> None:
+        self._log = log
+        self._names: dict[str, str] = {}  # by session
+        self._tick = self._stamp_ns = 0
+        bus.watch_links(self._note_link)
+        self._clock = bus.collect(CLOCK.key(bus.team))
+        self._put = bus.publisher(REFUSED.key(bus.team), droppable=True)
+
+    def tell(self) -> list[Refused]:
+        """Tell all that has been refused since the last call, and return it."""
+        self._follow_clock()
+        found: Counter[Refused] = Counter()
+        for refused, count in self._log.take().items():
+            found[refused._replace(who=self._name(refused.who))] += count
+        for refused, count in found.most_common(_MOST):
+            self._tell(refused, count)
+        if len(found) > _MOST:
+            print(f"refused: {len(found) - _MOST} more kinds", file=sys.stderr, flush=True)
+        return list(found)
+
+    def _tell(self, refused: Refused, count: int) -> None:
+        key = truncate_text(printable(refused.key), _LONGEST)
+        what = f"{refused.action} {key}".rstrip()
+        print(
+            f"refused: {refused.who}: {what} ({refused.reason}, {count} times)",
+            file=sys.stderr,
+            flush=True,
+        )
+        who, action, reason = refused.who, refused.action, refused.reason
+        self._put(encode(Refusal(self._tick, self._stamp_ns, who, action, key, reason, count)))
+
+    def _follow_clock(self) -> None:
+        arrivals = self._clock()
+        head = envelope(arrivals[-1][2]) if arrivals else None
+        if head is not None:
+            self._tick, self._stamp_ns = head
+
+    def _name(self, session: str) -> str:
+        """The name that goes with a session or its beginning; what is no session stays."""
+        known = self._names.get(session)
+        if known is not None:
+            return known
+        return next((n for s, n in self._names.items() if s.startswith(session)), session)
+
+    def _note_link(self, session: str, name: str) -> None:
+        self._names[session] = name
