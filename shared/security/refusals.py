@@ -29,11 +29,12 @@ _NO_LINK: Final = ". Hint: increase the system open file limit"  # of whatever f
 MARKERS: Final = (_DROPPED, _NO_SESSION, _NO_LINK)  # of the lines that tell a refusal
 _STRANGER: Final = "somebody"  # whose certificate was not accepted, so that it has no name
 _CONNECT: Final = "connect"
+_LONGEST: Final = 1000  # characters of a line that are read: a key may have 65,000
 
 _COLOUR: Final = re.compile(r"\x1b\[[0-9;]*m")
 _THREAD: Final = re.compile(r"ThreadId\((\d+)\)")
 _VERDICT: Final = re.compile(
-    r"(?P<session>[0-9a-f]+)(?: on \S+)? is (?P<un>un)?authorized to "
+    r"\b(?P<session>[0-9a-f]{1,32})(?: on \S+)? is (?P<un>un)?authorized to "
     r"(?P<action>[A-Za-z/ ]+?) \((?P<flow>in|e)gress\) on (?P<key>\S+)"
 )
 _OFTEN: Final = re.compile(
@@ -71,7 +72,7 @@ class RefusalParser:
         """The refusals that these lines tell, with how often."""
         found: Counter[Refused] = Counter()
         for line in lines:
-            refused = self._take(_COLOUR.sub("", line))
+            refused = self._take(_COLOUR.sub("", line[:_LONGEST]))
             if refused is not None:
                 found[refused] += 1
         return found

@@ -95,3 +95,13 @@ def test_a_router_does_not_guess_who_is_revoked(fortress: Fortress) -> None:
     fortress.certificates.revoked_file.unlink()
     with pytest.raises(ConfigError, match=r"router/revoked\.json: got No such file.*certs make"):
         router_rules(fortress.config)
+
+
+def test_without_a_router_there_is_one_clear_error(fortress: Fortress) -> None:
+    with pytest.raises(BusError, match=r"Unable to connect: Connection refused.*quadriga router"):
+        fortress.bus("sim")
+
+
+def test_who_has_no_certificate_does_not_even_try(fortress: Fortress) -> None:
+    with pytest.raises(ConfigError, match=r"player/authority\.pem: got no such file"):
+        fortress.bus("player")

@@ -92,3 +92,12 @@ def test_colours_do_not_matter() -> None:
     coloured = dropped(8).replace("TRACE", "\x1b[35mTRACE\x1b[0m")
     put = verdict(8, ONE, "unauthorized to Put (ingress)", "team/a")
     assert len(take(put.replace(ACCESS, f"\x1b[2m{ACCESS}\x1b[0m\x1b[2m"), coloured)) == 1
+
+
+def test_of_a_long_key_only_the_beginning_is_read() -> None:
+    """What somebody calls a key must not hold up who reads the log."""
+    key = "a" * 65_000
+    (found,) = take(verdict(8, ONE, "unauthorized to Put (ingress)", key), dropped(8))
+    assert (found.who, found.reason) == (ONE, "denied")
+    assert key.startswith(found.key)
+    assert len(found.key) < 1000
