@@ -9,12 +9,12 @@ from typing import Final
 
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.bus.zenoh_log import ZenohLog
+from quadriga.shared.printable import printable_line
 from quadriga.shared.security.refusals import LEVELS, MARKERS, RefusalParser, Refused
 from quadriga.shared.wire.codec import encode, truncate_text
 from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.messages import Refusal
 from quadriga.shared.wire.topics import CLOCK, REFUSED
-from quadriga.tables import printable
 
 _MOST: Final = 20  # kinds of refusal that are told at once; a flood of keys must not flood us
 _LONGEST: Final = 200  # characters of a key
@@ -71,7 +71,7 @@ class Audit:
         return list(found)
 
     def _tell(self, refused: Refused, count: int) -> None:
-        key = truncate_text(printable(refused.key), _LONGEST)
+        key = truncate_text(printable_line(refused.key), _LONGEST)
         what = f"{refused.action} {key}".rstrip()
         print(
             f"refused: {refused.who}: {what} ({refused.reason}, {count} times)",
