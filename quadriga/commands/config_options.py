@@ -67,7 +67,7 @@ def build_config_options(command: str) -> argparse.ArgumentParser:
         group.add_argument(
             "--connect",
             metavar="ENDPOINT",
-            help="through the router at tcp/HOST:PORT: sets bus.mode to client, and bus.endpoint",
+            help="through the router at tls/HOST:PORT: sets bus.mode to client, and bus.endpoint",
         )
     defaults = Config()
     for option, name in (KEYS | KEYS_OF.get(command, {})).items():

@@ -16,6 +16,7 @@ from quadriga.shared.bus.introduction import describe_process
 from quadriga.shared.bus.reach import OPEN, REFUSED, UNTRIED, Reach, is_loopback, try_endpoint
 from quadriga.shared.bus.roster import members, processes
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import DOCTOR
@@ -58,12 +59,15 @@ def _look_at_team(config: Config, me: About) -> tuple[TeamView, Diagnosis]:
     """What is seen of a team without being one of it, and how it is reached."""
     try:
         bus = Bus.open(config.bus, config.team.name, DOCTOR)
-    except BusError:
+    except BusError as error:
+        nobody = frozenset[str]()
+        view = TeamView(False, nobody, nobody, members(config))
+        if is_tls(config.bus.endpoint):  # a handshake has told why
+            return view, Diagnosis(LINK, BAD, f"{error.name}: {error.got}", error.cause)
         reach = try_endpoint(config.bus.endpoint)
         if reach.code == UNTRIED:
             raise
-        nobody = frozenset[str]()
-        return TeamView(False, nobody, nobody, members(config)), _judge_reach(reach, waiting=False)
+        return view, _judge_reach(reach, waiting=False)
     with bus:
         deadline = monotonic() + _LINK_TIMEOUT
         while not bus.linked and monotonic() < deadline:
@@ -81,8 +85,6 @@ def _look_at_team(config: Config, me: About) -> tuple[TeamView, Diagnosis]:
 
 def _judge_reach(reach: Reach, *, waiting: bool) -> Diagnosis:
     """What an attempt to connect says of the way to a team.
-
-    Why a TLS endpoint that is open gives no link, only a handshake tells: its reason belongs here.
 
     Args:
         reach: what came of it.

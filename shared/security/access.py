@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.members import AGENT, LEADS, OBSERVER, PROBE, RECORDER, ROUTER
+from quadriga.shared.members import AGENT, DOCTOR, LEADS, OBSERVER, PROBE, RECORDER, ROUTER
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.security.roll import Identity, team_roll, valid_names
+from quadriga.shared.wire.about import QUESTIONS
 from quadriga.shared.wire.topic import Topic
 from quadriga.shared.wire.topics import (
     CLOCK,
@@ -35,7 +36,7 @@ _PROBED: Final = (ALLOWED, LARGE, MANY)
 _ANYONE: Final = "anyone"
 
 _IN, _OUT, _BOTH = ["ingress"], ["egress"], ["ingress", "egress"]
-_HEARERS: Final = (RECORDER, OBSERVER)  # they hear everything and say nothing
+_HEARERS: Final = (RECORDER, OBSERVER, DOCTOR)  # they hear everything and say nothing
 _OF_LEAD: Final = (CLOCK, TRUTH, CLOCK_ANSWER)  # only who drives time knows
 
 
@@ -128,15 +129,20 @@ def _heard(who: Identity, team: str) -> tuple[str, ...]:
 
 
 def _common_rules(team: str) -> list[dict[str, Any]]:
-    """What everybody with a valid certificate may do: see who is there, and ask for receipts."""
+    """What everybody with a valid certificate may do: see who is there, and ask how it is."""
     tokens = [f"{team}/*/*/*"]
     return [
         _rule("tokens-seen", ["liveliness_token"], _OUT, tokens),
         _rule("tokens-asked", ["liveliness_query", "declare_liveliness_subscriber"], _BOTH, tokens),
         # A publisher sends nothing before it knows that somebody listens.
         _rule("listeners-seen", ["declare_subscriber"], _OUT, [f"{team}/**"]),
-        _rule("receipts", ["declare_queryable", "query", "reply"], _BOTH, [f"{team}/*/{RECEIVED}"]),
+        _rule("questions", ["declare_queryable", "query", "reply"], _BOTH, questions_of(team)),
     ]
+
+
+def questions_of(team: str) -> list[str]:
+    """What anybody may ask a process: whether all has arrived, and who it is."""
+    return [f"{team}/*/{RECEIVED}", *(question.key(team, "*") for question in QUESTIONS)]
 
 
 def _own_rules(rights: Rights, team: str) -> list[dict[str, Any]]:

@@ -18,6 +18,7 @@ from quadriga.shared.members import PROBE
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.security.access import LARGE, MANY
 from quadriga.shared.security.roll import team_roll
+from quadriga.shared.wire.about import QUESTIONS
 from quadriga.shared.wire.codec import MAX_BYTES, MAX_TEXT
 from quadriga.shared.wire.messages import Message
 from quadriga.shared.wire.topic import Topic
@@ -76,6 +77,9 @@ def _sizes(team: str) -> Iterable[dict[str, Any]]:
         yield _size(topic.name, ["put"], topic.key(team, "*"), largest(topic.type))
     yield _size("probe", ["put"], f"{team}/{PROBE}/{LARGE}", PROBE_BYTES)
     yield _size("receipts", ["query", "reply"], f"{team}/*/{RECEIVED}", _ANSWER)
+    for question in QUESTIONS:
+        limit = largest(question.type)
+        yield _size(question.name, ["query", "reply"], question.key(team, "*"), limit)
 
 
 def _size(name: str, messages: list[str], key: str, limit: int) -> dict[str, Any]:

@@ -15,14 +15,24 @@ from typing import Any, Final
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.members import ESTOP, LAUNCHER, OBSERVER, PROBE, ROLES, ROUTER, team_members
+from quadriga.shared.members import (
+    DOCTOR,
+    ESTOP,
+    LAUNCHER,
+    OBSERVER,
+    PROBE,
+    RESUME,
+    ROLES,
+    ROUTER,
+    team_members,
+)
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.topics import TABLE
 
 REVOKED: Final = "revoked.json"  # in the router's folder: by identity the last number revoked
 # Certificates of one identity that are valid at a time; more are given only after a revocation.
 MOST_VALID: Final = 32
-_OTHERS: Final = (LAUNCHER, ESTOP, OBSERVER, PROBE, ROUTER)
+_OTHERS: Final = (LAUNCHER, ESTOP, RESUME, DOCTOR, OBSERVER, PROBE, ROUTER)
 _LOOKS_ON: Final = re.compile(r".+-\d+")  # such as echo-4711
 
 
