@@ -115,7 +115,7 @@ class RuntimeConfig:
         "realtime",
         "-",
         "realtime: in world.mode realtime agents, planner and plants take precedence over ordinary "
-        "processes (SCHED_RR) if the user may do so, in lockstep they are a batch (SCHED_BATCH); "
+        "processes (SCHED_RR) if the user may do so; in lockstep nobody does; "
         "ordinary: as any other",
         choices=("realtime", "ordinary"),
     )

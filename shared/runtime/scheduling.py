@@ -14,26 +14,25 @@ _FIRST: Final = 2  # likewise, before those that walk
 
 
 def take_priority(priority: str, mode: str = REALTIME) -> bool:
-    """Schedule all threads of this process as a walk needs it, if `priority` is `REALTIME`.
+    """Schedule all threads of this process round robin in real time, if `priority` is `REALTIME`.
 
-    In real time that is round robin before ordinary processes: no other program delays a command.
-    The system keeps a share (5 % on Linux) for ordinary ones; the recorder stays one of them. In
-    lock-step, where nobody has to be in time, it is as a batch: as in real time a thread that
-    wakes up does not push out one at work, which costs both their caches, but nobody starves.
+    So a thread that wakes up does not push out one at work, which costs both their caches, and
+    no other program delays a command. The system keeps a share (5 % on Linux) for ordinary
+    processes; the recorder stays one of them. In lock-step, where nobody has to be in time, all
+    are ordinary: recorder and emergency stop would starve.
 
     Args:
         priority: `runtime.priority`.
         mode: `world.mode`.
 
     Returns:
-        Whether it is so now: a user without the right to real time (CAP_SYS_NICE, or an rtprio
-        limit) is not refused, the process merely runs as an ordinary one.
+        Whether it is so now: a user without the right (CAP_SYS_NICE, or an rtprio limit) is not
+        refused, the process merely runs as an ordinary one.
     """
-    if priority != REALTIME:
+    if priority != REALTIME or mode != REALTIME:
         return False
-    policy, level = (os.SCHED_RR, _PRIORITY) if mode == REALTIME else (os.SCHED_BATCH, 0)
     try:
-        _schedule(policy, level)
+        _schedule(os.SCHED_RR, _PRIORITY)
     except OSError as error:
         print(
             f"no real-time scheduling ({error.strerror}): this process runs as an ordinary one",
