@@ -88,7 +88,9 @@ class PlantServer:
             if truth is not None:
                 self._put_truth(encode(truth))
         for name, state in plant.states().items():
-            put = self._put_silent if name in self.silent else self._put_state
+            # Other plants wait for every state in lock-step: theirs may not be lost.
+            droppable = name in self.silent and self.time.alone
+            put = self._put_silent if droppable else self._put_state
             put[name](encode(state))
         self._published = plant.tick
         plant.settle()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import json
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from queue import Empty, SimpleQueue
@@ -15,13 +14,9 @@ import zenoh
 
 from quadriga.shared.bus.answers import Answers
 from quadriga.shared.bus.presence import Presence
+from quadriga.shared.bus.router_wait import RouterWait
 from quadriga.shared.bus.trust import check_trust
-from quadriga.shared.bus.zenoh_settings import (
-    NO_LINK,
-    member_settings,
-    opening_error,
-    router_settings,
-)
+from quadriga.shared.bus.zenoh_settings import member_settings, opening_error, router_settings
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import ROUTER
@@ -36,7 +31,6 @@ Arrival = tuple[int, str, bytes]  # when, ns of `monotonic_ns`, and the packet
 POLL: Final = 0.1  # s, longest wait before a loop looks at its stop flag
 _ACK_TIMEOUT: Final = 2.0  # s
 _LINK_TIMEOUT: Final = 5.0  # s
-_QUIET: Final = 5.0  # s without a router that need no word
 
 
 def _pause() -> None:
@@ -93,23 +87,13 @@ class Bus:
                 is no router, or it and this process do not trust each other.
             KeyboardInterrupt: `stopped()` came before the router.
         """
-        settings = member_settings(bus, name)
-        begun, quiet = monotonic(), True
-        deadline = begun + (bus.barrier_timeout if stopped else 0.0)
+        settings, waits = member_settings(bus, name), RouterWait(bus, name, stopped, POLL)
         while True:
             try:
                 check_trust(bus, name)
                 return cls(_open(settings, name), team, name)
             except BusError as error:
-                if NO_LINK not in error.got or monotonic() > deadline:
-                    raise
-            if stopped and stopped():
-                raise KeyboardInterrupt
-            if quiet and monotonic() - begun > _QUIET:
-                quiet = False
-                said = f"quadriga: {name} waits for a router at {bus.endpoint}"
-                print(said, file=sys.stderr, flush=True)
-            sleep(POLL)
+                waits.go_on(error)
 
     @classmethod
     def join(cls, bus: BusConfig, team: str, name: str) -> Self:

@@ -11,7 +11,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from quadriga.shared.bus import zenoh_bus
+from quadriga.shared.bus import router_wait
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError, ConfigError
@@ -318,7 +318,7 @@ def test_without_a_router_a_client_cannot_start(opened: Open) -> None:
 def test_who_waits_for_a_router_says_so_once(
     endpoint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(zenoh_bus, "_QUIET", 0.0)
+    monkeypatch.setattr(router_wait, "_QUIET", 0.0)
     looks = iter([False, False, False, True])
     config = BusConfig(mode="client", endpoint=endpoint)
     with pytest.raises(KeyboardInterrupt):
