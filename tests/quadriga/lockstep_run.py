@@ -27,6 +27,7 @@ LATE = range(120, 140)  # of these, ticks for which its command was sent too lat
 SCENE = {
     "team.robots": 2, "world.terrain": "boxes", "world.terrain_height": 0.03, "world.seed": 5,
     "world.payload": 3.0, "world.push": "r1:60:90:0.1:0.05", "world.seconds": 0.5,
+    "world.lost_command": "damp",
 }  # fmt: skip
 
 
