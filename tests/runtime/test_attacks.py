@@ -114,10 +114,11 @@ def test_a_stolen_certificate_sends_what_its_owner_may_and_nothing_else(
 ) -> None:
     since = len(fortress.said)
     with stranger(fortress, fortress.files(thief)) as session:
-        publisher = session.declare_publisher(key) if declared else None
+        block = zenoh.CongestionControl.BLOCK  # by default a busy machine would drop some here
+        publisher = session.declare_publisher(key, congestion_control=block) if declared else None
         for _ in range(TRIES):
             if publisher is None:
-                session.put(key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
+                session.put(key, payload, congestion_control=block)
             else:
                 publisher.put(payload)
         assert await_refused(fortress, since, f"{thief}.1", key, "denied|often") == TRIES
