@@ -22,7 +22,8 @@ def rights(**given: object) -> dict[str, Rights]:
 def test_a_robot_sends_under_its_own_key_only() -> None:
     sent = rights()["r1"].publishes
     assert {key for key in sent if key != "team/estop"} == {
-        f"team/r1/{name}" for name in ("command", "measurement", "plan", "status", "inputs")
+        f"team/r1/{name}"
+        for name in ("command", "measurement", "plan", "status", "inputs", "event")
     }
 
 
@@ -33,6 +34,7 @@ def test_a_robot_hears_its_own_state_and_what_its_peers_plan_and_measure() -> No
         "team/*/measurement",
         "team/reference",
         "team/estop",
+        "team/resume",
         "team/sim/truth",
         "team/sim/event",
     }
@@ -42,9 +44,14 @@ def test_the_operator_asks_for_speeds_and_may_stop_the_team() -> None:
     assert {*rights()["operator"].publishes} == {"team/reference", "team/estop"}
 
 
+def test_only_who_resumes_a_walk_may_say_so() -> None:
+    senders = {name for name, each in rights().items() if "team/resume" in each.publishes}
+    assert senders == {"resume"}
+
+
 def test_anyone_in_the_team_may_stop_it_and_who_only_hears_says_nothing() -> None:
     for name, each in rights().items():
-        hears_only = name in ("recorder", "observer")
+        hears_only = name in ("recorder", "observer", "doctor")
         assert ("team/estop" in each.publishes) is (not hears_only and name != "probe"), name
         assert not (hears_only and each.publishes)
         assert not hears_only or each.hears == ("team/**",)
