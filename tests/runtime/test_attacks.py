@@ -105,7 +105,6 @@ def await_refused(fortress: Fortress, since: int, who: str, key: str, word: str)
         ("observer", "team/reference", FAST),
         ("launcher", "team/refused", bytes(50)),
         ("r1", "team/of/strangers", bytes(50)),
-        ("r1", "other/r1/command", bytes(500)),
     ],
 )
 @pytest.mark.parametrize("declared", [False, True])
