@@ -37,7 +37,7 @@ from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Event, Status, Truth
 from quadriga.shared.wire.topics import EVENT, STATUS, topic_of
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec, process_table
+from quadriga.team.launch import Launch, ProcessSpec, process_table, router_row
 from quadriga.team.run_folder import CONFIG
 
 _STEADY_S: Final = 4.0  # from the begin of a walk to its steady part
@@ -83,10 +83,7 @@ def _rows(config: Config, folder: Path, routed: bool) -> Sequence[ProcessSpec]:
     if find_kind(config.planner.kind).needs_predictor:
         predictor = ensure_predictor(config, Console(stderr=True))
     rows = process_table(config, folder, predictor, "", armed=config.team.plant == BRIDGED)
-    if not routed:
-        return rows
-    command = (*QUADRIGA, "router", "--listen", config.bus.endpoint)
-    return (ProcessSpec(ROUTER, (*command, "--config", str(folder / CONFIG)), 5.0), *rows)
+    return (router_row(config, folder), *rows) if routed else rows
 
 
 class _Trial:

@@ -27,7 +27,7 @@ from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Clock
 from quadriga.shared.wire.topics import CLOCK
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec, process_table
+from quadriga.team.launch import Launch, process_table, router_row
 from quadriga.team.run_folder import CONFIG
 
 _EARLIEST_S, _LATEST_S = 1.5, 4.0  # from the begin of a walk until something goes wrong
@@ -62,8 +62,7 @@ def run_fault_trial(
     (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
     rows = process_table(config, folder, predictor, "")
     if fault.process == ROUTER:
-        command = (*QUADRIGA, "router", "--listen", config.bus.endpoint)
-        rows = (ProcessSpec(ROUTER, (*command, "--config", str(folder / CONFIG)), 5.0), *rows)
+        rows = (router_row(config, folder), *rows)
     with Launch(rows, folder / "logs") as launch:
         trial = _FaultTrial(config, fault, robot, tick, launch)
         moment = trial.run()

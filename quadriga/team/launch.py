@@ -14,7 +14,7 @@ from typing import Final, Self
 from quadriga.shared.bus.barrier import processes
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.members import LAST, LEADS, RECORDER, SIM, Member, has_lead
+from quadriga.shared.members import LAST, LEADS, RECORDER, ROUTER, SIM, Member, has_lead
 from quadriga.shared.runtime.clock import monotonic, sleep
 
 _ONE_THREAD: Final = (
@@ -26,6 +26,7 @@ _ONE_THREAD: Final = (
 QUADRIGA: Final = (sys.executable, "-m", "quadriga")
 _LAST_WORDS: Final = 12  # lines of a failed process's log that are shown
 _LOOK: Final = 0.05  # s
+_ROUTER_GRACE: Final = 5.0  # s
 _EARLY: Final = 4.0  # s, by which others may leave before who drives time: it closes politely
 
 
@@ -77,6 +78,12 @@ def process_table(
         return ProcessSpec(member.name, (*QUADRIGA, command, *options), role.grace + rest, rest)
 
     return tuple(map(build_row, processes(config)))
+
+
+def router_row(config: Config, run_dir: Path) -> ProcessSpec:
+    """The router of a walk in client mode, which is started before all others."""
+    words = ("router", "--listen", config.bus.endpoint, "--config", str(run_dir / "config.toml"))
+    return ProcessSpec(ROUTER, (*QUADRIGA, *words), _ROUTER_GRACE)
 
 
 class Launch:

@@ -126,6 +126,20 @@ def test_a_stolen_certificate_sends_what_its_owner_may_and_nothing_else(
     assert {each.who for each in told} == {f"{thief}.1"}
 
 
+def test_a_stolen_certificate_sends_nothing_under_another_team_s_name(
+    fortress: Fortress, recorder: Bus
+) -> None:
+    """Not declared: a declared publisher sends nothing once it knows that nobody listens."""
+    since, key = len(fortress.said), "other/r1/command"
+    with stranger(fortress, fortress.files("r1")) as session:
+        for _ in range(TRIES):
+            session.put(key, bytes(500), congestion_control=zenoh.CongestionControl.BLOCK)
+        assert await_refused(fortress, since, "r1.1", key, "denied") == TRIES
+        told = refusals(heard(fortress, recorder))
+    assert [(each.who, each.key) for each in told] == [("r1.1", key)] * len(told)
+    assert sum(each.count for each in told) == TRIES
+
+
 def test_a_stolen_certificate_hears_what_its_owner_may_and_nothing_else(
     fortress: Fortress, recorder: Bus
 ) -> None:
