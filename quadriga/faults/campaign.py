@@ -88,6 +88,8 @@ def describe_row(row: dict[str, Any]) -> str:
         return f"no result: {row['error'].splitlines()[0]}"
     parts = [f"at {row['robot']}, {1e-3 * row['tick']:.2f} s"]
     parts.append(f"fell: {', '.join(row['falls']) or 'none'}")
+    if row["lowered"]:
+        parts.append(f"led down: {', '.join(row['lowered'])}")
     for name, title in (("detect_ms", "noticed after"), ("stand_ms", "others stood after")):
         if row[name] is not None:
             parts.append(f"{title} {row[name]} ms")

@@ -39,9 +39,11 @@ def describe_outcome(
 
     `detect_ms` is the time from the fault until an agent no longer walks, or the world announces
     that a robot is silent or gone; None if nobody ever noticed. `stand_ms` is the time until all
-    others stand, or are damped; None if they walked on. `lost_messages` counts what the recording
-    lacks of the other robots, and the states and commands of all robots that it lacks before the
-    fault because it ends too early.
+    others stand, or are damped; None if they walked on. `lowered` are robots that the world has led
+    down since no commands came; their agents' last words in `status` may be of before.
+    `lost_messages` counts what the recording lacks of the other robots, in real time also commands
+    that were never sent, and the states and commands of all robots that it lacks before the fault
+    because it ends too early.
 
     Args:
         config: of the walk.
@@ -63,6 +65,7 @@ def describe_outcome(
         "robots": config.team.robots,
         "falls": fallen,
         "falls_of_others": sum(name in fallen for name in others),
+        "lowered": sorted({e.robot for e in traces.events if e.code == codes.LOWERED}),
         "detect_ms": _after(tick, _first_notice(traces, tick)),
         "stand_ms": _after(tick, _all_stand(traces.statuses, others, tick)),
         "lost_messages": _count_lost(config, traces, moment),

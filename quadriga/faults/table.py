@@ -13,15 +13,17 @@ from quadriga.shared.wire.codes import TIME_OVER, code_of
 from quadriga.tables import NOTHING, Table
 
 _COLUMNS: Final = (
-    *("fault", "tries", "no result", "walked on", "stood", "falls", "falls of others"),
+    *("fault", "tries", "no result", "walked on", "stopped", "falls", "falls of others"),
     *("noticed ms p50", "max", "others stood ms p50", "max", "lost messages"),
     "most frequent reason",
 )
 _NOTE: Final = """\
-"walked on": all robots walked until the time was over; "stood": somebody stopped, and nobody fell.
+"walked on": all robots walked until the time was over; "stopped": somebody stopped, or was led down
+by the world, and nobody fell.
 "noticed": from the fault until an agent no longer walked or the world said that a robot is silent
 or gone; "others stood": until all other robots stood or were damped. Falls and times are of the
-tries with a result. "lost messages": what the recordings lack, the faulty robot's own aside."""
+tries with a result. "lost messages": what the recordings lack, the faulty robot's own aside; in
+real time also commands of ticks that an agent did not answer."""
 
 
 def build_team_fault_table(rows: Sequence[dict[str, Any]]) -> Table:
@@ -55,7 +57,8 @@ def _cells(every: Sequence[dict[str, Any]]) -> list[str]:
 
 def _has_walked_on(row: dict[str, Any]) -> bool:
     walks = all(what == "walk" for what in row["status"].values())
-    return walks and not row["falls"] and code_of(row["end"]) == TIME_OVER
+    stopped = row["falls"] or row["lowered"]
+    return walks and not stopped and code_of(row["end"]) == TIME_OVER
 
 
 def _reasons(row: dict[str, Any]) -> list[str]:

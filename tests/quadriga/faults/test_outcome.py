@@ -69,6 +69,7 @@ def test_what_the_world_announces_is_a_notice_and_the_fault_itself_is_not(
     events = [
         Event.of(FAULT, codes.FAULT_BEGINS, "r2", "imu stuck"),
         Event.of(FAULT + 70, codes.GONE, "r2", "gone"),
+        Event.of(FAULT + 90, codes.LOWERED, "r2", "no command"),
         Event.of(FAULT + 900, codes.FALL, "r2", "tilt"),
         Event.of(FAULT + 950, codes.FALL, "r3", "tilt"),
     ]
@@ -77,6 +78,7 @@ def test_what_the_world_announces_is_a_notice_and_the_fault_itself_is_not(
     assert row["detect_ms"] == 70
     assert row["falls"] == ["r2", "r3"]
     assert row["falls_of_others"] == 1
+    assert row["lowered"] == ["r2"]
 
 
 def test_the_tick_of_a_signal_is_that_of_the_newest_state_by_then(write_run: WriteRun) -> None:
