@@ -55,7 +55,7 @@ class ComponentFault:
 
     @property
     def detail(self) -> str:
-        """Detail of the events that announce its beginning and its end."""
+        """Detail of the event that announces its beginning."""
         return f"{self.component} {self.kind}"
 
 

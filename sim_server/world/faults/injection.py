@@ -52,7 +52,8 @@ class Injection:
         for fault in self._faults:
             found.append(Event.of(fault.start, codes.FAULT_BEGINS, fault.robot, fault.detail))
             if fault.stop is not None:
-                found.append(Event.of(fault.stop, codes.FAULT_ENDS, fault.robot, fault.detail))
+                detail = f"{fault.component} sound again"
+                found.append(Event.of(fault.stop, codes.FAULT_ENDS, fault.robot, detail))
         return found
 
     def distort_states(self, states: Mapping[str, State]) -> dict[str, State]:

@@ -31,7 +31,7 @@ def test_a_faulty_sensor_lies_and_the_truth_does_not() -> None:
     told = [(e.tick, e.code, e.robot, e.detail) for e in events if e.kind == "fault"]
     assert told == [
         (100, codes.FAULT_BEGINS, "r2", "accel stuck"),
-        (150, codes.FAULT_ENDS, "r2", "accel stuck"),
+        (150, codes.FAULT_ENDS, "r2", "accel sound again"),
     ]
 
 
