@@ -68,7 +68,7 @@ def run(
             return
         rehearse_central(config, Central(config, planner))
         end_collection()
-        take_priority(config.runtime.priority, config.world.mode)
+        take_priority(config.runtime.priority)
         bus.declare(READY)
         try:
             shell.work(stopped)

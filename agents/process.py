@@ -72,7 +72,7 @@ def run(
         rehearse(config, Agent(config, robot, predictor))
         shell = _Shell(config, agent, inbox, bus)
         end_collection()
-        take_priority(config.runtime.priority, config.world.mode)
+        take_priority(config.runtime.priority)
         bus.declare(READY)
         try:
             shell.walk(stopped)

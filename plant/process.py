@@ -68,7 +68,7 @@ def run(
         if not meet(bus, config, stopped):
             return
         end_collection()
-        take_priority(config.runtime.priority, config.world.mode)
+        take_priority(config.runtime.priority)
         try:
             end = _walk(server, pace, stopped)
             if time.drives:

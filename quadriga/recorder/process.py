@@ -22,6 +22,7 @@ from quadriga.shared.members import RECORDER, has_lead
 from quadriga.shared.recording.admission import LARGEST, Admission
 from quadriga.shared.recording.writer import END
 from quadriga.shared.runtime.clock import sleep
+from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.topics import EVENT
 
@@ -90,6 +91,8 @@ def run(
                 session = Session(bus, parts, keys, config, stopped, say)
                 me = None if selection.at_once else Introduction(bus, config, predictor_sha256)
                 role = _join(bus, config, stopped, me)
+                if config.world.mode == "lockstep":  # else the others leave it nothing
+                    take_priority(config.runtime.priority)
                 if role == MEMBER:
                     bus.declare(READY)
                 if role:

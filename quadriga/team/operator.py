@@ -72,7 +72,7 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
         if not meet(bus, config, stopped):
             return
         # Without a reference the robots stop.
-        take_priority(config.runtime.priority, config.world.mode)
+        take_priority(config.runtime.priority)
         try:
             _operate(config, bus, stopped)
         finally:

@@ -114,8 +114,7 @@ class RuntimeConfig:
     priority: str = key(
         "realtime",
         "-",
-        "realtime: in world.mode realtime agents, planner and plants take precedence over ordinary "
-        "processes (SCHED_RR) if the user may do so; in lockstep nobody does; "
-        "ordinary: as any other",
+        "realtime: agents, planner and plants, in lockstep also the recorder, take precedence over "
+        "ordinary processes (SCHED_RR) if the user may do so; ordinary: as any other",
         choices=("realtime", "ordinary"),
     )

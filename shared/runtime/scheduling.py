@@ -13,23 +13,22 @@ _PRIORITY: Final = 1  # of 99: before every ordinary process, after everything e
 _FIRST: Final = 2  # likewise, before those that walk
 
 
-def take_priority(priority: str, mode: str = REALTIME) -> bool:
+def take_priority(priority: str) -> bool:
     """Schedule all threads of this process round robin in real time, if `priority` is `REALTIME`.
 
     So a thread that wakes up does not push out one at work, which costs both their caches, and
     no other program delays a command. The system keeps a share (5 % on Linux) for ordinary
-    processes; the recorder stays one of them. In lock-step, where nobody has to be in time, all
-    are ordinary: recorder and emergency stop would starve.
+    processes. In real time the recorder stays one of them; in lock-step, where agents and world
+    wait for nothing but each other, it would starve, and is scheduled like them.
 
     Args:
         priority: `runtime.priority`.
-        mode: `world.mode`.
 
     Returns:
         Whether it is so now: a user without the right (CAP_SYS_NICE, or an rtprio limit) is not
         refused, the process merely runs as an ordinary one.
     """
-    if priority != REALTIME or mode != REALTIME:
+    if priority != REALTIME:
         return False
     try:
         _schedule(os.SCHED_RR, _PRIORITY)
