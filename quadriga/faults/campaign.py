@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from rich.console import Console
 
-from quadriga.faults.catalogue import TeamFault
+from quadriga.faults.fault import TeamFault
 from quadriga.faults.trial import run_fault_trial
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.shared.config.sections import Config

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.faults.catalogue import OWN, TeamFault
+from quadriga.faults.fault import Draw, FaultScene, Strike, TeamFault
 from quadriga.faults.outcome import Moment, describe_outcome
 from quadriga.recordings.summary import RECORDING
 from quadriga.recordings.traces import read_traces
@@ -54,74 +54,74 @@ def run_fault_trial(
         ProcessError: the team did not begin to walk.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    draw = draw_fault(config, seed)
+    with fault.stage(_walk_config(config, fault, draw), draw, folder) as stage:
+        config = stage.config
+        (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
+        rows = process_table(config, folder, predictor, "")
+        if config.bus.mode == "client":
+            rows = (router_row(config, folder), *rows)
+        with Launch(tuple(map(stage.wrap, rows)), folder / "logs") as launch:
+            scene = FaultScene(config, draw, folder, launch)
+            moment = _FaultTrial(scene, stage.strike).run()
+    outcome = _describe(config, moment, folder)
+    return {"fault": fault.name, "seed": seed} | outcome | scene.facts
+
+
+def draw_fault(config: Config, seed: int) -> Draw:
+    """Whom a fault meets, and when: chance of the seed alone."""
     chance = np.random.default_rng((seed, 1))
     names = robot_names(config.team.robots)
     robot = names[chance.integers(len(names))]
     tick = config.gait.stand_ms + round(1000 * chance.uniform(_EARLIEST_S, _LATEST_S))
-    config = _with_fault(config, fault, seed, robot, tick)
-    (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
-    rows = process_table(config, folder, predictor, "")
-    if fault.process == ROUTER:
-        rows = (router_row(config, folder), *rows)
-    with Launch(rows, folder / "logs") as launch:
-        trial = _FaultTrial(config, fault, robot, tick, launch)
-        moment = trial.run()
-    return {"fault": fault.name, "seed": seed} | _describe(config, moment, folder)
+    return Draw(robot, tick, seed)
 
 
-def _with_fault(config: Config, fault: TeamFault, seed: int, robot: str, tick: int) -> Config:
-    seconds = 1e-3 * tick + (fault.seconds or 0.0) + _AFTER_S
+def _walk_config(config: Config, fault: TeamFault, draw: Draw) -> Config:
     world = replace(
         config.world,
-        seed=seed,
+        seed=draw.seed,
         mode="realtime" if fault.realtime else "lockstep",
-        seconds=max(config.world.seconds, seconds),
+        seconds=max(config.world.seconds, 1e-3 * draw.tick + _AFTER_S),
     )
-    if fault.component:
-        text = f"{robot}/{fault.component} {1e-3 * tick:g}"
-        text += "" if fault.seconds is None else f" {fault.seconds:g}"
-        world = replace(world, faults=text)
-    mode = "client" if fault.process == ROUTER else config.bus.mode
-    bus = replace(config.bus, endpoint=free_endpoint(), mode=mode)
+    bus = replace(config.bus, endpoint=free_endpoint())
     return replace(config, world=world, bus=bus, recorder=replace(config.recorder, enabled=True))
 
 
 class _FaultTrial:
-    def __init__(
-        self, config: Config, fault: TeamFault, robot: str, tick: int, launch: Launch
-    ) -> None:
-        self._config, self._fault, self._launch = config, fault, launch
-        self._robot, self._tick = robot, tick
-        self._patient = robot if fault.process == OWN else fault.process
+    def __init__(self, scene: FaultScene, strike: Strike | None) -> None:
+        self._scene, self._strike = scene, strike
+        self._config, self._launch = scene.config, scene.launch
 
     def run(self) -> Moment:
         """Wait for the moment, let the fault happen, and wait until the walk is over."""
-        if not self._fault.process:
+        draw = self._scene.draw
+        if self._strike is None:
             self._await_end()
-            return Moment(self._robot, self._tick)
+            return Moment(draw.robot, draw.tick)
         with Bus.open(self._config.bus, self._config.team.name, LAUNCHER, lambda: False) as bus:
             bus.subscribe(CLOCK.key(bus.team))
-            clock = self._await_tick(bus)
-        pid, begun, at = self._launch.pids[self._patient], monotonic(), wall_ns()
-        for number, after in self._fault.signals:
-            sleep(begun + after - monotonic())
-            os.kill(pid, number)
+            tick = self._await_tick(bus)
+        at = wall_ns()
+        self._strike(self._scene)
         self._await_end()
-        with suppress(OSError):  # one that stands still could not be told to leave
-            os.kill(pid, signal.SIGKILL)
-        return Moment(self._robot, clock, at)
+        for name in self._scene.struck & self._launch.pids.keys():
+            with suppress(OSError):  # it has ended by itself
+                os.kill(self._launch.pids[name], signal.SIGKILL)
+        return Moment(draw.robot, tick, at)
 
     def _await_tick(self, bus: Bus) -> int:
         """Wait until the world's clock has come to the moment of the fault; what it shows then."""
-        deadline = monotonic() + _START_S + 1e-3 * self._tick
+        wanted = self._scene.draw.tick
+        deadline = monotonic() + _START_S + 1e-3 * wanted
         while monotonic() < deadline and has_lead(self._launch.alive):
             for _, payload in bus.drain():
                 with suppress(MessageError):
                     tick = decode(payload, Clock).tick
-                    if tick >= self._tick:
+                    if tick >= wanted:
                         return tick
             sleep(_LOOK)
-        raise ProcessError("the team", "no walk", f"one that comes to {1e-3 * self._tick:g} s")
+        raise ProcessError("the team", "no walk", f"one that comes to {1e-3 * wanted:g} s")
 
     def _await_end(self) -> None:
         deadline = monotonic() + _START_S + self._config.world.seconds + _SLACK_S
@@ -129,7 +129,7 @@ class _FaultTrial:
             sleep(10 * _LOOK)
         # All others leave by themselves once the world has ended.
         deadline = monotonic() + _LEAVE_S
-        while self._launch.alive - {self._patient, ROUTER} and monotonic() < deadline:
+        while self._launch.alive - self._scene.struck - {ROUTER} and monotonic() < deadline:
             sleep(10 * _LOOK)
 
 

@@ -1,17 +1,22 @@
-import signal
+import sys
+from pathlib import Path
 
 import pytest
 
 from quadriga.faults.campaign import REALTIME_ROBOTS, config_for
-from quadriga.faults.catalogue import FAULTS, OWN, TeamFault, select_faults
-from quadriga.shared.bus.barrier import members
+from quadriga.faults.catalogue import BY_NAME, FAULTS, select_faults
+from quadriga.faults.fault import FaultScene, TeamFault
+from quadriga.faults.trial import draw_fault
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.members import ROUTER
+from quadriga.shared.members import OPERATOR
 from quadriga.shared.robot.robots import ROBOTS
 from quadriga.sim_server.world.faults.components import build_components
 from quadriga.sim_server.world.faults.fault import parse_faults
+from quadriga.team.launch import Launch, ProcessSpec
+
+_SLEEPER = ProcessSpec(OPERATOR, (sys.executable, "-c", "import time; time.sleep(60)"), 1.0)
 
 
 def test_faults_by_name_in_the_order_of_the_table() -> None:
@@ -23,23 +28,38 @@ def test_faults_by_name_in_the_order_of_the_table() -> None:
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
-def test_every_fault_is_one_that_can_be_made(fault: TeamFault) -> None:
-    assert bool(fault.process) != bool(fault.component)
-    assert bool(fault.process) == bool(fault.signals)
-    assert fault.process in {"", OWN, ROUTER, *members(Config())}
-    if fault.signals:
-        times = [after for _, after in fault.signals]
-        assert times == sorted(times)
-        assert times[0] == 0.0
-    if fault.component:
-        for kind in ROBOTS.values():
-            parse_faults(f"r1/{fault.component} 1", ("r1",), tuple(build_components(kind)))
+def test_every_fault_is_one_that_can_be_made(fault: TeamFault, tmp_path: Path) -> None:
+    draw = draw_fault(Config(), 7)
+    for kind in ROBOTS:
+        config = load(None, {"team.robot": kind})
+        with fault.stage(config, draw, tmp_path) as stage:
+            components = tuple(build_components(ROBOTS[kind]))
+            parsed = parse_faults(stage.config.world.faults, ("r1", "r2", "r3"), components)
+            assert bool(parsed) == (stage.strike is None) == (not fault.realtime)
+            for found in parsed:
+                assert found.robot == draw.robot
+                assert found.start == draw.tick
 
 
-def test_who_is_paused_goes_on() -> None:
-    for fault in FAULTS:
-        if fault.name.endswith("-paused"):
-            assert [number for number, _ in fault.signals] == [signal.SIGSTOP, signal.SIGCONT]
+def test_who_is_paused_goes_on(tmp_path: Path) -> None:
+    draw = draw_fault(Config(), 7)
+    with Launch([_SLEEPER], tmp_path) as launch:
+        scene = FaultScene(Config(), draw, tmp_path, launch)
+        with BY_NAME["operator-paused"].stage(Config(), draw, tmp_path) as stage:
+            assert stage.strike is not None
+            stage.strike(scene)
+        pid = launch.pids[OPERATOR]
+        state = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0]
+        assert state in {"R", "S"}  # not T
+        assert scene.struck == {OPERATOR}
+
+
+def test_chance_of_the_seed_alone_decides_whom_and_when() -> None:
+    draws = [draw_fault(Config(), seed) for seed in range(60)]
+    assert draws == [draw_fault(Config(), seed) for seed in range(60)]
+    assert {draw.robot for draw in draws} == {"r1", "r2", "r3"}
+    begin = Config().gait.stand_ms
+    assert all(begin + 1500 <= draw.tick <= begin + 4000 for draw in draws)
 
 
 def test_in_real_time_no_more_robots_walk_than_a_computer_keeps_up_with() -> None:

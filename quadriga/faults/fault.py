@@ -1,0 +1,99 @@
+"""What a fault of a team is: how its walk is prepared, and what happens at its moment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
+
+from quadriga.shared.config.sections import Config
+from quadriga.team.launch import Launch, ProcessSpec
+
+
+class Draw(NamedTuple):
+    """What the seed has drawn for a walk.
+
+    Attributes:
+        robot: whom the fault meets, if it meets a robot or its agent.
+        tick: world time of the fault, ms.
+        seed: of the world; further chance is drawn from it.
+    """
+
+    robot: str
+    tick: int
+    seed: int
+
+
+@dataclass(slots=True)
+class FaultScene:
+    """A team that walks, as a fault finds it.
+
+    Attributes:
+        config: of the walk.
+        draw: what the seed has drawn.
+        folder: of the walk: configuration, logs, recording.
+        launch: its processes.
+        struck: processes that need not leave by themselves any more; they are killed at the end.
+        facts: what the fault itself has to tell; they become fields of the row.
+    """
+
+    config: Config
+    draw: Draw
+    folder: Path
+    launch: Launch
+    struck: set[str] = field(default_factory=set)
+    facts: dict[str, Any] = field(default_factory=dict)
+
+
+Strike: TypeAlias = Callable[[FaultScene], None]
+
+
+def _unchanged(row: ProcessSpec) -> ProcessSpec:
+    return row
+
+
+class Stage(NamedTuple):
+    """A walk that is prepared for a fault.
+
+    Attributes:
+        config: it is walked with this. In client mode a router is started with it.
+        strike: is called at the fault's moment; None where the world itself makes the fault.
+        wrap: each process is started as the row that this makes of its own.
+    """
+
+    config: Config
+    strike: Strike | None = None
+    wrap: Callable[[ProcessSpec], ProcessSpec] = _unchanged
+
+
+SetStage: TypeAlias = Callable[[Config, Draw, Path], AbstractContextManager[Stage]]
+
+
+@dataclass(frozen=True, slots=True)
+class TeamFault:
+    """One thing that goes wrong.
+
+    Attributes:
+        name: on the command line and in tables.
+        what: in words.
+        stage: prepares its walk: gets the configuration, what was drawn and the walk's folder.
+            What it has set up it takes down on leaving.
+        realtime: whether it is tried in real time, or in lock-step.
+    """
+
+    name: str
+    what: str
+    stage: SetStage
+    realtime: bool = True
+
+
+def strike_with(strike: Strike) -> SetStage:
+    """The stage of a fault that needs no more than its moment."""
+
+    @contextmanager
+    def stage(config: Config, _draw: Draw, _folder: Path) -> Iterator[Stage]:
+        yield Stage(config, strike)
+
+    return stage

@@ -1,0 +1,72 @@
+"""Faults of processes: they are killed, or stand still."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Final, TypeAlias
+
+from quadriga.faults.fault import Draw, FaultScene, SetStage, Stage, TeamFault, strike_with
+from quadriga.shared.config.sections import Config
+from quadriga.shared.members import OPERATOR, RECORDER, ROUTER, SIM
+from quadriga.shared.runtime.clock import monotonic, sleep
+
+_OWN: Final = "robot"  # in place of a process: the agent of the robot that the seed draws
+_PAUSE_S: Final = 0.3  # of a process that stands still for a while
+
+_Signals: TypeAlias = tuple[tuple[signal.Signals, float], ...]
+"""Each with the time since the first, s."""
+
+_KILL: Final[_Signals] = ((signal.SIGKILL, 0.0),)
+_STOP: Final[_Signals] = ((signal.SIGSTOP, 0.0),)
+_PAUSE: Final[_Signals] = ((signal.SIGSTOP, 0.0), (signal.SIGCONT, _PAUSE_S))
+
+
+class _Strike:
+    """Send a process its signals."""
+
+    def __init__(self, process: str, signals: _Signals) -> None:
+        self._process, self._signals = process, signals
+
+    def __call__(self, scene: FaultScene) -> None:
+        name = scene.draw.robot if self._process == _OWN else self._process
+        scene.struck.add(name)  # one that stands still could not be told to leave
+        pid, begun = scene.launch.pids[name], monotonic()
+        for number, after in self._signals:
+            sleep(begun + after - monotonic())
+            os.kill(pid, number)
+
+
+def _stage(process: str, signals: _Signals) -> SetStage:
+    strike = _Strike(process, signals)
+    if process != ROUTER:
+        return strike_with(strike)
+
+    @contextmanager
+    def stage(config: Config, _draw: Draw, _folder: Path) -> Iterator[Stage]:
+        yield Stage(replace(config, bus=replace(config.bus, mode="client")), strike)
+
+    return stage
+
+
+_PAUSED: Final = f"it stands still for {_PAUSE_S:g} s"
+_ROUTER_KILLED: Final = "the router is killed: nobody hears anybody"
+
+PROCESS_FAULTS: Final = (
+    TeamFault("agent-killed", "an agent's process is killed", _stage(_OWN, _KILL)),
+    TeamFault("agent-frozen", "an agent's process stands still", _stage(_OWN, _STOP)),
+    TeamFault("agent-paused", _PAUSED, _stage(_OWN, _PAUSE)),
+    TeamFault("operator-killed", "the operator's process is killed", _stage(OPERATOR, _KILL)),
+    TeamFault("operator-frozen", "it stands still", _stage(OPERATOR, _STOP)),
+    TeamFault("operator-paused", _PAUSED, _stage(OPERATOR, _PAUSE)),
+    TeamFault("recorder-killed", "the recorder is killed", _stage(RECORDER, _KILL)),
+    TeamFault("recorder-paused", _PAUSED, _stage(RECORDER, _PAUSE)),
+    TeamFault("sim-paused", "the world stands still", _stage(SIM, _PAUSE)),
+    TeamFault("router-killed", _ROUTER_KILLED, _stage(ROUTER, _KILL)),
+    TeamFault("router-paused", _PAUSED, _stage(ROUTER, _PAUSE)),
+)
+"""In the order of the table."""
