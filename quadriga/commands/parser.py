@@ -43,6 +43,7 @@ from quadriga.commands import (
     tune,
     version,
     walk,
+    whatif,
 )
 from quadriga.commands.command import Run
 from quadriga.commands.config_options import build_config_options, read_config
@@ -57,11 +58,10 @@ INTERRUPTED: Final = 130
 # In the order of `quadriga --help`.
 _COMMANDS: Final = (
     walk.add, scenarios.add, sim.add, bridge.add, desk.add, fault.add, agent.add, plan.add,
-    record.add, report.add, play.add, resim.add, export.add, info.add, recover.add, check.add,
-    echo.add, hz.add, replay.add, router.add, certs.add, doctor.add, prepare.add, operate.add,
-    collect.add, fit.add, probe.add, campaign.add, experiments.add, tune.add, estop.add, resume.add,
-    config.add,
-    version.add,
+    record.add, report.add, play.add, resim.add, whatif.add, export.add, info.add, recover.add,
+    check.add, echo.add, hz.add, replay.add, router.add, certs.add, doctor.add, prepare.add,
+    operate.add, collect.add, fit.add, probe.add, campaign.add, experiments.add, tune.add,
+    estop.add, resume.add, config.add, version.add,
 )  # fmt: skip
 
 

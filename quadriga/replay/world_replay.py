@@ -51,7 +51,7 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
     Raises:
         RecordingError: not of a lock-step world, or with commands missing from the file.
     """
-    config = _computable_config(recording)
+    config = read_computable_config(recording)
     world, heard, lost_commands = World(config), _Heard(), LostCommands(config)
     keys = {
         name: (STATE.key(config.team.name, name), COMMAND.key(config.team.name, name))
@@ -96,7 +96,7 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
         )
 
 
-def _computable_config(recording: Recording) -> Config:
+def read_computable_config(recording: Recording) -> Config:
     """The configuration of a walk that can be computed again.
 
     Raises:

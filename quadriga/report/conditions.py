@@ -18,10 +18,12 @@ from quadriga.report.window import (
     SLIP,
     TILT,
     TORQUE,
+    YOKE,
     cut_window,
     find_lost_stance,
     passive_since,
 )
+from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import N_LEGS, Leg
 from quadriga.shared.wire.messages import Plan
@@ -46,7 +48,7 @@ class Condition:
 
 COLUMNS: Final = (
     "tilt at the end", "greatest tilt", "fastest slip", "stance without ground",
-    "torque at most", "planned force at a limit", "plans", "oldest input",
+    "torque at most", "strongest yoke", "planned force at a limit", "plans", "oldest input",
 )  # fmt: skip
 
 
@@ -60,6 +62,7 @@ def assess_robot(run: Run, index: int, tick: int) -> Condition:
     cells = (
         *_assess_trunk(window),
         *_assess_feet(window),
+        _find_strongest_yoke(run, index, tick),
         *_assess_planning(run, index, tick),
         _find_oldest_input(run, robot, tick),
     )
@@ -88,6 +91,26 @@ def _assess_feet(window: Samples) -> Iterator[tuple[str, bool]]:
     yield named or "none", bool(named)
     torque = float(window.torque.max())
     yield f"{100 * min(torque, 1.0):.0f} %", torque >= TORQUE
+
+
+def _find_strongest_yoke(run: Run, index: int, tick: int) -> tuple[str, bool]:
+    """The greatest force in a yoke of the robot, and whether it is more than its weight bears."""
+    truth, team = run.traces.truth, run.traces.config.team
+    pairs = yoke_pairs(team.robots, team.yokes)
+    own = [k for k, pair in enumerate(pairs) if index in pair]
+    kept = (truth.tick > tick - BEFORE_MS) & (truth.tick <= tick)
+    if not own:
+        return "no yoke", False
+    if not kept.any() or truth.yoke_force.shape[1:] != (len(pairs),):
+        return "not recorded", False
+    forces = truth.yoke_force[kept][:, own]
+    sample, yoke = np.unravel_index(np.abs(forces).argmax(), forces.shape)
+    force = float(forces[sample, yoke])
+    peer = run.traces.robots[sum(pairs[own[yoke]]) - index]
+    at = (tick - int(truth.tick[kept][sample])) / 1000
+    how = "pushes" if force > 0.0 else "pulls"
+    text = f"{peer} {how} with {abs(force):.0f} N, {at:.2f} s before"
+    return text, abs(force) > YOKE * run.traces.config.robot.weight
 
 
 def _assess_planning(run: Run, index: int, tick: int) -> Iterator[tuple[str, bool]]:

@@ -14,6 +14,7 @@ TOGETHER_MS: Final = 200  # troubles this close are one episode
 TILT: Final = 0.25  # rad; walks on rough ground stay below
 SLIP: Final = 0.2  # m/s; feet in stance roll at up to 0.06
 TORQUE: Final = 0.98  # share of the limit
+YOKE: Final = 0.5  # of a robot's weight, force in a yoke; on even ground it stays below 0.15
 _LOST_MS: Final = 40  # ms of scheduled stance without contact
 
 

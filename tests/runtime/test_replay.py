@@ -26,6 +26,7 @@ from quadriga.replay.team_replay import replay
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.errors import ConfigError, RecordingError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.wire.codes import BACK
 from quadriga.shared.wire.messages import (
@@ -39,6 +40,7 @@ from quadriga.shared.wire.messages import (
 )
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
+from quadriga.what_if.what_if import Branch, WhatIf, answer_what_if
 from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
 from tests.runtime.conftest import DATA, WAIT
 from tests.runtime.frozen import PATIENCE, await_event, await_tick, freeze
@@ -104,6 +106,45 @@ def test_lock_step_is_replayed_to_the_byte(
     assert all("measurements equal to the byte" in line for line in lines)
     assert not list(Recording(lockstep).messages(Consumed)), "nothing unusual happened"
     check_exact(lockstep, replayed(lockstep))
+
+
+def answered(path: Path, out: Path, *robots: str, **keys: Any) -> Branch:
+    """What would have happened had `section__key` been changed from 0.6 s on."""
+    given: dict[str, dict[str, Any]] = {}
+    for name, value in keys.items():
+        section, _, key = name.partition("__")
+        given.setdefault(section, {})[key] = value
+    return answer_what_if(WhatIf(path, 0.6, given, None, robots, out), Console(stderr=True))
+
+
+def test_what_would_have_happened(lockstep: Path, tmp_path: Path) -> None:
+    same = answered(lockstep, tmp_path)
+    assert (same.equal, same.parted) == (2000, None)
+    assert all(before == after for _, before, after in same.table.rows)
+    pushed = answered(lockstep, tmp_path, world__push="r2:900:90:0.7:0.2")
+    assert pushed.parted == 701, "the first state after the push's first tick"
+    tilts = [row for row in pushed.table.rows if row[0] == "r2, tilt at most [rad]"]
+    assert float(tilts[0][2]) > 2 * float(tilts[0][1])
+    # The agent's command is another one at once; the motors are some ticks behind it.
+    lower = answered(lockstep, tmp_path, "r1", controller__swing_height=0.02)
+    assert lower.parted is not None
+    assert 601 <= lower.parted <= 605
+    assert lower.equal == 2 * lower.parted, "all of both robots before, none after"
+    assert pushed.figure.stat().st_size > 10_000
+
+
+def test_what_cannot_be_asked_of_a_walk(lockstep: Path, tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"another walk: tick 0, .*up to 0\.6 s"):
+        answered(lockstep, tmp_path, world__seed=6)
+    with pytest.raises(ConfigError, match="--robot: got 'r3', expected one of r1, r2"):
+        answered(lockstep, tmp_path, "r3")
+    with pytest.raises(ConfigError, match=r"team: got team\.robots 2 → 3"):
+        answered(lockstep, tmp_path, team__robots=3)
+    with pytest.raises(ConfigError, match=r"planner\.kind: got 'centralised'"):
+        answered(lockstep, tmp_path, planner__kind="centralised")
+    late = WhatIf(lockstep, 1.5, {}, None, (), tmp_path)
+    with pytest.raises(ConfigError, match=r"--from: got 1\.5 s, expected a time up to 0\.99 s"):
+        answer_what_if(late, Console(stderr=True))
 
 
 def test_a_planted_bit_in_a_state_is_found_at_its_tick(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -112,6 +113,23 @@ def test_a_foot_that_slides_is_told_from_one_that_stands(write_run: WriteRun) ->
     assert marked
     assert float(text.split()[0]) == pytest.approx(0.51, abs=0.02)
     assert cell(trouble, "r1", "fastest slip") == ("0.00 m/s, FL", False)
+
+
+def test_a_strong_yoke_is_told_with_its_other_end(write_run: WriteRun) -> None:
+    def pulled(_key: str, message: Message) -> Message:
+        if isinstance(message, Truth) and message.tick == 1300:
+            return replace(message, yoke_force=np.full_like(message.yoke_force, -90.0))
+        return message
+
+    trouble = find_only(write_short(write_run, pulled, extra=fallen(FALL)))
+    text, marked = cell(trouble, "r2", "strongest yoke")
+    assert re.fullmatch(r"r1 pulls with 90 N, 0\.\d\d s before", text)
+    assert marked
+
+
+def test_a_weak_yoke_is_nothing_unusual(write_run: WriteRun) -> None:
+    trouble = find_only(write_short(write_run, extra=fallen(FALL)))
+    assert cell(trouble, "r2", "strongest yoke")[1] is False
 
 
 def test_plans_that_failed_aged_or_pushed_at_their_limits_are_found(write_run: WriteRun) -> None:
