@@ -31,7 +31,14 @@ def add(add_command: AddCommand) -> None:
         metavar="FILE",
         help="the team's, or another to see what it changes",
     )
-    command.add_argument(
+    moment = command.add_mutually_exclusive_group()
+    moment.add_argument(
+        "--save-qp",
+        type=float,
+        metavar="S",
+        help="save the whole-body QP and the planner's from this time on [s]",
+    )
+    moment.add_argument(
         "--break",
         type=float,
         metavar="S",
@@ -57,13 +64,16 @@ def run(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
 
     path, robot = arguments.file, arguments.robot
     options = (given, arguments.predictor, arguments.out)
-    if arguments.stop_at is None:
+    saving = arguments.save_qp is not None
+    moment = arguments.save_qp if saving else arguments.stop_at
+    if moment is None:
         robots = () if arguments.all else (robot,)
         outcomes = replay(path, robots, *options, Console(stderr=True))
     elif arguments.all:
-        raise ConfigError("--break", "--all", "--robot NAME", "one debugger, one robot")
+        option = "--save-qp" if saving else "--break"
+        raise ConfigError(option, "--all", "--robot NAME", "one moment of one robot")
     else:
-        outcomes = [replay_to_breakpoint(path, robot, *options, arguments.stop_at)]
+        outcomes = [replay_to_breakpoint(path, robot, *options, moment, save_qp=saving)]
     for outcome in outcomes:
         print(printable(format_outcome(outcome)))
     recording, failed = Recording(path), any(outcome.failed for outcome in outcomes)

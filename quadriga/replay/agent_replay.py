@@ -15,6 +15,7 @@ from quadriga.replay.comparison import Comparison, ReplayedStep, ReplayVerdict
 from quadriga.replay.config_changes import change_config, check_agents, format_changes
 from quadriga.replay.figure import Curves, draw
 from quadriga.replay.outcome import ReplayOutcome, format_inputs
+from quadriga.replay.problem_saver import ProblemSaver
 from quadriga.replay.recorded_inputs import RecordedInputs
 from quadriga.replay.recorded_predictor import find_predictor
 from quadriga.replay.saved_qp import PLANNER, WHOLE_BODY, problems_of, save
@@ -53,14 +54,16 @@ class ReplayJob:
 
 
 def replay_agent(
-    job: ReplayJob, show: Show = lambda doing, tick: None, stop_at: Breakpoint | None = None
+    job: ReplayJob,
+    show: Show = lambda doing, tick: None,
+    stop_at: Breakpoint | ProblemSaver | None = None,
 ) -> ReplayOutcome:
     """Replay one robot.
 
     Args:
         job: whose replay, and how.
         show: called with what is being done.
-        stop_at: where to stop in the debugger, if anywhere.
+        stop_at: where to stop in the debugger, or what saves the QPs of a moment.
 
     Raises:
         QuadrigaError: as `quadriga.replay.team_replay.replay`.
@@ -81,7 +84,7 @@ def replay_agent(
     wall = monotonic() - begun
     if stop_at is not None and not stop_at.reached:
         raise ConfigError(
-            "--break",
+            stop_at.option,
             f"{stop_at.tick / 1000:g} s",
             f"a time up to {log.last / 1000:g} s",
             f"{job.robot} has no step after it",
@@ -91,6 +94,8 @@ def replay_agent(
         files = (_draw_curves(job, curves, changed),)
     elif verdict.first is not None:
         files = _save_problem(job, current, verdict)
+    if stop_at is not None:
+        files += stop_at.files
     outcome = ReplayOutcome(
         job.robot,
         verdict,
@@ -120,7 +125,7 @@ def _replay_steps(
     inputs: RecordedInputs,
     comparison: Comparison,
     show: Show,
-    stop_at: Breakpoint | None,
+    stop_at: Breakpoint | ProblemSaver | None,
     *,
     changed: bool,
 ) -> None:

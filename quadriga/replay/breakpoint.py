@@ -13,9 +13,14 @@ class Breakpoint:
     """A stop before the first step from a tick on.
 
     Attributes:
+        option: what the user asked for it with.
         tick: the tick.
         reached: whether the replay has come to it.
+        files: what it has written: nothing.
     """
+
+    option = "--break"
+    files = ()
 
     def __init__(self, tick: int) -> None:
         self.tick = tick

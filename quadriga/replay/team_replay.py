@@ -15,6 +15,7 @@ from quadriga.progress import build_progress
 from quadriga.replay.agent_replay import ReplayJob, replay_agent
 from quadriga.replay.breakpoint import Breakpoint
 from quadriga.replay.outcome import ReplayOutcome
+from quadriga.replay.problem_saver import ProblemSaver
 from quadriga.shared.errors import ConfigError, QuadrigaError, RecordingError, name_file_errors
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
@@ -90,8 +91,12 @@ def replay_to_breakpoint(
     predictor: Path | None,
     out: Path | None,
     seconds: float,
+    *,
+    save_qp: bool = False,
 ) -> ReplayOutcome:
     """Replay one robot with a stop in the debugger before the step at a time, s.
+
+    With `save_qp` it saves the QPs of that step instead.
 
     Raises:
         ConfigError: that is no time.
@@ -99,11 +104,14 @@ def replay_to_breakpoint(
         KeyboardInterrupt: the user has left the debugger.
     """
     if not isfinite(seconds):
-        raise ConfigError("--break", f"{seconds}", "a time [s]")
+        option = ProblemSaver.option if save_qp else Breakpoint.option
+        raise ConfigError(option, f"{seconds}", "a time [s]")
     _choose_robots((robot,), robot_names(recorded_config(Recording(path)).team.robots))
     job = ReplayJob(path, robot, given, predictor, _make_folder(path, out))
     try:
-        return replay_agent(job, stop_at=Breakpoint(round(1000 * seconds)))
+        tick = round(1000 * seconds)
+        stop_at = ProblemSaver(tick, job.out) if save_qp else Breakpoint(tick)
+        return replay_agent(job, stop_at=stop_at)
     except bdb.BdbQuit:
         raise KeyboardInterrupt from None
 

@@ -23,8 +23,7 @@ _QUANTITIES: Final = (  # title, least span, of one robot
 
 
 def draw_branch(
-    recorded: WalkCourse,
-    branch: WalkCourse,
+    walks: tuple[WalkCourse, WalkCourse],
     robots: tuple[str, ...],
     moment: int,
     path: Path,
@@ -32,9 +31,17 @@ def draw_branch(
 ) -> None:
     """Write it: a column for each robot.
 
+    Args:
+        walks: the recorded one and the other one.
+        robots: their names.
+        moment: where the walks part, ms.
+        path: of the picture.
+        title: what is different, in words.
+
     Raises:
         RecordingError: it cannot be written.
     """
+    recorded, branch = walks
     panels = [
         Panel(
             f"{robot}: {name}",

@@ -103,7 +103,7 @@ def answer_what_if(question: WhatIf, console: Console) -> Branch:
     table = build_what_if_table(config, recorded, branch, change.moment, changed)
     figure = question.out / f"whatif-{change.moment}.png"
     names = robot_names(config.team.robots)
-    draw_branch(recorded, branch, names, change.moment, figure, table.title)
+    draw_branch((recorded, branch), names, change.moment, figure, table.title)
     return Branch(table, equal, parted, figure)
 
 

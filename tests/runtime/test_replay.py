@@ -108,6 +108,17 @@ def test_lock_step_is_replayed_to_the_byte(
     check_exact(lockstep, replayed(lockstep))
 
 
+def test_the_qps_of_a_moment_are_saved(lockstep: Path, tmp_path: Path) -> None:
+    arguments = ["replay", str(lockstep), "--robot", "r2", "--out", str(tmp_path)]
+    assert main([*arguments, "--save-qp", "0.702"]) == 0
+    found = {path.name: load_qp(path) for path in tmp_path.glob("*.npz")}
+    # The planner's next step after 702 is that of 720.
+    assert set(found) == {"replay-r2-702-command.npz", "replay-r2-720-plan.npz"}
+    for qp in found.values():
+        np.testing.assert_allclose(qp.solve(), qp.x, atol=1e-5)
+    assert main([*arguments, "--save-qp", "7"]) == 2
+
+
 def answered(path: Path, out: Path, *robots: str, **keys: Any) -> Branch:
     """What would have happened had `section__key` been changed from 0.6 s on."""
     given: dict[str, dict[str, Any]] = {}
