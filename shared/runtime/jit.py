@@ -27,10 +27,11 @@ _MARK: Final = "\n@compiled"
 def compiled(function: F) -> F:
     """Compile `function` with numba and keep the machine code on disk for the next process.
 
+    Where no folder can be written to, each process compiles for itself.
     NUMBA_DISABLE_JIT=1 leaves it plain Python. `fastmath` stays off: results must not depend
     on how the compiler reorders sums.
     """
-    return cast(F, numba.njit(cache=True)(function))
+    return cast(F, numba.njit(cache=_KEPT)(function))
 
 
 def sources(root: Path) -> Sequence[Path]:
@@ -58,8 +59,8 @@ def digest() -> str:
     return made_of.hexdigest()[:16]
 
 
-def _key_by_all_sources() -> None:
-    """Keep machine code by all it is made of.
+def _key_by_all_sources() -> bool:
+    """Keep machine code by all it is made of; False if no folder for it can be written to.
 
     numba looks at a function's own file alone: after a change of a function that it calls, or of a
     constant from another file, it would go on with the old code.
@@ -77,8 +78,9 @@ def _key_by_all_sources() -> None:
             folder.mkdir(parents=True, exist_ok=True)
             if os.access(folder, os.W_OK):
                 numba.config.CACHE_DIR = str(folder)
-                return
+                return True
+    return False
 
 
 count_references_plainly()
-_key_by_all_sources()
+_KEPT: Final = _key_by_all_sources()

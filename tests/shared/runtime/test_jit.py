@@ -97,6 +97,12 @@ def test_so_it_is_in_a_folder_that_the_user_names(package: Path, tmp_path: Path)
     assert not list((package / "quadriga" / "shared" / "__pycache__").glob("compiled-*"))
 
 
+def test_where_nothing_can_be_kept_each_process_compiles_for_itself(package: Path) -> None:
+    assert run(package, NUMBA_CACHE_DIR="/proc/none") == (2.5, 0)
+    assert run(package, NUMBA_CACHE_DIR="/proc/none") == (2.5, 0)
+    assert not list((package / "quadriga" / "shared" / "__pycache__").glob("compiled-*"))
+
+
 def test_the_sources_are_those_with_compiled_functions_and_what_they_import() -> None:
     root = places.SOURCE
     found = {str(path.relative_to(root)) for path in jit.sources(root)}
