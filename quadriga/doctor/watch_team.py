@@ -1,0 +1,140 @@
+"""SHELL of a doctor that stays: looks at a team again and again, and writes down who is healthy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+from quadriga.doctor.health import Health, judge_team
+from quadriga.shared.bus.inquiry import ask, view_of
+from quadriga.shared.bus.introduction import describe_process
+from quadriga.shared.bus.roster import processes
+from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError, MessageError, name_file_errors
+from quadriga.shared.members import DOCTOR, has_lead
+from quadriga.shared.printable import printable_line
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.signals import stop_on_signals
+from quadriga.shared.security.refusals import DENIED
+from quadriga.shared.security.roll import split_common_name
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Refusal
+from quadriga.shared.wire.topics import REFUSED
+
+EVERY: Final = 5.0  # s between two looks, each of which costs every process an answer
+_REMEMBERED: Final = 30.0  # s, for which it counts that something was denied
+_OVER: Final = 1.0  # s without who drives time after which the walk is over
+_LOST: Final = 15.0  # s without a link after which nobody is waited for: a router may come back
+
+
+def watch_team(config: Config, folder: Path, stopped: Callable[[], bool] | None = None) -> None:
+    """Write a file for each process of a team, until its walk is over or this is stopped.
+
+    The file `<folder>/<name>` says in one line whether the process is healthy, or why not. It is
+    written anew at each look, so one that is old says nothing. At the end all are removed.
+
+    Args:
+        config: the team's configuration.
+        folder: an existing folder.
+        stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
+
+    Raises:
+        ConfigError: the folder cannot be written to.
+        BusError: the bus cannot be opened.
+    """
+    stopped, files = stopped or stop_on_signals(), HealthFiles(folder)
+    files.write((Health(DOCTOR),))
+    try:
+        with Bus.open(config.bus, config.team.name, DOCTOR, stopped) as bus:
+            _watch(bus, config, files, stopped)
+    finally:
+        files.remove()
+
+
+def _watch(bus: Bus, config: Config, files: HealthFiles, stopped: Callable[[], bool]) -> None:
+    me, team = describe_process(config, DOCTOR), processes(config)
+    refusals, end = Refusals(bus), WalkEnd(bus)
+    while not (stopped() or end.is_over()):
+        due = monotonic() + EVERY
+        view = view_of(bus, config, ask(bus), me)
+        files.write(judge_team(team, view, refusals.recent()))
+        while monotonic() < due and not (stopped() or end.is_over()):
+            sleep(POLL)
+
+
+class HealthFiles:
+    """A file for each process, there whole or not at all; none need outlive a crash."""
+
+    def __init__(self, folder: Path) -> None:
+        """Begin with none of them."""
+        self._folder, self._written = folder, set[Path]()
+
+    def write(self, found: tuple[Health, ...]) -> None:
+        """Write down what was found.
+
+        Raises:
+            ConfigError: the folder cannot be written to.
+        """
+        expected = "an existing folder that can be written to"
+        with name_file_errors(ConfigError, f"--watch {self._folder}", expected):
+            for health in found:
+                path = self._folder / health.name
+                partial = path.with_name(f".{health.name}.partial")
+                partial.write_text(f"{health.line}\n", encoding="utf-8")
+                partial.replace(path)
+                self._written.add(path)
+
+    def remove(self) -> None:
+        """Remove all of them."""
+        for path in self._written:
+            path.unlink(missing_ok=True)
+
+
+class Refusals:
+    """What the router tells that it has denied, and to whom.
+
+    What was too large or came too often is no matter of trust.
+    """
+
+    def __init__(self, bus: Bus) -> None:
+        """Listen from now on."""
+        self._take = bus.collect(REFUSED.key(bus.team))
+        self._last: dict[str, tuple[float, str]] = {}
+
+    def recent(self) -> dict[str, str]:
+        """By identity what was denied last, if that is not long ago."""
+        now = monotonic()
+        for _, _, payload in self._take():
+            with suppress(MessageError):
+                refusal = decode(payload, Refusal)
+                if refusal.reason == DENIED:
+                    what = printable_line(f"{refusal.action} {refusal.key}")
+                    identity, _ = split_common_name(refusal.who)
+                    self._last[identity] = now, f"the router denies it: {what}"
+        self._last = {who: told for who, told in self._last.items() if now - told[0] < _REMEMBERED}
+        return {who: text for who, (_, text) in self._last.items()}
+
+
+class WalkEnd:
+    """Whether a walk that was seen is over, or nobody can be seen any more."""
+
+    def __init__(self, bus: Bus) -> None:
+        """Begin before the walk."""
+        self._bus, self._walks = bus, False
+        self._seen = self._unlinked = monotonic()  # who drives time, and no link, for the last time
+
+    def is_over(self) -> bool:
+        """Whether to wait no longer; asked often."""
+        now, linked = monotonic(), self._bus.linked
+        if has_lead(self._bus.members_at(READY)):
+            self._walks, self._seen = True, now
+        elif linked and not self._walks:
+            self._seen = now
+        if not linked:
+            self._unlinked = now
+            return now - self._seen > _LOST
+        # Who is there is seen some moments after a link has come back.
+        return now - max(self._seen, self._unlinked) > _OVER
