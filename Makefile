@@ -8,7 +8,7 @@ TOOLS := $(VENV)/.tools
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install walk test lint fuzz fuzz-readers drops starts endurance format docs figures clip acceptance bench bench-planner bench-recorder
+.PHONY: install walk test test-containers image-lock lint fuzz fuzz-readers drops starts endurance format docs figures clip acceptance bench bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -39,6 +39,17 @@ lint: $(TOOLS)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# A team in real containers, of Docker or Podman, one of which is killed; some five minutes, and
+# as many more for the first image. BASE, GL and BUILD_OPTIONS: deploy/README.md.
+test-containers: $(TOOLS)
+	$(BIN)/python -m tests.containers $(ARGS)
+
+# deploy/image.lock: what an image is made of, in the versions of requirements.lock, with hashes.
+image-lock: $(TOOLS)
+	echo 'setuptools>=77' | $(BIN)/uv pip compile --quiet pyproject.toml - -c requirements.lock \
+		--generate-hashes --no-annotate --custom-compile-command 'make image-lock' \
+		--python-version 3.11 --python-platform linux --only-binary :all: -o deploy/image.lock
 
 # A million damaged packets through the bridges of every kind of robot; some six minutes.
 fuzz: $(TOOLS)
