@@ -1,0 +1,179 @@
+"""`make test-containers`: a team in real containers, one of which is killed and started again.
+
+It builds the image, makes the certificates, starts the services of docker-compose.yml, waits until
+the engine finds all of them healthy, kills the agent of r2 in the midst of the walk and starts it
+again, reads the recording, and takes everything down. The exit status is 0 if all went as it
+should, 1 if not, 2 if there is no engine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from quadriga.recordings.check import check, format_findings
+from quadriga.recordings.gaps import missing_ticks
+from quadriga.recordings.traces import read_traces
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.signals import interrupt_on_sigterm
+from quadriga.shared.wire import codes
+from tests.containers.engine import CommandError, Containers, find_engine
+
+ROBOTS: Final = 2
+KILLED: Final = "r2"
+SERVICES: Final = ("router", "doctor", "recorder", "sim", "r1", "r2", "operator")
+TEAM: Final = """
+[bus]
+mode = "client"
+endpoint = "tls/router:7447"
+certificates = "/secrets"
+barrier_timeout = 300.0
+
+[world]
+seconds = {seconds}
+
+[identification]
+seconds = 60.0
+"""
+_PATIENCE: Final = 240.0  # s, far more than any step takes on a busy machine
+_LOOK: Final = 1.0  # s
+_BEGUN = monotonic()
+
+
+class Failure(Exception):
+    """Something was not as it should be."""
+
+
+def say(text: str) -> None:
+    print(f"{monotonic() - _BEGUN:6.1f} s  {text}", flush=True)
+
+
+def expect(condition: bool, text: str) -> None:
+    """Fail with this text if something is not so."""
+    if not condition:
+        raise Failure(text)
+
+
+def wait_until(condition: Callable[[], str], what: str) -> None:
+    """Wait until `condition()` names nothing that is missing."""
+    deadline = monotonic() + _PATIENCE
+    while missing := condition():
+        expect(monotonic() < deadline, f"not {what} after {_PATIENCE:g} s: {missing}")
+        sleep(_LOOK)
+    say(what)
+
+
+def unwell(team: Containers) -> str:
+    """Which services are not healthy, and why."""
+    found = [name for name in SERVICES if not team.is_healthy(name)]
+    return "; ".join(f"{name}: {team.health(name)}" for name in found)
+
+
+def unaware(team: Containers) -> str:
+    """Who of those that walk does not say yet that it cannot hear the killed one."""
+    names = [name for name in SERVICES if name not in (KILLED, "router", "doctor")]
+    return "; ".join(
+        f"{name}: {text}" for name in names if f"hear {KILLED}" not in (text := team.health(name))
+    )
+
+
+def walk(team: Containers, folder: Path, *, rejoins: bool) -> None:
+    """Walk in containers, kill an agent, start it again, and judge what was recorded."""
+    team.build()
+    say("image built")
+    team.up(*SERVICES)
+    say("certificates made, predictor fitted, all started")
+    wait_until(lambda: unwell(team), "all services are healthy")
+    team.kill(KILLED)
+    wait_until(lambda: unaware(team), f"{KILLED} is killed, nobody who walks is healthy without it")
+    team.start(KILLED)
+    if rejoins:
+        wait_until(lambda: unwell(team), f"{KILLED} is started again, and all are healthy")
+    else:
+        wait_until(
+            lambda: KILLED if team.state(KILLED)[0] else "", f"{KILLED} was not let in again"
+        )
+        expect("a team that walks already" in team.log(KILLED), team.log(KILLED))
+    wait_until(
+        lambda: ", ".join(name for name in SERVICES if team.state(name)[0]),
+        "the walk is over, all services have left",
+    )
+    statuses = {name: team.state(name)[1] for name in SERVICES if name != KILLED}
+    expect(not any(statuses[name] for name in statuses if name != "recorder"), f"{statuses}")
+    team.copy("recorder", "/work/runs", folder)
+    judge(folder, rejoins=rejoins)
+
+
+def judge(folder: Path, *, rejoins: bool) -> None:
+    """Hold the recording against the rules: nobody fell, the peer stood, the end was announced."""
+    (run,) = folder.iterdir()
+    findings = check(run / "run.mcap")
+    said = "\n".join(format_findings(findings))
+    # Nobody waits for the killed one: its states may come in bursts, of which a router drops some.
+    expect(all(finding.passed for finding in findings if finding.name != "gaps"), said)
+    traces = read_traces(Recording(run / "run.mcap"))
+    missing = missing_ticks(traces.config, traces.ticks)
+    own = f"{traces.config.team.name}/{KILLED}/"
+    lost = {key: count for key, count in missing.items() if count and not key.startswith(own)}
+    expect(not lost, f"the recording lacks {lost}")
+    events = {event.code for event in traces.events}
+    expect(codes.FALL not in events, "a robot fell")
+    expect({codes.GONE, codes.TIME_OVER} <= events, f"{events}")
+    expect((codes.BACK in events) == rejoins, f"{events}")
+    modes = {status.mode for status in traces.statuses["r1"]}
+    expect("stand" in modes, f"r1 has not stood: {modes}")
+    wanted = {"run.mcap", "summary.json", "report.html", "walk.png"}
+    expect(wanted <= {path.name for path in run.iterdir()}, "the report is not whole")
+    say(f"the recording is whole, nobody fell; events: {', '.join(sorted(events))}")
+
+
+def main() -> int:
+    """Run it; the exit status."""
+    parser = argparse.ArgumentParser(prog="make test-containers", description=__doc__)
+    parser.add_argument("--rejoin", action="store_true", help="a restarted agent walks on")
+    parser.add_argument("--seconds", type=float, default=40.0, help="of the walk")
+    arguments = parser.parse_args()
+    interrupt_on_sigterm()  # whoever ends it leaves nothing behind either
+    engine = find_engine()
+    if engine is None:
+        print(
+            "test-containers: neither Docker with Compose nor Podman with podman-compose runs here",
+            file=sys.stderr,
+        )
+        return 2
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "team.toml").write_text(TEAM.format(seconds=arguments.seconds), encoding="utf-8")
+        (folder / "runs").mkdir()
+        variables = {"TEAM": str(folder / "team.toml"), "TEAM_SIZE": str(ROBOTS)}
+        team, status = Containers(engine, variables), 1
+        try:
+            walk(team, folder / "runs", rejoins=arguments.rejoin)
+            status = 0
+        except (Failure, CommandError) as error:
+            print(f"test-containers: {error}", file=sys.stderr)
+            _show_logs(team)
+        finally:
+            team.down()
+    if left := team.left():
+        print(f"test-containers: left behind: {', '.join(left)}", file=sys.stderr)
+        return 1
+    say(f"all is taken down; {'passed' if status == 0 else 'failed'}")
+    return status
+
+
+def _show_logs(team: Containers) -> None:
+    for service in SERVICES:
+        try:
+            print(f"--- {service}\n{team.log(service)[-1500:]}", file=sys.stderr)
+        except (CommandError, IndexError):
+            print(f"--- {service}: no container", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
