@@ -41,6 +41,8 @@ def test_the_unit_starts_the_agent_of_its_instance_and_waits_as_long_as_the_othe
     arguments = build_parser().parse_args(words[1:])
     assert (arguments.robot, arguments.config) == ("r2", Path("/etc/quadriga/team.toml"))
     assert arguments.wait <= load(LAPTOP / "team.toml").bus.barrier_timeout
+    arguments.config = LAPTOP / "team.toml"
+    assert read_config(arguments)[0].bus.certificates == "/etc/quadriga/certs"
     assert unit()["Service"]["LimitRTPRIO"] == "1", "or the agent is late in real time"
 
 
@@ -69,12 +71,17 @@ COMMANDS = [
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_each_command_of_the_page_parses(command: str) -> None:
-    words = shlex.split(command)[1:]
-    here = [str(LAPTOP / "team.toml") if word.endswith("team.toml") else word for word in words]
-    arguments = build_parser().parse_args(here)
-    config, _ = read_config(arguments)
-    assert config.team.name == "team"
+def test_each_command_of_the_page_parses(command: str, tmp_path: Path) -> None:
+    """With the file that the page names, of the second team with what the page writes there."""
+    (second,) = re.findall(r"```toml\n(.*?)```", README, re.S)
+    (tmp_path / "blue.toml").write_text(second, encoding="utf-8")
+    files = {
+        "/etc/quadriga/team.toml": str(LAPTOP / "team.toml"),
+        "blue.toml": str(tmp_path / "blue.toml"),
+    }
+    words = [files.get(word, word) for word in shlex.split(command)[1:]]
+    config, _ = read_config(build_parser().parse_args(words))
+    assert config.team.name == ("blue" if "blue.toml" in command else "team")
 
 
 def test_the_page_names_the_commands_that_a_laptop_needs() -> None:
