@@ -19,7 +19,8 @@ def followed_files(root: Path, modules: Iterable[str]) -> Sequence[Path]:
     """Files of modules and of all that they import below `root`, sorted.
 
     Imports anywhere in a file count, also those within functions, and the packages that modules
-    lie in. What is imported from elsewhere is left out. Of `import_module(f"package.{name}")` every
+    lie in. Other packages are left out, also where they lie beside these: installed, that is all
+    libraries. Of `import_module(f"package.{name}")` every
     module of the package counts; whatever else `import_module` is given does not.
 
     Args:
@@ -39,13 +40,13 @@ def followed_files(root: Path, modules: Iterable[str]) -> Sequence[Path]:
         todo.append((name, file))
     if not todo:
         raise QuadrigaError("modules whose imports to follow", "none", "at least one")
-    files = {file for _, file in todo}
+    files, own = {file for _, file in todo}, {name.partition(".")[0] for name, _ in todo}
     while todo:
         name, file = todo.pop()
         package = name if file.name == "__init__.py" else name.rpartition(".")[0]
         text = file.read_text(encoding="utf-8")
         for imported in {*_parents(name), *_imports(package, text), *_chosen(root, text)}:
-            path = _file(root, imported)
+            path = _file(root, imported) if imported.partition(".")[0] in own else None
             if path is not None and path not in files:
                 files.add(path)
                 todo.append((imported, path))

@@ -53,6 +53,14 @@ def test_every_module_that_may_be_chosen_is_followed(root: Path) -> None:
     assert names(root, "pack.a") == {"pack/a", "pack/room/__init__", "pack/room/c"}
 
 
+def test_libraries_beside_the_package_are_left_out(root: Path) -> None:
+    """As in the folder that packages are installed in."""
+    put(root, "library/__init__", "import library.part\n")
+    put(root, "library/part", "X = 1\n")
+    put(root, "pack/a", "import library\nfrom pack import b\n")
+    assert names(root, "pack.a") == {"pack/a", "pack/b"}
+
+
 def test_imports_of_imports_count_and_circles_end(root: Path) -> None:
     put(root, "pack/a", "from pack import b\n")
     put(root, "pack/b", "from pack import a\nfrom pack.room.c import X\n")
