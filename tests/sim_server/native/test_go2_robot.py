@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from queue import SimpleQueue
 
 import numpy as np
 import pytest
@@ -33,7 +34,7 @@ class Desk:
         self._state = World(load(overrides={"team.robots": 1})).states()["r1"]
         self._over = threading.Event()
         self.command: Command | None = None
-        self.jobs = list[Callable[[], None]]()
+        self._jobs = SimpleQueue[tuple[Callable[[], None], threading.Event]]()
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
         self.driver = Go2Driver(BridgeConfig(interface="lo", domain=DOMAIN))
@@ -41,17 +42,23 @@ class Desk:
     def _run(self) -> None:
         tick = 0
         while not self._over.is_set():
-            while self.jobs:
-                self.jobs.pop(0)()
+            done = []
+            while not self._jobs.empty():
+                job, event = self._jobs.get()
+                job()
+                done.append(event)
             self.robot.report(replace(self._state, tick=tick), np.zeros(12))
             self.command = self.robot.obey()
             tick += 1
+            for event in done:
+                event.set()
             sleep(0.001)
 
     def do(self, job: Callable[[], None]) -> None:
-        """Have the robot's thread do it."""
-        self.jobs.append(job)
-        wait_until(lambda: not self.jobs)
+        """Have the robot's thread do it, and wait for the end of the tick that begins with it."""
+        event = threading.Event()
+        self._jobs.put((job, event))
+        assert event.wait(WAIT)
 
     def close(self) -> None:
         self.driver.close()
@@ -118,7 +125,9 @@ def test_a_robot_that_was_off_has_its_own_controller_in_charge_again(desk: Desk)
     desk.do(lambda: desk.robot.switch(on=True))
     assert desk.robot.controller == "normal"
     wait_until(lambda: desk.driver.receive() is not None)
-    assert not commands(desk), "its own controller has the motors"
+    for _ in range(50):  # ticks, far more than a command takes to come
+        assert not commands(desk), "its own controller has the motors"
+        desk.do(lambda: None)
 
 
 def test_buttons_and_battery_reach_the_bridge(desk: Desk) -> None:
