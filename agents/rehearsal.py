@@ -47,7 +47,10 @@ def rehearse(config: Config, agent: Agent) -> AgentState:
 
 
 def rehearse_central(config: Config, central: Central) -> None:
-    """Let `central` plan the first two steps of a team that stands."""
+    """Let `central` plan the first two steps of a team that stands.
+
+    What it takes in goes over the wire's bytes.
+    """
     state, y = CentralState(), np.zeros(N_OUTPUTS)
     y[0] = config.reference.height
     last = (first_step(config) + 1) * step_ms(config)
@@ -56,7 +59,8 @@ def rehearse_central(config: Config, central: Central) -> None:
         for index, name in enumerate(robot_names(config.team.robots)):
             stance = scheduled_stance(config, index, np.array([tick - SAMPLE_MS]))[0]
             u = nominal_forces(stance, config.robot.weight)
-            sampled.append((name, Measurement(tick, 0, u, y, stance.astype(float))))
+            sent = encode(Measurement(tick, 0, u, y, stance.astype(float)))
+            sampled.append((name, decode(sent, Measurement)))
         state, _ = central.step(central.remember(state, sampled, [_stay(config)]))
 
 

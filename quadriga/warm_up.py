@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
+from typing import Final
 
 import numpy as np
 from rich.console import Console
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.runtime.jit import digest
+from quadriga.shared.runtime.jit_cache import compiled_folder, is_switched_off
+
+_DONE: Final = "rehearsed"  # a file beside the machine code of all that an agent runs
 
 
 def warm_up(config: Config, console: Console) -> None:
-    """Rehearse an agent once, unless this code has been compiled on this machine before."""
-    from quadriga.agents.controller.maths.rotation import roll_pitch_yaw
+    """Rehearse an agent once, unless this code has been compiled on this machine before.
 
-    # Beside what the compiler keeps: in __pycache__, or the user's cache if the code is read-only.
-    stats = getattr(roll_pitch_yaw, "stats", None)
-    if stats is None:
-        return  # numba's compiler is switched off
-    stamp = Path(stats.cache_path) / f"compiled-{digest()}"
-    if stamp.exists():
+    The compiler is imported only then: whoever starts a team need not wait for it.
+    """
+    folder = compiled_folder()
+    if is_switched_off() or (folder is not None and (folder / _DONE).exists()):
         return
     with console.status("compiling the agents (the first time only)"):
         _rehearse_lone_agent(config)
-    stamp.touch()
+    if folder is not None:
+        (folder / _DONE).touch()
 
 
 def _rehearse_lone_agent(config: Config) -> None:

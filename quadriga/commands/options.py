@@ -22,7 +22,7 @@ def recording_path(text: str) -> Path:
     path = Path(text)
     if not path.is_dir():
         return path
-    from quadriga.recordings.summary import RECORDING
+    from quadriga.shared.recording.writer import RECORDING
 
     return path / RECORDING
 

@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     from rich.console import Console
 
     from quadriga.recorder import process
-    from quadriga.recordings.summary import RECORDING
+    from quadriga.shared.recording.writer import RECORDING
 
     path, selection = arguments.output, _selection(arguments)
     if path is None:

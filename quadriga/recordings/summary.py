@@ -26,7 +26,7 @@ from quadriga.recordings.traces import (
 )
 from quadriga.recordings.truth import distance
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.writer import END
+from quadriga.shared.recording.writer import END, RECORDING
 from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.shared.runtime.histogram import QUANTILES
 from quadriga.shared.wire.codes import FALL, LOWERED, code_of
@@ -35,7 +35,6 @@ from quadriga.shared.wire.topics import STATE
 
 __all__ = ["RECORDING", "SUMMARY", "steady_from", "summarise", "summary_of"]
 
-RECORDING: Final = "run.mcap"
 SUMMARY: Final = "summary.json"
 _SOURCES: Final = ("clock.leads", "clock.by_ping_pong", "clock.by_system_clock")
 SETTLING_MS: Final = 1000  # after the speed ramp's end, until the steady part begins

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from importlib.metadata import entry_points
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from quadriga.plant.process import PlantFactory
 from quadriga.shared.config.sections import BRIDGED, SIMULATED, Config
 from quadriga.shared.errors import ConfigError, did_you_mean
+
+if TYPE_CHECKING:
+    from quadriga.plant.process import PlantFactory
 
 GROUP: Final = "quadriga.plants"  # of the entry points; each is a `PlantFactory`
 
@@ -16,6 +18,16 @@ def plant_kinds() -> tuple[str, ...]:
     """What `team.plant` may be, the simulated world first."""
     own = (SIMULATED, BRIDGED)
     return (*own, *sorted(entry_points(group=GROUP).names.difference(own)))
+
+
+def check_plant(config: Config) -> None:
+    """Refuse a kind of plant that cannot be imported; the project's own kinds always can be.
+
+    Raises:
+        ConfigError: there is no such kind, or its package cannot be imported.
+    """
+    if config.team.plant not in (SIMULATED, BRIDGED):
+        plant_factory(config)
 
 
 def plant_factory(config: Config) -> PlantFactory:

@@ -6,8 +6,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
-from quadriga.recordings.summary import RECORDING
 from quadriga.shared.errors import ConfigError, name_file_errors
+from quadriga.shared.recording.writer import RECORDING
 from quadriga.shared.runtime.clock import wall_ns
 
 RUNS: Final = Path("runs")

@@ -8,10 +8,6 @@ from typing import Final
 
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import load_checked
-from quadriga.agents.predictor.store import predictor_sha256
-from quadriga.identification.predictors import ensure_predictor
-from quadriga.replay.recorded_predictor import copy_predictor
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
@@ -20,10 +16,9 @@ from quadriga.shared.runtime.signals import stop_flag
 from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.team.launch import Launch, ProcessSpec, process_table
-from quadriga.team.plants import plant_factory
+from quadriga.team.plants import check_plant
 from quadriga.team.progress import WalkProgress
 from quadriga.team.run_folder import CONFIG, make_run_dir
-from quadriga.team.run_report import has_failed, report_folder
 from quadriga.warm_up import warm_up
 
 OK: Final = 0
@@ -47,16 +42,14 @@ def walk(
         ProcessError: a process failed or left too early, or the walk did not come to its end.
         QuadrigaError: anything a user can put right before the walk begins.
     """
-    plant_factory(config)
+    check_plant(config)
     build_scenario(config, build_loads(config))
     trace_of(config)
     run_dir = make_run_dir(out)
     warm_up(config, console)
     predictor, sha256 = None, ""
     if find_kind(config.planner.kind).needs_predictor:
-        predictor = ensure_predictor(config, console)
-        sha256 = predictor_sha256(load_checked(predictor, config)[0])
-        copy_predictor(predictor, run_dir)
+        predictor, sha256 = _take_predictor(config, run_dir, console)
     (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
     rows = process_table(config, run_dir, predictor, sha256, armed=armed)
     with stop_flag() as stopped:
@@ -66,8 +59,32 @@ def walk(
             return INTERRUPTED
     if not config.recorder.enabled:
         return FELL if fallen else OK
+    # Imported late, as the predictor's part is: the processes need not wait for what draws figures.
+    from quadriga.team.run_report import has_failed, report_folder
+
     summary = report_folder(run_dir, pictures=pictures, console=console)
     return FELL if fallen or has_failed(summary) else OK
+
+
+def _take_predictor(config: Config, run_dir: Path, console: Console) -> tuple[Path, str]:
+    """The file of the team's predictor, made if there is none, and its digest.
+
+    Raises:
+        PredictorError: there is none that its gates accept.
+    """
+    from quadriga.agents.planner.checked_predictor import load_checked
+    from quadriga.agents.predictor.store import predictor_sha256
+    from quadriga.identification.cache import predictor_path
+    from quadriga.replay.recorded_predictor import copy_predictor
+
+    predictor = predictor_path(config)
+    if not predictor.is_file():
+        from quadriga.identification.predictors import ensure_predictor
+
+        ensure_predictor(config, console)
+    sha256 = predictor_sha256(load_checked(predictor, config)[0])
+    copy_predictor(predictor, run_dir)
+    return predictor, sha256
 
 
 def watch_walk(

@@ -16,6 +16,7 @@ from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.schema import json_schema
 from quadriga.shared.wire.topics import TABLE, Topic, find_topic
 
+RECORDING: Final = "run.mcap"  # in a run folder
 PROFILE: Final = "quadriga"
 COUNTS: Final = f"{PROFILE}.counts"  # written at the end: what the writer counted
 LOST: Final = f"{PROFILE}.lost"  # by key, messages that did not come

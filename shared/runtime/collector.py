@@ -8,8 +8,10 @@ from contextlib import contextmanager
 
 
 def end_collection() -> None:
-    """No garbage collection from now on; what there is by now is never looked through again."""
-    gc.collect()
+    """No garbage collection from now on; what there is by now is never looked through again.
+
+    What is garbage by now stays: to look for it costs a start 0.07 s and gains a few megabytes.
+    """
     gc.freeze()
     gc.disable()
 

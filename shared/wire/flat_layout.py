@@ -7,7 +7,8 @@ parser is dear not for what it computes but for all the code it goes through wit
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Final
 
 import msgpack
@@ -15,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.shared.robot.conventions import Array
-from quadriga.shared.runtime.jit import compiled
 
 Bytes = NDArray[np.uint8]
+Read = Callable[[Bytes, Bytes, Bytes, Bytes, Array, Array], tuple[int, int]]
 _TICK: Final = b"\xa4tick"  # MessagePack's text of four bytes
 _STAMP: Final = b"\xa8stamp_ns"
 _STAMP_BYTES: Final = np.frombuffer(_STAMP, np.uint8)
@@ -63,58 +64,23 @@ class FlatLayout:
         None is no judgement: the same fields in another order, for example, are a valid message.
         """
         row = np.empty(self._size)
-        tick, stamp_ns = _read(
-            np.frombuffer(payload, np.uint8), self._head_bytes, self._tail_bytes, self._spans, row
+        tick, stamp_ns = _compiled_read()(
+            np.frombuffer(payload, np.uint8),
+            self._head_bytes,
+            _STAMP_BYTES,
+            self._tail_bytes,
+            self._spans,
+            row,
         )
         return None if tick < 0 else (tick, stamp_ns, row)
 
 
-@compiled
-def _read(payload: Bytes, head: Bytes, tail: Bytes, spans: Array, row: Array) -> tuple[int, int]:
-    """Fill the row and return tick and stamp; −1 if the payload is not of this form."""
-    at = len(payload) - len(tail)
-    if at <= len(head) or not _same(payload, 0, head, 0, len(head)):
-        return -1, -1
-    tick, end = _integer(payload, len(head), at)
-    named = end + len(_STAMP_BYTES)
-    if tick < 0 or named >= at or not _same(payload, end, _STAMP_BYTES, 0, len(_STAMP_BYTES)):
-        return -1, -1
-    stamp_ns, end = _integer(payload, named, at)
-    if stamp_ns < 0 or end != at:
-        return -1, -1
-    raw, filled, passed = row.view(np.uint8), 0, 0
-    for start, size in spans:
-        if not _same(payload, at + passed, tail, passed, start - passed):
-            return -1, -1
-        passed = start + size
-        raw[filled : filled + size] = payload[at + start : at + passed]
-        filled += size
-    for number in row:
-        if number - number != 0.0:  # NaN or infinity
-            return -1, -1
-    return tick, stamp_ns
+@cache
+def _compiled_read() -> Read:
+    """The pass over the bytes. Only who reads such messages waits until the compiler is imported.
 
+    Operator, recorder, router and emergency stop do not.
+    """
+    from quadriga.shared.wire.flat_bytes import read_flat
 
-@compiled
-def _same(a: Bytes, start_a: int, b: Bytes, start_b: int, count: int) -> bool:
-    for i in range(count):  # noqa: SIM110 - a generator does not compile
-        if a[start_a + i] != b[start_b + i]:
-            return False
-    return True
-
-
-@compiled
-def _integer(payload: Bytes, at: int, stop: int) -> tuple[int, int]:
-    """MessagePack's unsigned integer at `at`, and where it ends; −1 if none ends before `stop`."""
-    first = int(payload[at])
-    if first < 0x80:
-        return first, at + 1
-    if not 0xCC <= first <= 0xCF:
-        return -1, at
-    end = at + 1 + (1 << (first - 0xCC))
-    if end > stop or (first == 0xCF and payload[at + 1] >= 0x40):  # beyond what an int64 holds
-        return -1, at
-    value = 0
-    for i in range(at + 1, end):
-        value = 256 * value + int(payload[i])
-    return value, end
+    return read_flat

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from quadriga.commands.parser import main
-from quadriga.recordings.summary import RECORDING
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.recording.writer import RECORDING
 from quadriga.team.run_folder import make_run_dir
 
 

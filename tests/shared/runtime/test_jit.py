@@ -10,13 +10,15 @@ from pathlib import Path
 import pytest
 
 from quadriga.shared import errors
-from quadriga.shared.runtime import imports, jit, jit_references, places
+from quadriga.shared.runtime import atomic, imports, jit, jit_cache, jit_references, places
 
 FILES = {
     "quadriga/__init__.py": "",
     "quadriga/shared/__init__.py": "",
     "quadriga/shared/runtime/__init__.py": "",
     "quadriga/shared/runtime/jit.py": Path(jit.__file__).read_text(encoding="utf-8"),
+    "quadriga/shared/runtime/jit_cache.py": Path(jit_cache.__file__).read_text(encoding="utf-8"),
+    "quadriga/shared/runtime/atomic.py": Path(atomic.__file__).read_text(encoding="utf-8"),
     "quadriga/shared/runtime/jit_references.py": Path(jit_references.__file__).read_text(
         encoding="utf-8"
     ),
@@ -105,7 +107,7 @@ def test_where_nothing_can_be_kept_each_process_compiles_for_itself(package: Pat
 
 def test_the_sources_are_those_with_compiled_functions_and_what_they_import() -> None:
     root = places.SOURCE
-    found = {str(path.relative_to(root)) for path in jit.sources(root)}
+    found = {str(path.relative_to(root)) for path in jit_cache.sources(root)}
     assert {
         "quadriga/agents/controller/acting.py",
         "quadriga/agents/controller/swing.py",
