@@ -27,7 +27,7 @@ from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import leave_priority, take_priority
-from quadriga.shared.runtime.signals import stop_on_signals
+from quadriga.shared.runtime.signals import interruptible, stop_on_signals
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.codes import code_of
 from quadriga.shared.wire.messages import Event, Measurement, Reference, Status
@@ -54,6 +54,7 @@ def run(
     Raises:
         BusError: the bus cannot be opened, or the team is not complete in time.
         ProcessError: who drives time, or the link to the router, has vanished.
+        KeyboardInterrupt: it is stopped before it is ready.
     """
     stopped = stopped or stop_on_signals()
     use_one_blas_thread()
@@ -66,7 +67,8 @@ def run(
         bus.subscribe(EVENT.key(team))
         if not meet(bus, config, stopped, Introduction(bus, config, predictor_sha256)):
             return
-        rehearse_central(config, Central(config, planner))
+        with interruptible(stopped):
+            rehearse_central(config, Central(config, planner))
         end_collection()
         take_priority(config.runtime.priority)
         bus.declare(READY)

@@ -24,7 +24,7 @@ from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import leave_priority, take_priority
-from quadriga.shared.runtime.signals import stop_on_signals
+from quadriga.shared.runtime.signals import interruptible, stop_on_signals
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import State
 from quadriga.shared.wire.topics import (
@@ -58,6 +58,7 @@ def run(
         BusError: the bus cannot be opened, or the team is not complete in time or has something
             else in common; or for 3 s no state has come that is newer than those before.
         ProcessError: who drives time, or the link to the router, has vanished.
+        KeyboardInterrupt: it is stopped before it is ready.
     """
     stopped = stopped or stop_on_signals()
     use_one_blas_thread()
@@ -69,7 +70,8 @@ def run(
             bus.subscribe(key)
         if not meet(bus, config, stopped, Introduction(bus, config, sha256)):
             return
-        rehearse(config, Agent(config, robot, predictor))
+        with interruptible(stopped):
+            rehearse(config, Agent(config, robot, predictor))
         shell = _Shell(config, agent, inbox, bus)
         end_collection()
         take_priority(config.runtime.priority)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Final
 
 from quadriga.plant.end import TOLD_TO_STOP, End
@@ -15,14 +16,14 @@ from quadriga.plant.team_time import team_time
 from quadriga.shared.bus.barrier import await_agents, meet, start_together
 from quadriga.shared.bus.lead_watch import Loss, loss_error
 from quadriga.shared.bus.zenoh_bus import Bus
-from quadriga.shared.config.sections import Config
+from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import MessageError, ProcessError
 from quadriga.shared.members import plant_name
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import leave_priority, take_priority
-from quadriga.shared.runtime.signals import stop_on_signals
+from quadriga.shared.runtime.signals import interruptible, stop_on_signals
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import EStop
@@ -51,10 +52,13 @@ def run(
         ConfigError: the plant cannot be built from the configuration.
         BusError: the bus cannot be opened, or the team is not complete in time.
         ProcessError: another plant, or the link to the router, vanished while the team walked.
+        KeyboardInterrupt: it is stopped before its plant is built.
     """
     stopped = stopped or stop_on_signals()
     team, name, time = config.team.name, plant_name(robot), team_time(config, robot)
-    plant = build(config, (robot,) if robot else robot_names(config.team.robots))
+    # A bridge opens sockets and starts its guard, which are not left half made.
+    with nullcontext() if config.team.plant == BRIDGED else interruptible(stopped):
+        plant = build(config, (robot,) if robot else robot_names(config.team.robots))
     with Bus.open(config.bus, team, name, stopped) as bus:
         for key in sorted({*time.keys, *(COMMAND.key(team, own) for own in plant.names)}):
             bus.subscribe(key)
@@ -62,7 +66,8 @@ def run(
         if plant.is_robot:
             plant.listen(estops)
         pace = team_pace(bus, config, robot, is_robot=plant.is_robot)
-        server = PlantServer(config, plant, bus, time, name)
+        with interruptible(stopped):
+            server = PlantServer(config, plant, bus, time, name)
         if not plant.is_robot:
             server.estops = estops
         if not meet(bus, config, stopped):

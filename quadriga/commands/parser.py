@@ -49,7 +49,7 @@ from quadriga.commands.command import Run
 from quadriga.commands.config_options import build_config_options, read_config
 from quadriga.shared.errors import ConfigError, ProcessError, QuadrigaError, system_reason
 from quadriga.shared.printable import printable, printable_line
-from quadriga.shared.runtime.signals import die_with_parent, interrupt_on_sigterm
+from quadriga.shared.runtime.signals import die_with_parent, interrupt_on_sigterm, kill_if_orphaned
 
 FAILED: Final = 1  # a robot fell or a process failed
 WRONG: Final = 2  # the command, the configuration or a file is wrong
@@ -74,6 +74,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         interrupt_on_sigterm()
         if arguments.parent:
             die_with_parent(arguments.parent)
+            kill_if_orphaned(arguments.parent)
         status: int = arguments.call(arguments, *read_config(arguments))
     except ProcessError as error:
         return _complain(error, FAILED)

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import ctypes
 import os
+import select
 import signal
-from collections.abc import Iterator
+import sys
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Final
+
+from quadriga.shared.runtime.clock import sleep
 
 _STOPS: Final = (signal.SIGINT, signal.SIGTERM)
 _IMPORTS: Final = "<frozen importlib"  # how the files begin whose functions import
 _AGAIN: Final = 0.02  # s, after which an interrupt in the midst of an import is tried again
 _PR_SET_PDEATHSIG: Final = 1  # linux/prctl.h
+_PATIENCE: Final = 90.0  # s; a bridge may take 72 to lay its robot down and leave
 
 
 class StopFlag:
@@ -54,6 +60,33 @@ def stop_flag() -> Iterator[StopFlag]:
             signal.signal(number, handler)
 
 
+@contextmanager
+def interruptible(stopped: Callable[[], bool]) -> Iterator[None]:
+    """Within the block a stop raises KeyboardInterrupt at once: it looks at no flag for long.
+
+    To compile takes a minute, in which a process would else go on that nobody waits for.
+
+    Args:
+        stopped: of `stop_on_signals`; any other is asked before the block only.
+
+    Raises:
+        KeyboardInterrupt: the process is to stop, or was to before the block.
+    """
+    if stopped():
+        raise KeyboardInterrupt
+    if not isinstance(stopped, StopFlag):
+        yield
+        return
+    before = {number: signal.signal(number, _interrupt) for number in _STOPS}
+    try:
+        if stopped():
+            raise KeyboardInterrupt
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def interrupt_on_sigterm() -> None:
     """Have SIGTERM raise KeyboardInterrupt, as SIGINT does, so that `with` blocks clean up.
 
@@ -87,6 +120,34 @@ def die_with_parent(parent: int) -> None:
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
     if os.getppid() != parent:
         os.kill(os.getpid(), signal.SIGTERM)
+
+
+def kill_if_orphaned(parent: int, patience: float = _PATIENCE) -> None:
+    """Have this process killed if it still runs some time after process `parent` has died.
+
+    It may be busy in a library, or wait for a lock: then it heeds no signal that it can handle.
+
+    Args:
+        parent: the process that started this one, as it said.
+        patience: how long this process may outlive it, s.
+    """
+    threading.Thread(target=_outlive, args=(parent, patience), daemon=True).start()
+
+
+def _outlive(parent: int, patience: float) -> None:
+    """Wait without a wake-up until the parent is gone; some time later kill this process."""
+    try:
+        ended = os.pidfd_open(parent)
+    except ProcessLookupError:
+        ended = -1  # gone already
+    except OSError:
+        return  # a system that cannot tell: SIGTERM must do
+    if ended >= 0 and os.getppid() == parent:
+        select.select([ended], [], [])
+    sleep(patience)
+    said = f"quadriga: killed {patience:g} s after process {parent}, which had started this one\n"
+    print(said, end="", file=sys.stderr, flush=True)
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -84,6 +85,7 @@ def serving(fortress: Fortress) -> Iterator[subprocess.Popen[str]]:
     file = fortress.folder / "config.toml"
     file.write_text(to_toml(fortress.config), encoding="utf-8")
     command = [sys.executable, "-m", "quadriga", "router", "--config", str(file)]
+    command += ["--parent", str(os.getpid())]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         errors = process.stderr
         assert errors

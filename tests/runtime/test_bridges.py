@@ -77,6 +77,7 @@ def robots(config: Config, file: Path, tmp_path: Path) -> Iterator[subprocess.Po
     log = tmp_path / "robots.log"
     with log.open("wb") as out:
         command = [*QUADRIGA, "sim", "--as", config.team.robot, "--config", str(file)]
+        command += ["--parent", str(os.getpid())]
         process = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT)
     deadline = monotonic() + WAIT
     while "on the network" not in log.read_text(encoding="utf-8"):

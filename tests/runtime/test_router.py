@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -30,6 +31,8 @@ def router(team: Team, *options: str) -> Iterator[subprocess.Popen[str]]:
         *options,
         "--set",
         f"bus.barrier_timeout={timeout}",
+        "--parent",
+        str(os.getpid()),
     )
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         try:

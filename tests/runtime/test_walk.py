@@ -18,6 +18,7 @@ from quadriga.shared.wire.messages import Command
 from tests.runtime.conftest import WAIT
 
 Start = Callable[..., subprocess.Popen[str]]
+QUADRIGA = (sys.executable, "-m", "quadriga")
 OPTIONS = ("--robots", "2", "--planner", "none", "--no-render")
 
 pytestmark = pytest.mark.usefixtures("_compiled")
@@ -58,7 +59,16 @@ def start(out: Path) -> Iterator[Start]:
 
     def start_walk(*options: str) -> subprocess.Popen[str]:
         walk = subprocess.Popen(
-            [sys.executable, "-m", "quadriga", "walk", *OPTIONS, "--out", str(out), *options],
+            [
+                *QUADRIGA,
+                "walk",
+                *OPTIONS,
+                "--parent",
+                str(os.getpid()),
+                "--out",
+                str(out),
+                *options,
+            ],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

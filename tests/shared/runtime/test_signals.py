@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.runtime.signals import interrupts_held, stop_flag
+from quadriga.shared.runtime.signals import interruptible, interrupts_held, stop_flag
 
 CHILD = """
 import os, sys
@@ -39,6 +39,30 @@ def test_signals_raise_the_flag_for_a_while(number: signal.Signals) -> None:
     assert signal.getsignal(number) is before
 
 
+def wait_after(number: signal.Signals) -> None:
+    os.kill(os.getpid(), number)
+    sleep(60.0)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_ends_at_once_what_looks_at_no_flag(number: signal.Signals) -> None:
+    with stop_flag() as stopped:
+        with pytest.raises(KeyboardInterrupt), interruptible(stopped):
+            wait_after(number)
+        assert not stopped()
+        os.kill(os.getpid(), number)
+        assert stopped(), "and after it the flag is raised as before"
+        with pytest.raises(KeyboardInterrupt), interruptible(stopped):
+            pytest.fail("a stop that has come before the block")
+
+
+def test_a_flag_of_another_kind_is_asked_before_the_block() -> None:
+    with interruptible(lambda: False):
+        pass
+    with pytest.raises(KeyboardInterrupt), interruptible(lambda: True):
+        pytest.fail("it was to stop before")
+
+
 def alive(pid: int) -> bool:
     try:
         with open(f"/proc/{pid}/stat") as stat:
@@ -59,6 +83,36 @@ def test_kill_9_of_the_parent_ends_the_child() -> None:
     deadline = monotonic() + 60.0
     while alive(child) and monotonic() < deadline:
         sleep(0.01)
+    assert not alive(child)
+
+
+SPINS = """
+import os, signal, sys
+from quadriga.shared.runtime.signals import die_with_parent, kill_if_orphaned
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+die_with_parent(int(sys.argv[1]))
+kill_if_orphaned(int(sys.argv[1]), 0.2)
+print(os.getpid(), flush=True)
+while True:
+    pass
+"""
+
+
+def test_a_child_that_does_not_heed_the_signal_is_killed_some_time_later() -> None:
+    pipe = subprocess.PIPE
+    command = [sys.executable, "-c", PARENT, SPINS]
+    parent = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True)
+    assert parent.stdout
+    assert parent.stderr
+    child = int(parent.stdout.readline())
+    sleep(0.4)
+    assert alive(child), "while its parent lives nobody kills it"
+    parent.kill()
+    said = parent.stderr.read()  # until the child has ended, too
+    parent.communicate()
+    assert said == (
+        f"quadriga: killed 0.2 s after process {parent.pid}, which had started this one\n"
+    )
     assert not alive(child)
 
 
