@@ -25,7 +25,8 @@ _ONE_THREAD: Final = (
 )
 QUADRIGA: Final = (sys.executable, "-m", "quadriga")
 _LAST_WORDS: Final = 12  # lines of a failed process's log that are shown
-_LOOK: Final = 0.05  # s
+_LOOK: Final = 0.02  # s
+_LAST_CHANCE: Final = 2.0  # s for who has not left by itself in time, before SIGKILL
 _ROUTER_GRACE: Final = 5.0  # s
 _EARLY: Final = 4.0  # s, by which others may leave before who drives time: it closes politely
 
@@ -94,18 +95,25 @@ class Launch:
         self._logs = logs
         self._running: dict[str, subprocess.Popen[bytes]] = {}
         self._rows = {row.name: row for row in rows}
+        self._overdue = set[str]()
         logs.mkdir(parents=True, exist_ok=True)
-        environment = {**os.environ, **dict.fromkeys(_ONE_THREAD, "1")}
-        for row in rows:
-            with (logs / f"{row.name}.log").open("wb") as log:
-                self._running[row.name] = subprocess.Popen(
-                    [*row.command, "--parent", str(os.getpid())],
-                    stdin=subprocess.DEVNULL,
-                    stdout=log,
-                    stderr=subprocess.STDOUT,
-                    env=environment,
-                    start_new_session=True,
-                )
+        try:
+            for row in rows:
+                self._running[row.name] = self._start(row)
+        except BaseException:
+            self.stop()  # nobody else knows of those that have been started
+            raise
+
+    def _start(self, row: ProcessSpec) -> subprocess.Popen[bytes]:
+        with (self._logs / f"{row.name}.log").open("wb") as log:
+            return subprocess.Popen(
+                [*row.command, "--parent", str(os.getpid())],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, **dict.fromkeys(_ONE_THREAD, "1")},
+                start_new_session=True,
+            )
 
     @property
     def pids(self) -> dict[str, int]:
@@ -148,6 +156,7 @@ class Launch:
         deadline = monotonic() + self._rows[name].grace
         while name in self._running and name not in self._reap():
             if monotonic() > deadline:
+                self._overdue.add(name)
                 raise self._error(name, "no end after the walk", "to leave by itself")
             sleep(_LOOK)
 
@@ -181,7 +190,9 @@ class Launch:
     def stop(self) -> None:
         """Stop what still runs: SIGTERM, the recorder last, and SIGKILL after a grace period.
 
-        The plant then tells the others that the walk is over, and the recorder hears it.
+        Who has had its grace already, and is frozen perhaps, gets two seconds and what it needs to
+        bring a robot to rest. The plant then tells the others that the walk is over, and the
+        recorder hears it.
         """
         self._terminate([name for name in self._running if name != LAST])
         self._terminate([name for name in self._running if name == LAST])
@@ -192,7 +203,8 @@ class Launch:
         for name in names:
             self._running[name].terminate()
         for name in names:
-            process, deadline = self._running[name], begun + self._rows[name].grace
+            process, row = self._running[name], self._rows[name]
+            deadline = begun + (row.rest + _LAST_CHANCE if name in self._overdue else row.grace)
             try:
                 process.wait(max(deadline - monotonic(), 0.0))
             except subprocess.TimeoutExpired:

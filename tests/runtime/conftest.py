@@ -35,7 +35,7 @@ class Team:
     config: Config
     folder: Path
 
-    def rows(self, *, standing: bool) -> tuple[ProcessSpec, ...]:
+    def rows(self, *, standing: bool = True) -> tuple[ProcessSpec, ...]:
         """The launcher's table, with agents that merely stand if asked for."""
         (self.folder / "config.toml").write_text(to_toml(self.config), encoding="utf-8")
         rows = process_table(self.config, self.folder, None, "")

@@ -86,6 +86,32 @@ def test_who_stays_after_the_walk_is_named(tmp_path: Path) -> None:
         running.watch(never)
 
 
+def test_who_has_had_its_time_to_leave_does_not_get_it_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(launch, "_LAST_CHANCE", 0.1)
+    speaks = f"{LAST.replace('60', '1')}"  # until the other is deaf to SIGTERM
+    rows = [row("sim", speaks), row("r1", STUBBORN, grace=2.0)]
+    with Launch(rows, tmp_path) as running:
+        pids = running.pids
+        with pytest.raises(ProcessError, match="process r1: got no end after the walk"):
+            running.watch(never)
+        begun = monotonic()
+    assert monotonic() - begun < 1.5
+    assert all(gone(pid) for pid in pids.values())
+
+
+def test_who_has_been_started_is_stopped_if_another_cannot_be(tmp_path: Path) -> None:
+    code = (
+        f"import os, pathlib; pathlib.Path({str(tmp_path / 'pid')!r}).write_text(str(os.getpid()))"
+    )
+    rows = [row("sim", f"{code}; {LAST}"), ProcessSpec("r1", (str(tmp_path / "none"),), 5.0)]
+    with pytest.raises(FileNotFoundError):
+        Launch(rows, tmp_path)
+    pid = tmp_path / "pid"
+    assert not pid.exists() or gone(int(pid.read_text()))
+
+
 def test_stopping_kills_who_does_not_obey_in_his_time(tmp_path: Path) -> None:
     with Launch([row("sim", STUBBORN, 0.5), row("recorder", LAST, 20.0)], tmp_path) as running:
         pids = running.pids
