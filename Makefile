@@ -8,7 +8,7 @@ TOOLS := $(VENV)/.tools
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install walk test test-containers image-lock lint fuzz fuzz-readers drops starts endurance format docs figures clip acceptance bench bench-planner bench-recorder
+.PHONY: install tools walk prepared test test-containers image-lock lint fuzz fuzz-readers drops starts endurance format docs figures clip acceptance bench bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -25,14 +25,20 @@ $(TOOLS): $(STAMP)
 	$(PIP) -r requirements.lock
 	@touch $@
 
+tools: $(TOOLS)
+
 walk: $(STAMP)
 	$(BIN)/quadriga walk $(ARGS)
 
 # What several tests need is compiled, collected and fitted once, before they run side by side.
-# Whoever tests is not started again after a test that hung, which would hang again.
-test: $(TOOLS)
+prepared: $(TOOLS)
 	$(BIN)/quadriga prepare --robots 2 --set identification.seconds=60
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --max-worker-restart 0 $(ARGS)
+
+# Files are taken in the order of tests/conftest.py. Whoever tests is not started again after a test
+# that hung, which would hang again.
+test: prepared
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder \
+		--max-worker-restart 0 $(ARGS)
 
 lint: $(TOOLS)
 	$(BIN)/ruff check .

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
+from typing import Final
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -14,6 +16,21 @@ settings.register_profile(
 )
 settings.register_profile("search", settings.get_profile("same"), derandomize=False)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
+
+
+# Folders whose tests start processes and take long.
+_LONG: Final = ("docs", "plugins", "runtime", "quadriga/experiments", "deploy")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What takes long comes first: then at the end no worker waits long for another one's file."""
+    folders = [Path(__file__).parent / name for name in _LONG]
+
+    def rank(item: pytest.Item) -> int:
+        ranks = (n for n, folder in enumerate(folders) if item.path.is_relative_to(folder))
+        return next(ranks, len(folders))
+
+    items.sort(key=rank)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
