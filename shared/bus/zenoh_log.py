@@ -10,9 +10,13 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from quadriga.shared.bus.zenoh_bus import start_log
+from quadriga.shared.runtime.clock import sleep
 
 _PIPE: Final = 1 << 20  # bytes that Zenoh may write while nobody reads; then its threads wait
 _MOST: Final = 1 << 18  # bytes that are looked at once
+# s, between two looks: Zenoh writes line by line, and to be woken by each line takes as much of a
+# processor as to pass the messages on.
+_BETWEEN: Final = 0.01
 _CARRIED: Final = 1 << 14  # bytes before these in which the line may be that a marker refers to
 
 
@@ -55,3 +59,5 @@ class ZenohLog:
                 kept = rest
             else:
                 kept = kept[max(0, end - _CARRIED) :]
+            if len(chunk) < _MOST:
+                sleep(_BETWEEN)

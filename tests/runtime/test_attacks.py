@@ -207,24 +207,6 @@ def test_a_revoked_certificate_may_do_nothing(fortress: Fortress, recorder: Bus)
         refusals(heard(fortress, recorder))
 
 
-def test_a_flood_of_its_own_commands_is_thinned_out(fortress: Fortress, recorder: Bus) -> None:
-    """As fast as a client can: twenty times as many as a robot sends."""
-    count, since = 2000, len(fortress.said)
-    with stranger(fortress, fortress.files("r2")) as session:
-        publisher = session.declare_publisher(
-            COMMAND.key("team", "r2"), congestion_control=zenoh.CongestionControl.BLOCK
-        )
-        begun = monotonic()
-        for _ in range(count):
-            publisher.put(bytes(500))
-        seconds = monotonic() - begun
-        told = await_refused(fortress, since, "r2.1", COMMAND.key("team", "r2"), "often")
-    packets = heard(fortress, recorder)
-    through = [key for key, _ in packets if key == COMMAND.key("team", "r2")]
-    assert 1 <= len(through) <= 1 + 10_000 * (seconds + WAIT / 1000)
-    assert len(through) + told <= count
-
-
 def test_a_message_that_is_too_large_stops_at_the_router(fortress: Fortress, recorder: Bus) -> None:
     since, limit = len(fortress.said), largest(COMMAND.type)
     with stranger(fortress, fortress.files("r2")) as session:

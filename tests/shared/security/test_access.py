@@ -102,7 +102,10 @@ def test_common_names_are_literal_and_revoked_ones_are_left_out() -> None:
     block = access_control(load(None, {"team.robots": 2}), {"r1": 3})
     names = {each["id"]: each.get("cert_common_names", []) for each in block["subjects"]}
     assert "router" not in names
-    assert names["anyone"] == []
+    assert {"r1.1", "r1.3", "r3.1", "plant_r1.1"} <= {*names["others"]}
+    assert not {*names["others"]} & {
+        name for key in names.keys() - {"others"} for name in names[key]
+    }
     assert names["r1"][0] == "r1.4"
     assert names["r2"][0] == "r2.1"
     assert not [name for each in names.values() for name in each if "*" in name]

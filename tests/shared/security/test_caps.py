@@ -69,7 +69,7 @@ def test_what_is_sent_a_thousand_times_a_second_is_small() -> None:
 
 
 def test_only_messages_of_every_tick_have_a_rate() -> None:
-    assert greatest_rate(STATE) == greatest_rate(COMMAND) == 10_000.0
+    assert greatest_rate(STATE) == greatest_rate(COMMAND) == 200_000.0
     assert not any(map(greatest_rate, (ESTOP, REFERENCE, MEASUREMENT)))
 
 
