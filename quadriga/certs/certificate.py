@@ -7,6 +7,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from cryptography import x509
+from cryptography.exceptions import InvalidSignature
 from cryptography.x509.oid import NameOID
 
 from quadriga.shared.errors import ConfigError, name_file_errors
@@ -37,16 +38,40 @@ def read_certificate(path: Path) -> Certificate:
     Raises:
         ConfigError: it cannot be read, or is none.
     """
-    with name_file_errors(ConfigError, path, "a certificate", "`quadriga certs make` makes it"):
-        text = path.read_bytes()
+    found = _load(path)
     try:
-        found = x509.load_pem_x509_certificate(text)
         names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
         hosts = _hosts_of(found)
     except ValueError as error:
-        raise ConfigError(str(path), str(error)[:200], "a certificate", "damaged?") from None
+        raise _damaged(path, error) from None
     name = str(names[0].value) if names else ""
     return Certificate(name, hosts, found.not_valid_after_utc)
+
+
+def is_signed(path: Path, authority: Path) -> bool:
+    """Whether the certificate in one file is signed by the owner of that in another.
+
+    Raises:
+        ConfigError: one cannot be read, or is none.
+    """
+    try:
+        _load(path).verify_directly_issued_by(_load(authority))
+    except (ValueError, TypeError, InvalidSignature):  # another name, another key
+        return False
+    return True
+
+
+def _load(path: Path) -> x509.Certificate:
+    with name_file_errors(ConfigError, path, "a certificate", "`quadriga certs make` makes it"):
+        text = path.read_bytes()
+    try:
+        return x509.load_pem_x509_certificate(text)
+    except ValueError as error:
+        raise _damaged(path, error) from None
+
+
+def _damaged(path: Path, error: ValueError) -> ConfigError:
+    return ConfigError(str(path), str(error)[:200], "a certificate", "damaged?")
 
 
 def _hosts_of(found: x509.Certificate) -> tuple[str, ...]:

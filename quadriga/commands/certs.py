@@ -43,12 +43,7 @@ def add(add_command: AddCommand) -> None:
 
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Do one of the four in the folder `bus.certificates`."""
-    from datetime import UTC, datetime
-    from pathlib import Path
-
-    from quadriga.certs.folder import CertificateFolder
-    from quadriga.shared.runtime.clock import wall_ns
-    from quadriga.shared.security.roll import team_roll
+    from quadriga.certs.secured import certificates_of, utc_now
 
     action, names = arguments.action, arguments.names
     if not 0.0 < arguments.days <= _LONGEST:
@@ -57,9 +52,7 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
         raise ConfigError("NAME", " ".join(names), f"none with {action!r}")
     if not names and action == "revoke":
         raise ConfigError("NAME", "none", "whose certificates are to be revoked")
-    identities = [who.name for who in team_roll(config)]
-    folder = CertificateFolder(Path(config.bus.certificates), identities)
-    now = datetime.fromtimestamp(1e-9 * wall_ns(), UTC)
+    folder, now = certificates_of(config), utc_now()
     if action == "make":
         made = folder.make(config.team.name, arguments.hosts, now, arguments.days)
         say(f"{', '.join(made) or 'nobody'} got a certificate in {folder.path}")

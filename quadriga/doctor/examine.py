@@ -7,21 +7,24 @@ from typing import Final
 from quadriga.doctor.machine import check_machine, need_of
 from quadriga.doctor.readings import read_machine
 from quadriga.doctor.report import DoctorReport, MemberReport
-from quadriga.shared.bus.absence import DIFFERS, TeamView, diagnose
+from quadriga.doctor.trust import look_at_certificates, try_certificate
+from quadriga.shared.bus.absence import DIFFERS, TeamView, diagnose, diagnose_nameless
 from quadriga.shared.bus.agreement import REFUSED as DECISIVE
 from quadriga.shared.bus.agreement import disagreements
 from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
-from quadriga.shared.bus.inquiry import ask, pause, view_of
+from quadriga.shared.bus.distrust import REVOKED
+from quadriga.shared.bus.inquiry import look, pause
 from quadriga.shared.bus.introduction import describe_process
 from quadriga.shared.bus.reach import OPEN, REFUSED, UNTRIED, Reach, is_loopback, try_endpoint
 from quadriga.shared.bus.roster import members, processes
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import BusError
-from quadriga.shared.members import DOCTOR
+from quadriga.shared.errors import BusError, ConfigError
+from quadriga.shared.members import DOCTOR, Member
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.runtime.installed import project_version
+from quadriga.shared.security.tls import tls_files
 from quadriga.shared.wire.about import About
 
 LINK: Final = "link"
@@ -41,27 +44,35 @@ def examine(config: Config, *, here: bool) -> DoctorReport:
     """
     endpoint, team = config.bus.endpoint, config.team.name
     need = need_of(config, spread=not is_loopback(endpoint))
-    machine = check_machine(read_machine(), need)
+    machine = (*check_machine(read_machine(), need), *look_at_certificates(config))
     if here:
         link = _judge_reach(try_endpoint(endpoint), waiting=True)
         return DoctorReport(team, endpoint, project_version(), link, machine)
     me = describe_process(config, DOCTOR)
     view, link = _look_at_team(config, me)
     differs = tuple(_own_differences(me, view))
-    found = tuple(
-        MemberReport(member.name, view.answers.get(member.name, ()), diagnose(member, view))
-        for member in processes(config)
-    )
-    return DoctorReport(team, endpoint, me.version, link, (*differs, *machine), found)
+    found = tuple(_report(member, view, config) for member in processes(config))
+    router = diagnose_nameless(view)
+    return DoctorReport(team, endpoint, me.version, link, (*differs, *machine), found, router)
+
+
+def _report(member: Member, view: TeamView, config: Config) -> MemberReport:
+    """What is to be said of a member; of one that is not there also whether it could come in."""
+    answers, found = view.answers.get(member.name, ()), diagnose(member, view)
+    if not answers and not any(item.code == REVOKED for item in found):
+        found += tuple(try_certificate(config, member.name))
+    return MemberReport(member.name, answers, found)
 
 
 def _look_at_team(config: Config, me: About) -> tuple[TeamView, Diagnosis]:
     """What is seen of a team without being one of it, and how it is reached."""
+    nobody = frozenset[str]()
+    view = TeamView(False, nobody, nobody, members(config))
+    if without := _lack_of_certificate(config):
+        return view, without
     try:
         bus = Bus.open(config.bus, config.team.name, DOCTOR)
     except BusError as error:
-        nobody = frozenset[str]()
-        view = TeamView(False, nobody, nobody, members(config))
         if is_tls(config.bus.endpoint):  # a handshake has told why
             return view, Diagnosis(LINK, BAD, f"{error.name}: {error.got}", error.cause)
         reach = try_endpoint(config.bus.endpoint)
@@ -77,10 +88,21 @@ def _look_at_team(config: Config, me: About) -> tuple[TeamView, Diagnosis]:
             if monotonic() > deadline:
                 break
             pause()
-        view = view_of(bus, config, ask(bus), me)
+        view = look(bus, config, me)
     if view.linked:
         return view, Diagnosis(LINK, GOOD, f"linked by {config.bus.endpoint}")
     return view, _judge_reach(try_endpoint(config.bus.endpoint), waiting=False)
+
+
+def _lack_of_certificate(config: Config) -> Diagnosis | None:
+    """Why the doctor cannot be let in, if it has no certificate here."""
+    if not is_tls(config.bus.endpoint):
+        return None
+    try:
+        tls_files(config.bus.certificates, DOCTOR)
+    except ConfigError as error:
+        return Diagnosis(LINK, BAD, f"{error.name}: {error.got}", error.cause)
+    return None
 
 
 def _judge_reach(reach: Reach, *, waiting: bool) -> Diagnosis:

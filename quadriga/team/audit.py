@@ -1,16 +1,29 @@
-"""What a router has refused, told to whoever reads its output and to the recording."""
+"""What a router has refused: told to who reads its output, to the recording, and to who asks."""
 
 from __future__ import annotations
 
 import sys
 from collections import Counter
+from collections.abc import Mapping
 from queue import SimpleQueue
 from typing import Final
 
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.bus.zenoh_log import ZenohLog
+from quadriga.shared.members import ROUTER
 from quadriga.shared.printable import printable_line
-from quadriga.shared.security.refusals import LEVELS, MARKERS, RefusalParser, Refused
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.security.past_refusals import RefusalMemory
+from quadriga.shared.security.refusals import (
+    DENIED,
+    LEVELS,
+    MARKERS,
+    REVOKED,
+    RefusalParser,
+    Refused,
+)
+from quadriga.shared.security.roll import split_common_name
+from quadriga.shared.wire.about import REFUSALS, Refusals
 from quadriga.shared.wire.codec import encode, truncate_text
 from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.messages import Refusal
@@ -48,23 +61,27 @@ class Audit:
     Args:
         bus: the router's.
         log: where refusals come from.
+        revoked: by identity the number of the last certificate that is not valid any more.
     """
 
-    def __init__(self, bus: Bus, log: RefusalLog) -> None:
-        self._log = log
+    def __init__(self, bus: Bus, log: RefusalLog, revoked: Mapping[str, int]) -> None:
+        self._log, self._revoked = log, revoked
         self._names: dict[str, str] = {}  # by session
         self._tick = self._stamp_ns = 0
+        self._memory = RefusalMemory()
         bus.watch_links(self._note_link)
         self._clock = bus.collect(CLOCK.key(bus.team))
         self._put = bus.publisher(REFUSED.key(bus.team), droppable=True)
+        bus.answer(REFUSALS.key(bus.team, ROUTER), self._answer)
 
     def tell(self) -> list[Refused]:
         """Tell all that has been refused since the last call, and return it."""
         self._follow_clock()
         found: Counter[Refused] = Counter()
         for refused, count in self._log.take().items():
-            found[refused._replace(who=self._name(refused.who))] += count
+            found[self._name_sender(refused)] += count
         for refused, count in found.most_common(_MOST):
+            self._memory.note(refused, count, monotonic())
             self._tell(refused, count)
         if len(found) > _MOST:
             print(f"refused: {len(found) - _MOST} more kinds", file=sys.stderr, flush=True)
@@ -81,11 +98,22 @@ class Audit:
         who, action, reason = refused.who, refused.action, refused.reason
         self._put(encode(Refusal(self._tick, self._stamp_ns, who, action, key, reason, count)))
 
+    def _answer(self) -> bytes:
+        return encode(Refusals(self._tick, self._stamp_ns, self._memory.entries(monotonic())))
+
     def _follow_clock(self) -> None:
         arrivals = self._clock()
         head = envelope(arrivals[-1][2]) if arrivals else None
         if head is not None:
             self._tick, self._stamp_ns = head
+
+    def _name_sender(self, refused: Refused) -> Refused:
+        """With the common name of the sender's certificate, and whether that is revoked."""
+        who = self._name(refused.who)
+        identity, number = split_common_name(who)
+        revoked = 0 < number <= self._revoked.get(identity, 0)
+        reason = REVOKED if revoked and refused.reason == DENIED else refused.reason
+        return refused._replace(who=who, reason=reason)
 
     def _name(self, session: str) -> str:
         """The name that goes with a session or its beginning; what is no session stays."""

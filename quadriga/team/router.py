@@ -15,7 +15,7 @@ from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.team.audit import Audit, RefusalLog
-from quadriga.team.router_rules import router_rules
+from quadriga.team.router_rules import revoked_numbers, router_rules
 from quadriga.team.rule_check import check_rules
 
 _STAGES: Final = 3  # waits of the barrier: for the router, for everyone's presence, for readiness
@@ -59,7 +59,7 @@ def _open(stack: ExitStack, config: Config, listen: str) -> tuple[Bus, Callable[
         return stack.enter_context(Bus.route(listen, team, config.bus)), lambda: None
     rules, log = router_rules(config), RefusalLog()
     bus = stack.enter_context(Bus.route(listen, team, config.bus, rules))
-    audit = Audit(bus, log)
+    audit = Audit(bus, log, revoked_numbers(config))
     check_rules(bus, config, listen, audit.tell)
     return bus, audit.tell
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +21,17 @@ def router_rules(config: Config) -> dict[str, Any]:
     Raises:
         ConfigError: the list of revoked certificates is missing or damaged.
     """
+    return {"access_control": access_control(config, revoked_numbers(config)), **capacity(config)}
+
+
+def revoked_numbers(config: Config) -> Mapping[str, int]:
+    """By identity the number of the last certificate that is not valid any more.
+
+    Raises:
+        ConfigError: the list is missing or damaged.
+    """
     path = identity_folder(Path(config.bus.certificates), ROUTER) / REVOKED
     cause = "`quadriga certs make` makes it; copy the folder router to this machine"
     with name_file_errors(ConfigError, path, "numbers of revoked certificates", cause):
         text = path.read_text(encoding="utf-8")
-    rules = access_control(config, read_numbers(text, str(path)))
-    return {"access_control": rules, **capacity(config)}
+    return read_numbers(text, str(path))

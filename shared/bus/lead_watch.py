@@ -48,7 +48,7 @@ def loss_error(loss: Loss, tick: int) -> ProcessError:
     """
     cause = "killed, failed, or cut off: see what it says itself"
     if loss.code == LINK_LOST:
-        cause = "the router was killed or stopped, or the network is gone"
+        cause = "the router was killed, the network is gone, or a certificate has expired"
     got = f"none any more after {tick / 1000:.3f} s of the walk"
     return ProcessError(loss.what, got, "it to be there until the walk's announced end", cause)
 

@@ -1,13 +1,14 @@
-"""Before a process connects with a certificate: do it and the router trust each other?"""
+"""Whether a process and its router trust each other, and how the router is reached."""
 
 from __future__ import annotations
 
 from typing import Final
 
+from quadriga.shared.bus.reach import try_endpoint
 from quadriga.shared.bus.zenoh_settings import NO_LINK
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import BusConfig
-from quadriga.shared.errors import BusError
+from quadriga.shared.errors import BusError, QuadrigaError
 from quadriga.shared.security.handshake import CAUSES, TRUSTED, UNREACHABLE, shake_hands
 from quadriga.shared.security.tls import tls_files
 
@@ -31,3 +32,17 @@ def check_trust(bus: BusConfig, name: str) -> None:
             "a router that is trusted and trusts this process",
             CAUSES[found.outcome],
         )
+
+
+def describe_way(bus: BusConfig, name: str) -> str:
+    """How `bus.endpoint` is reached from here by process `name`, in words.
+
+    It takes seconds if nobody answers. Zenoh itself never says why there is no link.
+    """
+    if not is_tls(bus.endpoint):
+        return try_endpoint(bus.endpoint).text
+    try:
+        check_trust(bus, name)
+    except QuadrigaError as error:
+        return f"{error.name}: {error.got} ({error.cause})"
+    return f"the router at {bus.endpoint} and {name} trust each other"

@@ -7,10 +7,10 @@ from collections.abc import Collection
 from typing import Final
 
 from quadriga.shared.bus.absence import describe_absent
-from quadriga.shared.bus.inquiry import Pause, ask, view_of
+from quadriga.shared.bus.inquiry import Pause, look
 from quadriga.shared.bus.introduction import describe_process
-from quadriga.shared.bus.reach import try_endpoint
 from quadriga.shared.bus.roster import processes
+from quadriga.shared.bus.trust import describe_way
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.clock import monotonic
@@ -57,12 +57,11 @@ class Watch:
         """Why some are not there, in one line; takes a second if one of those there is frozen."""
         reasons, linked = self._describe(absent)
         # Only now, at the end: to try it may take a second in which a robot would not be attended.
-        return reasons if linked else f"{reasons}; {try_endpoint(self._config.bus.endpoint).text}"
+        return reasons if linked else f"{reasons}; {describe_way(self._config.bus, self._bus.name)}"
 
     def _describe(self, absent: Collection[str]) -> tuple[str, bool]:
         """Why some are not there, and whether this process is linked to anybody."""
         bus, config = self._bus, self._config
-        told = ask(bus, wait=self._wait)
-        view = view_of(bus, config, told, describe_process(config, bus.name))
+        view = look(bus, config, describe_process(config, bus.name), self._wait)
         waited = [member for member in processes(config) if member.name in absent]
         return describe_absent(waited, view), view.linked

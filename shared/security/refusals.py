@@ -13,23 +13,31 @@ from collections.abc import Iterable
 from typing import Final, NamedTuple
 
 DENIED: Final = "denied"  # no rule permits it
+REVOKED: Final = "revoked"  # nothing is permitted to its certificate any more
 LARGE: Final = "large"  # larger than permitted
 OFTEN: Final = "often"  # sooner after the last than permitted
+EXPIRED: Final = "expired"  # its certificate has, and its link was closed
 UNTRUSTED: Final = "untrusted"  # its certificate, or the lack of one, was not accepted
 FULL: Final = "full"  # there are as many sessions as permitted
+REASONS: Final = (DENIED, REVOKED, LARGE, OFTEN, EXPIRED, UNTRUSTED, FULL)
 
 # What must be logged so that refusals can be told from it.
 LEVELS: Final = (
     "error,zenoh::net::routing::interceptor=trace,"
-    "zenoh_transport::unicast::manager=trace,zenoh_link_tls=debug"
+    "zenoh_transport::unicast::manager=trace,zenoh_link_tls=debug,zenoh_link_commons=warn"
 )
 _DROPPED: Final = "Msg intercepted!"
 _NO_SESSION: Final = "Denying new transport"
 _NO_LINK: Final = ". Hint: increase the system open file limit"  # of whatever failed
-MARKERS: Final = (_DROPPED, _NO_SESSION, _NO_LINK)  # of the lines that tell a refusal
-_STRANGER: Final = "somebody"  # whose certificate was not accepted, so that it has no name
-_CONNECT: Final = "connect"
+_ACCEPTS: Final = "Accepted TLS connection"
+_EXPIRES: Final = "remote certificate chain expired"
+# Of the lines that tell a refusal, or whose a link is.
+MARKERS: Final = (_DROPPED, _NO_SESSION, _NO_LINK, _ACCEPTS, _EXPIRES)
+SOMEBODY: Final = "somebody"  # whose certificate was not accepted, so that it has no name
+CONNECT: Final = "connect"
+_STAY: Final = "stay connected"
 _LONGEST: Final = 1000  # characters of a line that are read: a key may have 65,000
+_MOST_LINKS: Final = 1000  # whose are remembered: more than a router has at a time
 
 _COLOUR: Final = re.compile(r"\x1b\[[0-9;]*m")
 _THREAD: Final = re.compile(r"ThreadId\((\d+)\)")
@@ -41,8 +49,12 @@ _OFTEN: Final = re.compile(
     r"dropped by the downsampling interceptor: \w+\((?P<key>[^()\s]+)\).* "
     r"from:\S*?/(?P<session>[0-9a-f]+)"
 )
-_ACCEPTED: Final = re.compile(r"Accepted TLS connection .*Common Name: (?P<name>.+?)\.?$")
+_ACCEPTED: Final = re.compile(
+    _ACCEPTS + r" on \S+: (?P<address>\S+)\. .*Common Name: (?P<name>.+?)\.?$"
+)
+_CLOSED: Final = re.compile(r"=> (?:tls/)?(?P<address>\S+?) : " + re.escape(_EXPIRES))
 _UNACCEPTED: Final = re.compile(r"zenoh_link_tls\S*: (?P<why>.*)" + re.escape(_NO_LINK))
+_MOMENT: Final = re.compile(r"[:(]?\s*verification time.*")  # and what follows differs each time
 
 
 class Refused(NamedTuple):
@@ -66,7 +78,8 @@ class RefusalParser:
 
     def __init__(self) -> None:
         self._verdicts: dict[str, Refused] = {}  # the last of each thread
-        self._accepted = _STRANGER  # whose link was accepted last
+        self._accepted = SOMEBODY  # whose link was accepted last
+        self._links: dict[str, str] = {}  # whose they are, by the other side's address
 
     def take(self, lines: Iterable[str]) -> Counter[Refused]:
         """The refusals that these lines tell, with how often."""
@@ -82,12 +95,22 @@ class RefusalParser:
             return self._take_message(line)
         accepted = _ACCEPTED.search(line)
         if accepted:
-            self._accepted = accepted["name"]
+            self._note_link(accepted["address"], accepted["name"])
         elif _NO_SESSION in line:
-            return Refused(self._accepted, _CONNECT, "", FULL)
+            return Refused(self._accepted, CONNECT, "", FULL)
+        elif closed := _CLOSED.search(line):
+            return Refused(self._links.get(closed["address"], SOMEBODY), _STAY, "", EXPIRED)
         elif unaccepted := _UNACCEPTED.search(line):
-            return Refused(_STRANGER, f"{_CONNECT}: {unaccepted['why']}", "", UNTRUSTED)
+            why = _MOMENT.sub("", unaccepted["why"])
+            return Refused(SOMEBODY, f"{CONNECT}: {why}", "", UNTRUSTED)
         return None
+
+    def _note_link(self, address: str, name: str) -> None:
+        self._accepted = name
+        self._links.pop(address, None)
+        self._links[address] = name
+        if len(self._links) > _MOST_LINKS:
+            del self._links[next(iter(self._links))]
 
     def _take_message(self, line: str) -> Refused | None:
         thread = _THREAD.search(line)

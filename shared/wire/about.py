@@ -1,4 +1,4 @@
-"""What a process says of itself when it is asked: the answer to a question, not a topic."""
+"""What a process says when it is asked: the answers to questions, which are no topics."""
 
 from __future__ import annotations
 
@@ -64,8 +64,19 @@ class About(Message):
     wall_error_ns: int = plain(int, "how far that may be off; 0: it is not synchronised [ns]")
 
 
-ABOUT: Final = Question("about", About, ("every process before the walk", DOCTOR))
-QUESTIONS: Final = (ABOUT,)
+@record
+class Refusals(Message):
+    """What a router that has rules has refused so far, of each sender the newest kinds."""
+
+    entries: tuple[str, ...] = plain(
+        list, "JSON: who, action, key and reason as in a Refusal, how many times, s since the last"
+    )
+
+
+_ASKERS: Final = ("every process before the walk", DOCTOR)
+ABOUT: Final = Question("about", About, _ASKERS)
+REFUSALS: Final = Question("refusals", Refusals, _ASKERS)  # nobody but a router answers it
+QUESTIONS: Final = (ABOUT, REFUSALS)
 
 
 def stage_of(reached: frozenset[str], *, met: bool) -> str:

@@ -305,5 +305,5 @@ class Refusal(Message):
     who: str = plain(str, "common name of the sender's certificate, or where it came from")
     action: str = plain(str, "what was refused, such as put or declare subscriber")
     key: str = plain(str, "the key concerned, or empty")
-    reason: str = plain(str, "denied, large, often or unknown")
+    reason: str = plain(str, "denied, revoked, large, often, expired, untrusted or full")
     count: int = plain(int, "how many times")

@@ -203,7 +203,7 @@ def test_a_revoked_certificate_may_do_nothing(fortress: Fortress, recorder: Bus)
     with stranger(fortress, fortress.files("planner")) as session:
         for _ in range(TRIES):
             session.put("team/r1/plan", bytes(500))
-        await_refused(fortress, since, "planner.1", "team/r1/plan", "denied")
+        await_refused(fortress, since, "planner.1", "team/r1/plan", "revoked")
         refusals(heard(fortress, recorder))
 
 

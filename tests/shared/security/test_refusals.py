@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from quadriga.shared.security.refusals import RefusalParser, Refused
 
 ONE, TWO = "29a8f12d130c0a69d0b4355a58008dfc", "4d6341e01f894aa2fe81b1531d4ab363"
@@ -76,6 +78,35 @@ def test_a_link_that_is_not_accepted_is_told_with_its_reason() -> None:
     hint = "invalid peer certificate: BadSignature. Hint: increase the system open file limit."
     assert take(line(5, hint, "zenoh_link_tls::unicast")) == {
         Refused("somebody", "connect: invalid peer certificate: BadSignature", "", "untrusted"): 1
+    }
+
+
+def test_when_it_was_verified_does_not_make_another_kind() -> None:
+    lines = [
+        f"invalid peer certificate: certificate expired: verification time {k} (UNIX), but "
+        f"certificate is not valid after 5 ({k} seconds ago). Hint: increase the system open file "
+        "limit."
+        for k in (7, 8)
+    ]
+    why = "connect: invalid peer certificate: certificate expired"
+    assert take(*(line(5, text, "zenoh_link_tls::unicast") for text in lines)) == {
+        Refused("somebody", why, "", "untrusted"): 2
+    }
+
+
+@pytest.mark.parametrize("form", ["tls/127.0.0.2:7447 => tls/{}", "127.0.0.2:7447 => {}"])
+def test_a_link_that_expires_is_told_with_whose_it_was(form: str) -> None:
+    accepted = [
+        f"Accepted TLS connection on 127.0.0.2:7447: 127.0.0.1:{port}. Common Name: {name}."
+        for name, port in (("r1.1", 53748), ("r2.1", 53749))
+    ]
+    closed = f"Closing TLS link {form.format('127.0.0.1:53748')} : remote certificate chain expired"
+    assert take(
+        *(line(5, text, "zenoh_link_tls::unicast") for text in accepted),
+        line(7, closed, "zenoh_link_commons::tls::expiration"),
+    ) == {Refused("r1.1", "stay connected", "", "expired"): 1}
+    assert take(line(7, closed, "zenoh_link_commons::tls")) == {
+        Refused("somebody", "stay connected", "", "expired"): 1
     }
 
 

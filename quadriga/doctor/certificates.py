@@ -1,0 +1,90 @@
+"""Whether the certificates that a computer holds are good, and for how long: pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Final
+
+from quadriga.certs.certificate import Certificate
+from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, Diagnosis
+from quadriga.shared.security.roll import split_common_name
+
+CERTIFICATE: Final = "certificate"
+CERTIFICATE_EXPIRED: Final = "certificate-expired"
+CERTIFICATE_EXPIRING: Final = "certificate-expiring"
+CERTIFICATE_UNTRUSTED: Final = "certificate-untrusted"
+CERTIFICATE_REVOKED: Final = "certificate-revoked"
+CERTIFICATE_UNREADABLE: Final = "certificate-unreadable"
+KEY_OPEN: Final = "key-open"
+
+_SOON: Final = 14.0  # days: time to renew
+_OTHERS: Final = 0o077  # permissions of others than the owner
+
+
+@dataclass(frozen=True, slots=True)
+class HeldCertificate:
+    """What a computer holds of one identity.
+
+    Attributes:
+        identity: whose.
+        certificate: None: it cannot be read.
+        signed: whether the authority beside it has signed it.
+        key_mode: permissions of its private key; None: there is no key.
+        problem: why it cannot be read.
+    """
+
+    identity: str
+    certificate: Certificate | None
+    signed: bool = False
+    key_mode: int | None = None
+    problem: str = ""
+
+
+def check_certificates(
+    held: Sequence[HeldCertificate], revoked: dict[str, int], now: datetime
+) -> tuple[Diagnosis, ...]:
+    """All that is wrong with them, or one line that they are good.
+
+    Args:
+        held: by this computer.
+        revoked: by identity the number of the last certificate that is not valid any more, if this
+            computer has that list.
+        now: by its clock.
+    """
+    found = tuple(item for each in held for item in _check(each, revoked, now))
+    days = [each.certificate.days_left(now) for each in held if each.certificate]
+    if found or not days:
+        return found
+    names = ", ".join(each.identity for each in held)
+    text = f"certificates of {names}: valid for {min(days):.0f} days at least"
+    return (Diagnosis(CERTIFICATE, GOOD, text),)
+
+
+def _check(held: HeldCertificate, revoked: dict[str, int], now: datetime) -> Iterator[Diagnosis]:
+    name, certificate = held.identity, held.certificate
+    again = f"`quadriga certs renew {name}`, and copy its folder to its machine"
+    if held.key_mode is None:
+        text = f"there is no private key of {name}"
+        yield Diagnosis(CERTIFICATE_UNREADABLE, BAD, text, f"copy the whole folder {name}")
+    elif held.key_mode & _OTHERS:
+        text = f"others can read the private key of {name} (mode {held.key_mode:o})"
+        yield Diagnosis(KEY_OPEN, BAD, text, f"chmod 600 {name}/key.pem; renew it if it was read")
+    if certificate is None:
+        yield Diagnosis(CERTIFICATE_UNREADABLE, BAD, f"that of {name}: {held.problem}", again)
+        return
+    identity, number = split_common_name(certificate.name)
+    days = certificate.days_left(now)
+    if not held.signed:
+        text = f"{certificate.name} is not signed by the authority whose certificate is beside it"
+        cause = "files of two teams, or of before `quadriga certs make` began anew: copy the folder"
+        yield Diagnosis(CERTIFICATE_UNTRUSTED, BAD, text, cause)
+    if 0 < number <= revoked.get(identity, 0):
+        yield Diagnosis(CERTIFICATE_REVOKED, BAD, f"{certificate.name} is revoked", again)
+    if days <= 0.0:
+        text = f"{certificate.name} expired {-days:.1f} days ago"
+        yield Diagnosis(CERTIFICATE_EXPIRED, BAD, text, again)
+    elif days < _SOON:
+        text = f"{certificate.name} expires in {days:.1f} days"
+        yield Diagnosis(CERTIFICATE_EXPIRING, NOTE, text, again)
