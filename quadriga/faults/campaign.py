@@ -93,5 +93,7 @@ def describe_row(row: dict[str, Any]) -> str:
     for name, title in (("detect_ms", "noticed after"), ("stand_ms", "others stood after")):
         if row[name] is not None:
             parts.append(f"{title} {row[name]} ms")
+    if "forged" in row:
+        parts.append(f"refused {row['refused']} of {row['forged']}")
     parts += [f"{name}: {what}" for name, what in row["status"].items() if what != "walk"]
     return "; ".join(parts)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from quadriga.faults.attack_faults import ATTACK_FAULTS
 from quadriga.faults.component_faults import COMPONENT_FAULTS
 from quadriga.faults.fault import TeamFault
 from quadriga.faults.process_faults import PROCESS_FAULTS
 from quadriga.shared.errors import ConfigError, did_you_mean
 
 ALL: Final = "all"
-FAULTS: Final = (*PROCESS_FAULTS, *COMPONENT_FAULTS)
+FAULTS: Final = (*PROCESS_FAULTS, *COMPONENT_FAULTS, *ATTACK_FAULTS)
 """In the order of the table."""
 BY_NAME: Final = {fault.name: fault for fault in FAULTS}
 

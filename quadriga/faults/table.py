@@ -15,7 +15,7 @@ from quadriga.tables import NOTHING, Table
 _COLUMNS: Final = (
     *("fault", "tries", "no result", "walked on", "stopped", "falls", "falls of others"),
     *("noticed ms p50", "max", "others stood ms p50", "max", "lost messages"),
-    "most frequent reason",
+    *("forged", "refused", "passed", "most frequent reason"),
 )
 _NOTE: Final = """\
 "walked on": all robots walked until the time was over; "stopped": somebody stopped, or was led down
@@ -23,7 +23,9 @@ by the world, and nobody fell.
 "noticed": from the fault until an agent no longer walked or the world said that a robot is silent
 or gone; "others stood": until all other robots stood or were damped. Falls and times are of the
 tries with a result. "lost messages": what the recordings lack, the faulty robot's own aside; in
-real time also commands of ticks that an agent did not answer."""
+real time also commands of ticks that an agent did not answer.
+"forged": messages and connections of an attacker; "refused": by the router, which has told it, or
+since nobody can read it; "passed": what came through and can be read."""
 
 
 def build_team_fault_table(rows: Sequence[dict[str, Any]]) -> Table:
@@ -51,6 +53,7 @@ def _cells(every: Sequence[dict[str, Any]]) -> list[str]:
         *_times(found, "detect_ms"),
         *_times(found, "stand_ms"),
         str(sum(row["lost_messages"] for row in found)),
+        *_attack(found),
         *(f"{reason} ({times})" for reason, times in reasons or [(NOTHING, 0)]),
     ]
 
@@ -65,6 +68,13 @@ def _reasons(row: dict[str, Any]) -> list[str]:
     """Codes of the reasons for which agents no longer walked."""
     reasons = (what.partition(" ")[2] for what in row["status"].values())
     return [code_of(reason) for reason in reasons if reason]
+
+
+def _attack(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """What attackers have tried, and what came of it."""
+    attacked = [row for row in rows if "forged" in row]
+    names = ("forged", "refused", "passed")
+    return [str(sum(row[name] for row in attacked)) if attacked else NOTHING for name in names]
 
 
 def _times(rows: Sequence[dict[str, Any]], name: str) -> list[str]:

@@ -11,24 +11,25 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import zenoh
 
 from quadriga.certs.folder import CertificateFolder
+from quadriga.certs.secured import certificates_of, secure, utc_now
+from quadriga.faults.attacks import client_settings
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
-from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
-from quadriga.shared.security.roll import team_roll
-from quadriga.shared.security.tls import TlsFiles, tls_files, tls_settings
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.security.tls import TlsFiles, tls_files
 from quadriga.team.endpoint import free_endpoint
 
 WAIT = 20.0  # s, far more than anything here takes
-NOW = datetime.fromtimestamp(1e-9 * wall_ns(), UTC)
+NOW = utc_now()
 LONG_AGO = NOW - timedelta(days=10)
 
 
@@ -42,8 +43,7 @@ class Fortress:
 
     @property
     def certificates(self) -> CertificateFolder:
-        names = [who.name for who in team_roll(self.config)]
-        return CertificateFolder(Path(self.config.bus.certificates), names)
+        return certificates_of(self.config)
 
     def files(self, identity: str) -> TlsFiles:
         return tls_files(self.config.bus.certificates, identity)
@@ -65,18 +65,8 @@ class Fortress:
 
 def make_fortress(folder: Path) -> Fortress:
     """A team of two with certificates for an endpoint of its own."""
-    endpoint = free_endpoint().replace("tcp/", "tls/")
-    given = {
-        "team.robots": 2,
-        "planner.kind": "none",
-        "bus.mode": "client",
-        "bus.endpoint": endpoint,
-        "bus.certificates": str(folder / "certs"),
-    }
-    made = Fortress(load(None, given), folder)
-    host = endpoint.removeprefix("tls/").partition(":")[0]
-    made.certificates.make("team", [host], NOW, 1.0)
-    return made
+    given = {"team.robots": 2, "planner.kind": "none", "bus.endpoint": free_endpoint()}
+    return Fortress(secure(load(None, given), folder / "certs", NOW), folder)
 
 
 @contextmanager
@@ -104,17 +94,7 @@ def serving(fortress: Fortress) -> Iterator[subprocess.Popen[str]]:
 
 def settings_of(fortress: Fortress, files: TlsFiles | None) -> dict[str, Any]:
     """A stock client's settings, with somebody's files or none."""
-    given: dict[str, Any] = {
-        "mode": "client",
-        "connect/endpoints": [fortress.config.bus.endpoint],
-        "scouting/multicast/enabled": False,
-        "connect/timeout_ms": 1000,
-        "connect/exit_on_failure": True,
-    }
-    if files is None:
-        authority = fortress.files("r1").authority
-        return given | {"transport/link/tls/root_ca_certificate": str(authority)}
-    return given | dict(tls_settings(files, listens=False))
+    return client_settings(fortress.config, files) | {"connect/timeout_ms": 1000}
 
 
 @contextmanager

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +18,18 @@ import pytest
 import zenoh
 
 from quadriga.certs.folder import CertificateFolder
+from quadriga.faults import attacks
+from quadriga.faults.attack import Attack, AttackReport
+from quadriga.faults.attack_outcome import describe_attack
+from quadriga.faults.fault import Draw
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import ESTOP as STOPPER
+from quadriga.shared.recording.mcap_chunk import ChunkEntry
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.security.caps import capacity, largest
+from quadriga.shared.security.markdown import PAGE
 from quadriga.shared.security.tls import TlsFiles, tls_files, tls_settings
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import EStop, Event, Reference, Refusal
@@ -41,6 +50,19 @@ TRIES = 20
 STOP = encode(Event.of(1 << 41, "signal", "", "told to stop"))
 FAST = encode(Reference(0, 0, 2.0, 0.0, 0.0, 0.3))
 LAST = EStop(0, 0, "the last word")
+ATTACKS = (  # whose certificate was stolen, and what is sent with it, or without any
+    ("r2", "team/r1/command", bytes(500)),
+    ("r2", "team/r1/state", bytes(500)),
+    ("operator", "team/r1/command", bytes(500)),
+    ("operator", "team/sim/event", STOP),
+    ("r1", "team/reference", FAST),
+    ("r1", "team/r2/plan", bytes(500)),
+    ("sim", "team/r1/command", bytes(500)),
+    ("recorder", "team/estop", encode(EStop(0, 0, "forged"))),
+    ("observer", "team/reference", FAST),
+    ("launcher", "team/refused", bytes(50)),
+    ("r1", "team/of/strangers", bytes(50)),
+)
 
 
 @pytest.fixture(scope="module")
@@ -91,22 +113,14 @@ def await_refused(fortress: Fortress, since: int, who: str, key: str, word: str)
         sleep(0.01)
 
 
-@pytest.mark.parametrize(
-    ("thief", "key", "payload"),
-    [
-        ("r2", "team/r1/command", bytes(500)),
-        ("r2", "team/r1/state", bytes(500)),
-        ("operator", "team/r1/command", bytes(500)),
-        ("operator", "team/sim/event", STOP),
-        ("r1", "team/reference", FAST),
-        ("r1", "team/r2/plan", bytes(500)),
-        ("sim", "team/r1/command", bytes(500)),
-        ("recorder", "team/estop", encode(EStop(0, 0, "forged"))),
-        ("observer", "team/reference", FAST),
-        ("launcher", "team/refused", bytes(50)),
-        ("r1", "team/of/strangers", bytes(50)),
-    ],
-)
+def test_the_page_lists_every_attack() -> None:
+    lines = PAGE.read_text(encoding="utf-8").splitlines()
+    for thief, key, _ in ATTACKS:
+        short = key.removeprefix("team/")
+        assert any(f"| `{short}` |" in line and f"`{thief}`" in line for line in lines), short
+
+
+@pytest.mark.parametrize(("thief", "key", "payload"), ATTACKS)
 @pytest.mark.parametrize("declared", [False, True])
 def test_a_stolen_certificate_sends_what_its_owner_may_and_nothing_else(
     fortress: Fortress, recorder: Bus, thief: str, key: str, payload: bytes, declared: bool
@@ -164,10 +178,10 @@ def test_a_stolen_certificate_hears_what_its_owner_may_and_nothing_else(
 
 
 def knock(fortress: Fortress, files: TlsFiles | None) -> None:
-    """Try to come in and to stop the team. Zenoh may say that it is in although it is not."""
+    """Try to come in and all attacks. Zenoh may say that it is in although it is not."""
     with suppress(zenoh.ZError), stranger(fortress, files) as session:
-        for _ in range(TRIES):
-            session.put("team/estop", encode(EStop(0, 0, "forged")))
+        for _, key, payload in ATTACKS:
+            session.put(key, payload)
 
 
 def test_without_a_certificate_nobody_comes_in(fortress: Fortress, recorder: Bus) -> None:
@@ -268,3 +282,35 @@ def test_a_stolen_certificate_of_a_robot_makes_no_router(fortress: Fortress) -> 
         config.insert_json5(key, json.dumps(value))
     with zenoh.open(config), pytest.raises(BusError, match="untrusted"):
         Bus.open(replace(fortress.config.bus, endpoint=endpoint), "team", "r1")
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [
+        attacks.forged_certificate,
+        attacks.forged_messages,
+        attacks.oversized_messages,
+        attacks.malformed_messages,
+    ],
+    ids=lambda given: given.__name__,
+)
+def test_the_attackers_of_the_table_of_faults_are_refused_to_the_last(
+    fortress: Fortress, recorder: Bus, tmp_path: Path, plan: Callable[[Config, Draw], Attack]
+) -> None:
+    file = tmp_path / "attack.json"
+    file.write_text(plan(fortress.config, Draw("r1", 3000, 1)).to_json(), encoding="utf-8")
+    command = [sys.executable, "-m", "quadriga.faults.attacker", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT, check=True)
+    report = AttackReport.from_json(done.stdout)
+    entries, deadline = list[ChunkEntry](), monotonic() + WAIT
+    while True:
+        entries += [ChunkEntry(key, 0, 0, load) for key, load in heard(fortress, recorder)]
+        row = describe_attack(entries, report)
+        if row["refused"] >= row["forged"]:
+            break
+        assert monotonic() < deadline, row
+    assert row["forged"] >= 20
+    # What is no message is let through under its sender's own key, but for what is too large.
+    malformed = plan is attacks.malformed_messages
+    assert (row["told"] < row["refused"]) if malformed else (row["told"] == row["refused"])
+    assert row["passed"] == 0

@@ -32,10 +32,14 @@ def test_a_line_for_each_fault_with_what_came_of_it() -> None:
         row(falls=["r1", "r2"], falls_of_others=1, end="fallen: fall of r1", detect_ms=100),
         {"fault": "agent-killed", "seed": 5, "error": "the team: got no walk"},
         row(fault="imu-stuck"),
+        row(fault="message-forged", forged=220, refused=219, passed=1),
+        row(fault="message-forged", forged=220, refused=220, passed=0),
     ]
     table = build_team_fault_table(rows)
     lines = {line[0]: dict(zip(table.columns, line, strict=True)) for line in table.rows}
-    assert list(lines) == ["agent-killed", "imu-stuck"]
+    assert list(lines) == ["agent-killed", "imu-stuck", "message-forged"]
+    attack = [[line[name] for name in ("forged", "refused", "passed")] for line in lines.values()]
+    assert attack == [["–"] * 3, ["–"] * 3, ["440", "439", "1"]]
     killed = lines["agent-killed"]
     assert (killed["tries"], killed["no result"], killed["walked on"]) == ("5", "1", "1")
     assert (killed["stopped"], killed["falls"], killed["falls of others"]) == ("2", "1", "1")

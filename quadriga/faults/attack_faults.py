@@ -1,0 +1,117 @@
+"""Faults that somebody makes: a stranger, and who has stolen a certificate, at a secured router."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final, TypeAlias
+
+from quadriga.certs.secured import secure, utc_now
+from quadriga.faults import attacks
+from quadriga.faults.attack import Attack, AttackReport
+from quadriga.faults.attack_outcome import describe_attack
+from quadriga.faults.expiry_fault import EXPIRY_FAULT
+from quadriga.faults.fault import Draw, FaultScene, SetStage, Stage, TeamFault
+from quadriga.recordings.summary import RECORDING
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ProcessError, RecordingError
+from quadriga.shared.recording.reader import Recording
+
+_LASTS_S: Final = 4.0  # world time that the attack takes on a busy computer
+_WAIT_S: Final = 60.0  # wall time after which it is given up
+
+_Plan: TypeAlias = Callable[[Config, Draw], Attack]
+
+
+def _stage(plan: _Plan) -> SetStage:
+    """A team behind a router with certificates, and an attacker at the fault's moment."""
+
+    @contextmanager
+    def stage(config: Config, draw: Draw, folder: Path) -> Iterator[Stage]:
+        with TemporaryDirectory(prefix="quadriga-certs-") as private:
+            secured = secure(config, Path(private) / "certs", utc_now())
+            strike = _AttackStrike(plan(secured, draw), Path(private))
+            world = replace(secured.world, seconds=secured.world.seconds + _LASTS_S)
+            yield Stage(replace(secured, world=world), strike)
+            strike.conclude(folder)
+
+    return stage
+
+
+class _AttackStrike:
+    """Run an attacker to its end, and tell afterwards what came of it."""
+
+    def __init__(self, attack: Attack, private: Path) -> None:
+        self._attack, self._private = attack, private
+        self._scene: FaultScene | None = None
+        self._report = AttackReport(0, ())
+
+    def __call__(self, scene: FaultScene) -> None:
+        self._scene = scene
+        plan = self._private / "attack.json"
+        plan.write_text(self._attack.to_json(), encoding="utf-8")
+        command = [sys.executable, "-m", "quadriga.faults.attacker", str(plan)]
+        try:
+            done = subprocess.run(
+                command, capture_output=True, text=True, timeout=_WAIT_S, check=False
+            )
+        except subprocess.TimeoutExpired:
+            raise ProcessError("the attacker", f"no end after {_WAIT_S:g} s", "one") from None
+        if done.returncode:
+            last = done.stderr.strip().splitlines()[-1:]
+            raise ProcessError("the attacker", f"exit status {done.returncode}", "0", *last)
+        self._report = AttackReport.from_json(done.stdout)
+
+    def conclude(self, folder: Path) -> None:
+        """Tell by the recording what came of it; whether it can be read is told elsewhere."""
+        if self._scene is None:
+            return
+        with suppress(RecordingError):
+            entries = Recording(folder / RECORDING).entries()
+            self._scene.facts.update(describe_attack(entries, self._report))
+
+
+ATTACK_FAULTS: Final = (
+    EXPIRY_FAULT,
+    TeamFault(
+        "certificate-expired",
+        "somebody connects with a certificate that has expired",
+        _stage(attacks.expired_certificate),
+    ),
+    TeamFault(
+        "certificate-forged",
+        "somebody connects with a robot's certificate of another authority",
+        _stage(attacks.forged_certificate),
+    ),
+    TeamFault(
+        "message-forged",
+        "stolen certificates of other roles command, stop, plan and lie",
+        _stage(attacks.forged_messages),
+    ),
+    TeamFault(
+        "message-replayed",
+        "a stolen certificate of who looks on sends again all that it has heard",
+        _stage(attacks.replayed_messages),
+    ),
+    TeamFault(
+        "message-malformed",
+        "a robot's stolen certificate sends what is no message under its own keys",
+        _stage(attacks.malformed_messages),
+    ),
+    TeamFault(
+        "message-oversized",
+        "a robot's stolen certificate sends messages of up to 512 KiB under its own keys",
+        _stage(attacks.oversized_messages),
+    ),
+    TeamFault(
+        "stranger",
+        "somebody without a certificate floods the router with connections",
+        _stage(attacks.stranger),
+    ),
+)
+"""In the order of the table."""

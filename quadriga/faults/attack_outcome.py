@@ -1,0 +1,63 @@
+"""What came of an attack, from the recording of the walk and what the attacker tells."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from contextlib import suppress
+
+from quadriga.faults.attack import AttackReport, digest_of
+from quadriga.shared.errors import MessageError
+from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Refusal
+from quadriga.shared.wire.topics import REFUSED, find_topic
+
+
+def describe_attack(entries: Iterable[ChunkEntry], report: AttackReport) -> dict[str, int]:
+    """Fields of a trial's row.
+
+    `forged` is all that the attacker has tried: messages, and connections that nobody may make.
+    `told` is how much of it the router has refused by its audit. `refused` counts what reached a
+    receiver and cannot be read, too. `passed` is what came through and can be read: of a message
+    that is sent again all but the first.
+
+    Args:
+        entries: of the recording.
+        report: of the attacker.
+    """
+    shots = {(shot.key, shot.digest): shot for shot in report.shots}
+    keys = {shot.key for shot in report.shots}
+    readable, unreadable, told = Counter[tuple[str, str]](), 0, 0
+    for entry in entries:
+        told += _count_told(entry)
+        if entry.key not in keys:
+            continue
+        at = entry.key, digest_of(entry.payload)
+        if at not in shots:
+            continue
+        if _can_be_read(entry):
+            readable[at] += 1
+        else:
+            unreadable += 1
+    passed = sum(max(count - shots[at].heard, 0) for at, count in readable.items())
+    refused = told + unreadable
+    return {"forged": report.total, "refused": refused, "told": told, "passed": passed}
+
+
+def _count_told(entry: ChunkEntry) -> int:
+    if find_topic(entry.key)[0] is REFUSED:
+        with suppress(MessageError):
+            return decode(entry.payload, Refusal).count
+    return 0
+
+
+def _can_be_read(entry: ChunkEntry) -> bool:
+    topic, _ = find_topic(entry.key)
+    if topic is None:
+        return True  # nobody reads it, but it came through
+    try:
+        decode(entry.payload, topic.type)
+    except MessageError:
+        return False
+    return True
