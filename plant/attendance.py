@@ -10,18 +10,22 @@ from quadriga.shared.wire import codes
 def note_absences(server: PlantServer) -> None:
     """Announce whose commands are lost since the last look, and who answers again.
 
-    A robot is silent once its motors would be damped.
+    A robot is silent once its motors would be damped, or have been held for as long: commands that
+    always come late move nobody.
     """
     world, tick = server.config.world, server.plant.tick
     present = server.bus.members_at(HERE)
     for name in server.plant.names:
-        age = tick - server.commands.tick_of(name)
+        age, late_ms = tick - server.commands.tick_of(name), server.late_ms.get(name, 0)
         if name not in server.silent:
             if name not in present:
                 _announce_loss(server, name, codes.GONE, "gone")
             elif age > world.command_damp_ms:
                 _announce_loss(server, name, codes.SILENT, f"silent for {age} ms")
-        elif name in present and age <= world.command_hold_ms:
+            elif late_ms > world.command_damp_ms:
+                why = f"late for {late_ms} ms: its joints are held"
+                _announce_loss(server, name, codes.SILENT, why)
+        elif name in present and age <= world.command_hold_ms and not late_ms:
             server.silent.discard(name)
             server.announce(codes.BACK, name, "answers again")
 

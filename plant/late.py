@@ -14,7 +14,8 @@ FRESH: Final = "fresh"
 HOLD: Final = "hold"
 DAMP: Final = "damp"
 
-PROMPT_TICKS: Final = 10  # for which a command must be prompt after one was late
+PROMPT_TICKS: Final = 10  # for which commands must be prompt after one was late
+SURE_TICKS: Final = 100  # likewise, after commands were lost
 MOTOR_DAMPING: Final = 2.0  # N·m·s/rad, damping of a motor without a command
 _HOLD_KP: Final = 80.0  # N·m/rad, carries a standing robot
 _HOLD_KD: Final = 3.0  # N·m·s/rad
@@ -32,26 +33,33 @@ class Lateness:
 
     Over a link that takes about as long as a command may be old, its age dithers about that limit.
     The motors would change to and fro between holding a posture and torques that belong to another
-    one. So they hold until commands have been younger than half the limit for some ticks.
+    one. So they hold until commands have been younger than half the limit for some ticks. A link
+    that loses packets comes and goes: once commands were lost, they must be prompt for longer.
 
     Args:
         world: the limits.
+
+    Attributes:
+        late_ms: for how long the motors have not followed the commands; 0: they follow them.
     """
 
     def __init__(self, world: WorldConfig) -> None:
         self._world = world
-        self._prompt = PROMPT_TICKS  # ticks in a row with a prompt command, up to as many
+        self._state = FRESH
+        self._prompt = 0  # ticks in a row with a prompt command
+        self.late_ms = 0
 
     def grade(self, age_ms: int) -> str:
         """Which of the three applies at the next tick, with a command of this age."""
         now = grade(age_ms, self._world)
-        if now != FRESH:
-            self._prompt = 0
-            return now
-        if self._prompt < PROMPT_TICKS:
-            is_prompt = 2 * age_ms <= self._world.command_hold_ms
-            self._prompt = self._prompt + 1 if is_prompt else 0
-        return FRESH if self._prompt == PROMPT_TICKS else HOLD
+        if now == DAMP or (now == HOLD and self._state == FRESH):
+            self._state = now
+        is_prompt = 2 * age_ms <= self._world.command_hold_ms
+        self._prompt = self._prompt + 1 if is_prompt else 0
+        if self._prompt >= (SURE_TICKS if self._state == DAMP else PROMPT_TICKS):
+            self._state = FRESH
+        self.late_ms = 0 if self._state == FRESH else self.late_ms + 1
+        return self._state
 
 
 def hold_joints(state: State) -> Command:

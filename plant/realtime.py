@@ -95,6 +95,7 @@ class _Motors:
                     chosen[name] = command
                 continue
             state = self._lateness[name].grade(age)
+            server.late_ms[name] = self._lateness[name].late_ms
             if command is not None and state == FRESH:
                 chosen[name] = command
                 self._held.pop(name, None)

@@ -42,6 +42,7 @@ class PlantServer:
             which sees to it itself, nobody presses it.
         commands: the newest command of every robot of the plant.
         silent: robots that are not waited for.
+        late_ms: by robot, for how long its motors have not followed its commands, in real time.
     """
 
     def __init__(
@@ -52,6 +53,7 @@ class PlantServer:
         self.time = time or TeamTime()
         self.commands = CommandBox(team, plant.names, config.robot)
         self.silent: set[str] = set()
+        self.late_ms: dict[str, int] = {}
         self._lost, self._lowered = LostCommands(config), frozenset[str]()
         self.estops: Callable[[], str] = lambda: ""
         self._stopped = False

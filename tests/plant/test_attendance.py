@@ -55,3 +55,18 @@ def test_who_leaves_who_is_silent_and_who_is_back() -> None:
         (420, "r2", codes.BACK),
         (440, "r1", codes.BACK),
     ]
+
+
+def test_a_robot_whose_commands_always_come_late_is_announced() -> None:
+    config, bus = configured(2, mode="realtime"), Meeting()
+    server = PlantServer(config, World(config), cast("Bus", bus))
+    walk(server, 100)
+    server.late_ms["r2"] = config.world.command_damp_ms
+    walk(server, 200)
+    assert bus.events() == []
+    server.late_ms["r2"] += 1
+    walk(server, 300)
+    server.late_ms["r2"] = 0
+    walk(server, 400)
+    told = [(event.tick, event.robot, event.code) for event in bus.events()]
+    assert told == [(200, "r2", codes.SILENT), (300, "r2", codes.BACK)]

@@ -10,7 +10,16 @@ import numpy as np
 import pytest
 
 from quadriga.plant.commands import CommandBox
-from quadriga.plant.late import DAMP, FRESH, HOLD, PROMPT_TICKS, Lateness, grade, hold_joints
+from quadriga.plant.late import (
+    DAMP,
+    FRESH,
+    HOLD,
+    PROMPT_TICKS,
+    SURE_TICKS,
+    Lateness,
+    grade,
+    hold_joints,
+)
 from quadriga.plant.realtime import _Motors
 from quadriga.plant.server import PlantServer
 from quadriga.shared.config.sections import Config, TeamConfig
@@ -34,11 +43,24 @@ def test_an_age_that_dithers_about_the_limit_does_not_change_the_grade_with_it()
 
 def test_who_was_late_is_followed_again_once_its_commands_are_prompt() -> None:
     lateness = Lateness(Config().world)
-    assert [lateness.grade(age) for age in (18, 201, 200, 21)] == [FRESH, DAMP, HOLD, HOLD]
+    assert [lateness.grade(age) for age in (18, 21, 200)] == [FRESH, HOLD, HOLD]
     assert {lateness.grade(10) for _ in range(PROMPT_TICKS - 1)} == {HOLD}
     assert lateness.grade(11) == HOLD, "so it begins to count anew"
     assert {lateness.grade(10) for _ in range(PROMPT_TICKS - 1)} == {HOLD}
+    assert lateness.late_ms == 2 + 2 * (PROMPT_TICKS - 1) + 1
     assert {lateness.grade(age) for age in (10, 20, 1, 19)} == {FRESH}
+    assert lateness.late_ms == 0
+
+
+def test_whose_commands_were_lost_is_led_down_until_they_are_surely_back() -> None:
+    """A link that loses packets lets some commands through between two silences."""
+    lateness = Lateness(Config().world)
+    silence_and_burst = [*range(202), *([1] * 40)]
+    grades = [lateness.grade(age) for age in 3 * silence_and_burst]
+    assert grades.index(DAMP) == 201
+    assert set(grades[201:]) == {DAMP}
+    assert {lateness.grade(1) for _ in range(SURE_TICKS - 41)} == {DAMP}
+    assert lateness.grade(1) == FRESH
 
 
 def test_holding_keeps_a_standing_robot_up_and_damping_does_not() -> None:
@@ -53,11 +75,12 @@ def test_holding_keeps_a_standing_robot_up_and_damping_does_not() -> None:
     assert not held.fallen()
 
 
-def test_a_robot_that_was_damped_is_not_drawn_back_to_where_it_was_held() -> None:
+def test_a_robot_that_was_damped_is_not_held_by_a_command_that_is_late() -> None:
     """Silent for 400 ms it is held, then damped and sinks; then a command comes, 100 ms old."""
     world = World(replace(Config(), team=TeamConfig(robots=1)))
     box = CommandBox("team", world.names, A1)
-    motors = _Motors(cast(PlantServer, SimpleNamespace(plant=world, commands=box, config=Config())))
+    server = SimpleNamespace(plant=world, commands=box, config=Config(), late_ms={})
+    motors = _Motors(cast(PlantServer, server))
     box.latest["r1"] = hold_joints(world.states()["r1"])
     poses = {}
     while world.tick < 500:
@@ -66,8 +89,8 @@ def test_a_robot_that_was_damped_is_not_drawn_back_to_where_it_was_held() -> Non
         commands = motors.commands()
         poses[world.tick] = commands["r1"].q_des if commands else None
         world.step(commands)
-    assert poses[300] is None
     assert poses[100] is not None
-    assert poses[499] is not None
+    assert poses[200] is not None
     np.testing.assert_array_equal(poses[100], poses[200])
-    assert np.abs(poses[499] - poses[100]).max() > 0.1
+    assert poses[300] is poses[499] is None
+    assert server.late_ms == {"r1": 500 - 21}, "held from the tick on at which it was 21 ms old"
