@@ -8,11 +8,12 @@ from typing import Final
 from quadriga.faults.attack_faults import ATTACK_FAULTS
 from quadriga.faults.component_faults import COMPONENT_FAULTS
 from quadriga.faults.fault import TeamFault
+from quadriga.faults.link_faults import LINK_FAULTS
 from quadriga.faults.process_faults import PROCESS_FAULTS
 from quadriga.shared.errors import ConfigError, did_you_mean
 
 ALL: Final = "all"
-FAULTS: Final = (*PROCESS_FAULTS, *COMPONENT_FAULTS, *ATTACK_FAULTS)
+FAULTS: Final = (*PROCESS_FAULTS, *COMPONENT_FAULTS, *LINK_FAULTS, *ATTACK_FAULTS)
 """In the order of the table."""
 BY_NAME: Final = {fault.name: fault for fault in FAULTS}
 

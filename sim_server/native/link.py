@@ -88,6 +88,11 @@ class Link:
             arrived.append(self._way.popleft()[1])
         return arrived
 
+    @property
+    def next_arrival(self) -> float:
+        """When the next packet on its way arrives, ms; infinity: none is on its way."""
+        return self._way[0][0] if self._way else float("inf")
+
     def forget(self) -> None:
         """Lose all that is on its way."""
         self._way.clear()

@@ -6,6 +6,7 @@ import pytest
 from quadriga.faults.campaign import REALTIME_ROBOTS, config_for
 from quadriga.faults.catalogue import BY_NAME, FAULTS, select_faults
 from quadriga.faults.fault import FaultScene, TeamFault
+from quadriga.faults.link_faults import LINK_FAULTS
 from quadriga.faults.trial import draw_fault
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
@@ -27,7 +28,10 @@ def test_faults_by_name_in_the_order_of_the_table() -> None:
         select_faults(["agent-killed", "imu-stack"])
 
 
-@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+# Those of links make a network each: tests/runtime.
+@pytest.mark.parametrize(
+    "fault", [fault for fault in FAULTS if fault not in LINK_FAULTS], ids=lambda fault: fault.name
+)
 def test_every_fault_is_one_that_can_be_made(fault: TeamFault, tmp_path: Path) -> None:
     draw = draw_fault(Config(), 7)
     for kind in ROBOTS:

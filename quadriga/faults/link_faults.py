@@ -1,0 +1,69 @@
+"""Faults of a robot's link: packets are lost, late, swapped, doubled, damaged, or all gone.
+
+Each agent is at a place of its own, and what it sends and hears goes through an emulated network
+with real TCP: everything (`link-…`), or all but the states and commands of its robot, which take a
+cable (`radio-…`), as where the agent's computer is beside its robot.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+from quadriga.faults.fault import Draw, FaultScene, SetStage, Stage, TeamFault
+from quadriga.faults.network.emulated import EmulatedNetwork
+from quadriga.faults.network.layout import NetworkLayout
+from quadriga.faults.network.order import RadioOrder
+from quadriga.shared.config.sections import Config
+from quadriga.sim_server.native.link import LinkFaults
+
+_GONE: Final = LinkFaults(loss=1.0)
+_LOG: Final = Path("logs", "air.log")
+
+# Name, what it does each way, for how many seconds, and in words.
+_KINDS: Final = (
+    *((f"loss-{p}", LinkFaults(loss=0.01 * p), None, f"{p} % lost, each way") for p in (1, 5, 20)),
+    *(
+        (f"delay-{ms}", LinkFaults(delay=0.5 * ms), None, f"a round trip of {ms} ms")
+        for ms in (5, 20, 50)
+    ),
+    (
+        "loss-20-delay-50",
+        LinkFaults(loss=0.2, delay=25.0),
+        None,
+        "20 % lost each way, and a round trip of 50 ms",
+    ),
+    ("reorder", LinkFaults(reorder=0.2), None, "a fifth after the next"),
+    ("duplicate", LinkFaults(duplicate=0.2), None, "a fifth twice"),
+    ("garbage", LinkFaults(garbage=0.2), None, "a fifth damaged"),
+    *((f"down-{ms}", _GONE, 1e-3 * ms, f"nothing arrives for {ms} ms") for ms in (100, 300, 1000)),
+    ("partition", _GONE, None, "nothing arrives any more"),
+)
+
+
+def _stage(faults: LinkFaults, seconds: float | None, *, wired: bool) -> SetStage:
+    @contextmanager
+    def stage(config: Config, draw: Draw, folder: Path) -> Iterator[Stage]:
+        layout = NetworkLayout.of_team(config, os.getpid(), wired=wired)
+        with EmulatedNetwork(layout, draw.seed, folder / _LOG) as network:
+
+            def strike(_scene: FaultScene) -> None:
+                network.order(RadioOrder(draw.robot, faults, seconds))
+
+            yield Stage(layout.with_endpoints(config), strike, network.wrap)
+
+    return stage
+
+
+LINK_FAULTS: Final = tuple(
+    TeamFault(f"{prefix}-{name}", f"{whose}: {what}", _stage(faults, seconds, wired=wired))
+    for prefix, whose, wired in (
+        ("link", "an agent's packets", False),
+        ("radio", "the same, with a cable from agent to robot", True),
+    )
+    for name, faults, seconds, what in _KINDS
+)
+"""In the order of the table."""

@@ -1,0 +1,1 @@
+"""A network that loses, delays and damages packets, between processes of one machine."""
