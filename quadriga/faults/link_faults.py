@@ -2,7 +2,8 @@
 
 Each agent is at a place of its own, and what it sends and hears goes through an emulated network
 with real TCP: everything (`link-…`), or all but the states and commands of its robot, which take a
-cable (`radio-…`), as where the agent's computer is beside its robot.
+cable (`radio-…`), as where the agent's computer is beside its robot. There TCP may send again after
+20 ms, as deploy/laptop has it, and not after 200 ms.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.sim_server.native.link import LinkFaults
 
 _GONE: Final = LinkFaults(loss=1.0)
+_RTO_MIN_MS: Final = 20
 _LOG: Final = Path("logs", "air.log")
 
 # Name, what it does each way, for how many seconds, and in words.
@@ -44,10 +46,12 @@ _KINDS: Final = (
 )
 
 
-def _stage(faults: LinkFaults, seconds: float | None, *, wired: bool) -> SetStage:
+def _stage(
+    faults: LinkFaults, seconds: float | None, *, wired: bool, rto_min_ms: int = 0
+) -> SetStage:
     @contextmanager
     def stage(config: Config, draw: Draw, folder: Path) -> Iterator[Stage]:
-        layout = NetworkLayout.of_team(config, os.getpid(), wired=wired)
+        layout = NetworkLayout.of_team(config, os.getpid(), wired=wired, rto_min_ms=rto_min_ms)
         with EmulatedNetwork(layout, draw.seed, folder / _LOG) as network:
 
             def strike(_scene: FaultScene) -> None:
@@ -58,12 +62,25 @@ def _stage(faults: LinkFaults, seconds: float | None, *, wired: bool) -> SetStag
     return stage
 
 
-LINK_FAULTS: Final = tuple(
-    TeamFault(f"{prefix}-{name}", f"{whose}: {what}", _stage(faults, seconds, wired=wired))
-    for prefix, whose, wired in (
-        ("link", "an agent's packets", False),
-        ("radio", "the same, with a cable from agent to robot", True),
-    )
-    for name, faults, seconds, what in _KINDS
+LINK_FAULTS: Final = (
+    *(
+        TeamFault(
+            f"link-{name}", f"an agent's packets: {what}", _stage(faults, seconds, wired=False)
+        )
+        for name, faults, seconds, what in _KINDS
+    ),
+    *(
+        TeamFault(
+            f"radio-{name}",
+            f"the same beside a cable to its robot: {what}",
+            _stage(faults, seconds, wired=True, rto_min_ms=_RTO_MIN_MS),
+        )
+        for name, faults, seconds, what in _KINDS
+    ),
+    TeamFault(
+        "radio-loss-20-rto-200",
+        "20 % lost, each way, and TCP repeats as late as systems have it",
+        _stage(LinkFaults(loss=0.2), None, wired=True),
+    ),
 )
 """In the order of the table."""
