@@ -16,6 +16,7 @@ DAMP: Final = "damp"
 
 PROMPT_TICKS: Final = 10  # for which commands must be prompt after one was late
 SURE_TICKS: Final = 100  # likewise, after commands were lost
+MOST_HELD_MS: Final = 1000  # then late commands are as good as lost: yokes tip over who is held
 MOTOR_DAMPING: Final = 2.0  # N·m·s/rad, damping of a motor without a command
 _HOLD_KP: Final = 80.0  # N·m/rad, carries a standing robot
 _HOLD_KD: Final = 3.0  # N·m·s/rad
@@ -52,6 +53,8 @@ class Lateness:
     def grade(self, age_ms: int) -> str:
         """Which of the three applies at the next tick, with a command of this age."""
         now = grade(age_ms, self._world)
+        if now == HOLD and self.late_ms >= MOST_HELD_MS:
+            now = DAMP
         if now == DAMP or (now == HOLD and self._state == FRESH):
             self._state = now
         is_prompt = 2 * age_ms <= self._world.command_hold_ms

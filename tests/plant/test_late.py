@@ -14,6 +14,7 @@ from quadriga.plant.late import (
     DAMP,
     FRESH,
     HOLD,
+    MOST_HELD_MS,
     PROMPT_TICKS,
     SURE_TICKS,
     Lateness,
@@ -50,6 +51,12 @@ def test_who_was_late_is_followed_again_once_its_commands_are_prompt() -> None:
     assert lateness.late_ms == 2 + 2 * (PROMPT_TICKS - 1) + 1
     assert {lateness.grade(age) for age in (10, 20, 1, 19)} == {FRESH}
     assert lateness.late_ms == 0
+
+
+def test_commands_that_are_always_late_are_lost() -> None:
+    lateness = Lateness(Config().world)
+    grades = [lateness.grade(22) for _ in range(MOST_HELD_MS + 10)]
+    assert grades == [HOLD] * MOST_HELD_MS + [DAMP] * 10
 
 
 def test_whose_commands_were_lost_is_led_down_until_they_are_surely_back() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from ipaddress import ip_address, ip_network
+from ipaddress import IPv4Network, ip_address
 
 import pytest
 
@@ -26,8 +26,8 @@ def test_addresses_are_of_the_network_and_of_one_place_each(number: int) -> None
     layout = build(number)
     addresses = [layout.address(place) for place in layout.places]
     assert len(set(addresses)) == len(addresses) == 12
-    network = ip_network(layout.subnet)
-    assert network.subnet_of(ip_network("198.18.0.0/15"))
+    network = IPv4Network(layout.subnet)
+    assert network.subnet_of(IPv4Network("198.18.0.0/15"))
     assert all(ip_address(address) in network for address in addresses)
     assert [layout.hosts[int(a.rpartition(".")[2])] for a in addresses] == list(layout.places)
 
