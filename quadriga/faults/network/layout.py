@@ -85,6 +85,8 @@ class NetworkLayout:
         """The configuration of the processes at `TEAM`: who they all find is there."""
         bus = replace(
             config.bus,
+            # A router at `TEAM` would take what robots tell each other through their cables.
+            mode="peer" if self.wired else config.bus.mode,
             endpoint=self.endpoint(TEAM),
             listen=self.endpoint(TEAM, 0),
             plaintext=True,  # no other machine is on this network

@@ -48,6 +48,12 @@ def test_agents_are_with_their_robots_and_a_wired_team_has_its_operator_on_the_a
     assert [split.place_of(name) for name in names] == ["r1", "r2", TEAM, OPERATOR, *[TEAM] * 3]
 
 
+def test_what_wired_robots_tell_each_other_takes_no_router_at_the_cables() -> None:
+    config = replace(Config(), bus=replace(Config().bus, mode="client"))
+    modes = {wired: build(wired=wired).with_endpoints(config).bus.mode for wired in (False, True)}
+    assert modes == {False: "client", True: "peer"}
+
+
 def test_a_team_may_meet_at_its_endpoint() -> None:
     layout = build(robots=2)
     bus = layout.with_endpoints(Config()).bus
