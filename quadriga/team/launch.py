@@ -99,14 +99,15 @@ class Launch:
         logs.mkdir(parents=True, exist_ok=True)
         try:
             for row in rows:
-                self._running[row.name] = self._start(row)
+                (logs / f"{row.name}.log").write_bytes(b"")
+                self._start(row)
         except BaseException:
             self.stop()  # nobody else knows of those that have been started
             raise
 
-    def _start(self, row: ProcessSpec) -> subprocess.Popen[bytes]:
-        with (self._logs / f"{row.name}.log").open("wb") as log:
-            return subprocess.Popen(
+    def _start(self, row: ProcessSpec) -> None:
+        with (self._logs / f"{row.name}.log").open("ab") as log:
+            self._running[row.name] = subprocess.Popen(
                 [*row.command, "--parent", str(os.getpid())],
                 stdin=subprocess.DEVNULL,
                 stdout=log,
@@ -114,6 +115,23 @@ class Launch:
                 env={**os.environ, **dict.fromkeys(_ONE_THREAD, "1")},
                 start_new_session=True,
             )
+
+    def restart(self, name: str) -> None:
+        """Start a row again whose process has ended, by the same command; its log goes on.
+
+        Raises:
+            ProcessError: it has no row, or its process still runs after its grace.
+        """
+        row = self._rows.get(name)
+        if row is None:
+            raise ProcessError(f"process {name}", "no row", f"one of {', '.join(self._rows)}")
+        before = self._running.get(name)
+        if before is not None:
+            try:
+                before.wait(row.grace)
+            except subprocess.TimeoutExpired:
+                raise self._error(name, "still running", "an end before it is restarted") from None
+        self._start(row)
 
     @property
     def pids(self) -> dict[str, int]:

@@ -31,6 +31,13 @@ def gone(pid: int) -> bool:
     return not os.path.exists(f"/proc/{pid}")
 
 
+def await_lines(log: Path, count: int) -> None:
+    deadline = monotonic() + 10.0
+    while log.read_text().count("\n") < count and monotonic() < deadline:
+        sleep(0.01)
+    assert log.read_text().count("\n") == count
+
+
 def test_a_walk_that_ends_well(tmp_path: Path) -> None:
     rows = [row("sim", "print('tick')"), row("r1", "import time; time.sleep(0.2)")]
     with Launch(rows, tmp_path / "logs") as running:
@@ -115,13 +122,33 @@ def test_who_has_been_started_is_stopped_if_another_cannot_be(tmp_path: Path) ->
 def test_stopping_kills_who_does_not_obey_in_his_time(tmp_path: Path) -> None:
     with Launch([row("sim", STUBBORN, 0.5), row("recorder", LAST, 20.0)], tmp_path) as running:
         pids = running.pids
-        deadline = monotonic() + 10.0
-        while not (tmp_path / "sim.log").read_text() and monotonic() < deadline:
-            sleep(0.01)
+        await_lines(tmp_path / "sim.log", 1)
         begun = monotonic()
         running.watch(lambda: True)
     assert 0.5 < monotonic() - begun < 5.0
     assert all(gone(pid) for pid in pids.values())
+
+
+def test_who_has_ended_is_started_again_and_its_log_goes_on(tmp_path: Path) -> None:
+    code = f"print('up'); {LAST}"
+    with Launch([row("sim", code), row("r1", LAST)], tmp_path) as running:
+        await_lines(tmp_path / "sim.log", 1)
+        before = running.pids
+        os.kill(before["sim"], signal.SIGKILL)
+        running.restart("sim")
+        await_lines(tmp_path / "sim.log", 2)
+        after = running.pids
+        assert after["sim"] != before["sim"]
+        assert after["r1"] == before["r1"]
+    assert all(gone(pid) for pid in after.values())
+
+
+def test_nobody_is_started_twice(tmp_path: Path) -> None:
+    with Launch([row("sim", LAST, grace=0.1)], tmp_path) as running:
+        with pytest.raises(ProcessError, match="process sim: got still running"):
+            running.restart("sim")
+        with pytest.raises(ProcessError, match="process r9: got no row, expected one of sim"):
+            running.restart("r9")
 
 
 def test_the_table_starts_everyone_once_and_stops_the_recorder_last() -> None:
