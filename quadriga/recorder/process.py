@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from quadriga.recorder.continuation import choose_path
 from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter, Selection
 from quadriga.recorder.session import Session
-from quadriga.recordings.metadata import build_metadata
+from quadriga.recordings.metadata import CONTINUES, build_metadata
 from quadriga.shared.bus.barrier import await_members, meet, members
 from quadriga.shared.bus.introduction import Introduction
 from quadriga.shared.bus.lead_watch import Loss, loss_error
@@ -68,7 +69,8 @@ def run(
 
     Args:
         config: the team's configuration, stored with the recording.
-        path: the file to write; it must not exist.
+        path: the file to write. It must not exist, unless the team walks: then it is what a
+            recorder before this one has left, and `run.2.mcap` goes on beside `run.mcap`.
         predictor_sha256: hash of the predictor the team walks with, stored as well.
         stopped: asked often whether to stop; by default a flag that the two signals raise.
         selection: what to record; by default everything, in one file.
@@ -85,7 +87,10 @@ def run(
     paths = [path]
     try:
         with Bus.open(config.bus, config.team.name, RECORDER, stopped) as bus:
-            with _open_parts(config, path, predictor_sha256, selection, keys) as parts:
+            path, before = choose_path(path, lambda: _walks(bus), say)
+            about = build_metadata(config, predictor_sha256) | selection.metadata()
+            about |= {CONTINUES: before.name} if before else {}
+            with _open_parts(config, path, about, selection, keys) as parts:
                 paths = parts.paths
                 _subscribe(bus, keys)
                 session = Session(bus, parts, keys, config, stopped, say)
@@ -109,12 +114,18 @@ def run(
         ) from None
 
 
+def _walks(bus: Bus) -> bool:
+    """Whether the team walks, as far as it is known after a moment."""
+    sleep(_SETTLE)
+    return has_lead(bus.members_at(READY))
+
+
 def _open_parts(
-    config: Config, path: Path, predictor_sha256: str, selection: Selection, keys: KeyFilter
+    config: Config, path: Path, about: Mapping[str, str], selection: Selection, keys: KeyFilter
 ) -> Parts:
     return Parts(
         path,
-        build_metadata(config, predictor_sha256) | selection.metadata(),
+        about,
         config.recorder.chunk_kib,
         periods(config),
         selection.limits,

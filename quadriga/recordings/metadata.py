@@ -16,6 +16,7 @@ from quadriga.shared.planner_kinds import installed_kinds, plugin_origin
 from quadriga.shared.recording.writer import COUNTS
 from quadriga.shared.runtime.installed import package_versions
 
+CONTINUES: Final = "continues"  # of a recording: the file beside it that it goes on from
 _DIGITS: Final = 18  # of a number of messages that can be meant
 
 
