@@ -24,6 +24,9 @@ from quadriga.agents.healing import Healing, has_lost_input, may_resume, ramp, s
 from quadriga.agents.modes import (
     DAMPING,
     ESTOP,
+    FALL,
+    NO_ESTIMATE,
+    PEER_LOST,
     REFERENCE_LOST,
     STAND,
     STOPPING,
@@ -38,82 +41,29 @@ from quadriga.agents.planning.interface import Expected, PlanningInputs, Plannin
 from quadriga.agents.planning.operator_references import reference_at, remember_references
 from quadriga.agents.planning.registry import build_planning
 from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.rising import Rise, Rising
 from quadriga.agents.schedules import Schedules
+from quadriga.agents.step_io import Inputs as Inputs
+from quadriga.agents.step_io import Outputs as Outputs
 from quadriga.agents.tasks import Tasks
+from quadriga.agents.teammates import Teammates, TeamWatch
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import code_of, with_detail
-from quadriga.shared.wire.messages import (
-    Command,
-    EStop,
-    Measurement,
-    Plan,
-    Reference,
-    Resume,
-    State,
-    Truth,
-)
+from quadriga.shared.wire.messages import Command, Measurement, Reference
 from quadriga.shared.wire.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
 
 _TRUTH_AGE_MS: Final = 20  # of the simulator's truth, where it stands in for an estimator
 _LONGEST_DT: Final = 0.02  # s, after a gap in the ticks the filters advance by no more than this
-NO_ESTIMATE: Final = "no-estimate"  # stop: the orientation is not a number
-FALL: Final = "fall"  # stop: the trunk is tilted beyond `controller.fall_tilt`
-
-
-@record
-class Inputs:
-    """Everything that reached the agent since its last step, sorted by robot, then tick.
-
-    Attributes:
-        state: the robot's own sensors at this tick.
-        measurements: samples of peers, with the peer's name.
-        plans: plans of peers, or of whoever plans for the robot, with the sender's name.
-        references: of the operator.
-        estop: an emergency stop, if one came.
-        resume: the operator's word to go on, if it came.
-        truth: of the simulator, only for the estimator "truth".
-        excitation: force deviation to add, (12,), N, yaw frame; data collection only.
-    """
-
-    state: State
-    measurements: tuple[tuple[str, Measurement], ...] = ()
-    plans: tuple[tuple[str, Plan], ...] = ()
-    references: tuple[Reference, ...] = ()
-    estop: EStop | None = None
-    truth: Truth | None = None
-    excitation: Array | None = None
-    resume: Resume | None = None
-
-    @property
-    def bare(self) -> bool:
-        """Whether nothing but the state has come."""
-        others = self.measurements or self.plans or self.references
-        words = self.estop is not None or self.resume is not None
-        return not (others or words) and self.truth is None
-
-
-@record
-class Outputs:
-    """What one step of the agent gives: the command always, the rest when it is due.
-
-    `planner_ns` is for telemetry: the planner's time by the agent's clock, None if it did not plan.
-    """
-
-    command: Command
-    measurement: Measurement | None
-    plan: Plan | None
-    mode: str
-    reason: str
-    counters: Mapping[str, int]
-    ages_ms: Mapping[str, float]
-    planner_ns: int | None
 
 
 @record
 class AgentState:
-    """Everything the agent remembers between ticks; `planning` is known to its planning part."""
+    """Everything the agent remembers between ticks; `planning` is known to its planning part.
+
+    `rise` is there while the robot gets up.
+    """
 
     tick: int
     mode: Mode
@@ -124,6 +74,8 @@ class AgentState:
     failures: int = 0
     counters: Mapping[str, int] = field(default_factory=dict)
     healing: Healing = field(default_factory=Healing)
+    team: Teammates = field(default_factory=Teammates)
+    rise: Rise | None = None
 
 
 @record
@@ -167,6 +119,7 @@ class Agent:
         self._by_truth = config.estimator.kind == "truth"
         self._stand_ms, self._stance_ms = config.gait.stand_ms, config.gait.stance_ms
         self._height = config.reference.height
+        self._watch, self._rising = TeamWatch(config, robot), Rising(config)
         self._schedules = Schedules(config, self.index)
         self._tasks = Tasks(config)
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
@@ -193,8 +146,48 @@ class Agent:
 
     def step(self, state: AgentState, inputs: Inputs) -> tuple[AgentState, Outputs]:
         """Advance to the tick of `inputs.state`; that tick must be later than the last one."""
+        if self.gets_up(state, inputs):
+            return self._rise(state, inputs)
         new, outputs, _ = self._run(state, inputs)
         return new, outputs
+
+    def gets_up(self, state: AgentState, inputs: Inputs) -> bool:
+        """Whether the robot, which has been led down, gets up in the step of these arguments."""
+        return state.rise is not None or self._was_led_down(state, inputs)
+
+    def _was_led_down(self, state: AgentState, inputs: Inputs) -> bool:
+        return self._rising.is_due(state.mode, state.tick, inputs.state.tick)
+
+    def _rise(self, state: AgentState, inputs: Inputs) -> tuple[AgentState, Outputs]:
+        """Get up by a tick: nothing is estimated or planned before the robot stands."""
+        tick, team = inputs.state.tick, self._look_around(state, inputs)
+        before = None if self._was_led_down(state, inputs) else state.rise  # maybe once more
+        since = tick if before is None else state.mode.since
+        still = self._watch.are_still(team, tick, since)
+        mode, rise, command = self._rising.step(
+            state.mode, before, inputs.state, may_begin=still, estop=inputs.estop
+        )
+        word = inputs.resume is not None
+        healing = step_healing(state.healing, mode, tick, whole_from=None, word=word)
+        references = remember_references(state.references, inputs.references, tick)
+        new = AgentState(
+            tick,
+            mode,
+            state.planning,
+            references=references,
+            counters=state.counters,
+            healing=healing,
+            team=team,
+            rise=rise,
+        )
+        outputs = Outputs(command, None, None, mode.name, mode.reason, state.counters, {}, None)
+        return new, outputs
+
+    def _look_around(self, state: AgentState, inputs: Inputs) -> Teammates:
+        """What is known of the other robots after a tick."""
+        if not (inputs.statuses or inputs.events):
+            return state.team
+        return self._watch.remember(state.team, inputs.statuses, inputs.events)
 
     def problems_of(self, state: AgentState, inputs: Inputs) -> StepProblems:
         """The QPs that `step` solves for these arguments, also where a closed form answers them."""
@@ -209,14 +202,13 @@ class Agent:
         """Sense, plan, act. Each of them sees the mode after the stops that came up before it."""
         tick = inputs.state.tick
         dt = 1e-3 if state.tick < 0 else min(_LONGEST_DT, 1e-3 * (tick - state.tick))
-        references = state.references
-        if inputs.references:
-            references = remember_references(references, inputs.references, tick)
+        references = remember_references(state.references, inputs.references, tick)
         course, healing = self._course(state, tick)
+        team = self._look_around(state, inputs)
         followed = ramp(references, healing, tick)
         reference, reference_age = reference_at(followed, tick, self._height)
 
-        stops = _stops_on_arrival(inputs.estop, course, reference_age)
+        stops = self._stops_on_arrival(inputs, course, reference_age, team)
         mode = resolve_stops(course, tick, stops) if stops else course
         schedule = self._schedules.at(tick, mode)
         sensed = self._sense(state, inputs, schedule, dt)
@@ -258,20 +250,41 @@ class Agent:
             {"reference": float(reference_age), **planned.ages_ms},
             planned.planner_ns,
         )
-        healing = self._heal(healing, mode, reference_age, planning, inputs)
+        whole = self._is_whole(tick, mode, reference_age, team, planning)
+        healing = self._heal(healing, mode, inputs, whole=whole)
         new = AgentState(
-            tick, mode, planning, acted.memory, references, tau, failures, counters, healing
+            tick, mode, planning, acted.memory, references, tau, failures, counters, healing, team
         )
         return new, outputs, (sensed, planning_inputs, acted)
 
-    def _heal(
-        self, healing: Healing, mode: Mode, reference_age: int, planning: Any, inputs: Inputs
-    ) -> Healing:
-        """The way back from a loss after a tick; nothing is looked at while nothing is lost."""
+    def _stops_on_arrival(
+        self, inputs: Inputs, course: Mode, reference_age: int, team: Teammates
+    ) -> list[Stop]:
+        """Stops that what arrived, or did not arrive, asks for."""
+        stops, estop = list[Stop](), inputs.estop
+        if estop is not None:
+            stops.append(Stop(ESTOP, with_detail(ESTOP, estop.reason)))
+        if course.name != WALK:
+            return stops
+        if reference_age > REFERENCE.max_age_ms:
+            stops.append(Stop(STOPPING, REFERENCE_LOST))
+        lost = self._watch.find_lost(team, inputs.state.tick, course.since)
+        if lost:
+            stops.append(Stop(STOPPING, with_detail(PEER_LOST, ",".join(lost))))
+        return stops
+
+    def _is_whole(
+        self, tick: int, mode: Mode, reference_age: int, team: Teammates, planning: Any
+    ) -> bool:
+        """Whether a robot that stands after a loss has all inputs, and the others can walk."""
+        if mode.name != STAND or not has_lost_input(mode) or reference_age > REFERENCE.max_age_ms:
+            return False
+        return self._watch.are_ready(team, tick) and self._planning.is_whole(planning, tick)
+
+    def _heal(self, healing: Healing, mode: Mode, inputs: Inputs, *, whole: bool) -> Healing:
+        """The way back from a loss after a tick at which all inputs are `whole`, or not."""
         tick, whole_from = inputs.state.tick, None
-        stands = mode.name == STAND and has_lost_input(mode)
-        hears = stands and reference_age <= REFERENCE.max_age_ms
-        if hears and self._planning.is_whole(planning, tick):
+        if whole:
             whole_from = tick + self._stance_ms - (tick - self._stand_ms) % self._stance_ms
         word = inputs.resume is not None
         return step_healing(healing, mode, tick, whole_from=whole_from, word=word)
@@ -327,16 +340,6 @@ class Agent:
         if not passive:
             row[:12] = tau
         return Command.from_row(tick, tick * 1_000_000, row)
-
-
-def _stops_on_arrival(estop: EStop | None, course: Mode, reference_age: int) -> list[Stop]:
-    """Stops that what arrived, or did not arrive, asks for."""
-    stops = []
-    if estop is not None:
-        stops.append(Stop(ESTOP, with_detail(ESTOP, estop.reason)))
-    if course.name == WALK and reference_age > REFERENCE.max_age_ms:
-        stops.append(Stop(STOPPING, REFERENCE_LOST))
-    return stops
 
 
 def _count(

@@ -104,6 +104,8 @@ class _CentralShell:
             packet = self._bus.get(POLL)
             if packet is None:
                 self._lead.look(state.step * step_ms(self._config))
+            else:
+                self._lead.hear()
             for key, payload in (packet, *self._bus.drain()) if packet else ():
                 self._take(key, payload)
             state = self._central.remember(state, self._measurements, self._references)

@@ -1,4 +1,4 @@
-"""When a robot that stands because it lacked an input may walk again.
+"""When a robot that stands because it lacked an input, or was led down, may walk again.
 
 It goes on at the begin of a half cycle, once all its inputs have been whole for a second: by itself
 if the team is configured so, else if the operator has said so lately. The second is counted from
@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from quadriga.agents.modes import LOSSES, STAND, STOPPING, WALK, WHOLE_MS, Mode
+from quadriga.agents.modes import LOSSES, RISING, STAND, STOPPING, WALK, WHOLE_MS, Mode
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import INPUT_LOST, RESUMED, code_of
+from quadriga.shared.wire.codes import INPUT_LOST, RESUMED, RISES, STANDS_AGAIN, code_of
 from quadriga.shared.wire.messages import Event, Reference
 
 WORD_MS: Final = 5000  # for which the operator's word is obeyed
@@ -38,8 +38,8 @@ class Healing:
 
 
 def has_lost_input(mode: Mode) -> bool:
-    """Whether a robot stands, or slows down, because of a loss of inputs and of nothing graver."""
-    return mode.name in (STAND, STOPPING) and code_of(mode.reason) in LOSSES
+    """Whether a robot stands, slows down or gets up after a loss, and nothing graver is wrong."""
+    return mode.name in (STAND, STOPPING, RISING) and code_of(mode.reason) in LOSSES
 
 
 def step_healing(
@@ -90,6 +90,10 @@ def _share(item: Reference, share: float) -> Reference:
 
 def change_event(before: Mode, after: Mode, tick: int, robot: str) -> Event | None:
     """What an agent announces of a change of its mode: a loss of inputs, and its way back."""
+    if after.name == RISING and before.name != RISING:
+        return Event.of(tick, RISES, robot, "was led down, gets up where it is")
+    if before.name == RISING and after.name == STAND:
+        return Event.of(tick, STANDS_AGAIN, robot, f"stands after {tick - before.since} ms")
     if has_lost_input(after) and not before.reason:
         return Event.of(tick, INPUT_LOST, robot, f"slows down and stands: {after.reason}")
     if after.name == WALK and has_lost_input(before):

@@ -1,6 +1,7 @@
 """What the robot is doing and why: the modes, their order, and the named reasons to leave them.
 
-stand → walk → stopping → stand (for good); damping and estop are latched from anywhere.
+stand → walk → stopping → stand; damping and estop are latched from anywhere. A robot that has been
+led down begins anew: rising → stand.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from quadriga.shared.runtime.record import record
 STAND: Final = "stand"
 WALK: Final = "walk"
 STOPPING: Final = "stopping"
+RISING: Final = "rising"  # in place, after it has been led down
 DAMPING: Final = "damping"
 ESTOP: Final = "estop"
 
@@ -22,7 +24,13 @@ REFERENCE_LOST: Final = "reference-lost"  # the operator is silent
 WINDOW_LOST: Final = "window-lost"  # no plan of its own for as long as a peer may be silent
 PEER_LOST: Final = "peer-lost"  # no plan of a peer for that long
 PLANNER_LOST: Final = "planner-lost"  # no plan came for as long as a team waits for one
-LOSSES: Final = frozenset((REFERENCE_LOST, WINDOW_LOST, PEER_LOST, PLANNER_LOST))
+LED_DOWN: Final = "led-down"  # its motors had no commands: the agent was away, or cut off
+LOSSES: Final = frozenset((REFERENCE_LOST, WINDOW_LOST, PEER_LOST, PLANNER_LOST, LED_DOWN))
+
+# Reasons for which a robot is damped.
+NO_ESTIMATE: Final = "no-estimate"  # the orientation is not a number
+FALL: Final = "fall"  # the trunk is tilted beyond `controller.fall_tilt`
+NOT_UP: Final = "not-up"  # it got up, and does not stand
 
 PRECEDENCE: Final = (ESTOP, DAMPING, STOPPING)  # of the stops of one tick, the gravest first
 REASON_MOST: Final = 200  # characters of a reason; beyond 4096 no status could be read

@@ -14,7 +14,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.agents.rehearsal import rehearse
 from quadriga.agents.telemetry import Telemetry
-from quadriga.shared.bus.barrier import meet
+from quadriga.shared.bus.barrier import join
 from quadriga.shared.bus.introduction import Introduction
 from quadriga.shared.bus.lead_watch import LeadWatch
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
@@ -48,6 +48,9 @@ def run(
 ) -> None:
     """Walk one robot until the walk ends or it is stopped.
 
+    In real time an agent that is started while its team walks takes its robot over: it gets it up
+    where it is.
+
     Args:
         config: the team's configuration.
         robot: the robot's name, r1 … rn.
@@ -55,8 +58,9 @@ def run(
         stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
 
     Raises:
-        BusError: the bus cannot be opened, or the team is not complete in time or has something
-            else in common; or for 3 s no state has come that is newer than those before.
+        BusError: the bus cannot be opened, or the team is not complete in time, has something
+            else in common, or walks already in lock-step; or for 3 s no state has come that is
+            newer than those before.
         ProcessError: who drives time, or the link to the router, has vanished.
         KeyboardInterrupt: it is stopped before it is ready.
     """
@@ -68,7 +72,7 @@ def run(
     with Bus.open(config.bus, config.team.name, robot, stopped) as bus:
         for key in inbox.keys:
             bus.subscribe(key)
-        if not meet(bus, config, stopped, Introduction(bus, config, sha256)):
+        if not join(bus, config, stopped, Introduction(bus, config, sha256)):
             return
         with interruptible(stopped):
             rehearse(config, Agent(config, robot, predictor))
@@ -109,6 +113,7 @@ class _Shell:
             if state is not None:
                 memory = self._answer(memory, state)
                 self._misfits = None
+                self._lead.hear()
             else:
                 self._lead.look(memory.tick)
                 self._check_clock(memory.tick)

@@ -12,18 +12,20 @@ from quadriga.plant.late import damp_joints
 from quadriga.plant.lost import LostCommands
 from quadriga.plant.protocol import Plant
 from quadriga.plant.team_time import TeamTime
-from quadriga.shared.bus.lead_watch import find_lost_link
+from quadriga.shared.bus.lead_watch import LossWatch, find_lost_link
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.members import SIM
 from quadriga.shared.printable import printable_line
 from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import encode, truncate_text
 from quadriga.shared.wire.messages import Clock, Command, Event, Status
 from quadriga.shared.wire.topics import CLOCK, EVENT, STATE, STATUS, TRUTH
 
+_TOLD_AFTER: Final = 5.0  # s; a process looks for a router that is gone at least every 4 s
 FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first simulated fall
 
 
@@ -57,6 +59,8 @@ class PlantServer:
         self._lost, self._lowered = LostCommands(config), frozenset[str]()
         self.estops: Callable[[], str] = lambda: ""
         self._stopped = False
+        self._outage: tuple[float, float] | None = None  # when the link was back, and after what
+        self._link = LossWatch(lambda: find_lost_link(bus, config), config, grace=0.0)
         self._put_state = {
             name: bus.publisher(STATE.key(team, name), droppable=realtime) for name in plant.names
         }
@@ -118,10 +122,18 @@ class PlantServer:
             self.take(*packet, oldest)
 
     def look_at_link(self) -> None:
-        """Set the end of this plant's walk if its link to the router is gone: nobody hears it."""
-        loss = find_lost_link(self.bus, self.config)
+        """Set the end of this plant's walk if its link to the router is gone for good.
+
+        Nobody hears it then. That a link is back is announced once the others have one, too.
+        """
+        before, loss, now = self._link.since, self._link.look(), monotonic()
         if loss is not None and self.time.end is None:
             self.time.end = End(*loss)
+        if before is not None and self._link.since is None:
+            self._outage = now, now - before
+        if self._outage is not None and now - self._outage[0] > _TOLD_AFTER:
+            seconds, self._outage = self._outage[1], None
+            self.announce(codes.LINK_BACK, "", f"no link to the router for {seconds:.1f} s")
 
     def announce(self, code: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""

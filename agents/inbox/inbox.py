@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Final
@@ -16,12 +17,14 @@ from quadriga.agents.plausibility import (
     is_within_limits,
     measured_limits,
 )
+from quadriga.agents.teammates import concerns_robot
 from quadriga.agents.time_grid import step_ms
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.timing import waits_for_router
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import OPERATOR, PLANNER, SIM
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import (
     EStop,
@@ -43,6 +46,7 @@ from quadriga.shared.wire.topics import (
     RESUME,
     SAMPLE_MS,
     STATE,
+    STATUS,
     TRUTH,
     Topic,
 )
@@ -54,7 +58,7 @@ UNREADABLE: Final = "unreadable"  # reason of a stop whose message does not deco
 _NEVER: Final = (-1, 0)
 _HELD: Final = 256  # messages of one source beyond those of the stand; more can only be a flood
 _GAP_MS: Final = 100  # from one state to the next; a longer jump must be confirmed by one more
-_JUMP_MS: Final = 5000  # longer than any silence that the team survives
+_JUMP_MS: Final = 5000  # longer than any silence that the team survives, its router aside
 
 
 class Inbox:
@@ -95,6 +99,10 @@ class Inbox:
             self.topics[TRUTH.key(team)] = (TRUTH, SIM)
         if central:
             self.topics[PLAN.key(team, robot)] = (PLAN, PLANNER)
+        if not self._lockstep:
+            for name in robot_names(config.team.robots):
+                if name != robot:
+                    self.topics[STATUS.key(team, name)] = (STATUS, name)
         for peer in self._peers:
             self.topics[PLAN.key(team, peer)] = (PLAN, peer)
             self.topics[MEASUREMENT.key(team, peer)] = (MEASUREMENT, peer)
@@ -108,13 +116,14 @@ class Inbox:
         # In lock-step nobody asks for what peers measure while they stand until they walk.
         self._most = _HELD + config.gait.stand_ms // SAMPLE_MS
         self._step_ms = step_ms(config)
-        self._gate = state_gate()
+        self._gate = state_gate(config)
         self._slew = ReferenceSlew(config)
         self._measurable = measured_limits(config.robot)
         self._state: State | None = None
         self._sample_end: State | None = None  # older than `_state`
         self._estop: EStop | None = None
         self._resume: Resume | None = None
+        self._events: list[Event] = []
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -156,6 +165,8 @@ class Inbox:
             self._resume = message
         elif isinstance(message, Event):
             self.ended = self.ended or message.kind == "stop"
+            if concerns_robot(message) and len(self._events) < _HELD:
+                self._events.append(message)
         else:
             source = (topic.name, sender)
             if self._count[source] >= self._most:
@@ -221,15 +232,17 @@ class Inbox:
 
     def pop_inputs(self, state: State, expected: Expected) -> Inputs:
         """All that is due at the step of `state`, sorted by robot, then tick; it is removed."""
-        words = self._estop is not None or self._resume is not None
+        words = self._estop is not None or self._resume is not None or self._events
         if self._lockstep and expected is NOTHING and not words:
             return Inputs(state)
         plans = self._pop_due(PLAN, expected.plan)
         measurements = self._pop_due(MEASUREMENT, _tick(expected.measurement_tick))
         references = self._pop_due(REFERENCE, _tick(expected.reference_tick))
         truths = self._pop_due(TRUTH, _tick(state.tick if expected.truth else None))
+        statuses = self._pop_due(STATUS, None)
         estop, self._estop = self._estop, None
         resume, self._resume = self._resume, None
+        events, self._events = self._events, []
         return Inputs(
             state,
             tuple(measurements),
@@ -238,6 +251,8 @@ class Inbox:
             estop,
             truths[-1][1] if truths else None,
             resume=resume,
+            statuses=tuple(statuses),
+            events=tuple(events),
         )
 
     def _pop_due(self, topic: Topic, limit: Order | None) -> list[tuple[str, Any]]:
@@ -254,9 +269,10 @@ class Inbox:
         return sorted(due, key=lambda item: (item[0], order_of(item[1])))
 
 
-def state_gate() -> TickGate:
+def state_gate(config: Config) -> TickGate:
     """Which states are believed by their ticks."""
-    return TickGate(_GAP_MS, _JUMP_MS)
+    away_ms = 1000 * math.ceil(config.bus.reconnect_timeout) if waits_for_router(config) else 0
+    return TickGate(_GAP_MS, _JUMP_MS + away_ms)
 
 
 def decode_packet(topic: Topic, payload: bytes) -> Message | None:

@@ -13,11 +13,13 @@ from quadriga.shared.members import OPERATOR, SIM
 from quadriga.shared.wire.messages import Consumed, Message
 from quadriga.shared.wire.topics import (
     ESTOP,
+    EVENT,
     MEASUREMENT,
     PLAN,
     REFERENCE,
     REFERENCE_EPOCH_MS,
     RESUME,
+    STATUS,
     TRUTH,
 )
 
@@ -87,12 +89,12 @@ class Intake:
 def has_rule(source: Source, order: Order) -> bool:
     """Whether the rules of lock-step speak of such a message.
 
-    They know nothing of an emergency stop, of the word to go on, nor of a second operator's words
-    between those of the first.
+    They know nothing of an emergency stop, of the word to go on, of what the plant says of robots,
+    nor of a second operator's words between those of the first.
     """
     if source[0] == REFERENCE.name:
         return order[0] % REFERENCE_EPOCH_MS == 0
-    return source[0] not in (ESTOP.name, RESUME.name)
+    return source[0] not in (ESTOP.name, RESUME.name, EVENT.name)
 
 
 def list_messages(inputs: Inputs) -> list[tuple[Source, Order]]:
@@ -101,6 +103,8 @@ def list_messages(inputs: Inputs) -> list[tuple[Source, Order]]:
         *((PLAN.name, name, plan) for name, plan in inputs.plans),
         *((MEASUREMENT.name, name, sample) for name, sample in inputs.measurements),
         *((REFERENCE.name, OPERATOR, reference) for reference in inputs.references),
+        *((STATUS.name, name, status) for name, status in inputs.statuses),
+        *((EVENT.name, SIM, event) for event in inputs.events),
     ]
     if inputs.estop is not None:
         messages.append((ESTOP.name, ANYONE, inputs.estop))

@@ -8,7 +8,7 @@ from typing import Final
 
 from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter
-from quadriga.shared.bus.lead_watch import LAST_WORDS, Loss, find_loss
+from quadriga.shared.bus.lead_watch import LAST_WORDS, Loss, LossWatch, find_loss
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
@@ -56,6 +56,7 @@ class Session:
         self._say = say
         self._flushed = self._begun = monotonic()
         self._ended = self._seen = self._announced = False
+        self._losses = LossWatch(lambda: find_loss(bus, config), config, grace=0.0)
 
     def record(self, *, late: bool, seen: bool) -> None:
         """Record until the end; a late recorder reports what it has once it knows.
@@ -133,9 +134,9 @@ class Session:
             return
         self._parts.flush()
         self._flushed = monotonic()
-        there = find_loss(self._bus, self._config) is None
-        self._ended = self._seen and not there
-        self._seen = self._seen or there
+        gone = self._losses.look() is not None
+        self._ended = self._seen and gone
+        self._seen = self._seen or self._losses.since is None
 
 
 def _format_missed(first_ticks: Mapping[str, int]) -> str:

@@ -10,16 +10,16 @@ from typing import Final
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox, Order, Source, decode_packet, order_of, state_gate
 from quadriga.agents.inbox.intake_log import ANYONE
+from quadriga.agents.teammates import concerns_robot
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.messages import Consumed
+from quadriga.shared.wire.messages import Consumed, Event
 from quadriga.shared.wire.topics import (
     COMMAND,
     ESTOP,
-    EVENT,
     INPUTS,
     MEASUREMENT,
     PLAN,
@@ -112,10 +112,10 @@ def _build_handlers(
 
     handlers: dict[str, Callable[[ChunkEntry], None]] = {}
     for key, (topic, sender) in inbox.topics.items():
-        if topic not in (STATE, EVENT):
+        if topic is not STATE:
             sent_by = ANYONE if topic in (ESTOP, RESUME) else sender
             handlers[key] = _keep_received(log, topic, sent_by)
-    handlers[STATE.key(team, robot)] = _keep_states(log)
+    handlers[STATE.key(team, robot)] = _keep_states(log, config)
     handlers[COMMAND.key(team, robot)] = keep_command
     handlers[INPUTS.key(team, robot)] = keep_record
     handlers[MEASUREMENT.key(team, robot)] = _keep_sent(log, MEASUREMENT)
@@ -126,8 +126,8 @@ def _build_handlers(
     return handlers
 
 
-def _keep_states(log: AgentLog) -> Callable[[ChunkEntry], None]:
-    gate = state_gate()
+def _keep_states(log: AgentLog, config: Config) -> Callable[[ChunkEntry], None]:
+    gate = state_gate(config)
 
     def keep(entry: ChunkEntry) -> None:
         in_time = entry.tick <= gate.newest or gate.take(entry.tick)
@@ -141,7 +141,8 @@ def _keep_received(log: AgentLog, topic: Topic, sender: str) -> Callable[[ChunkE
 
     def keep(entry: ChunkEntry) -> None:
         message = decode_packet(topic, entry.payload)
-        if message is not None:  # what is not valid, the agent dropped
+        passes = not isinstance(message, Event) or concerns_robot(message)
+        if message is not None and passes:  # what is not valid, the agent dropped
             by_order[order_of(message)].append((entry.key, entry.payload))
 
     return keep

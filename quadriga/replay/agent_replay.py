@@ -14,6 +14,7 @@ from quadriga.replay.breakpoint import Breakpoint
 from quadriga.replay.comparison import Comparison, ReplayedStep, ReplayVerdict
 from quadriga.replay.config_changes import change_config, check_agents, format_changes
 from quadriga.replay.figure import Curves, draw
+from quadriga.replay.lives import first_tick, split_lives
 from quadriga.replay.outcome import ReplayOutcome, format_inputs
 from quadriga.replay.problem_saver import ProblemSaver
 from quadriga.replay.recorded_inputs import RecordedInputs
@@ -77,9 +78,14 @@ def replay_agent(
     log = read_agent_log(recording, config, recorded, inbox, lambda tick: show("reading", tick))
     curves = Curves(config.planner.applied) if changed else None
     comparison = Comparison(log, None if curves is None else curves.add)
-    inputs = RecordedInputs(config, recorded, inbox, log)
+    lives = split_lives(log)
     with collector_off():  # a long log need not be looked through again and again
-        _replay_steps(current, inputs, comparison, show, stop_at, changed=bool(changed))
+        for life in lives:
+            inbox = Inbox(config, job.robot, recorded.peers)
+            inputs = RecordedInputs(config, recorded, inbox, life)
+            _replay_steps(current, inputs, comparison, show, stop_at, changed=bool(changed))
+            if comparison.verdict.missing and not changed:
+                break  # nothing after it could be equal but by chance
     verdict = comparison.finish()
     wall = monotonic() - begun
     if stop_at is not None and not stop_at.reached:
@@ -104,6 +110,7 @@ def replay_agent(
         wall=wall,
         inputs="" if verdict.step is None else format_inputs(verdict.step),
         files=files,
+        lives=tuple(map(first_tick, lives)),
     )
     verdict.step = None  # not to be carried between processes
     return outcome
@@ -129,12 +136,15 @@ def _replay_steps(
     *,
     changed: bool,
 ) -> None:
-    """Step the agent over everything it took in; up to what is missing unless it is changed."""
+    """Step one life of the agent over all it took in; up to what is missing unless it is changed.
+
+    Its begin is as that of an agent that has just been started.
+    """
     memory = agent.initial()
     for step in inputs.steps():
         comparison.verdict.missing += [(step.tick, name) for name in step.missing]
         if step.missing and not changed:
-            return  # nothing after it could be equal but by chance
+            return
         if step.inputs is None:
             continue
         if step.tick % _SHOWN_EVERY == 0:

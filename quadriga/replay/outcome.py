@@ -25,6 +25,7 @@ class ReplayOutcome:
         wall: time that reading and replaying took, s.
         inputs: what the agent took in at the first difference, in short.
         files: what was left behind: the figure of a change, the problem at a difference.
+        lives: first tick of each process that the agent had: it may have been started again.
     """
 
     robot: str
@@ -34,6 +35,7 @@ class ReplayOutcome:
     wall: float
     inputs: str = ""
     files: tuple[Path, ...] = ()
+    lives: tuple[int, ...] = ()
 
     @property
     def failed(self) -> bool:
@@ -57,6 +59,9 @@ def format_outcome(outcome: ReplayOutcome) -> str:
     """One line for a robot, more where something differs."""
     lines = [f"{outcome.robot}: {_format_counts(outcome)}; {_format_pace(outcome)}"]
     verdict = outcome.verdict
+    if len(outcome.lives) > 1:
+        begins = ", ".join(map(str, outcome.lives))
+        lines.append(f"  {len(outcome.lives)} lives, each replayed by itself, from ticks {begins}")
     if outcome.changed:
         lines.append(f"  changed: {outcome.changed}")
     if verdict.first is not None:

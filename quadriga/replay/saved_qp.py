@@ -86,12 +86,16 @@ def load(path: Path) -> SavedQp:
 def problems_of(agent: Agent, before: AgentState, inputs: Inputs, about: str) -> dict[str, SavedQp]:
     """The problems behind one step of an agent, by the topic that is made of each.
 
+    None is behind a step by which a robot gets up.
+
     Args:
         agent: whose step it is.
         before: what it remembered.
         inputs: what it took in.
         about: which step this is, in words.
     """
+    if agent.gets_up(before, inputs):
+        return {}
     problems = agent.problems_of(before, inputs)
     saved = {WHOLE_BODY: _save_whole_body(problems, about)}
     if problems.planner is not None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from quadriga.shared import members
-from quadriga.shared.bus.barrier import meet
+from quadriga.shared.bus.barrier import REJOINS, join
 from quadriga.shared.bus.lead_watch import LeadWatch
 from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
 from quadriga.shared.config.reference_trace import trace_of
@@ -56,6 +56,8 @@ def references_of(config: Config) -> Callable[[int], Reference | None]:
 def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
     """Publish the reference, following the team's clock, until the walk ends or it is stopped.
 
+    An operator that is started while its team walks goes on where the team's time is.
+
     Args:
         config: the team's configuration.
         stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
@@ -69,20 +71,27 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
     with Bus.open(config.bus, team, members.OPERATOR, stopped) as bus:
         for topic in topics_for(members.OPERATOR):
             bus.subscribe(topic.key(team))
-        if not meet(bus, config, stopped):
+        joined = join(bus, config, stopped)
+        if not joined:
             return
         # Without a reference the robots stop.
         take_priority(config.runtime.priority)
         try:
-            _operate(config, bus, stopped)
+            _operate(config, bus, stopped, late=joined == REJOINS)
         finally:
             leave_priority()
 
 
-def _operate(config: Config, bus: Bus, stopped: Callable[[], bool]) -> None:
-    """Publish the reference of each epoch that the team's time comes near to."""
+def _operate(config: Config, bus: Bus, stopped: Callable[[], bool], *, late: bool) -> None:
+    """Publish the reference of each epoch that the team's time comes near to.
+
+    Who is `late` first waits for the time, and begins with the epoch that is in force.
+    """
     put, watch = bus.publisher(REFERENCE.key(bus.team)), LeadWatch(bus, config)
-    time, epoch = TeamTicks(bus, round(1000 * config.world.seconds)), 0
+    time = TeamTicks(bus, round(1000 * config.world.seconds))
+    while late and not (stopped() or time.over or time.known):
+        _follow(time, watch)
+    epoch = time.tick // EPOCH_MS
     while not stopped():
         if EPOCH_MS * epoch <= time.tick + EPOCH_MS * _AHEAD:
             put(encode(reference_at(config, EPOCH_MS * epoch)))
@@ -91,8 +100,15 @@ def _operate(config: Config, bus: Bus, stopped: Callable[[], bool]) -> None:
         if time.over:
             return
         bus.declare(READY)
-        if not time.follow():
-            watch.look(time.tick)
+        _follow(time, watch)
+
+
+def _follow(time: TeamTicks, watch: LeadWatch) -> None:
+    """Take in the team's time; see who is gone where there is none."""
+    if time.follow():
+        watch.hear()
+    else:
+        watch.look(time.tick)
 
 
 class TeamTicks:
@@ -113,6 +129,11 @@ class TeamTicks:
         self._bus, self._last = bus, last
         self._gate = TickGate(_GAP_MS, last)
         self.over = False
+
+    @property
+    def known(self) -> bool:
+        """Whether the time has been heard."""
+        return self._gate.newest >= 0
 
     @property
     def tick(self) -> int:

@@ -1,11 +1,13 @@
 """The start-up barrier: nobody walks before everybody is there, linked and warmed up.
 
-Nor before all have said that they have the same version, configuration and predictor.
+Nor before all have said that they have the same version, configuration and predictor. A process
+that is started again joins its team as it walks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from typing import Final
 
 from quadriga.shared.bus.inquiry import Pause, check_oneself, check_others, pause
 from quadriga.shared.bus.introduction import Introduction
@@ -16,7 +18,12 @@ from quadriga.shared.bus.watch import Watch, say
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
-from quadriga.shared.members import LEADS, SIM, has_lead
+from quadriga.shared.members import LEADS, OPERATOR, SIM, has_lead
+from quadriga.shared.runtime.clock import sleep
+
+STARTS: Final = "starts"  # with its team
+REJOINS: Final = "rejoins"  # a team that walks
+_SETTLE: Final = 0.2  # s, in which all who are there become known, maybe one of the same name
 
 
 def meet(
@@ -38,20 +45,66 @@ def meet(
             has another version, configuration or predictor.
     """
     me = me or Introduction(bus, config)
+    joined = _await_team(bus, config, stopped)
+    if joined == REJOINS:
+        cause = "another team.name or bus.endpoint is needed"
+        raise _walks_already(bus, config, cause)
+    return bool(joined) and _introduce(bus, config, me)
+
+
+def join(
+    bus: Bus, config: Config, stopped: Callable[[], bool], me: Introduction | None = None
+) -> str:
+    """As `meet`, but take part in a team that walks already: `STARTS` or `REJOINS`.
+
+    "" if `stopped()` came first. In lock-step only an operator may be started again: what an agent
+    does depends on all that it has heard since the begin of the walk.
+
+    Raises:
+        BusError: as `meet`; or an agent is started again in lock-step.
+    """
+    me = me or Introduction(bus, config)
+    joined = _await_team(bus, config, stopped)
+    lockstep = config.world.mode == "lockstep"
+    if joined == REJOINS and lockstep and bus.name != OPERATOR:
+        cause = "in lock-step no agent can be started again: start the whole team"
+        raise _walks_already(bus, config, cause)
+    if not joined or not _introduce(bus, config, me):
+        return ""
+    if joined == REJOINS:
+        say(f"{bus.name} joins team {bus.team!r}, which walks")
+    return joined
+
+
+def _await_team(bus: Bus, config: Config, stopped: Callable[[], bool]) -> str:
+    """Announce this process and wait until all are here, or the team is seen to walk."""
+
+    def walks() -> bool:
+        return has_lead(bus.members_at(READY))
+
     bus.declare(HERE)
-    if not await_members(bus, config, HERE, members(config), stopped):
-        return False
-    if has_lead(bus.members_at(READY)):
-        raise BusError(
-            f"team {bus.team!r} at {config.bus.endpoint}",
-            "a team that walks already",
-            "a network without this team",
-            "another team.name or bus.endpoint is needed",
-        )
+    here = await_members(bus, config, HERE, members(config), lambda: stopped() or walks())
+    if stopped():
+        return ""
+    if here:
+        pause()  # who is ready has said so right behind that it is here
+    if not walks():
+        return STARTS
+    sleep(_SETTLE)
+    return REJOINS
+
+
+def _introduce(bus: Bus, config: Config, me: Introduction) -> bool:
+    """See that this process is alone of its name, and has the same in common with the others."""
     _check_single(bus, config)
     check_oneself(bus, config, me.about, say)
     me.met = True
     return True
+
+
+def _walks_already(bus: Bus, config: Config, cause: str) -> BusError:
+    team = f"team {bus.team!r} at {config.bus.endpoint}"
+    return BusError(team, "a team that walks already", "a network without this team", cause)
 
 
 def await_members(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from quadriga.shared.bus.barrier import lead
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.timing import waits_for_router
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import has_lead
 from quadriga.shared.runtime.clock import monotonic
@@ -53,11 +55,52 @@ def loss_error(loss: Loss, tick: int) -> ProcessError:
     return ProcessError(loss.what, got, "it to be there until the walk's announced end", cause)
 
 
+class LossWatch:
+    """How long something is gone already, and whether it is gone for good.
+
+    A router may be started again. Then each process finds it by itself, so that who drives time is
+    absent for longer, too.
+
+    Args:
+        find: what is gone at the moment; None: nothing.
+        config: the team's configuration.
+        grace: s, after which a loss is one that has nothing to do with the router.
+
+    Attributes:
+        since: when the loss was seen first, s of the clock; None: there is none.
+    """
+
+    def __init__(self, find: Callable[[], Loss | None], config: Config, grace: float) -> None:
+        self._find, self._grace = find, grace
+        waits = waits_for_router(config)
+        self._of_link = max(grace, config.bus.reconnect_timeout) if waits else grace
+        self._patience = grace
+        self.since: float | None = None
+
+    def look(self) -> Loss | None:
+        """What is gone for good; None if all is there, or may be back."""
+        loss = self._find()
+        if loss is None:
+            self.clear()
+            return None
+        now = monotonic()
+        if self.since is None:
+            self.since = now
+        if loss.code == LINK_LOST:
+            self._patience = self._of_link
+        return loss if now - self.since >= self._patience else None
+
+    def clear(self) -> None:
+        """All is there again."""
+        self.since, self._patience = None, self._grace
+
+
 class LeadWatch:
     """Ends a process whose team is gone, and says what has vanished.
 
     The last words of who drives time may arrive after its token has vanished, and they announce
-    the end of the walk. So a loss counts after `LAST_WORDS`.
+    the end of the walk. So a loss counts after `LAST_WORDS`, and that of a router as `LossWatch`
+    tells.
 
     Args:
         bus: the process's own, in the midst of a walk.
@@ -65,8 +108,7 @@ class LeadWatch:
     """
 
     def __init__(self, bus: Bus, config: Config) -> None:
-        self._bus, self._config = bus, config
-        self._since: float | None = None
+        self._watch = LossWatch(lambda: find_loss(bus, config), config, LAST_WORDS)
 
     def look(self, tick: int) -> None:
         """See whether the others are there; called while nothing arrives.
@@ -75,15 +117,13 @@ class LeadWatch:
             tick: the team's time as far as this process knows it, ms.
 
         Raises:
-            ProcessError: who drives time, or the link to the router, has been gone for
-                `LAST_WORDS`.
+            ProcessError: who drives time, or the link to the router, is gone for good.
         """
-        loss = find_loss(self._bus, self._config)
-        if loss is None:
-            self._since = None
-            return
-        now = monotonic()
-        if self._since is None:
-            self._since = now
-        if now - self._since >= LAST_WORDS:
+        loss = self._watch.look()
+        if loss is not None:
             raise loss_error(loss, max(tick, 0))
+
+    def hear(self) -> None:
+        """Something has arrived: who was gone is back."""
+        if self._watch.since is not None:
+            self._watch.clear()

@@ -19,6 +19,7 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "team.plants": "one",
         "team.auto_resume": False,
         "bus.clock_timeout": 0.5,
+        "bus.reconnect_timeout": 30.0,
         "bus.certificates": "certs",
         "bus.plaintext": False,
         "planner.options": "",

@@ -42,6 +42,9 @@ ESTOPPED: Final = "estop"
 LOWERED: Final = "lowered"
 INPUT_LOST: Final = "input-lost"
 RESUMED: Final = "resumed"
+RISES: Final = "rises"
+STANDS_AGAIN: Final = "stands-again"
+LINK_BACK: Final = "link-back"
 BRIDGE_MODE: Final = "bridge-mode"
 ROBOT_STOPPED: Final = "robot-stopped"
 CLOCK: Final = "clock"
@@ -64,6 +67,9 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         LOWERED: EventCode("fault", "a simulated robot without commands is led down: no fall"),
         INPUT_LOST: EventCode("fault", "an agent slows down and stands: it lacks an input"),
         RESUMED: EventCode("fault", "an agent walks again: its inputs have been whole for 1 s"),
+        RISES: EventCode("fault", "an agent gets its robot up, which was led down"),
+        STANDS_AGAIN: EventCode("fault", "an agent's robot stands that had been led down"),
+        LINK_BACK: EventCode("fault", "the link to the router was gone for a while"),
         BRIDGE_MODE: EventCode("bridge", "a bridge's robot begins to stand up, walk or lie down"),
         ROBOT_STOPPED: EventCode("fault", "a bridge has stopped its robot: damped, then limp"),
         CLOCK: EventCode("fault", "how well a plant knows the team's clock crosses 1 ms"),

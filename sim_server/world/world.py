@@ -25,6 +25,7 @@ from quadriga.sim_server.world.team_model import build_team_model
 
 _FALL_COSINE: Final = math.cos(1.0)  # of the angle between the trunk's z axis and the vertical
 _FALL_HEIGHT: Final = 0.12  # m, trunk origin above the mean terrain under the hips
+_RISEN: Final = 0.06  # m, above that height a robot is up again that was led down
 _DAMPED: Final = damp_joints(0)
 
 
@@ -192,7 +193,7 @@ class World(Plant):
         for i, (x, y, z, qw, qx, qy, qz) in enumerate(self._q[:, layout.POSE].tolist()):
             cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
             if cosine >= _FALL_COSINE and z >= self._surely_up:
-                if self._lying:
+                if self._lying and z >= self._surely_up + _RISEN:
                     self._lying -= {self.names[i]} - self._led_down
                 continue
             if self._fallen[i]:

@@ -58,6 +58,8 @@ def test_subscribes_to_what_it_needs_and_no_more() -> None:
     peers = {f"team/{r}/{t}" for r in ("r1", "r3") for t in ("plan", "measurement")}
     assert {*arrivals(planner="none").keys} == alone
     assert {*arrivals(planner="centralised").keys} == alone | {"team/r2/plan"}
+    statuses = {"team/r1/status", "team/r3/status"}
+    assert {*arrivals("realtime", planner="none").keys} == alone | statuses
     assert {*arrivals().keys} == alone | peers
     assert {*arrivals(estimator="truth").keys} == alone | peers | {"team/sim/truth"}
 

@@ -17,7 +17,16 @@ from quadriga.agents.inbox.intake_log import (
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.shared.config.load import load
 from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Consumed, EStop, Measurement, Plan, Reference
+from quadriga.shared.wire.codes import GONE
+from quadriga.shared.wire.messages import (
+    Consumed,
+    EStop,
+    Event,
+    Measurement,
+    Plan,
+    Reference,
+    Status,
+)
 from tests.a1 import standing
 
 PLAN = Plan(480, 0, 12, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 1)
@@ -77,6 +86,18 @@ def test_a_step_that_took_in_the_next_state_alone_needs_no_record() -> None:
     again = box.record(3, full(4), NOTHING)
     assert again is not None
     assert again.number == 1
+
+
+def test_what_others_say_of_themselves_and_the_plant_of_them_is_listed_in_both_modes() -> None:
+    said = Status(500, 0, "walk", "", "", {}, {}, np.zeros(0), np.zeros(0))
+    gone = Event.of(503, GONE, "r1", "gone")
+    for mode in ("realtime", "lockstep"):
+        _, box = intake(mode)
+        told = Inputs(standing(504), statuses=(("r1", said),), events=(gone,))
+        found = box.record(503, told, NOTHING)
+        assert found is not None
+        assert found.taken == ("status:r1:500", "sim/event:sim:503")
+        assert [parse_message_id(text) for text in found.taken] == list_messages(told)
 
 
 def test_lock_step_tells_only_the_unusual() -> None:

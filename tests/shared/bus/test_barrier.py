@@ -6,7 +6,8 @@ from threading import Thread
 
 import pytest
 
-from quadriga.shared.bus.barrier import meet, members, start_together
+from quadriga.shared.bus.barrier import REJOINS, STARTS, meet, members, start_together
+from quadriga.shared.bus.barrier import join as take_part
 from quadriga.shared.bus.zenoh_bus import READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
@@ -58,6 +59,52 @@ def test_the_world_starts_when_all_are_ready_and_nobody_joins_later() -> None:
             pytest.raises(BusError, match="a team that walks already, expected a network without"),
         ):
             meet(late, config, never)
+
+
+@pytest.mark.parametrize("mode", ["realtime", "lockstep"])
+def test_an_agent_and_an_operator_join_a_team_that_walks(
+    mode: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """But in lock-step no agent does."""
+    config = team(**{"world.mode": mode})
+    buses = {name: join(config, name) for name in ("sim", "r1", "operator")}
+    all_meet(config, *buses.values())
+    for name in ("r1", "operator"):
+        buses[name].declare(READY)
+    assert start_together(buses["sim"], config, never)
+    with (
+        join(config, "r1") as double,
+        pytest.raises(BusError, match=r"walks already|two processes"),
+    ):
+        take_part(double, config, never)
+    for name in ("r1", "operator"):
+        buses[name].close()
+        with join(config, name) as again:
+            if (name, mode) == ("r1", "lockstep"):
+                with pytest.raises(BusError, match="no agent can be started again"):
+                    take_part(again, config, never)
+            else:
+                assert take_part(again, config, never) == REJOINS
+                said = f"quadriga: {name} joins team 'team', which walks"
+                assert said in capsys.readouterr().err
+    buses["sim"].close()
+
+
+def test_who_is_started_with_its_team_starts() -> None:
+    config, found = team(), dict[str, str]()
+    buses = [join(config, name) for name in ("sim", "r1", "operator")]
+
+    def start(bus: Bus) -> None:
+        found[bus.name] = take_part(bus, config, never)
+
+    threads = [Thread(target=start, args=(bus,)) for bus in buses]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == dict.fromkeys(("sim", "r1", "operator"), STARTS)
+    for bus in reversed(buses):
+        bus.close()
 
 
 @pytest.mark.parametrize("again", ["plant_r2", "r2"])

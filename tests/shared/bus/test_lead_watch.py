@@ -88,6 +88,45 @@ def test_a_link_that_is_gone_is_named_and_not_those_behind_it() -> None:
     assert said.startswith(f"link of r1 to the router at {config.bus.endpoint}: got none any more")
 
 
+def routed(**more: object) -> Config:
+    """Of a team that waits for its router."""
+    keys = {"bus.mode": "client", "world.mode": "realtime", "bus.endpoint": free_endpoint()}
+    return load(None, {**keys, **more})
+
+
+def test_a_router_that_is_started_again_is_waited_for() -> None:
+    """So is who drives time, whose process finds the router by itself."""
+    config = routed()
+    router = Bus.route(config.bus.endpoint, "team")
+    with together(config) as (sim, r1):
+        heard = r1.collect("team/clock")
+        watch = LeadWatch(r1, config)
+        router.close()
+        wait_until(lambda: find_loss(r1, config) is not None)
+        watch.look(1)
+        sleep(0.4)  # longer than last words
+        watch.look(2)
+        with Bus.route(config.bus.endpoint, "team"):
+            wait_until(lambda: find_loss(r1, config) is None)
+            watch.look(3)
+            put = sim.publisher("team/clock")
+            wait_until(lambda: put(b"12") or bool(heard()))
+            assert SIM in r1.members_at(HERE)
+
+
+@pytest.mark.parametrize(
+    "keys", [{"world.mode": "lockstep"}, {"bus.reconnect_timeout": 0.0}], ids=["lockstep", "never"]
+)
+def test_a_router_is_not_waited_for_where_that_is_no_use(keys: dict[str, object]) -> None:
+    config = routed(**keys)
+    router = Bus.route(config.bus.endpoint, "team")
+    with together(config) as (_, r1):
+        watch = LeadWatch(r1, config)
+        router.close()
+        wait_until(lambda: find_loss(r1, config) is not None)
+        assert complaint(watch, 5)[1] < 5.0
+
+
 def test_who_is_back_in_time_is_not_missed() -> None:
     config = load(None, {"bus.endpoint": free_endpoint()})
     with together(config) as (sim, r1):

@@ -27,11 +27,12 @@ def test_a_robot_sends_under_its_own_key_only() -> None:
     }
 
 
-def test_a_robot_hears_its_own_state_and_what_its_peers_plan_and_measure() -> None:
+def test_a_robot_hears_its_own_state_and_what_the_others_plan_measure_and_do() -> None:
     assert {*rights()["r1"].hears} == {
         "team/r1/state",
         "team/*/plan",
         "team/*/measurement",
+        "team/*/status",
         "team/reference",
         "team/estop",
         "team/resume",

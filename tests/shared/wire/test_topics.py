@@ -12,7 +12,15 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.runtime.places import SOURCE
 from quadriga.shared.wire.markdown import to_markdown
 from quadriga.shared.wire.messages import Flat, Message
-from quadriga.shared.wire.topics import AGENT_EVENT, CONFIGURED, TABLE, Topic, topic_of, topics_for
+from quadriga.shared.wire.topics import (
+    AGENT_EVENT,
+    CONFIGURED,
+    STATUS,
+    TABLE,
+    Topic,
+    topic_of,
+    topics_for,
+)
 
 rows = pytest.mark.parametrize("topic", TABLE, ids=lambda topic: topic.name)
 
@@ -53,12 +61,15 @@ def test_one_robot_has_what_per_robot_says(topic: Topic) -> None:
 
 @pytest.mark.parametrize("kind", ["distributed", "centralised", "none"])
 @pytest.mark.parametrize("estimator", ["kalman", "truth"])
-def test_an_agent_takes_what_the_table_says(kind: str, estimator: str) -> None:
-    config = load(None, {"planner.kind": kind, "estimator.kind": estimator})
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_an_agent_takes_what_the_table_says(kind: str, estimator: str, mode: str) -> None:
+    given = {"planner.kind": kind, "estimator.kind": estimator, "world.mode": mode}
+    config = load(None, given)
     taken = {topic for topic, _ in Inbox(config, "r1", ["r2"]).topics.values()}
     assert taken <= {*topics_for(members.AGENT)}
     if kind == "distributed" and estimator == "truth":
-        assert taken == {*topics_for(members.AGENT)}
+        unheard = set() if mode == "realtime" else {STATUS}
+        assert taken == {*topics_for(members.AGENT)} - unheard
 
 
 def test_the_page_is_in_step_with_the_tables() -> None:

@@ -1,0 +1,177 @@
+"""A robot that has been led down gets up in place, before the whole-body QP takes charge of it.
+
+Its motors had no commands for so long that the plant has led them down: its agent was restarted,
+stood still or was cut off. The joints are held where they are until no other robot of the team
+walks, then led to the stand, with limited torques. Only once they are there, and the trunk is
+level, the robot stands.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from quadriga.agents.modes import (
+    DAMPING,
+    ESTOP,
+    FALL,
+    LED_DOWN,
+    NO_ESTIMATE,
+    NOT_UP,
+    RISING,
+    STAND,
+    Mode,
+    enter_passive,
+)
+from quadriga.shared.config.sections import BRIDGED, Config
+from quadriga.shared.robot.conventions import N_JOINTS, Array
+from quadriga.shared.robot.motions import Motion, posture_at, way_up
+from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.codes import with_detail
+from quadriga.shared.wire.messages import Command, EStop, State
+
+_SECONDS: Final = 1.5  # from lying on folded legs to the stand
+_SETTLE_MS: Final = 200  # at the stand, before it is looked at
+_LATEST_MS: Final = 1500  # after the motion; then it does not stand
+_HOLD: Final = Motion(np.zeros((2, N_JOINTS)), np.array([1.0]))
+_SHARE: Final = 0.8  # of the motors' torque that stiffness may ask for
+_OFF: Final = 0.25  # rad, that a joint may be off the stand
+_LEVEL: Final = math.cos(0.45)  # of the greatest tilt, rad: a robot stands on a steep slope too
+
+
+@record
+class Rise:
+    """What an agent remembers while its robot gets up.
+
+    Attributes:
+        held: angles at which the joints were when the agent was back, (12,), rad.
+        begun: tick at which the motion began; −1: it waits.
+        motion: the way up, from the angles at that tick.
+    """
+
+    held: Array
+    begun: int = -1
+    motion: Motion = _HOLD
+
+
+class RisingStep(NamedTuple):
+    """What a tick gives; `rise` is None once the robot no longer gets up."""
+
+    mode: Mode
+    rise: Rise | None
+    command: Command
+
+
+class Rising:
+    """Fixed data of how one robot gets up; its functions depend on their arguments alone.
+
+    Args:
+        config: the team's configuration.
+    """
+
+    def __init__(self, config: Config) -> None:
+        # In lock-step every command is waited for, and a bridge gets its robot up by itself.
+        self._rises = config.world.mode == "realtime" and config.team.plant != BRIDGED
+        self._away_ms = config.world.command_damp_ms
+        # Before the first command the motors are held: while the team stands that will do.
+        self._latest_ms = max(self._away_ms, config.gait.stand_ms)
+        self._robot = config.robot
+        self._kp, self._kd = config.bridge.stand_kp, config.bridge.stand_kd
+        self._most_off = _SHARE * config.robot.torque_limit / self._kp  # (12,), rad
+        self._fallen_cosine = math.cos(config.controller.fall_tilt)
+        self._damping = config.controller.damping
+
+    def is_due(self, mode: Mode, last: int, tick: int) -> bool:
+        """Whether a robot has been led down since the agent's last command.
+
+        Args:
+            mode: the agent's before this tick.
+            last: tick of its last command, −1: it has given none.
+            tick: the present one.
+        """
+        if not self._rises or mode.passive:
+            return False
+        return tick > self._latest_ms if last < 0 else tick - last > self._away_ms
+
+    def step(
+        self,
+        mode: Mode,
+        rise: Rise | None,
+        state: State,
+        *,
+        may_begin: bool,
+        estop: EStop | None = None,
+    ) -> RisingStep:
+        """Get up by a tick.
+
+        Args:
+            mode: before it.
+            rise: what is remembered; None: the agent is back since this tick.
+            state: what the robot measures.
+            may_begin: whether the others stand.
+            estop: an emergency stop, if one came.
+        """
+        tick = state.tick
+        if rise is None:
+            rise, mode = Rise(state.q_joint), Mode(RISING, tick, LED_DOWN)
+        if estop is not None:
+            mode = enter_passive(mode, tick, ESTOP, with_detail(ESTOP, estop.reason))
+        elif trouble := self._find_trouble(rise, state):
+            mode = enter_passive(mode, tick, DAMPING, trouble)
+        if mode.passive:
+            return RisingStep(mode, None, self._damp(tick))
+        if rise.begun < 0 and may_begin:
+            rise = Rise(rise.held, tick, way_up(state.q_joint, self._robot, _SECONDS))
+        if self._has_settled(rise, tick) and self._is_up(state):
+            mode, rise = Mode(STAND, tick, LED_DOWN), None
+        return RisingStep(mode, rise, self._lead(rise, state))
+
+    def _find_trouble(self, rise: Rise, state: State) -> str:
+        """Why a robot cannot get up; "" if it can so far."""
+        cosine = _upright(state)
+        if math.isnan(cosine):
+            return NO_ESTIMATE
+        if cosine < self._fallen_cosine:
+            return FALL
+        late = rise.begun >= 0 and state.tick - rise.begun > _ms(rise.motion) + _LATEST_MS
+        return NOT_UP if late else ""
+
+    def _has_settled(self, rise: Rise, tick: int) -> bool:
+        return rise.begun >= 0 and tick - rise.begun >= _ms(rise.motion) + _SETTLE_MS
+
+    def _is_up(self, state: State) -> bool:
+        """Whether the joints are at the stand, and the trunk is level."""
+        off = np.abs(state.q_joint - self._robot.q_stand)
+        return bool((off <= _OFF).all()) and _upright(state) >= _LEVEL
+
+    def _lead(self, rise: Rise | None, state: State) -> Command:
+        """The command that leads the joints where they ought to be at a tick.
+
+        The motors follow it by themselves, so that a late one does no harm.
+        """
+        q_des, v_des = self._robot.q_stand, np.zeros(N_JOINTS)
+        if rise is not None and rise.begun < 0:
+            q_des = rise.held
+        elif rise is not None:
+            q_des, v_des = posture_at(rise.motion, 1e-3 * (state.tick - rise.begun))
+        off = np.clip(q_des - state.q_joint, -self._most_off, self._most_off)
+        kp, kd = np.full(N_JOINTS, self._kp), np.full(N_JOINTS, self._kd)
+        zero = np.zeros(N_JOINTS)
+        return Command(state.tick, state.stamp_ns, zero, state.q_joint + off, v_des, kp, kd)
+
+    def _damp(self, tick: int) -> Command:
+        row = np.zeros(60)
+        row[Command.CUTS["kd"]] = self._damping
+        return Command.from_row(tick, tick * 1_000_000, row)
+
+
+def _upright(state: State) -> float:
+    """Cosine of the trunk's tilt."""
+    _, x, y, _ = state.imu_quat_wxyz
+    return float(1.0 - 2.0 * (x * x + y * y))
+
+
+def _ms(motion: Motion) -> int:
+    return round(1e3 * motion.seconds)

@@ -1,0 +1,41 @@
+"""What the others say of themselves, and the plant of them, between bus and agent."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.codes import BACK, GONE, LOWERED, PUSH
+from quadriga.shared.wire.messages import Event, Status
+from tests.a1 import standing
+from tests.agents.inbox.test_inbox import NOTHING, arrivals, feed
+
+
+def status(tick: int, mode: str) -> Status:
+    return Status(tick, 0, mode, "", "", {}, {}, np.zeros(0), np.zeros(0))
+
+
+def test_in_real_time_the_others_words_are_handed_over_as_they_come() -> None:
+    box = arrivals("realtime", planner="none")
+    feed(box, ("r3/status", status(100, "walk")), ("r1/status", status(103, "stand")))
+    inputs = box.pop_inputs(standing(104), NOTHING)
+    assert [(name, said.mode) for name, said in inputs.statuses] == [
+        ("r1", "stand"),
+        ("r3", "walk"),
+    ]
+    assert not inputs.bare
+    assert box.pop_inputs(standing(105), NOTHING).bare
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_what_the_plant_says_of_robots_is_handed_over_at_once_in_its_order(mode: str) -> None:
+    box = arrivals(mode, planner="none")
+    told = [Event.of(100, GONE, "r1", "gone"), Event.of(104, BACK, "r1", "answers again")]
+    others = [Event.of(101, PUSH, "r1", ""), Event.of(102, LOWERED, "r1", "")]
+    for event in (told[0], *others, told[1]):
+        box.take("team/sim/event", encode(event))
+    inputs = box.pop_inputs(standing(105), NOTHING)
+    assert [event.code for event in inputs.events] == [GONE, BACK]
+    assert not inputs.bare
+    assert box.pop_inputs(standing(106), NOTHING).bare
