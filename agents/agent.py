@@ -21,10 +21,13 @@ from quadriga.agents.controller.whole_body.problem import (
     WholeBodySolution,
 )
 from quadriga.agents.healing import Healing, has_lost_input, may_resume, ramp, step_healing
+from quadriga.agents.held_posture import held_row, hold_or_release
+from quadriga.agents.imu_bridge import ImuState, bridge_imu
 from quadriga.agents.modes import (
     DAMPING,
     ESTOP,
     FALL,
+    IMU_LOST,
     NO_ESTIMATE,
     PEER_LOST,
     REFERENCE_LOST,
@@ -55,6 +58,7 @@ from quadriga.shared.wire.messages import Command, Measurement, Reference
 from quadriga.shared.wire.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
 
 _TRUTH_AGE_MS: Final = 20  # of the simulator's truth, where it stands in for an estimator
+_BLIND_MS: Final = 100.0  # for which a robot walks on without its attitude
 _LONGEST_DT: Final = 0.02  # s, after a gap in the ticks the filters advance by no more than this
 
 
@@ -76,6 +80,7 @@ class AgentState:
     healing: Healing = field(default_factory=Healing)
     team: Teammates = field(default_factory=Teammates)
     rise: Rise | None = None
+    imu: ImuState = field(default_factory=ImuState)
 
 
 @record
@@ -202,8 +207,9 @@ class Agent:
         """Sense, plan, act. Each of them sees the mode after the stops that came up before it."""
         tick = inputs.state.tick
         dt = 1e-3 if state.tick < 0 else min(_LONGEST_DT, 1e-3 * (tick - state.tick))
+        imu, inputs = _believe(state.imu, inputs, dt)
         references = remember_references(state.references, inputs.references, tick)
-        course, healing = self._course(state, tick)
+        course, healing = self._course(state, tick, imu.missing_ms)
         team = self._look_around(state, inputs)
         followed = ramp(references, healing, tick)
         reference, reference_age = reference_at(followed, tick, self._height)
@@ -217,10 +223,8 @@ class Agent:
             mode = resolve_stops(course, tick, stops)
 
         measurement = self._sample_measurement(state, tick, sensed)
-        planning_inputs = PlanningInputs(
-            tick, mode, followed, measurement, inputs.measurements, inputs.plans
-        )
-        planning, planned = self._planning.step(state.planning, planning_inputs)
+        asked = PlanningInputs(tick, mode, followed, measurement, inputs.measurements, inputs.plans)
+        planning, planned = self._planning.step(state.planning, asked)
         if planned.stop_reason:
             stops.append(Stop(STOPPING, planned.stop_reason))
             mode = resolve_stops(course, tick, stops)
@@ -238,8 +242,9 @@ class Agent:
                 mode = resolve_stops(course, tick, stops)
 
         tau = solution.tau if not failures else state.last_tau  # the QP's, or the last good ones
-        command = self._command(tick, tau, mode, solved=not failures)
-        counters = _count(state.counters, planned, solution)
+        imu = hold_or_release(imu, inputs.state, stands=mode.name == STAND)
+        command = self._command(tick, tau, mode, imu.held, solved=not failures)
+        counters = _count(state.counters, planned, solution, bridged=imu.bridged)
         outputs = Outputs(
             command,
             measurement,
@@ -250,12 +255,23 @@ class Agent:
             {"reference": float(reference_age), **planned.ages_ms},
             planned.planner_ns,
         )
-        whole = self._is_whole(tick, mode, reference_age, team, planning)
+        fed = reference_age <= REFERENCE.max_age_ms and not imu.missing_ms
+        whole = fed and self._is_whole(tick, mode, team, planning)
         healing = self._heal(healing, mode, inputs, whole=whole)
         new = AgentState(
-            tick, mode, planning, acted.memory, references, tau, failures, counters, healing, team
+            tick,
+            mode,
+            planning,
+            acted.memory,
+            references,
+            tau,
+            failures,
+            counters,
+            healing,
+            team,
+            imu=imu,
         )
-        return new, outputs, (sensed, planning_inputs, acted)
+        return new, outputs, (sensed, asked, acted)
 
     def _stops_on_arrival(
         self, inputs: Inputs, course: Mode, reference_age: int, team: Teammates
@@ -273,11 +289,9 @@ class Agent:
             stops.append(Stop(STOPPING, with_detail(PEER_LOST, ",".join(lost))))
         return stops
 
-    def _is_whole(
-        self, tick: int, mode: Mode, reference_age: int, team: Teammates, planning: Any
-    ) -> bool:
-        """Whether a robot that stands after a loss has all inputs, and the others can walk."""
-        if mode.name != STAND or not has_lost_input(mode) or reference_age > REFERENCE.max_age_ms:
+    def _is_whole(self, tick: int, mode: Mode, team: Teammates, planning: Any) -> bool:
+        """Whether a robot that stands after a loss has all plans, and the others can walk."""
+        if mode.name != STAND or not has_lost_input(mode):
             return False
         return self._watch.are_ready(team, tick) and self._planning.is_whole(planning, tick)
 
@@ -289,9 +303,11 @@ class Agent:
         word = inputs.resume is not None
         return step_healing(healing, mode, tick, whole_from=whole_from, word=word)
 
-    def _course(self, state: AgentState, tick: int) -> tuple[Mode, Healing]:
+    def _course(self, state: AgentState, tick: int, blind_ms: float) -> tuple[Mode, Healing]:
         """The mode if nothing stops the robot at this tick, and its way back from a loss."""
         mode, healing = state.mode, state.healing
+        if blind_ms > _BLIND_MS and mode.name in (WALK, STOPPING):
+            return Mode(STAND, tick, IMU_LOST), healing
         if mode.name == WALK:
             return mode, healing
         stand_ms, stance_ms = self._stand_ms, self._stance_ms
@@ -331,8 +347,15 @@ class Agent:
         stance = self._schedules.at(begun, state.mode).stance
         return Measurement(tick, tick * 1_000_000, sensed.memory.mean_force, sensed.outputs, stance)
 
-    def _command(self, tick: int, tau: Array, mode: Mode, *, solved: bool) -> Command:
-        """The motor command: torques, with damping where they are not this tick's, or damping."""
+    def _command(
+        self, tick: int, tau: Array, mode: Mode, held: Array | None, *, solved: bool
+    ) -> Command:
+        """The motor command: torques, with damping where they are not this tick's, or damping.
+
+        A posture that is `held` comes before torques.
+        """
+        if held is not None:
+            return Command.from_row(tick, tick * 1_000_000, held_row(held, tick, self.config.robot))
         row = np.zeros(60)  # tau, q_des, v_des, kp, kd
         passive = mode.passive
         if passive or not solved:
@@ -342,11 +365,21 @@ class Agent:
         return Command.from_row(tick, tick * 1_000_000, row)
 
 
+def _believe(imu: ImuState, inputs: Inputs, dt: float) -> tuple[ImuState, Inputs]:
+    """What is remembered of the IMU, and the inputs with what is believed of it."""
+    imu, believed = bridge_imu(imu, inputs.state, dt)
+    return imu, inputs if believed is inputs.state else replace(inputs, state=believed)
+
+
 def _count(
-    counters: Mapping[str, int], planned: PlanningOutputs, solution: WholeBodySolution
+    counters: Mapping[str, int],
+    planned: PlanningOutputs,
+    solution: WholeBodySolution,
+    *,
+    bridged: bool,
 ) -> Mapping[str, int]:
     """The counters with what was out of the ordinary at this tick."""
-    names = []
+    names = ["imu_bridged"] if bridged else []
     if planned.plan is not None and planned.plan.status != SOLVED:
         names.append(f"plan_{code_of(planned.plan.status)}")
     names += planned.unusual

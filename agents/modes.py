@@ -25,7 +25,10 @@ WINDOW_LOST: Final = "window-lost"  # no plan of its own for as long as a peer m
 PEER_LOST: Final = "peer-lost"  # no plan of a peer for that long
 PLANNER_LOST: Final = "planner-lost"  # no plan came for as long as a team waits for one
 LED_DOWN: Final = "led-down"  # its motors had no commands: the agent was away, or cut off
-LOSSES: Final = frozenset((REFERENCE_LOST, WINDOW_LOST, PEER_LOST, PLANNER_LOST, LED_DOWN))
+IMU_LOST: Final = "imu-lost"  # its attitude is not known
+LOSSES: Final = frozenset(
+    (REFERENCE_LOST, WINDOW_LOST, PEER_LOST, PLANNER_LOST, LED_DOWN, IMU_LOST)
+)
 
 # Reasons for which a robot is damped.
 NO_ESTIMATE: Final = "no-estimate"  # the orientation is not a number

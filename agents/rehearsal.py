@@ -10,6 +10,7 @@ import numpy as np
 from quadriga.agents.agent import Agent, AgentState, Inputs
 from quadriga.agents.controller.maths.leg_kinematics import leg_kinematics
 from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.imu_bridge import BELIEVED_AFTER_MS
 from quadriga.agents.planning.team import Central, CentralState
 from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.shared.config.sections import Config
@@ -34,11 +35,12 @@ def rehearse(config: Config, agent: Agent) -> AgentState:
 
     What it takes in and what it commands goes over the wire's bytes.
 
-    For the last two of them it leans, so far that limits of both its QPs are active.
+    For the last two of them it leans, so far that limits of both its QPs are active. It leans some
+    ticks earlier: an attitude that jumps is not believed at once.
     """
     memory, lean = agent.initial(), _LEAN * config.controller.fall_tilt
     upright = config.gait.stand_ms + SAMPLE_MS * config.planner.T_ini + 2 * step_ms(config)
-    for tick in range(upright + 2 * step_ms(config) + 1):
+    for tick in range(upright + BELIEVED_AFTER_MS + 2 * step_ms(config) + 1):
         sent = encode(standing(config.robot, tick, lean if tick > upright else 0.0))
         inputs = Inputs(decode(sent, State), references=(_stay(config, tick),))
         memory, outputs = agent.step(memory, inputs)

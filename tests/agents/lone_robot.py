@@ -16,6 +16,8 @@ from tests.agents.duet import asked, over_the_bus, simple_predictor
 
 ALONE = Config(team=TeamConfig(robots=1))
 
+_LEAP = 0.09  # rad per tick
+
 
 class Robot:
     """One agent that stands on imaginary ground whatever it does; a reference every 100 ms."""
@@ -45,6 +47,14 @@ class Robot:
 def tilted(tick: int, roll: float) -> State:
     quat = np.array([np.cos(roll / 2), np.sin(roll / 2), 0.0, 0.0])
     return over_the_bus(replace(standing(tick), imu_quat_wxyz=quat))
+
+
+def lean(robot: Robot, roll: float, begun: float = 0.0) -> Outputs:
+    """Have a robot lean on, as fast as an attitude may change without its gyro, rad."""
+    angles = np.linspace(begun, roll, 2 + int(abs(roll - begun) / _LEAP))
+    for angle in angles[1:]:
+        outputs = robot.step(tilted(robot.tick, angle))
+    return outputs
 
 
 def is_damping(outputs: Outputs, config: Config = ALONE) -> bool:

@@ -1,0 +1,220 @@
+"""What an agent believes of its IMU; while it says nothing, or what cannot be, the trunk is level.
+
+A reading is not believed that has no attitude, whose attitude has jumped against its gyro, that
+stays the same although its gyro turns, or whose gravity points upwards; nor an accelerometer alone
+that is at the end of its range, says nothing, or stays the same. Then the last attitude is kept,
+with no rates, and with gravity alone in place of the accelerometer: a trot goes on so for some
+tenths of a second. Soon the robot stands by its joints alone (`agents.held_posture`). What an IMU
+says afterwards is believed again once it has agreed with itself for a while; it need not agree with
+what was assumed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import field
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from quadriga.agents.controller.maths.rows import places, row_size
+from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.messages import State
+
+BELIEVED_AFTER_MS: Final = 20  # for which readings must be in agreement once one was not
+
+_JUMP: Final = 0.1  # rad, of an attitude against its gyro from one reading to the next
+_SAME_MS: Final = 20  # for which readings may be equal to the last digit: IMUs may be slow
+_TURNS: Final = 1e-3  # rad/s, of a gyro that says that the robot moves
+_RANGE: Final = 150.0  # m/s², of an accelerometer: those of such robots end at 16 g
+_UP_TIME: Final = 0.01  # s, time constant of the force that holds the trunk against gravity
+_UP_LEAST: Final = -3.0  # m/s²; nothing pulls a trunk down by so much for so long
+_QUAT_NORM2: Final = (0.5, 2.0)  # |q|² of an attitude
+_IMU: Final = slice(State.CUTS["imu_quat_wxyz"].start, State.CUTS["imu_accel"].stop)
+_QUAT, _GYRO, _ACCEL = slice(0, 4), slice(4, 7), slice(7, 10)  # of what an IMU says
+
+
+class ImuLayout(NamedTuple):
+    """Where the row of what is remembered keeps what.
+
+    Attributes:
+        begun: 1 once there was a reading.
+        believed: attitude, gyro and accelerometer as they were believed last, (10,).
+        read: the same as they were read last, (10,).
+        same: time for which all of it has been the same, ms.
+        same_accel: likewise of the accelerometer alone.
+        agrees: time for which readings have been in agreement, ms.
+        agrees_accel: likewise of the accelerometer alone.
+        up: filtered specific force along the trunk's vertical, m/s².
+        missing: time since the last attitude that was believed, ms.
+    """
+
+    begun: int
+    believed: slice
+    read: slice
+    same: int
+    same_accel: int
+    agrees: int
+    agrees_accel: int
+    up: int
+    missing: int
+
+
+IMU: Final = ImuLayout(
+    **places(
+        begun=1,
+        believed=10,
+        read=10,
+        same=1,
+        same_accel=1,
+        agrees=1,
+        agrees_accel=1,
+        up=1,
+        missing=1,
+    )
+)
+
+
+def _initial_row() -> Array:
+    """Nothing has been read yet: the trunk is level."""
+    row = np.zeros(row_size(IMU))
+    row[IMU.believed] = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, GRAVITY)
+    row[[IMU.agrees, IMU.agrees_accel]] = BELIEVED_AFTER_MS
+    row[IMU.up] = GRAVITY
+    return row
+
+
+@record
+class ImuState:
+    """What an agent remembers of its IMU.
+
+    Attributes:
+        row: see `ImuLayout`.
+        held: of a robot that stands without an attitude: since which tick, and where its joints
+            were then, rad, (13,).
+        bridged: whether something else was believed at the last tick than was read.
+    """
+
+    row: Array = field(default_factory=_initial_row)
+    held: Array | None = None
+    bridged: bool = False
+
+    @property
+    def missing_ms(self) -> float:
+        """For how long no attitude has been believed."""
+        return float(self.row[IMU.missing])
+
+
+def bridge_imu(before: ImuState, state: State, dt: float) -> tuple[ImuState, State]:
+    """What is remembered after a tick, and its state with what is believed of the IMU.
+
+    Args:
+        before: what was remembered.
+        state: what was read.
+        dt: time since the last reading, s.
+    """
+    row, imu = before.row.copy(), state.row[_IMU]
+    if _judge(row, imu, dt):
+        return ImuState(row, before.held), state
+    bridged = state.row.copy()
+    bridged[_IMU] = row[IMU.believed]
+    return ImuState(row, before.held, bridged=True), State.from_row(
+        state.tick, state.stamp_ns, bridged
+    )
+
+
+@compiled
+def _judge(memory: Array, imu: Array, dt: float) -> bool:
+    """Whether all that an IMU says is believed; `memory` is brought up to date."""
+    before, believed, ms = memory[IMU.read].copy(), memory[IMU.believed], 1e3 * dt
+    attitude = _is_attitude(imu[_QUAT])
+    agrees = attitude and (memory[IMU.begun] < 0.5 or _follows(before, imu, dt))
+    _count_same(memory, before, imu, ms)
+    memory[IMU.read] = imu
+    memory[IMU.begun] = 1.0 if attitude else memory[IMU.begun]
+    moves = np.max(np.abs(imu[_GYRO])) > _TURNS
+    agrees = agrees and not (moves and memory[IMU.same] >= _SAME_MS)
+    memory[IMU.agrees] = memory[IMU.agrees] + ms if agrees else 0.0
+    _note_vertical(memory, imu, dt)
+    # Of an IMU that was not believed, gravity must point downwards, too.
+    upright = memory[IMU.missing] <= 0.0 or memory[IMU.up] >= _UP_LEAST
+    whole = agrees and upright and memory[IMU.agrees] >= BELIEVED_AFTER_MS
+    if whole:
+        believed[:7] = imu[:7]
+        memory[IMU.missing] = 0.0
+    else:
+        believed[_GYRO] = 0.0
+        memory[IMU.missing] += ms
+    believes = _judge_accel(memory, imu[_ACCEL], moves, ms)
+    return whole and believes
+
+
+@compiled
+def _judge_accel(memory: Array, accel: Array, moves: bool, ms: float) -> bool:
+    """Whether the accelerometer is believed; else what is believed is gravity alone."""
+    same = moves and memory[IMU.same_accel] >= _SAME_MS
+    agrees = _is_in_range(accel) and not same and memory[IMU.up] >= _UP_LEAST
+    memory[IMU.agrees_accel] = memory[IMU.agrees_accel] + ms if agrees else 0.0
+    long_enough = memory[IMU.agrees_accel] >= BELIEVED_AFTER_MS
+    believes = agrees and long_enough and memory[IMU.missing] <= 0.0
+    believed = memory[IMU.believed]
+    believed[_ACCEL] = accel if believes else GRAVITY * _vertical(believed[_QUAT])
+    return believes
+
+
+@compiled
+def _note_vertical(memory: Array, imu: Array, dt: float) -> None:
+    """Filter the force along the vertical that the accelerometer measures, while it measures."""
+    if _is_in_range(imu[_ACCEL]):
+        up = np.sum(_vertical(memory[IMU.believed][_QUAT]) * imu[_ACCEL])
+        memory[IMU.up] += dt / (_UP_TIME + dt) * (up - memory[IMU.up])
+
+
+@compiled
+def _is_in_range(accel: Array) -> bool:
+    return bool(0.0 < np.max(np.abs(accel)) < _RANGE)
+
+
+@compiled
+def _is_attitude(quat_wxyz: Array) -> bool:
+    norm2 = np.sum(quat_wxyz * quat_wxyz)
+    return bool(_QUAT_NORM2[0] < norm2 < _QUAT_NORM2[1])
+
+
+@compiled
+def _follows(before: Array, imu: Array, dt: float) -> bool:
+    """Whether an attitude follows from the one before by the gyro."""
+    if not _is_attitude(before[_QUAT]):
+        return False
+    w, x, y, z = before[_QUAT]
+    a, b, c = 0.25 * dt * (before[_GYRO] + imu[_GYRO])
+    # q ⊗ (1, ω dt / 2), and half the sine of the angle between it and what is read.
+    expected = np.array(
+        [
+            w - x * a - y * b - z * c,
+            x + w * a + y * c - z * b,
+            y + w * b + z * a - x * c,
+            z + w * c + x * b - y * a,
+        ]
+    )
+    quat = imu[_QUAT]
+    cosine = abs(np.sum(expected * quat)) / np.sqrt(
+        np.sum(expected * expected) * np.sum(quat * quat)
+    )
+    return bool(cosine >= np.cos(0.5 * _JUMP))
+
+
+@compiled
+def _count_same(memory: Array, before: Array, imu: Array, ms: float) -> None:
+    same_accel = np.all(imu[_ACCEL] == before[_ACCEL])
+    same = same_accel and np.all(imu == before)
+    memory[IMU.same] = memory[IMU.same] + ms if same else 0.0
+    memory[IMU.same_accel] = memory[IMU.same_accel] + ms if same_accel else 0.0
+
+
+@compiled
+def _vertical(quat_wxyz: Array) -> Array:
+    """The vertical in the trunk's frame by an attitude, (3,)."""
+    w, x, y, z = quat_wxyz / np.sqrt(np.sum(quat_wxyz * quat_wxyz))
+    return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])

@@ -1,0 +1,44 @@
+"""A robot that walks, and whose IMU fails: it stands, and does not fall."""
+
+from __future__ import annotations
+
+import pytest
+
+from quadriga.identification.rollout import Rollout
+from quadriga.shared.config.load import load
+from quadriga.team.operator import references_of
+
+FAILS = 2000  # tick
+
+
+def walk_with(fault: str, until: int) -> tuple[list[tuple[str, str]], tuple[str, ...]]:
+    """Modes in their order, and who fell."""
+    given = {"team.robots": 1, "planner.kind": "none", "world.seed": 52}
+    config = load(None, given | {"world.faults": f"r1/{fault}"})
+    rollout = Rollout(config, None, references_of(config))
+    modes = list[tuple[str, str]]()
+    for tick in rollout.ticks(until):
+        mode = tick.outputs["r1"].mode, tick.outputs["r1"].reason
+        if mode not in modes:
+            modes.append(mode)
+    return modes, rollout.world.fallen()
+
+
+@pytest.mark.parametrize("kind", ["off", "garbage", "wrong", "stuck"])
+def test_half_a_second_without_an_imu_is_no_fall(kind: str) -> None:
+    modes, fallen = walk_with(f"imu {kind} {1e-3 * FAILS:g} 0.5", FAILS + 3000)
+    assert fallen == ()
+    assert modes[-1] == ("stand", "imu-lost")
+
+
+def test_without_an_imu_for_good_a_robot_holds_its_joints() -> None:
+    modes, fallen = walk_with(f"imu off {1e-3 * FAILS:g}", FAILS + 4000)
+    assert fallen == ()
+    assert modes[-1] == ("stand", "imu-lost")
+
+
+@pytest.mark.parametrize("kind", ["off", "garbage", "wrong", "stuck"])
+def test_half_a_second_without_an_accelerometer_stops_nobody(kind: str) -> None:
+    modes, fallen = walk_with(f"accel {kind} {1e-3 * FAILS:g} 0.5", FAILS + 2000)
+    assert fallen == ()
+    assert modes[-1] == ("walk", "")
