@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from typing import Final
 
 from quadriga.plant.end import TOLD_TO_STOP, End
@@ -26,8 +26,8 @@ from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 from quadriga.shared.runtime.signals import interruptible, stop_on_signals
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import EStop
-from quadriga.shared.wire.topics import COMMAND, ESTOP
+from quadriga.shared.wire.messages import EStop, LiveFault
+from quadriga.shared.wire.topics import COMMAND, ESTOP, LIVE_FAULT
 
 _PAUSE: Final = 0.002  # s, between two looks of a simulated robot's plant that waits
 
@@ -68,6 +68,7 @@ def run(
         pace = team_pace(bus, config, robot, is_robot=plant.is_robot)
         with interruptible(stopped):
             server = PlantServer(config, plant, bus, time, name)
+        server.faults = _faults(bus)
         if not plant.is_robot:
             server.estops = estops
         if not meet(bus, config, stopped):
@@ -123,6 +124,20 @@ def _estops(bus: Bus) -> Callable[[], str]:
         return ""
 
     return reason
+
+
+def _faults(bus: Bus) -> Callable[[], list[str]]:
+    """A function that gives the faults that somebody has asked for since it was called last."""
+    take = bus.collect(LIVE_FAULT.key(bus.team))
+
+    def asked() -> list[str]:
+        found = list[str]()
+        for _, _, payload in take():
+            with suppress(MessageError):
+                found.append(decode(payload, LiveFault).fault)
+        return found
+
+    return asked
 
 
 def _pause() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Protocol
 
+from quadriga.shared.errors import ConfigError
 from quadriga.shared.wire.messages import Command, Event, State, Status, Truth
 
 
@@ -60,6 +61,18 @@ class Plant(Protocol):
         A robot without a command damps its joints.
         """
         ...
+
+    def inject(self, fault: str) -> Sequence[Event]:
+        """Make a sensor or motor faulty soon, as `world.faults` describes it without its time.
+
+        Returns:
+            What is to be announced of it.
+
+        Raises:
+            ConfigError: that cannot be done.
+        """
+        cause = "no sensor or motor of a real robot is made faulty on purpose"
+        raise ConfigError("fault", repr(fault), "a simulated world", cause)
 
     def expect_down(self, names: Collection[str]) -> None:
         """Hear which robots are led to the ground, since their commands are lost: no falls."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from quadriga.plant.commands import CommandBox
@@ -16,6 +16,7 @@ from quadriga.shared.bus.lead_watch import LossWatch, find_lost_link
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
+from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import SIM
 from quadriga.shared.printable import printable_line
 from quadriga.shared.robot.conventions import robot_names
@@ -42,6 +43,7 @@ class PlantServer:
     Attributes:
         estops: tells why the team's emergency stop was pressed; "" if it was not. For a robot,
             which sees to it itself, nobody presses it.
+        faults: gives the faults that somebody has asked for since it was called last.
         commands: the newest command of every robot of the plant.
         silent: robots that are not waited for.
         late_ms: by robot, for how long its motors have not followed its commands, in real time.
@@ -58,6 +60,7 @@ class PlantServer:
         self.late_ms: dict[str, int] = {}
         self._lost, self._lowered = LostCommands(config), frozenset[str]()
         self.estops: Callable[[], str] = lambda: ""
+        self.faults: Callable[[], Sequence[str]] = tuple
         self._stopped = False
         self._outage: tuple[float, float] | None = None  # when the link was back, and after what
         self._link = LossWatch(lambda: find_lost_link(bus, config), config, grace=0.0)
@@ -146,6 +149,8 @@ class PlantServer:
     def step(self, commands: Mapping[str, Command]) -> End | None:
         """Advance the plant by one tick; why the walk ends, if it does."""
         self._report_invalid()
+        for fault in self.faults():
+            self._inject(fault)
         for event in self.plant.step(self._final_commands(commands)):
             if event.robot or self.time.drives:  # what concerns all is announced once
                 self._send(event)
@@ -178,6 +183,21 @@ class PlantServer:
             self._lowered = self._lost.lowered
             plant.expect_down(self._lowered)
         return filled
+
+    def _inject(self, fault: str) -> None:
+        """Make a sensor or motor of one of the plant's robots faulty, or say why not."""
+        robot = fault.partition("/")[0]
+        if robot not in self.plant.names and not self.time.drives:
+            return  # whoever drives time answers for robots that there are not
+        if robot in robot_names(self.config.team.robots) and robot not in self.plant.names:
+            return
+        try:
+            events = self.plant.inject(fault)
+        except ConfigError as error:
+            self.announce(codes.FAULT_REFUSED, "", str(error))
+            return
+        for event in events:
+            self._send(event)
 
     def _note_fall(self, event: Event) -> None:
         if event.code in codes.DOWN:

@@ -77,6 +77,8 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
             return
         compared += result
         heard.take(config.team.name, entries)
+        for fault in heard.pop_faults():
+            world.add_fault(fault)
         commands = _choose_commands(keys, entries, heard.silent)
         absent = [name for name in world.names if name not in {*commands, *heard.silent}]
         if heard.estop:
@@ -94,6 +96,16 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
             "nothing that a world published from tick 0 on",
             "states or sim/truth of a whole walk",
         )
+
+
+def read_asked_faults(recording: Recording) -> dict[int, list[str]]:
+    """By tick the faults that somebody asked for while the team walked, as in `world.faults`."""
+    found: dict[int, list[str]] = {}
+    key = EVENT.key(recorded_config(recording).team.name)
+    for _, event in _decode_valid(Event, key, recording.entries({EVENT.name})):
+        if event.code == codes.FAULT_ASKED:
+            found.setdefault(event.tick, []).append(event.detail)
+    return found
 
 
 def read_computable_config(recording: Recording) -> Config:
@@ -122,15 +134,22 @@ def read_computable_config(recording: Recording) -> Config:
 
 @dataclass(slots=True)
 class _Heard:
-    """What the world announced of commands that it did not take.
+    """What the world announced of commands that it did not take, and of what it was asked for.
 
     Attributes:
         silent: robots that it does not wait for.
         estop: whether the emergency stop has been pressed.
+        faults: that somebody has asked for, as in `world.faults`.
     """
 
     silent: set[str] = field(default_factory=set)
     estop: bool = False
+    faults: list[str] = field(default_factory=list)
+
+    def pop_faults(self) -> list[str]:
+        """Faults that somebody has asked for, once."""
+        found, self.faults = self.faults, []
+        return found
 
     def take(self, team: str, entries: Iterable[ChunkEntry]) -> None:
         """Take in the events of a tick."""
@@ -140,6 +159,8 @@ class _Heard:
             elif event.code in (codes.SILENT, codes.GONE):
                 self.silent.add(event.robot)
             self.estop = self.estop or event.code == codes.ESTOPPED
+            if event.code == codes.FAULT_ASKED:
+                self.faults.append(event.detail)
 
 
 def _decode_valid(

@@ -17,6 +17,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout, build_agents
 from quadriga.recordings.by_tick import by_tick
 from quadriga.replay.difference import Difference, find_difference
+from quadriga.replay.world_replay import read_asked_faults
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.reader import Recording
@@ -104,6 +105,7 @@ def walk_branch(
     references = _choose_references(recording, config, change)
     rollout = Rollout(change.config, None, references, agents=agents)
     recorded = by_tick(recording, {STATE.name})
+    asked = read_asked_faults(recording)
     last = round(1000 * change.config.world.seconds)
     equal, parted = 0, None
     while rollout.world.tick < last and not rollout.world.fallen():
@@ -118,6 +120,8 @@ def walk_branch(
             else:
                 equal += found
         truth = rollout.world.truth() if rollout.world.tick % SAMPLE_MS == 0 else None
+        for fault in asked.get(rollout.world.tick, ()):
+            rollout.world.add_fault(fault)
         tick = rollout.step()
         yield BranchTick(tick.tick, truth, tick.events, equal, parted)
 

@@ -37,6 +37,7 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "world.leg_collisions": False,
         "world.friction_of": "",
         "world.faults": "",
+        "world.live_faults": False,
         "world.lost_command": "damp",
         "motors.preset": "ideal",
         "motors.torque_speed": False,

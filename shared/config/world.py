@@ -115,6 +115,11 @@ class WorldConfig:
         "faulty sensors and motors, 'robot/component kind start[s] [duration[s]]' separated by "
         "commas, as 'r2/imu stuck 4 2'; docs/world.md has the components and kinds",
     )
+    live_faults: bool = key(
+        False,
+        "-",
+        "sensors and motors may be made faulty while the team walks, by quadriga fault --live",
+    )
     command_timeout: float = key(
         10.0,
         "s wall",

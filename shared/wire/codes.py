@@ -27,6 +27,8 @@ FALL: Final = "fall"
 WEAK_MOTOR: Final = "weak-motor"
 FAULT_BEGINS: Final = "fault-begins"
 FAULT_ENDS: Final = "fault-ends"
+FAULT_ASKED: Final = "fault-asked"
+FAULT_REFUSED: Final = "fault-refused"
 SILENT: Final = "silent"
 GONE: Final = "gone"
 BACK: Final = "back"
@@ -59,6 +61,8 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         WEAK_MOTOR: EventCode("fault", "a motor gives less torque from now on"),
         FAULT_BEGINS: EventCode("fault", "a sensor or motor is made faulty on purpose"),
         FAULT_ENDS: EventCode("fault", "it is sound again"),
+        FAULT_ASKED: EventCode("fault", "somebody has asked for a fault: as in world.faults"),
+        FAULT_REFUSED: EventCode("fault", "somebody has asked for one that there cannot be"),
         SILENT: EventCode("fault", "a robot did not answer in time: the world waits no longer"),
         GONE: EventCode("fault", "a robot left the bus: the world waits no longer"),
         BACK: EventCode("fault", "a robot answers again: the world waits for it"),

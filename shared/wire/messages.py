@@ -227,6 +227,13 @@ class Resume(Message):
 
 
 @record
+class LiveFault(Message):
+    """A sensor or motor is to be faulty from now on, in a simulated world that permits it."""
+
+    fault: str = plain(str, "as in world.faults without its time: robot/component kind [seconds]")
+
+
+@record
 class Truth(Message):
     """The world as the simulator knows it; no agent may use it outside `--estimator truth`.
 

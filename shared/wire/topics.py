@@ -48,6 +48,7 @@ REFERENCE: Final = Topic(
 )  # fmt: skip
 ESTOP: Final = Topic("estop", msg.EStop, (members.ESTOP,), (AGENT, SIM), period_ms=0)
 RESUME: Final = Topic("resume", msg.Resume, (members.RESUME,), (AGENT,), period_ms=0, repeats=True)
+LIVE_FAULT: Final = Topic("fault", msg.LiveFault, (LAUNCHER,), (SIM,), period_ms=0, repeats=True)
 TRUTH: Final = Topic("sim/truth", msg.Truth, (SIM,), (AGENT, LAUNCHER), period_ms=CONFIGURED)
 EVENT: Final = Topic(
     "sim/event", msg.Event, (SIM,), (*_PLANS, OPERATOR, LAUNCHER, SIM), period_ms=0, repeats=True
@@ -74,8 +75,8 @@ CLOCK_ANSWER: Final = Topic(
 REFUSED: Final = Topic("refused", msg.Refusal, (ROUTER,), (), period_ms=0, repeats=True)
 
 _OWN: Final = (
-    STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, ESTOP, RESUME, TRUTH, EVENT,
-    AGENT_EVENT, CLOCK, CLOCK_ASK, CLOCK_ANSWER, REFUSED,
+    STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, ESTOP, RESUME, LIVE_FAULT, TRUTH,
+    EVENT, AGENT_EVENT, CLOCK, CLOCK_ASK, CLOCK_ANSWER, REFUSED,
 )  # fmt: skip
 TABLE: Final = (*_OWN, *plugin_topics(_OWN))
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}

@@ -12,11 +12,13 @@ import numpy as np
 from quadriga.plant.late import damp_joints
 from quadriga.plant.protocol import Plant
 from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, N_LEGS, Array
-from quadriga.shared.wire.codes import FALL
+from quadriga.shared.wire.codes import FALL, FAULT_ASKED
 from quadriga.shared.wire.messages import Command, Event, State, Truth
 from quadriga.sim_server.terrain.relief import FOLLOW_MS
 from quadriga.sim_server.world import layout
+from quadriga.sim_server.world.faults.fault import with_time
 from quadriga.sim_server.world.faults.injection import Injection
 from quadriga.sim_server.world.motors import Motors
 from quadriga.sim_server.world.scenario import build_scenario
@@ -64,7 +66,8 @@ class World(Plant):
         self._push_changes = self._scenario.changes()
         self._weakenings = self._scenario.weakenings()
         self._injection = Injection(config, self.names)
-        announced = (*self._scenario.events, *self._injection.events())
+        self._live_faults = config.world.live_faults
+        announced = (*self._scenario.events, *self._injection.events)
         events = [e for e in announced if e.robot in ("", *self.names)]
         self._events = {
             tick: tuple(event for event in events if event.tick == tick)
@@ -164,6 +167,23 @@ class World(Plant):
             yoke_error=self.physics.ten_length - self.team.rest_length,
             yoke_force=self._yoke_force,
         )
+
+    def inject(self, fault: str) -> tuple[Event, ...]:
+        if not self._live_faults:
+            expected = "world.live_faults = true when the walk begins"
+            raise ConfigError("fault", f"{fault!r} in a world without", expected)
+        return self.add_fault(with_time(fault, self.tick))
+
+    def add_fault(self, fault: str) -> tuple[Event, ...]:
+        """Add a fault as `world.faults` has it; what is announced of it now.
+
+        Raises:
+            ConfigError: it does not parse, or names what there is not.
+        """
+        added = self._injection.add(fault)
+        for event in added:
+            self._events[event.tick] = (*self._events.get(event.tick, ()), event)
+        return tuple(Event.of(self.tick, FAULT_ASKED, e.robot, fault) for e in added[:1])
 
     def fallen(self) -> tuple[str, ...]:
         """Robots that have fallen so far."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Final
 
 import numpy as np
 
@@ -15,12 +14,11 @@ from quadriga.sim_server.world.faults.fault import (
     INTERMITTENT,
     OFF,
     SLOW,
+    SPAN_MS,
     STUCK,
     WRONG,
     ComponentFault,
 )
-
-SPAN_MS: Final = 50  # of what is slow, delayed or intermittent
 
 
 class Distortion:

@@ -11,6 +11,8 @@ from quadriga.shared.errors import ConfigError, did_you_mean
 KEY: Final = "world.faults"
 _GRAMMAR: Final = "'robot/component kind start[s] [duration[s]]', commas between faults"
 _LATEST: Final = 3600.0  # s
+SPAN_MS: Final = 50  # of what is slow, delayed or intermittent
+AHEAD_MS: Final = SPAN_MS + 10  # from a word to the fault that it asks for
 
 OFF: Final = "off"
 STUCK: Final = "stuck"
@@ -75,6 +77,20 @@ def parse_faults(
     if not text:
         return ()
     return tuple(_parse(part.strip(), robots, components) for part in text.split(","))
+
+
+def with_time(text: str, tick: int) -> str:
+    """A fault as `world.faults` has it, of one without its time: it begins some ms after a tick.
+
+    What a faulty component says may depend on what it has said in the `AHEAD_MS` before.
+
+    Raises:
+        ConfigError: there are too few or too many words.
+    """
+    words = text.split()
+    if len(words) not in (2, 3):
+        raise ConfigError("fault", repr(text), "'robot/component kind [duration[s]]'")
+    return " ".join([*words[:2], f"{1e-3 * (tick + AHEAD_MS):.3f}", *words[2:]])
 
 
 def _parse(part: str, robots: tuple[str, ...], components: tuple[str, ...]) -> ComponentFault:

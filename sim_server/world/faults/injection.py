@@ -13,13 +13,16 @@ from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Event, State
 from quadriga.sim_server.world.faults.components import build_components
 from quadriga.sim_server.world.faults.distortion import Distortion
-from quadriga.sim_server.world.faults.fault import parse_faults
+from quadriga.sim_server.world.faults.fault import ComponentFault, parse_faults
 
 _STREAM: Final = 5  # of the seed; terrain, sensors, pushes and motors draw from others
 
 
 class Injection:
-    """The faults of `world.faults`; without any it changes nothing and costs nothing.
+    """The faults of `world.faults`, and those added later; without any it costs nothing.
+
+    Attributes:
+        events: when each fault of the configuration begins and ends.
 
     Args:
         config: the team's configuration.
@@ -30,31 +33,39 @@ class Injection:
     """
 
     def __init__(self, config: Config, names: Sequence[str]) -> None:
-        components = build_components(config.robot)
-        team = robot_names(config.team.robots)
-        self._faults = parse_faults(config.world.faults, team, tuple(components))
+        self._components = build_components(config.robot)
+        self._team, self._names = robot_names(config.team.robots), tuple(names)
+        self._seed, self._count = config.world.seed, 0
         self._sensors: dict[str, list[Distortion]] = {}
         self._motors: dict[int, list[Distortion]] = {}
-        for number, fault in enumerate(self._faults):
-            if fault.robot not in names:
-                continue
-            for part, component in enumerate(components[fault.component]):
-                chance = np.random.default_rng((config.world.seed, _STREAM, number, part))
-                made = Distortion(fault, component, chance)
-                if component.message is State:
-                    self._sensors.setdefault(fault.robot, []).append(made)
-                else:
-                    self._motors.setdefault(list(names).index(fault.robot), []).append(made)
+        self.events = self.add(config.world.faults)
 
-    def events(self) -> list[Event]:
-        """When each fault begins and ends."""
+    def add(self, text: str) -> list[Event]:
+        """Add faults that have not begun; when each begins and ends.
+
+        Raises:
+            ConfigError: the text does not parse, or names what there is not.
+        """
         found = list[Event]()
-        for fault in self._faults:
+        for fault in parse_faults(text, self._team, tuple(self._components)):
+            self._add(fault)
             found.append(Event.of(fault.start, codes.FAULT_BEGINS, fault.robot, fault.detail))
             if fault.stop is not None:
                 detail = f"{fault.component} sound again"
                 found.append(Event.of(fault.stop, codes.FAULT_ENDS, fault.robot, detail))
         return found
+
+    def _add(self, fault: ComponentFault) -> None:
+        number, self._count = self._count, self._count + 1
+        if fault.robot not in self._names:
+            return
+        for part, component in enumerate(self._components[fault.component]):
+            chance = np.random.default_rng((self._seed, _STREAM, number, part))
+            made = Distortion(fault, component, chance)
+            if component.message is State:
+                self._sensors.setdefault(fault.robot, []).append(made)
+            else:
+                self._motors.setdefault(self._names.index(fault.robot), []).append(made)
 
     def distort_states(self, states: Mapping[str, State]) -> dict[str, State]:
         """What faulty sensors make of the states of a tick, by robot; called once a tick."""

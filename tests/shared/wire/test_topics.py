@@ -97,6 +97,7 @@ def test_the_keys_are_the_contract_with_other_tools() -> None:
         "team/reference",
         "team/estop",
         "team/resume",
+        "team/fault",
         "team/sim/truth",
         "team/sim/event",
         "team/r1/event",

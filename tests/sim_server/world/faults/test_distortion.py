@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.robot.robots import ROBOTS
 from quadriga.sim_server.world.faults.components import build_components
-from quadriga.sim_server.world.faults.distortion import SPAN_MS, Distortion
-from quadriga.sim_server.world.faults.fault import KINDS, ComponentFault
+from quadriga.sim_server.world.faults.distortion import Distortion
+from quadriga.sim_server.world.faults.fault import KINDS, SPAN_MS, ComponentFault
 
 COMPONENTS = build_components(ROBOTS["a1"])
 (GYRO,) = COMPONENTS["gyro"]

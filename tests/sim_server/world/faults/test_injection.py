@@ -68,3 +68,34 @@ def test_a_robot_in_a_world_of_its_own_has_its_own_faults() -> None:
 def test_a_fault_that_does_not_parse_is_a_wrong_configuration() -> None:
     with pytest.raises(ConfigError, match=r"^world\.faults"):
         World(configured(1, faults="r1/nose stuck 1"))
+
+
+@pytest.mark.parametrize("kind", ["stuck", "garbage", "delayed", "off"])
+def test_a_fault_that_is_asked_for_is_the_same_as_one_that_was_known_from_the_start(
+    kind: str,
+) -> None:
+    config = configured(2, noise=True, live_faults=True)
+    world, known = World(config), World(configured(2, noise=True, faults=f"r2/imu {kind} 0.1 0.05"))
+    before, _ = states_of(world, 40)
+    told = world.inject(f"r2/imu {kind} 0.05")
+    assert [(e.tick, e.code, e.detail) for e in told] == [
+        (40, codes.FAULT_ASKED, f"r2/imu {kind} 0.100 0.05")
+    ]
+    after, events = states_of(world, 160)
+    expected, announced = states_of(known, 200)
+    for one, other in zip([*before, *after[1:]], expected, strict=True):
+        assert encode(one["r2"]) == encode(other["r2"])
+    assert [e for e in events if e.kind == "fault"] == [e for e in announced if e.kind == "fault"]
+
+
+def test_nobody_makes_a_world_faulty_that_does_not_permit_it() -> None:
+    world = World(configured(1))
+    with pytest.raises(ConfigError, match=r"world\.live_faults = true"):
+        world.inject("r1/imu off")
+
+
+@pytest.mark.parametrize("fault", ["r1/imu", "r1/imu off 1 2", "r9/imu off", "r1/imu of", "r1 imu"])
+def test_a_fault_that_there_cannot_be_is_refused(fault: str) -> None:
+    world = World(configured(1, live_faults=True))
+    with pytest.raises(ConfigError):
+        world.inject(fault)
