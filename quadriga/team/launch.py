@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from collections import deque
@@ -25,6 +26,7 @@ _ONE_THREAD: Final = (
 )
 QUADRIGA: Final = (sys.executable, "-m", "quadriga")
 _LAST_WORDS: Final = 12  # lines of a failed process's log that are shown
+_LEAST_DISK: Final = 4096  # bytes, of a file's first block
 _LOOK: Final = 0.02  # s
 _LAST_CHANCE: Final = 2.0  # s for who has not left by itself in time, before SIGKILL
 _ROUTER_GRACE: Final = 5.0  # s
@@ -203,7 +205,9 @@ class Launch:
     def _last_words(self, name: str) -> str:
         with (self._logs / f"{name}.log").open(encoding="utf-8", errors="replace") as log:
             lines = deque(log, maxlen=_LAST_WORDS)
-        return "".join(f"  {line}" for line in lines).rstrip() or "  (none)"
+        words = "".join(f"  {line}" for line in lines).rstrip()
+        none = "(none: the disk is full)" if _is_full(self._logs) else "(none)"
+        return words or f"  {none}"
 
     def stop(self) -> None:
         """Stop what still runs: SIGTERM, the recorder last, and SIGKILL after a grace period.
@@ -234,3 +238,8 @@ class Launch:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
+
+
+def _is_full(folder: Path) -> bool:
+    """Whether nothing more can be written there, so that a process cannot say what is wrong."""
+    return shutil.disk_usage(folder).free < _LEAST_DISK
