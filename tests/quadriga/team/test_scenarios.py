@@ -17,6 +17,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.codes import FAULT_BEGINS
 from quadriga.sim_server.world.world import World
 from quadriga.team.operator import reference_at
 from quadriga.team.scenarios import description, label, names, path
@@ -30,7 +31,7 @@ PROMISED = {
     "flat": 3, "hard-blocks": 3, "hard-payload": 3, "hard-friction": 3, "hard-push": 3,
     "hard-motor": 3, "stairs": 3, "edge-blocks": 3, "edge-payload": 3, "edge-friction": 3,
     "edge-push": 3, "edge-motor": 3, "distribution-pushed": 3, "distribution-loaded": 3,
-    "distribution-slipping": 3,
+    "distribution-slipping": 3, "faulty-imu": 3,
 }  # fmt: skip
 
 
@@ -79,6 +80,13 @@ def test_another_seed_is_another_world_even_without_sensor_noise(name: str) -> N
     if name in drawn:
         assert first[1] != other[1]
     assert (first[2] != other[2]) == (name == "joystick-3")
+
+
+def test_a_scenario_may_have_sensors_and_motors_fail() -> None:
+    world = World(load(path("faulty-imu")))
+    events = [event for _, at in sorted(world._events.items()) for event in at]
+    told = [(event.tick, event.robot) for event in events if event.code == FAULT_BEGINS]
+    assert told == [(4000, "r2"), (7000, "r2"), (10_000, "r3")]
 
 
 def test_a_scenario_lies_beneath_the_file_and_the_options(
