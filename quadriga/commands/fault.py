@@ -3,25 +3,49 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 from quadriga.commands.command import AddCommand, Given
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.printable import printable_line
+
+_SHORTEST_S: Final = 0.5  # of a walk, as far as its own fault asks for no more
 
 
 def add(add_command: AddCommand) -> None:
     command = add_command("fault", run, "walk with a fault of a process, a sensor or a motor")
     option = command.add_argument
-    option("names", nargs="*", metavar="FAULT", help="what goes wrong 1.5 to 4 s into each walk")
+    option(
+        "names",
+        nargs="*",
+        metavar="FAULT",
+        help="what goes wrong 1.5 to 4 s into each walk, or with --at: ROBOT/COMPONENT KIND",
+    )
+    option("--at", type=float, metavar="S", help="with r2/imu stuck: when it is, in world time")
+    option("--for", type=float, dest="span", metavar="S", help="for how long (until the end)")
+    option(
+        "--live",
+        action="store_true",
+        help="in the team that walks now, if it has world.live_faults: ROBOT/COMPONENT KIND",
+    )
     option("--list", action="store_true", help="list all faults, and do not walk")
     option("--table", action="store_true", help="all faults, one after another")
     option("--tries", type=int, default=1, metavar="K", help="walks, of seeds world.seed on (1)")
+    option(
+        "--jobs",
+        type=int,
+        default=1,
+        metavar="K",
+        help="teams that walk side by side in lock-step (1); in real time each walks alone",
+    )
     option("--json", type=Path, metavar="FILE", help="write all rows there")
     option("--out", type=Path, metavar="DIR", help="folder to write to (runs/<date>-<time>)")
 
 
-def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     """Walk; 1 if a walk had no result, or another robot fell than the one with the fault."""
     import json
 
@@ -29,7 +53,7 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 
     from quadriga.faults.campaign import run_fault_campaign
     from quadriga.faults.catalogue import ALL, FAULTS, select_faults
-    from quadriga.faults.table import build_team_fault_table
+    from quadriga.faults.table import build_team_fault_tables
     from quadriga.shared.errors import name_file_errors
     from quadriga.tables import Table, print_tables
     from quadriga.team.run_folder import check_own_config, make_run_dir
@@ -38,21 +62,55 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
         meanings = tuple((fault.name, fault.what) for fault in FAULTS)
         print_tables([Table("Faults", ("fault", "what"), meanings)])
         return 0
-    names = [ALL] if arguments.table else arguments.names
+    if arguments.live:
+        return _ask(arguments, config)
+    names = [ALL] if arguments.table else _names_of(arguments)
     if not names:
         raise ConfigError("fault", "none", "the name of a fault, or --table", "--list lists them")
-    if arguments.tries < 1:
-        raise ConfigError("--tries", str(arguments.tries), "at least 1")
-    faults = select_faults(names)
+    for name in ("tries", "jobs"):
+        if getattr(arguments, name) < 1:
+            raise ConfigError(f"--{name}", str(getattr(arguments, name)), "at least 1")
+    if "seconds" not in given.get("world", {}):  # then a walk lasts no longer than its fault needs
+        config = replace(config, world=replace(config.world, seconds=_SHORTEST_S))
+    faults = select_faults(names, config)
     check_own_config(arguments.config, arguments.out)
     folder = make_run_dir(arguments.out)
     seeds = range(config.world.seed, config.world.seed + arguments.tries)
     console = Console()
-    rows = run_fault_campaign(config, faults, seeds, folder, console)
-    print_tables([build_team_fault_table(rows)])
+    rows = run_fault_campaign(config, faults, seeds, folder, console, arguments.jobs)
+    print_tables(build_team_fault_tables(rows))
     if arguments.json is not None:
         with name_file_errors(ConfigError, f"--json {arguments.json}", "a file to write to"):
             text = json.dumps(rows, indent=1, ensure_ascii=False)
             arguments.json.write_text(text + "\n", encoding="utf-8")
     console.print(f"folder: {folder}", markup=False, highlight=False)
     return int(any("error" in row or row["falls_of_others"] for row in rows))
+
+
+def _ask(arguments: argparse.Namespace, config: Config) -> int:
+    """Ask for a fault in a team that walks; 0 once the world has said that it comes."""
+    from quadriga.team.live_fault import ask_for_fault
+
+    if arguments.at is not None:
+        raise ConfigError("--at", f"{arguments.at:g} with --live", "--for alone", "it is now")
+    words = [*arguments.names, *([] if arguments.span is None else [f"{arguments.span:g}"])]
+    event = ask_for_fault(config, " ".join(words))
+    print(printable_line(f"{1e-3 * event.tick:.3f} s: {event.detail}"))
+    return 0
+
+
+def _names_of(arguments: argparse.Namespace) -> list[str]:
+    """The faults asked for; the words of one with --at are one, as `world.faults` has it.
+
+    Raises:
+        ConfigError: --at without such a fault, or the other way round.
+    """
+    names: list[str] = arguments.names
+    given, timed = any("/" in name for name in names), arguments.at is not None
+    if not given and not timed and arguments.span is None:
+        return names
+    if not (given and timed):
+        got = " ".join(names) or "none"
+        raise ConfigError("fault", got, "ROBOT/COMPONENT KIND --at S [--for S]", "docs/world.md")
+    words = [*names, f"{arguments.at:g}"]
+    return [" ".join(words if arguments.span is None else [*words, f"{arguments.span:g}"])]

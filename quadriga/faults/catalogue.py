@@ -6,26 +6,50 @@ from collections.abc import Sequence
 from typing import Final
 
 from quadriga.faults.attack_faults import ATTACK_FAULTS
-from quadriga.faults.component_faults import COMPONENT_FAULTS
+from quadriga.faults.clock_faults import CLOCK_FAULTS
+from quadriga.faults.component_faults import COMPONENT_FAULTS, given_fault
 from quadriga.faults.fault import TeamFault
 from quadriga.faults.link_faults import LINK_FAULTS
+from quadriga.faults.load_faults import LOAD_FAULTS
 from quadriga.faults.process_faults import PROCESS_FAULTS
+from quadriga.faults.restart_faults import RESTART_FAULTS
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean
 
 ALL: Final = "all"
-FAULTS: Final = (*PROCESS_FAULTS, *COMPONENT_FAULTS, *LINK_FAULTS, *ATTACK_FAULTS)
+FAULTS: Final = (
+    *PROCESS_FAULTS,
+    *RESTART_FAULTS,
+    *LOAD_FAULTS,
+    *CLOCK_FAULTS,
+    *COMPONENT_FAULTS,
+    *LINK_FAULTS,
+    *ATTACK_FAULTS,
+)
 """In the order of the table."""
 BY_NAME: Final = {fault.name: fault for fault in FAULTS}
 
 
-def select_faults(names: Sequence[str]) -> list[TeamFault]:
+def find_fault(name: str, config: Config) -> TeamFault:
+    """A fault by its name, or that of one component by a text as in `world.faults`.
+
+    Raises:
+        ConfigError: there is no such fault.
+    """
+    if "/" in name:
+        return given_fault(name, config)
+    if name not in BY_NAME:
+        hint = did_you_mean(name, BY_NAME)
+        raise ConfigError("fault", repr(name), f"all, {', '.join(BY_NAME)}", hint)
+    return BY_NAME[name]
+
+
+def select_faults(names: Sequence[str], config: Config) -> list[TeamFault]:
     """Faults by their names, or all, in the order of the table.
 
     Raises:
         ConfigError: there is no such fault.
     """
-    for name in names:
-        if name != ALL and name not in BY_NAME:
-            hint = did_you_mean(name, BY_NAME)
-            raise ConfigError("fault", repr(name), f"all, {', '.join(BY_NAME)}", hint)
-    return [fault for fault in FAULTS if ALL in names or fault.name in names]
+    found = {find_fault(name, config) for name in names if name != ALL}
+    own = [fault for fault in FAULTS if ALL in names or fault in found]
+    return [*own, *(fault for fault in found if fault.given is not None)]

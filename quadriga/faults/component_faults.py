@@ -10,12 +10,14 @@ from typing import Final
 
 from quadriga.faults.fault import Draw, SetStage, Stage, TeamFault
 from quadriga.shared.config.sections import Config
-from quadriga.sim_server.world.faults.fault import KINDS
+from quadriga.shared.robot.conventions import robot_names
+from quadriga.sim_server.world.faults.components import build_components
+from quadriga.sim_server.world.faults.fault import KINDS, parse_faults
 
 _SHORT_S: Final = 0.5  # of a component that is faulty for a while
 _COMPONENTS: Final = (  # as in `world.faults`, in words, and how long: None is from then on
     ("imu", "imu", "imu", _SHORT_S),
-    ("encoder_FL_calf", "encoder_FL_calf", "encoder_FL_calf", _SHORT_S),
+    ("encoder", "encoder_FL_calf", "a knee's encoder", _SHORT_S),
     ("feet", "feet", "feet", None),
     ("knee", "motor_FL_calf", "a knee's motor", _SHORT_S),
 )
@@ -42,3 +44,21 @@ def _build() -> Iterator[TeamFault]:
 
 COMPONENT_FAULTS: Final = tuple(_build())
 """In the order of the table."""
+
+
+def given_fault(text: str, config: Config) -> TeamFault:
+    """The fault of one component that a text describes as `world.faults` does.
+
+    Raises:
+        ConfigError: the text does not follow the grammar, or names what there is not.
+    """
+    robots = robot_names(config.team.robots)
+    (fault,) = parse_faults(text, robots, tuple(build_components(config.robot)))
+
+    @contextmanager
+    def stage(config: Config, _draw: Draw, _folder: Path) -> Iterator[Stage]:
+        after_s = 0.0 if fault.stop is None else 1e-3 * (fault.stop - fault.start)
+        world = replace(config.world, faults=text, seconds=config.world.seconds + after_s)
+        yield Stage(replace(config, world=world))
+
+    return TeamFault(text, fault.detail, stage, realtime=False, given=(fault.robot, fault.start))

@@ -6,10 +6,12 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 from quadriga.shared.config.sections import Config
 from quadriga.team.launch import Launch, ProcessSpec
+
+OWN: Final = "robot"  # in place of a process: the agent of the robot that the seed draws
 
 
 class Draw(NamedTuple):
@@ -35,7 +37,7 @@ class FaultScene:
         draw: what the seed has drawn.
         folder: of the walk: configuration, logs, recording.
         launch: its processes.
-        struck: processes that need not leave by themselves any more; they are killed at the end.
+        struck: processes that will not leave by themselves any more; they are killed at the end.
         facts: what the fault itself has to tell; they become fields of the row.
     """
 
@@ -45,6 +47,10 @@ class FaultScene:
     launch: Launch
     struck: set[str] = field(default_factory=set)
     facts: dict[str, Any] = field(default_factory=dict)
+
+    def name_of(self, process: str) -> str:
+        """The name of a process, which is the drawn robot's in place of `OWN`."""
+        return self.draw.robot if process == OWN else process
 
 
 Strike: TypeAlias = Callable[[FaultScene], None]
@@ -81,12 +87,14 @@ class TeamFault:
         stage: prepares its walk: gets the configuration, what was drawn and the walk's folder.
             What it has set up it takes down on leaving.
         realtime: whether it is tried in real time, or in lock-step.
+        given: whom it meets and at which tick, ms; None: the seed draws both.
     """
 
     name: str
     what: str
     stage: SetStage
     realtime: bool = True
+    given: tuple[str, int] | None = None
 
 
 def strike_with(strike: Strike) -> SetStage:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from quadriga.recordings.gaps import missing_ticks
@@ -16,6 +17,8 @@ from quadriga.shared.wire.topics import STATE
 _WALKS: Final = "walk"
 _STANDS: Final = ("stand", "damping", "estop")  # a robot that walks no more
 _ANNOUNCED: Final = (codes.FAULT_BEGINS, codes.FAULT_ENDS)
+_SILENT_MS: Final = 300  # without a status, of which one is due every 100 ms
+_CLOCK_MS: Final = 500  # by which the walk may be further than the clock that was read last
 
 
 class Moment(NamedTuple):
@@ -39,11 +42,12 @@ def describe_outcome(
 
     `detect_ms` is the time from the fault until an agent no longer walks, or the world announces
     that a robot is silent or gone; None if nobody ever noticed. `stand_ms` is the time until all
-    others stand, or are damped; None if they walked on. `lowered` are robots that the world has led
-    down since no commands came; their agents' last words in `status` may be of before.
-    `lost_messages` counts what the recording lacks of the other robots, in real time also commands
-    that were never sent, and the states and commands of all robots that it lacks before the fault
-    because it ends too early.
+    others stand, or are damped; None if they walked on. `recover_ms` is the time until all robots
+    walk again for good: 0 if none stopped, None if one has not walked again, or if the recording
+    lacks the end of the walk. `lowered` are robots that the world has led down since no commands
+    came; their agents' last words in `status` may be of before. `lost_messages` counts what the
+    recording lacks of the other robots, in real time also commands that were never sent, and the
+    states and commands of all robots that it lacks before the fault because it ends too early.
 
     Args:
         config: of the walk.
@@ -52,8 +56,8 @@ def describe_outcome(
         moment: of the fault.
     """
     tick = moment.tick
-    if moment.wall_ns:
-        tick = max(tick, tick_at(recording, moment.wall_ns))
+    if moment.wall_ns:  # by the recorder's clock, which may be what the fault is about
+        tick = max(tick, min(tick_at(recording, moment.wall_ns), tick + _CLOCK_MS))
     fallen = sorted({e.robot for e in traces.events if e.code == codes.FALL})
     others = [name for name in traces.robots if name != moment.robot]
     end = next((e for e in reversed(traces.events) if e.kind == "stop"), None)
@@ -68,6 +72,7 @@ def describe_outcome(
         "lowered": sorted({e.robot for e in traces.events if e.code == codes.LOWERED}),
         "detect_ms": _after(tick, _first_notice(traces, tick)),
         "stand_ms": _after(tick, _all_stand(traces.statuses, others, tick)),
+        "recover_ms": None if end is None else _after(tick, _all_walk(traces, tick)),
         "lost_messages": _count_lost(config, traces, moment),
         "status": {name: f"{s.mode} {s.reason}".strip() for name, s in last.items()},
         "end": "none recorded" if end is None else f"{end.code}: {end.detail}",
@@ -110,6 +115,29 @@ def _all_stand(
             return None
         ticks.append(still[0])
     return max(ticks, default=None)
+
+
+def _all_walk(traces: Traces, tick: int) -> int | None:
+    """When the last robot went on for good; the fault's tick if none stopped; None: one did not."""
+    newest = max((s[-1].tick for s in traces.statuses.values() if s), default=tick)
+    lowered = {event.robot for event in traces.events if event.code == codes.LOWERED}
+    since = [tick]
+    for name in traces.robots:
+        statuses = [s for s in traces.statuses[name] if s.tick >= tick - _SILENT_MS]
+        if not statuses or statuses[-1].mode != _WALKS:
+            return None
+        if newest - statuses[-1].tick > _SILENT_MS:
+            return None
+        since += _stops(statuses, name in lowered)
+    return max(since)
+
+
+def _stops(statuses: Sequence[Status], lowered: bool) -> Iterator[int]:
+    """When a robot walked again after it had stopped, or had said nothing while it was led down."""
+    for before, now in itertools.pairwise(statuses):
+        silent = lowered and now.tick - before.tick > _SILENT_MS
+        if now.mode == _WALKS and (before.mode != _WALKS or silent):
+            yield now.tick
 
 
 def _after(tick: int, later: int | None) -> int | None:

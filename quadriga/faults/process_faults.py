@@ -10,12 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final, TypeAlias
 
-from quadriga.faults.fault import Draw, FaultScene, SetStage, Stage, TeamFault, strike_with
+from quadriga.faults.fault import OWN, Draw, FaultScene, SetStage, Stage, TeamFault, strike_with
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER, ROUTER, SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
 
-_OWN: Final = "robot"  # in place of a process: the agent of the robot that the seed draws
 _PAUSE_S: Final = 0.3  # of a process that stands still for a while
 
 _Signals: TypeAlias = tuple[tuple[signal.Signals, float], ...]
@@ -33,8 +32,9 @@ class _Strike:
         self._process, self._signals = process, signals
 
     def __call__(self, scene: FaultScene) -> None:
-        name = scene.draw.robot if self._process == _OWN else self._process
-        scene.struck.add(name)  # one that stands still could not be told to leave
+        name = scene.name_of(self._process)
+        if self._signals[-1][0] != signal.SIGCONT:
+            scene.struck.add(name)
         pid, begun = scene.launch.pids[name], monotonic()
         for number, after in self._signals:
             sleep(begun + after - monotonic())
@@ -57,9 +57,9 @@ _PAUSED: Final = f"it stands still for {_PAUSE_S:g} s"
 _ROUTER_KILLED: Final = "the router is killed: nobody hears anybody"
 
 PROCESS_FAULTS: Final = (
-    TeamFault("agent-killed", "an agent's process is killed", _stage(_OWN, _KILL)),
-    TeamFault("agent-frozen", "an agent's process stands still", _stage(_OWN, _STOP)),
-    TeamFault("agent-paused", _PAUSED, _stage(_OWN, _PAUSE)),
+    TeamFault("agent-killed", "an agent's process is killed", _stage(OWN, _KILL)),
+    TeamFault("agent-frozen", "an agent's process stands still", _stage(OWN, _STOP)),
+    TeamFault("agent-paused", _PAUSED, _stage(OWN, _PAUSE)),
     TeamFault("operator-killed", "the operator's process is killed", _stage(OPERATOR, _KILL)),
     TeamFault("operator-frozen", "it stands still", _stage(OPERATOR, _STOP)),
     TeamFault("operator-paused", _PAUSED, _stage(OPERATOR, _PAUSE)),

@@ -1,9 +1,9 @@
-"""Rows of walks with faults, summed up: a line for each fault."""
+"""Rows of walks with faults, summed up: a line for each fault, of what came and what was said."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -13,49 +13,99 @@ from quadriga.shared.wire.codes import TIME_OVER, code_of
 from quadriga.tables import NOTHING, Table
 
 _COLUMNS: Final = (
-    *("fault", "tries", "no result", "walked on", "stopped", "falls", "falls of others"),
-    *("noticed ms p50", "max", "others stood ms p50", "max", "lost messages"),
-    *("forged", "refused", "passed", "most frequent reason"),
+    *("fault", "mode", "tries", "void", "fell"),
+    *("noticed ms", "stood ms", "again ms", "lost", "refused"),
 )
 _NOTE: Final = """\
-"walked on": all robots walked until the time was over; "stopped": somebody stopped, or was led down
-by the world, and nobody fell.
-"noticed": from the fault until an agent no longer walked or the world said that a robot is silent
-or gone; "others stood": until all other robots stood or were damped. Falls and times are of the
-tries with a result. "lost messages": what the recordings lack, the faulty robot's own aside; in
-real time also commands of ticks that an agent did not answer.
-"forged": messages and connections of an attacker; "refused": by the router, which has told it, or
-since nobody can read it; "passed": what came through and can be read."""
+"void": tries without a result; "fell": other robots than the one of the fault, and that one. Of
+times, and of messages lost, the median and the largest of all other tries. "noticed": from the
+fault until an agent no longer walked or the world said that a robot is silent or gone; "stood":
+until all others stood or were damped; "again": until all robots walked for good, 0 if none had
+stopped. "lost": what the recording lacks, the faulty robot's own aside; in real time also commands
+of ticks that an agent did not answer. "refused": share of what was forged."""
+_SAID_COLUMNS: Final = ("fault", "walked on", "stopped", "fell", "status", "doctor")
+_SAID_NOTE: Final = """\
+"walked on": all robots walked when the time was over; "stopped": somebody stopped, or was led down
+by the world, and nobody fell. "status": why most robots no longer walked; "doctor": what `quadriga
+doctor` found wrong with most processes 1 s after the fault, in real time."""
+_MODES: Final = {"lockstep": "lock", "realtime": "real"}
+
+_Rows = Sequence[dict[str, Any]]
 
 
-def build_team_fault_table(rows: Sequence[dict[str, Any]]) -> Table:
-    """For each fault: tries, what became of the team, how soon it was noticed."""
-    lines = [
-        (name, *_cells([row for row in rows if row["fault"] == name]))
-        for name in BY_NAME
-        if any(row["fault"] == name for row in rows)
-    ]
-    return Table("Faults of a team", _COLUMNS, tuple(lines), [_NOTE])
+def build_team_fault_tables(rows: _Rows) -> tuple[Table, Table]:
+    """For each fault: how soon it was noticed and what was lost; what became of the team."""
+    names = dict.fromkeys([*BY_NAME, *(row["fault"] for row in rows)])
+    found = [(name, [row for row in rows if row["fault"] == name]) for name in names]
+    found = [(name, tries) for name, tries in found if tries]
+    return (
+        Table(
+            "Faults of a team",
+            _COLUMNS,
+            tuple((name, *_times(tries)) for name, tries in found),
+            [_NOTE],
+        ),
+        Table(
+            "What became of it",
+            _SAID_COLUMNS,
+            tuple((name, *_words(tries)) for name, tries in found),
+            [_SAID_NOTE],
+        ),
+    )
 
 
-def _cells(every: Sequence[dict[str, Any]]) -> list[str]:
-    found = [row for row in every if "error" not in row]
-    walked = [row for row in found if _has_walked_on(row)]
-    fell = [row for row in found if row["falls"]]
-    reasons = Counter(reason for row in found for reason in _reasons(row)).most_common(1)
+def with_result(rows: _Rows) -> _Rows:
+    """The tries that have come to the fault and have been recorded."""
+    return [row for row in rows if "error" not in row]
+
+
+def _times(every: _Rows) -> list[str]:
+    rows = with_result(every)
     return [
+        next((_MODES[row["mode"]] for row in rows), NOTHING),
         str(len(every)),
-        str(len(every) - len(found)),
-        str(len(walked)),
-        str(len(found) - len(walked) - len(fell)),
-        str(len(fell)),
-        str(sum(row["falls_of_others"] for row in found)),
-        *_times(found, "detect_ms"),
-        *_times(found, "stand_ms"),
-        str(sum(row["lost_messages"] for row in found)),
-        *_attack(found),
-        *(f"{reason} ({times})" for reason, times in reasons or [(NOTHING, 0)]),
+        str(len(every) - len(rows)),
+        f"{sum(row['falls_of_others'] for row in rows)}/{sum(map(_has_own_fallen, rows))}",
+        *(_median_and_most(row[name] for row in rows) for name in _FIGURES),
+        _share_refused(rows),
     ]
+
+
+_FIGURES: Final = ("detect_ms", "stand_ms", "recover_ms", "lost_messages")
+
+
+def _median_and_most(values: Iterable[int | None]) -> str:
+    known = [value for value in values if value is not None]
+    return f"{np.median(known):.0f}/{max(known)}" if known else NOTHING
+
+
+def _share_refused(rows: _Rows) -> str:
+    forged = sum(row.get("forged", 0) for row in rows)
+    return (
+        f"{100 * sum(row.get('refused', 0) for row in rows) / forged:.4g} %" if forged else NOTHING
+    )
+
+
+def _words(every: _Rows) -> list[str]:
+    rows = with_result(every)
+    walked, fell = sum(map(_has_walked_on, rows)), sum(bool(row["falls"]) for row in rows)
+    said = (what.partition(" ")[2] for row in rows for what in row["status"].values())
+    doctors = (
+        f"{name if name in ('sim', 'operator', 'recorder', 'link') else 'agent'}: {what}"
+        for row in rows
+        for name, what in row.get("doctor", {}).items()
+    )
+    return [
+        str(walked),
+        str(len(rows) - walked - fell),
+        str(fell),
+        _most_frequent(code_of(reason) for reason in said if reason),
+        _most_frequent(doctors),
+    ]
+
+
+def _has_own_fallen(row: dict[str, Any]) -> bool:
+    return row["robot"] in row["falls"]
 
 
 def _has_walked_on(row: dict[str, Any]) -> bool:
@@ -64,19 +114,7 @@ def _has_walked_on(row: dict[str, Any]) -> bool:
     return walks and not stopped and code_of(row["end"]) == TIME_OVER
 
 
-def _reasons(row: dict[str, Any]) -> list[str]:
-    """Codes of the reasons for which agents no longer walked."""
-    reasons = (what.partition(" ")[2] for what in row["status"].values())
-    return [code_of(reason) for reason in reasons if reason]
-
-
-def _attack(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """What attackers have tried, and what came of it."""
-    attacked = [row for row in rows if "forged" in row]
-    names = ("forged", "refused", "passed")
-    return [str(sum(row[name] for row in attacked)) if attacked else NOTHING for name in names]
-
-
-def _times(rows: Sequence[dict[str, Any]], name: str) -> list[str]:
-    times = [row[name] for row in rows if row[name] is not None]
-    return [f"{np.median(times):.0f}", str(max(times))] if times else [NOTHING] * 2
+def _most_frequent(words: Iterable[str]) -> str:
+    for word, times in Counter(words).most_common(1):
+        return f"{word} ({times})"
+    return NOTHING

@@ -11,6 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from quadriga.faults.aftermath import await_end, consult_doctor
+from quadriga.faults.continued import ContinuedRecording
 from quadriga.faults.fault import Draw, FaultScene, Strike, TeamFault
 from quadriga.faults.outcome import Moment, describe_outcome
 from quadriga.recordings.summary import RECORDING
@@ -19,8 +21,7 @@ from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import MessageError, ProcessError, RecordingError
-from quadriga.shared.members import LAUNCHER, ROUTER, has_lead
-from quadriga.shared.recording.reader import Recording
+from quadriga.shared.members import LAUNCHER, SIM, has_lead
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.wire.codec import decode
@@ -33,8 +34,7 @@ from quadriga.team.run_folder import CONFIG
 _EARLIEST_S, _LATEST_S = 1.5, 4.0  # from the begin of a walk until something goes wrong
 _AFTER_S: Final = 4.0  # world time that is walked at least after it
 _START_S: Final = 120.0  # for the team to start
-_LEAVE_S: Final = 25.0  # wall time for the others to leave after the world
-_SLACK_S: Final = 60.0  # wall time for the walk beyond that of the world
+_DOCTOR_S: Final = 1.0  # wall time from a fault until the doctor is asked
 _LOOK: Final = 0.005  # s
 
 
@@ -54,7 +54,7 @@ def run_fault_trial(
         ProcessError: the team did not begin to walk.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    draw = draw_fault(config, seed)
+    draw = draw_fault(config, seed) if fault.given is None else Draw(*fault.given, seed)
     with fault.stage(_walk_config(config, fault, draw), draw, folder) as stage:
         config = stage.config
         (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
@@ -97,14 +97,17 @@ class _FaultTrial:
         """Wait for the moment, let the fault happen, and wait until the walk is over."""
         draw = self._scene.draw
         if self._strike is None:
-            self._await_end()
+            await_end(self._scene)
             return Moment(draw.robot, draw.tick)
         with Bus.open(self._config.bus, self._config.team.name, LAUNCHER, lambda: False) as bus:
             bus.subscribe(CLOCK.key(bus.team))
             tick = self._await_tick(bus)
-        at = wall_ns()
+        at, begun = wall_ns(), monotonic()
         self._strike(self._scene)
-        self._await_end()
+        if SIM not in self._scene.struck:  # else there is nobody to be asked about
+            sleep(begun + _DOCTOR_S - monotonic())
+            consult_doctor(self._scene)
+        await_end(self._scene, begun)
         for name in self._scene.struck & self._launch.pids.keys():
             with suppress(OSError):  # it has ended by itself
                 os.kill(self._launch.pids[name], signal.SIGKILL)
@@ -123,20 +126,11 @@ class _FaultTrial:
             sleep(_LOOK)
         raise ProcessError("the team", "no walk", f"one that comes to {1e-3 * wanted:g} s")
 
-    def _await_end(self) -> None:
-        deadline = monotonic() + _START_S + self._config.world.seconds + _SLACK_S
-        while has_lead(self._launch.alive) and monotonic() < deadline:
-            sleep(10 * _LOOK)
-        # All others leave by themselves once the world has ended.
-        deadline = monotonic() + _LEAVE_S
-        while self._launch.alive - self._scene.struck - {ROUTER} and monotonic() < deadline:
-            sleep(10 * _LOOK)
-
 
 def _describe(config: Config, moment: Moment, folder: Path) -> dict[str, Any]:
     """What the recording says of it, as far as it can be read."""
     try:
-        recording = Recording(folder / RECORDING)
+        recording = ContinuedRecording(folder / RECORDING)
         return describe_outcome(config, read_traces(recording), recording, moment)
     except RecordingError as error:
         # Rows are published, and where they were walked is nobody's business.

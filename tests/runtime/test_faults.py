@@ -11,7 +11,7 @@ from quadriga.commands.parser import main
 from tests.runtime.conftest import DATA
 
 ARGUMENTS = (
-    *("--planner", "none", "--seconds", "1", "--robots", "2"),
+    *("--planner", "none", "--robots", "2", "--jobs", "2"),
     *(word for name, value in DATA.items() for word in ("--set", f"{name}={value:g}")),
 )
 
@@ -31,6 +31,8 @@ def test_a_killed_agent_and_a_dead_knee(tmp_path: Path) -> None:
     assert killed["lowered"] == [killed["robot"]]
     assert killed["falls"] == knee["lowered"] == []
     assert 0 <= killed["detect_ms"] < 1000
+    assert killed["recover_ms"] is None
+    assert killed["doctor"] == {killed["robot"]: "not-started"}
     # Half a second without a knee: the robot falls, or limps on; nobody else is touched by it.
     assert set(knee["falls"]) <= {knee["robot"]}
     # What has been walked is not walked again.

@@ -5,7 +5,7 @@ import pytest
 
 from quadriga.faults.campaign import REALTIME_ROBOTS, config_for
 from quadriga.faults.catalogue import BY_NAME, FAULTS, select_faults
-from quadriga.faults.fault import FaultScene, TeamFault
+from quadriga.faults.fault import Draw, FaultScene, TeamFault
 from quadriga.faults.link_faults import LINK_FAULTS
 from quadriga.faults.trial import draw_fault
 from quadriga.shared.config.load import load
@@ -13,19 +13,31 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import OPERATOR
 from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.runtime.clock import monotonic
 from quadriga.sim_server.world.faults.components import build_components
 from quadriga.sim_server.world.faults.fault import parse_faults
-from quadriga.team.launch import Launch, ProcessSpec
+from quadriga.team.launch import Launch, ProcessSpec, process_table
 
 _SLEEPER = ProcessSpec(OPERATOR, (sys.executable, "-c", "import time; time.sleep(60)"), 1.0)
 
 
 def test_faults_by_name_in_the_order_of_the_table() -> None:
-    assert select_faults(["all"]) == list(FAULTS)
-    found = [fault.name for fault in select_faults(["imu-stuck", "agent-killed"])]
+    assert select_faults(["all"], Config()) == list(FAULTS)
+    found = [fault.name for fault in select_faults(["imu-stuck", "agent-killed"], Config())]
     assert found == ["agent-killed", "imu-stuck"]
     with pytest.raises(ConfigError, match=r"fault: got 'imu-stack'.*did you mean 'imu-stuck'"):
-        select_faults(["agent-killed", "imu-stack"])
+        select_faults(["agent-killed", "imu-stack"], Config())
+
+
+def test_a_fault_of_one_component_may_be_given_with_its_time(tmp_path: Path) -> None:
+    (fault,) = select_faults(["r2/gyro stuck 4 0.5"], Config())
+    assert (fault.given, fault.realtime) == (("r2", 4000), False)
+    with fault.stage(Config(), Draw("r2", 4000, 1), tmp_path) as stage:
+        assert stage.config.world.faults == "r2/gyro stuck 4 0.5"
+    with pytest.raises(ConfigError, match=r"component 'giro'.*did you mean 'gyro'"):
+        select_faults(["r2/giro stuck 4"], Config())
+    with pytest.raises(ConfigError, match="robot 'r4'"):
+        select_faults(["r4/gyro stuck 4"], Config())
 
 
 # Those of links make a network each: tests/runtime.
@@ -55,7 +67,32 @@ def test_who_is_paused_goes_on(tmp_path: Path) -> None:
         pid = launch.pids[OPERATOR]
         state = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0]
         assert state in {"R", "S"}  # not T
-        assert scene.struck == {OPERATOR}
+        assert not scene.struck  # it leaves by itself
+
+
+def test_who_is_restarted_is_another_process_after_a_while(tmp_path: Path) -> None:
+    draw = draw_fault(Config(), 7)
+    with Launch([_SLEEPER], tmp_path) as launch:
+        before, begun = launch.pids[OPERATOR], monotonic()
+        with BY_NAME["operator-restarted"].stage(Config(), draw, tmp_path) as stage:
+            assert stage.config.team.auto_resume
+            assert stage.strike is not None
+            stage.strike(FaultScene(stage.config, draw, tmp_path, launch))
+        assert monotonic() - begun >= 1.0
+        assert launch.pids[OPERATOR] != before
+        assert launch.alive == {OPERATOR}
+
+
+@pytest.mark.parametrize("name", ["clock-step", "clock-drift"])
+def test_the_clocks_of_one_process_go_wrong(name: str, tmp_path: Path) -> None:
+    draw = draw_fault(Config(), 7)
+    rows = process_table(Config(), tmp_path, None, "")
+    with BY_NAME[name].stage(Config(), draw, tmp_path) as stage:
+        changed = [row.name for row in rows if stage.wrap(row) != row]
+        assert len(changed) == 1
+        (own,) = (row for row in rows if row.name == changed[0])
+        assert stage.wrap(own).command[4:] == own.command[2:]
+        assert (tmp_path / "clock").read_text(encoding="ascii") == "0 0"
 
 
 def test_chance_of_the_seed_alone_decides_whom_and_when() -> None:

@@ -17,6 +17,7 @@ from tests.quadriga.conftest import WALL, WALL_0, WriteRun, run_config
 
 FAULT = 3000  # tick
 CONFIG = run_config(robots=3, seconds=6.0)
+ENDS = [("team/sim/event", Event.of(6000, codes.TIME_OVER, "", "end of world.seconds"))]
 
 
 def outcome(folder: Path, moment: Moment) -> dict[str, Any]:
@@ -46,6 +47,7 @@ def test_nobody_notices_what_harms_nobody(write_run: WriteRun) -> None:
     assert row["falls"] == []
     assert row["falls_of_others"] == row["lost_messages"] == 0
     assert row["detect_ms"] is row["stand_ms"] is None
+    assert row["recover_ms"] is None  # nobody knows: the recording lacks the walk's end
     assert row["status"] == {"r1": "walk", "r2": "walk", "r3": "walk"}
     assert row["end"] == "none recorded"
 
@@ -61,6 +63,39 @@ def test_who_only_slows_down_has_noticed_and_does_not_stand(write_run: WriteRun)
     change = stop_from(3400, "stopping", "peer-lost:r2", ("r1", "r3"))
     row = outcome(write_run(CONFIG, change=change), Moment("r2", FAULT))
     assert (row["detect_ms"], row["stand_ms"]) == (400, None)
+
+
+def test_a_team_that_walks_again_has_recovered_when_the_last_robot_does(
+    write_run: WriteRun,
+) -> None:
+    def change(key: str, message: Message) -> Message:
+        since = {"r1": 3400, "r3": 3500}.get(key.split("/")[1])
+        if isinstance(message, Status) and since and since <= message.tick < since + 1000:
+            return replace(message, mode="stand", reason="peer-lost:r2")
+        return message
+
+    row = outcome(write_run(CONFIG, change=change, extra=ENDS), Moment("r2", FAULT))
+    assert (row["stand_ms"], row["recover_ms"]) == (500, 1500)
+
+
+def test_a_team_of_which_nobody_stopped_had_nothing_to_recover_from(write_run: WriteRun) -> None:
+    row = outcome(write_run(CONFIG, extra=ENDS), Moment("r2", FAULT))
+    assert row["recover_ms"] == 0
+
+
+def test_a_robot_that_stands_at_the_end_has_not_recovered(write_run: WriteRun) -> None:
+    stands = stop_from(3400, "stand", "peer-lost:r2", ("r1",))
+    row = outcome(write_run(CONFIG, change=stands, extra=ENDS), Moment("r2", FAULT))
+    assert row["recover_ms"] is None
+
+
+def test_a_robot_that_says_nothing_at_the_end_has_not_recovered(write_run: WriteRun) -> None:
+    def fall_silent(key: str, message: Message) -> Message | None:
+        silent = isinstance(message, Status) and message.tick > FAULT and "/r2/" in key
+        return None if silent else message
+
+    row = outcome(write_run(CONFIG, change=fall_silent, extra=ENDS), Moment("r2", FAULT))
+    assert row["recover_ms"] is None
 
 
 def test_what_the_world_announces_is_a_notice_and_the_fault_itself_is_not(

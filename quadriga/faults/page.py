@@ -1,0 +1,52 @@
+"""The page of published faults: `python -m quadriga.faults.page > docs/faults.md`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from quadriga.faults.catalogue import FAULTS
+from quadriga.faults.goals import build_goal_table
+from quadriga.faults.table import build_team_fault_tables
+from quadriga.shared.config.load import load
+from quadriga.tables import Table
+from quadriga.team.run_folder import CONFIG
+from quadriga.team.trial_rows import read_rows
+
+PUBLISHED: Final = Path("docs/results/faults")
+_HEAD: Final = """\
+# When something goes wrong
+
+`quadriga fault NAME` walks a simulated team in which one thing goes wrong, 1.5 to 4 s into the
+walk, at a robot and at a time that the seed draws, and tells what came of it. Sensors and motors
+fail in lock-step, where the same seed gives the same walk; everything else in real time, with two
+robots at most, since a computer must keep up. `quadriga fault --table --tries 20 --jobs 2` walks
+with all of them, goes on where an earlier call with the same `--out` was stopped, and writes rows
+with `--json`.
+
+This page is generated from the configuration and the rows that are in a folder each of
+`docs/results/faults`: `make docs`, or `python -m quadriga.faults.page > docs/faults.md`.
+"""
+_NONE: Final = "Nothing is published yet."
+
+
+def to_markdown(published: Path = PUBLISHED) -> str:
+    """The page, of all folders of rows in `published`."""
+    parts = [_HEAD.rstrip()]
+    folders = sorted(file.parent for file in published.glob(f"*/{CONFIG}"))
+    for folder in folders:
+        config, rows = load(folder / CONFIG), read_rows(folder)
+        parts.append(
+            f"## {folder.name}: {config.team.robots} robots, planner {config.planner.kind}"
+        )
+        tables = (build_goal_table(config, rows), *build_team_fault_tables(rows))
+        parts += [table.to_markdown(3).rstrip() for table in tables]
+    if not folders:
+        parts.append(_NONE)
+    meanings = tuple((fault.name, fault.what) for fault in FAULTS)
+    parts.append(Table("What the faults are", ("fault", "what"), meanings).to_markdown().rstrip())
+    return "\n\n".join(parts) + "\n"
+
+
+if __name__ == "__main__":
+    print(to_markdown(), end="")
