@@ -100,8 +100,8 @@ def test_who_has_had_its_time_to_leave_does_not_get_it_twice(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(launch, "_LAST_CHANCE", 0.1)
-    speaks = f"{LAST.replace('60', '1')}"  # until the other is deaf to SIGTERM
-    rows = [row("sim", speaks), row("r1", STUBBORN, grace=2.0)]
+    world = LAST.replace("60", "1")  # s, by which the other is deaf to SIGTERM
+    rows = [row("sim", world), row("r1", STUBBORN, grace=2.0)]
     with Launch(rows, tmp_path) as running:
         pids = running.pids
         with pytest.raises(ProcessError, match="process r1: got no end after the walk"):
