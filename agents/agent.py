@@ -258,19 +258,8 @@ class Agent:
         fed = reference_age <= REFERENCE.max_age_ms and not imu.missing_ms
         whole = fed and self._is_whole(tick, mode, team, planning)
         healing = self._heal(healing, mode, inputs, whole=whole)
-        new = AgentState(
-            tick,
-            mode,
-            planning,
-            acted.memory,
-            references,
-            tau,
-            failures,
-            counters,
-            healing,
-            team,
-            imu=imu,
-        )
+        after = (references, tau, failures, counters, healing, team, None, imu)
+        new = AgentState(tick, mode, planning, acted.memory, *after)
         return new, outputs, (sensed, asked, acted)
 
     def _stops_on_arrival(
