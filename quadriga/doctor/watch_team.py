@@ -56,7 +56,7 @@ def watch_team(config: Config, folder: Path, stopped: Callable[[], bool] | None 
 
 def _watch(bus: Bus, config: Config, files: HealthFiles, stopped: Callable[[], bool]) -> None:
     me, team = describe_process(config, DOCTOR), processes(config)
-    refusals, end = Refusals(bus), WalkEnd(bus)
+    refusals, end = RecentRefusals(bus), WalkEnd(bus)
     while not (stopped() or end.is_over()):
         due = monotonic() + EVERY
         view = view_of(bus, config, ask(bus), me)
@@ -93,7 +93,7 @@ class HealthFiles:
             path.unlink(missing_ok=True)
 
 
-class Refusals:
+class RecentRefusals:
     """What the router tells that it has denied, and to whom.
 
     What was too large or came too often is no matter of trust.

@@ -18,6 +18,7 @@ from quadriga.agents.healing import (
     ramp,
     step_healing,
 )
+from quadriga.agents.imu_bridge import BELIEVED_AFTER_MS
 from quadriga.agents.modes import LOSSES, STAND, STOPPING, WALK, WHOLE_MS, Mode
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
@@ -149,11 +150,12 @@ def test_a_word_while_all_is_well_is_forgotten() -> None:
 
 @pytest.mark.parametrize("auto", [False, True])
 def test_a_fall_or_an_emergency_stop_meanwhile_is_for_good(auto: bool) -> None:
-    for stop in ({"state": tilted(2000, 1.2)}, {"estop": EStop(2000, 0, "dog")}):
+    lies = [{"state": tilted(tick, 1.2)} for tick in range(2000, 2000 + BELIEVED_AFTER_MS + 1)]
+    for stops, mode in ((lies, "damping"), ([{"estop": EStop(2000, 0, "dog")}], "estop")):
         robot = stood(AUTO if auto else ALONE)
-        mode = robot.step(**stop).mode
-        assert mode in ("damping", "estop")
-        assert modes(robot, 5000, resume=Resume(2001, 0)) == {mode: 2001}
+        assert [robot.step(**stop).mode for stop in stops][-1] == mode
+        after = 2000 + len(stops)
+        assert modes(robot, 5000, resume=Resume(after, 0)) == {mode: after}
 
 
 def pair(**team: Any) -> tuple[Rollout, Callable[[int], dict[str, Outputs]]]:
