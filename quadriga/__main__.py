@@ -10,7 +10,7 @@ from typing import Final, NoReturn
 
 _STOP: Final = "estop"
 _FEW_COLLECTIONS: Final = 50_000  # new objects between two; imports make many and no garbage
-_LOST_OUTPUT: Final = 1
+_WRONG: Final = 2
 _INTERRUPTED: Final = 130
 
 
@@ -34,7 +34,7 @@ def run() -> int:
         from quadriga.commands.parser import main as command_line
     except QuadrigaError as error:  # of a package that adds to this one
         print(printable_line(f"quadriga: {error}"), file=sys.stderr)
-        return 2
+        return _WRONG
 
     return command_line()
 
@@ -52,7 +52,7 @@ def end(status: int) -> NoReturn:
         pass
     except OSError as error:
         os.write(2, f"quadriga: the output: got {error.strerror}, expected room for it\n".encode())
-        status = status or _LOST_OUTPUT
+        status = status or _WRONG
     except KeyboardInterrupt:  # nobody reads what is left
         status = status or _INTERRUPTED
     os._exit(status)

@@ -43,11 +43,16 @@ def test_what_was_said_has_been_written_when_the_process_ends(tmp_path: Path) ->
 
 
 def test_output_for_which_there_is_no_room_is_one_clear_line() -> None:
+    code = "from quadriga.__main__ import end; print('said'); end(0)"
     with open("/dev/full", "wb") as full:
         done = subprocess.run(
-            [*QUADRIGA, "version"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+            [sys.executable, "-c", code],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
         )
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert done.stderr == (
         "quadriga: the output: got No space left on device, expected room for it\n"
     )

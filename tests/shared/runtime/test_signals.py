@@ -71,6 +71,13 @@ def alive(pid: int) -> bool:
         return False
 
 
+def await_end(pid: int) -> None:
+    deadline = monotonic() + 60.0
+    while alive(pid) and monotonic() < deadline:
+        sleep(0.01)
+    assert not alive(pid)
+
+
 def test_kill_9_of_the_parent_ends_the_child() -> None:
     parent = subprocess.Popen(
         [sys.executable, "-c", PARENT, CHILD], stdin=subprocess.PIPE, stdout=subprocess.PIPE
@@ -80,10 +87,7 @@ def test_kill_9_of_the_parent_ends_the_child() -> None:
     assert alive(child)
     parent.kill()
     parent.communicate()
-    deadline = monotonic() + 60.0
-    while alive(child) and monotonic() < deadline:
-        sleep(0.01)
-    assert not alive(child)
+    await_end(child)
 
 
 SPINS = """
@@ -113,7 +117,7 @@ def test_a_child_that_does_not_heed_the_signal_is_killed_some_time_later() -> No
     assert said == (
         f"quadriga: killed 0.2 s after process {parent.pid}, which had started this one\n"
     )
-    assert not alive(child)
+    await_end(child)
 
 
 def test_a_child_whose_parent_is_gone_already_ends_itself() -> None:
