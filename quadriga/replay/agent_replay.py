@@ -79,6 +79,7 @@ def replay_agent(
     curves = Curves(config.planner.applied) if changed else None
     comparison = Comparison(log, None if curves is None else curves.add)
     lives = split_lives(log)
+    begins = tuple(map(first_tick, lives))  # now: what is replayed is taken out of the logs
     with collector_off():  # a long log need not be looked through again and again
         for life in lives:
             inbox = Inbox(config, job.robot, recorded.peers)
@@ -110,7 +111,7 @@ def replay_agent(
         wall=wall,
         inputs="" if verdict.step is None else format_inputs(verdict.step),
         files=files,
-        lives=tuple(map(first_tick, lives)),
+        lives=begins,
     )
     verdict.step = None  # not to be carried between processes
     return outcome
