@@ -89,13 +89,8 @@ def replay_agent(
                 break  # nothing after it could be equal but by chance
     verdict = comparison.finish()
     wall = monotonic() - begun
-    if stop_at is not None and not stop_at.reached:
-        raise ConfigError(
-            stop_at.option,
-            f"{stop_at.tick / 1000:g} s",
-            f"a time up to {log.last / 1000:g} s",
-            f"{job.robot} has no step after it",
-        )
+    if stop_at is not None:
+        _check_reached(stop_at, job.robot, log.last)
     files: tuple[Path, ...] = ()
     if curves is not None:
         files = (_draw_curves(job, curves, changed),)
@@ -115,6 +110,17 @@ def replay_agent(
     )
     verdict.step = None  # not to be carried between processes
     return outcome
+
+
+def _check_reached(stop_at: Breakpoint | ProblemSaver, robot: str, last: int) -> None:
+    """Refuse a moment that the robot has not lived to see; `last` is its last tick.
+
+    Raises:
+        ConfigError: it is after that.
+    """
+    if not stop_at.reached:
+        got, expected = f"{stop_at.tick / 1000:g} s", f"a time up to {last / 1000:g} s"
+        raise ConfigError(stop_at.option, got, expected, f"{robot} has no step after it")
 
 
 def _build_agents(job: ReplayJob, recording: Recording, config: Config) -> tuple[Agent, Agent, str]:
