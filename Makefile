@@ -30,8 +30,10 @@ tools: $(TOOLS)
 walk: $(STAMP)
 	$(BIN)/quadriga walk $(ARGS)
 
-# What several tests need is compiled, collected and fitted once, before they run side by side.
+# What several tests need is compiled, collected and fitted once, before they run side by side. Some
+# environments forbid Python to keep bytecode; then each of their processes would compile all source.
 prepared: $(TOOLS)
+	$(BIN)/python -m compileall -q quadriga agents bridges plant shared sim_server tests
 	$(BIN)/quadriga prepare --robots 2 --set identification.seconds=60
 
 # Files are taken in the order of tests/conftest.py. Whoever tests is not started again after a test
