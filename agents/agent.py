@@ -51,6 +51,7 @@ from quadriga.agents.step_io import Outputs as Outputs
 from quadriga.agents.tasks import Tasks
 from quadriga.agents.teammates import Teammates, TeamWatch
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.yokes import neighbours
 from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import code_of, with_detail
@@ -58,7 +59,10 @@ from quadriga.shared.wire.messages import Command, Measurement, Reference
 from quadriga.shared.wire.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
 
 _TRUTH_AGE_MS: Final = 20  # of the simulator's truth, where it stands in for an estimator
-_BLIND_MS: Final = 100.0  # for which a robot walks on without its attitude
+# For which a robot walks on without its attitude: yokes keep it level, and one that stands is
+# dragged along by those that walk on.
+_BLIND_MS: Final = 100.0
+_YOKED_BLIND_MS: Final = 600.0
 _LONGEST_DT: Final = 0.02  # s, after a gap in the ticks the filters advance by no more than this
 
 
@@ -125,6 +129,8 @@ class Agent:
         self._stand_ms, self._stance_ms = config.gait.stand_ms, config.gait.stance_ms
         self._height = config.reference.height
         self._watch, self._rising = TeamWatch(config, robot), Rising(config)
+        yoked = neighbours(config.team.robots, config.team.yokes, self.index)
+        self._blind_ms = _YOKED_BLIND_MS if yoked else _BLIND_MS
         self._schedules = Schedules(config, self.index)
         self._tasks = Tasks(config)
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
@@ -295,7 +301,7 @@ class Agent:
     def _course(self, state: AgentState, tick: int, blind_ms: float) -> tuple[Mode, Healing]:
         """The mode if nothing stops the robot at this tick, and its way back from a loss."""
         mode, healing = state.mode, state.healing
-        if blind_ms > _BLIND_MS and mode.name in (WALK, STOPPING):
+        if blind_ms > self._blind_ms and mode.name in (WALK, STOPPING):
             return Mode(STAND, tick, IMU_LOST), healing
         if mode.name == WALK:
             return mode, healing

@@ -11,9 +11,11 @@ from quadriga.team.operator import references_of
 FAILS = 2000  # tick
 
 
-def walk_with(fault: str, until: int) -> tuple[list[tuple[str, str]], tuple[str, ...]]:
-    """Modes in their order, and who fell."""
-    given = {"team.robots": 1, "planner.kind": "none", "world.seed": 52}
+def walk_with(
+    fault: str, until: int, robots: int = 1, seed: int = 52
+) -> tuple[list[tuple[str, str]], tuple[str, ...]]:
+    """Modes of the first robot in their order, and who fell."""
+    given = {"team.robots": robots, "planner.kind": "none", "world.seed": seed}
     config = load(None, given | {"world.faults": f"r1/{fault}"})
     rollout = Rollout(config, None, references_of(config))
     modes = list[tuple[str, str]]()
@@ -29,6 +31,13 @@ def test_half_a_second_without_an_imu_is_no_fall(kind: str) -> None:
     modes, fallen = walk_with(f"imu {kind} {1e-3 * FAILS:g} 0.5", FAILS + 3000)
     assert fallen == ()
     assert modes[-1] == ("stand", "imu-lost")
+
+
+@pytest.mark.parametrize("kind", ["off", "stuck"])
+def test_yoked_robots_walk_on_without_the_imu_of_one_for_half_a_second(kind: str) -> None:
+    modes, fallen = walk_with(f"imu {kind} {1e-3 * FAILS:g} 0.5", FAILS + 2500, 2, seed=61)
+    assert fallen == ()
+    assert modes == [("stand", ""), ("walk", "")]
 
 
 def test_without_an_imu_for_good_a_robot_holds_its_joints() -> None:
