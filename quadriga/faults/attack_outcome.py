@@ -8,7 +8,9 @@ from contextlib import suppress
 
 from quadriga.faults.attack import AttackReport, digest_of
 from quadriga.shared.errors import MessageError
+from quadriga.shared.members import PROBE
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.shared.security.roll import split_common_name
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Refusal
 from quadriga.shared.wire.topics import REFUSED, find_topic
@@ -18,7 +20,8 @@ def describe_attack(entries: Iterable[ChunkEntry], report: AttackReport) -> dict
     """Fields of a trial's row.
 
     `forged` is all that the attacker has tried: messages, and connections that nobody may make.
-    `told` is how much of it the router has refused by its audit. `refused` counts what reached a
+    `told` is how much of it the router has refused by its audit; what the router itself tries, to
+    see that its rules are in force, is not counted. `refused` counts what reached a
     receiver and cannot be read, too. `passed` is what came through and can be read: of a message
     that is sent again all but the first.
 
@@ -48,7 +51,8 @@ def describe_attack(entries: Iterable[ChunkEntry], report: AttackReport) -> dict
 def _count_told(entry: ChunkEntry) -> int:
     if find_topic(entry.key)[0] is REFUSED:
         with suppress(MessageError):
-            return decode(entry.payload, Refusal).count
+            refusal = decode(entry.payload, Refusal)
+            return 0 if split_common_name(refusal.who)[0] == PROBE else refusal.count
     return 0
 
 

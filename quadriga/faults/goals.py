@@ -49,7 +49,11 @@ def build_goal_table(config: Config, rows: Sequence[dict[str, Any]]) -> Table:
     """
     found = with_result(rows)
     fell = sum(row["falls_of_others"] for row in found)
-    lines = [_line("robots fall that the fault was not of", len(found), fell, 0)]
+    own = sum(len(row["falls"]) for row in found) - fell
+    lines = [
+        _line("robots fall that the fault was not of", len(found), fell, 0),
+        _line("the robot of the fault falls", len(found), own, 0),
+    ]
     for goal in GOALS:
         tries = [row for row in found if row["fault"] in goal.faults]
         if tries:
@@ -59,7 +63,9 @@ def build_goal_table(config: Config, rows: Sequence[dict[str, Any]]) -> Table:
     forged = sum(row.get("forged", 0) for row in found)
     if forged:
         refused = sum(row.get("refused", 0) for row in found)
-        lines.append(_line("forgeries get through", forged, forged - refused, 0))
+        passed = sum(row.get("passed", 0) for row in found)
+        lines.append(_line("forgeries get through", forged, passed, 0))
+        lines.append(_line("forgeries that nobody has refused", forged, forged - refused, 0))
     return Table("Goals", ("goal", "tries", "worst", "at most", "reached"), tuple(lines))
 
 

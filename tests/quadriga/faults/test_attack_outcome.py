@@ -16,8 +16,8 @@ def entry(key: str, payload: bytes) -> ChunkEntry:
     return ChunkEntry(key, 5, 0, payload)
 
 
-def told(count: int) -> ChunkEntry:
-    refusal = Refusal(5, 0, "r2.1", "put", "team/estop", "denied", count)
+def told(count: int, who: str = "r2.1") -> ChunkEntry:
+    refusal = Refusal(5, 0, who, "put", "team/estop", "denied", count)
     return entry("team/refused", encode(refusal))
 
 
@@ -27,7 +27,7 @@ def report(*shots: tuple[str, bytes, int, bool], connects: int = 0) -> AttackRep
 
 
 def test_what_the_router_has_told_is_refused_and_what_others_send_is_not_counted() -> None:
-    entries = [told(15), entry("team/estop", TRUE), told(5)]
+    entries = [told(15), entry("team/estop", TRUE), told(5), told(4, "probe.1")]
     row = describe_attack(entries, report(("team/estop", STOP, 20, False)))
     assert row == {"forged": 20, "refused": 20, "told": 20, "passed": 0}
 
