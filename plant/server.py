@@ -18,11 +18,11 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import SIM
-from quadriga.shared.printable import printable_line
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import encode, truncate_text
+from quadriga.shared.wire.event_line import format_event
 from quadriga.shared.wire.messages import Clock, Command, Event, Status
 from quadriga.shared.wire.topics import CLOCK, EVENT, STATE, STATUS, TRUTH
 
@@ -217,5 +217,4 @@ class PlantServer:
     def _send(self, event: Event) -> None:
         put = self._put_stop if event.kind == "stop" else self._put_event
         put(encode(event))
-        line = f"{event.tick} ms: {event.kind} {event.robot} {event.detail}"
-        print(printable_line(line), file=sys.stderr, flush=True)
+        print(format_event(event), file=sys.stderr, flush=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from quadriga.doctor.examine import examine
 from quadriga.faults.fault import FaultScene
@@ -48,15 +48,12 @@ def await_end(scene: FaultScene, begun: float | None = None) -> None:
     while _has_world(scene) and monotonic() < deadline:
         sleep(_LOOK_S)
     # All others leave by themselves once the world has ended.
-    deadline, first = monotonic() + _LEAVE_S, 0.0
+    deadline = monotonic() + _LEAVE_S
     others = launch.alive - scene.struck - {ROUTER}
     while (left := launch.alive - scene.struck - {ROUTER}) and monotonic() < deadline:
-        if left < others and not first:
-            first = monotonic()
         sleep(_LOOK_S)
     if lost_world and begun is not None:
         scene.facts |= {
-            "detect_ms": round(1000 * ((first or monotonic()) - begun)),
             "left_ms": None if left else round(1000 * (monotonic() - begun)),
             "said": {name: _last_line(scene.folder, name) for name in sorted(others)},
         }
@@ -66,7 +63,12 @@ def _has_world(scene: FaultScene) -> bool:
     return has_lead(scene.launch.alive - scene.struck)
 
 
-def _last_line(folder: Path, name: str) -> Any:
+def read_log(folder: Path, name: str) -> list[str]:
+    """The lines that a process of a walk in `folder` has said."""
     log = folder / "logs" / f"{name}.log"
-    lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
+    return log.read_text(encoding="utf-8", errors="replace").splitlines()
+
+
+def _last_line(folder: Path, name: str) -> str:
+    lines = read_log(folder, name)
     return lines[-1].replace(f"{folder}/", "") if lines else ""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
 from quadriga.faults.table import with_result
+from quadriga.shared.bus.zenoh_settings import LEASE_MS
 from quadriga.shared.config.sections import Config
 from quadriga.tables import NOTHING, Table
 
@@ -32,10 +33,19 @@ GOALS: Final = (
     FaultGoal("a kill of an agent is noticed", ("agent-killed",), "detect_ms", lambda _: _SEEN_MS),
     FaultGoal("a kill of the world is noticed", ("sim-killed",), "detect_ms", lambda _: _SEEN_MS),
     FaultGoal(
+        "a kill of the router is noticed", ("router-killed",), "detect_ms", lambda _: _SEEN_MS
+    ),
+    FaultGoal(
         "a frozen agent is noticed, from its command_damp_ms on",
         ("agent-frozen",),
         "detect_ms",
         lambda config: config.world.command_damp_ms + _SEEN_MS,
+    ),
+    FaultGoal(
+        "a frozen world is noticed, from the lease of a link on",
+        ("sim-frozen",),
+        "detect_ms",
+        lambda _: LEASE_MS + _SEEN_MS,
     ),
 )
 

@@ -1,17 +1,18 @@
-"""What came of a fault, from the recording of the walk alone."""
+"""What came of a fault, from the recording of the walk; where that ends early, the world tells."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from quadriga.recordings.gaps import missing_ticks
 from quadriga.recordings.traces import Traces
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.writer import END
 from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Status
+from quadriga.shared.wire.messages import Event, Status
 from quadriga.shared.wire.topics import STATE
 
 _WALKS: Final = "walk"
@@ -36,31 +37,35 @@ class Moment(NamedTuple):
 
 
 def describe_outcome(
-    config: Config, traces: Traces, recording: Recording, moment: Moment
+    config: Config, traces: Traces, recording: Recording, moment: Moment, told: Sequence[Event] = ()
 ) -> dict[str, Any]:
     """The row of a trial.
 
     `detect_ms` is the time from the fault until an agent no longer walks, or the world announces
-    that a robot is silent or gone; None if nobody ever noticed. `stand_ms` is the time until all
-    others stand, or are damped; None if they walked on. `recover_ms` is the time until all robots
-    walk again for good: 0 if none stopped, None if one has not walked again, or if the recording
-    lacks the end of the walk. `lowered` are robots that the world has led down since no commands
-    came; their agents' last words in `status` may be of before. `lost_messages` counts what the
-    recording lacks of the other robots, in real time also commands that were never sent, and the
-    states and commands of all robots that it lacks before the fault because it ends too early.
+    that a robot is silent or gone, or the recorder misses the world; None if nobody ever noticed.
+    `stand_ms` is the time until all others stand, or are damped; None if they walked on.
+    `recover_ms` is the time until all robots walk again for good: 0 if none stopped, None if one
+    has not walked again, or if the recording lacks the end of the walk. `lowered` are robots that
+    the world has led down since no commands came; their agents' last words in `status` may be of
+    before. `lost_messages` counts what the recording lacks of the other robots, in real time also
+    commands that were never sent, and the states and commands of all robots that it lacks before
+    the fault because it ends too early.
 
     Args:
         config: of the walk.
         traces: of its recording.
         recording: it.
         moment: of the fault.
+        told: what the world itself has logged: a recording may lack the end.
     """
     tick = moment.tick
     if moment.wall_ns:  # by the recorder's clock, which may be what the fault is about
         tick = max(tick, min(tick_at(recording, moment.wall_ns), tick + _CLOCK_MS))
-    fallen = sorted({e.robot for e in traces.events if e.code == codes.FALL})
+    events = [*traces.events, *told]
+    fallen = sorted({e.robot for e in events if e.code == codes.FALL})
     others = [name for name in traces.robots if name != moment.robot]
-    end = next((e for e in reversed(traces.events) if e.kind == "stop"), None)
+    recorded_end = next((e for e in reversed(traces.events) if e.kind == "stop"), None)
+    end = recorded_end or next((e for e in reversed(events) if e.kind == "stop"), None)
     last = {name: s[-1] for name, s in traces.statuses.items() if s}
     return {
         "robot": moment.robot,
@@ -69,13 +74,13 @@ def describe_outcome(
         "robots": config.team.robots,
         "falls": fallen,
         "falls_of_others": sum(name in fallen for name in others),
-        "lowered": sorted({e.robot for e in traces.events if e.code == codes.LOWERED}),
-        "detect_ms": _after(tick, _first_notice(traces, tick)),
+        "lowered": sorted({e.robot for e in events if e.code == codes.LOWERED}),
+        "detect_ms": _first_notice(traces, events, moment, tick),
         "stand_ms": _after(tick, _all_stand(traces.statuses, others, tick)),
-        "recover_ms": None if end is None else _after(tick, _all_walk(traces, tick)),
+        "recover_ms": None if recorded_end is None else _after(tick, _all_walk(traces, tick)),
         "lost_messages": _count_lost(config, traces, moment),
         "status": {name: f"{s.mode} {s.reason}".strip() for name, s in last.items()},
-        "end": "none recorded" if end is None else f"{end.code}: {end.detail}",
+        "end": "none announced" if end is None else f"{end.code}: {end.detail}",
     }
 
 
@@ -89,18 +94,21 @@ def tick_at(recording: Recording, wall_ns: int) -> int:
     return newest
 
 
-def _first_notice(traces: Traces, tick: int) -> int | None:
+def _first_notice(traces: Traces, events: Iterable[Event], moment: Moment, tick: int) -> int | None:
     noticed = [
-        status.tick
+        status.tick - tick
         for statuses in traces.statuses.values()
         for status in statuses
         if status.tick >= tick and status.mode != _WALKS
     ]
     noticed += [
-        event.tick
-        for event in traces.events
+        event.tick - tick
+        for event in events
         if event.kind == "fault" and event.code not in _ANNOUNCED and event.tick >= tick
     ]
+    missed_ns = int(traces.notes.get(END, {}).get("missed_ns", "0"))
+    if missed_ns and moment.wall_ns:
+        noticed.append(round(1e-6 * (missed_ns - moment.wall_ns)))
     return min(noticed, default=None)
 
 

@@ -15,6 +15,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER, ROUTER, SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
 
+_RECONNECT_S: Final = 3.0  # for which a router is waited for that does not come back
 _PAUSE_S: Final = 0.3  # of a process that stands still for a while
 
 _Signals: TypeAlias = tuple[tuple[signal.Signals, float], ...]
@@ -48,7 +49,8 @@ def _stage(process: str, signals: _Signals) -> SetStage:
 
     @contextmanager
     def stage(config: Config, _draw: Draw, _folder: Path) -> Iterator[Stage]:
-        yield Stage(replace(config, bus=replace(config.bus, mode="client")), strike)
+        bus = replace(config.bus, mode="client", reconnect_timeout=_RECONNECT_S)
+        yield Stage(replace(config, bus=bus), strike)
 
     return stage
 
@@ -64,9 +66,11 @@ PROCESS_FAULTS: Final = (
     TeamFault("operator-frozen", "it stands still", _stage(OPERATOR, _STOP)),
     TeamFault("operator-paused", _PAUSED, _stage(OPERATOR, _PAUSE)),
     TeamFault("recorder-killed", "the recorder is killed", _stage(RECORDER, _KILL)),
+    TeamFault("recorder-frozen", "it stands still", _stage(RECORDER, _STOP)),
     TeamFault("recorder-paused", _PAUSED, _stage(RECORDER, _PAUSE)),
     TeamFault("sim-paused", "the world stands still", _stage(SIM, _PAUSE)),
     TeamFault("router-killed", _ROUTER_KILLED, _stage(ROUTER, _KILL)),
+    TeamFault("router-frozen", "it stands still", _stage(ROUTER, _STOP)),
     TeamFault("router-paused", _PAUSED, _stage(ROUTER, _PAUSE)),
 )
 """In the order of the table."""

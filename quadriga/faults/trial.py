@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.faults.aftermath import await_end, consult_doctor
+from quadriga.faults.aftermath import await_end, consult_doctor, read_log
 from quadriga.faults.continued import ContinuedRecording
 from quadriga.faults.fault import Draw, FaultScene, Strike, TeamFault
 from quadriga.faults.outcome import Moment, describe_outcome
@@ -25,6 +25,7 @@ from quadriga.shared.members import LAUNCHER, SIM, has_lead
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.event_line import parse_events
 from quadriga.shared.wire.messages import Clock
 from quadriga.shared.wire.topics import CLOCK
 from quadriga.team.endpoint import free_endpoint
@@ -131,7 +132,8 @@ def _describe(config: Config, moment: Moment, folder: Path) -> dict[str, Any]:
     """What the recording says of it, as far as it can be read."""
     try:
         recording = ContinuedRecording(folder / RECORDING)
-        return describe_outcome(config, read_traces(recording), recording, moment)
+        told = list(parse_events(read_log(folder, SIM)))
+        return describe_outcome(config, read_traces(recording), recording, moment, told)
     except RecordingError as error:
         # Rows are published, and where they were walked is nobody's business.
         return {"robot": moment.robot, "error": str(error).replace(f"{folder}/", "")}

@@ -14,7 +14,7 @@ from quadriga.recorder.session import Session
 from quadriga.recordings.metadata import CONTINUES, build_metadata
 from quadriga.shared.bus.barrier import await_members, meet, members
 from quadriga.shared.bus.introduction import Introduction
-from quadriga.shared.bus.lead_watch import Loss, loss_error
+from quadriga.shared.bus.lead_watch import loss_error
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
@@ -103,7 +103,7 @@ def run(
                 if role:
                     session.record(late=role == LATE, seen=not selection.at_once)
                 session.drain()
-                ending = _note_end(parts, session.find_unannounced())
+                ending = _note_end(parts, session)
             return _list_files(parts, ending)
     except OSError as error:
         raise RecordingError(
@@ -147,14 +147,15 @@ def _list_files(parts: Parts, ending: ProcessError | None) -> RecordedFiles:
     )
 
 
-def _note_end(parts: Parts, loss: Loss | None) -> ProcessError | None:
+def _note_end(parts: Parts, session: Session) -> ProcessError | None:
     """Write down in the file why it ends, if nobody has announced it; likewise as an error."""
+    loss = session.find_unannounced()
     if loss is None:
         return None
     tick = max(parts.last_tick(), 0)
     error = loss_error(loss, tick)
-    detail = f"{error.name}: {error.got}"
-    parts.note(END, {"code": loss.code, "detail": detail, "tick": str(tick)})
+    detail, missed = f"{error.name}: {error.got}", str(session.loss_ns)
+    parts.note(END, {"code": loss.code, "detail": detail, "tick": str(tick), "missed_ns": missed})
     return error
 
 

@@ -108,6 +108,12 @@ class Session:
         """What has vanished without an announced end of the walk; None if nothing has."""
         return find_loss(self._bus, self._config) if self._seen and not self._announced else None
 
+    @property
+    def loss_ns(self) -> int:
+        """When what has vanished was missed first, ns since 1970; 0: all is there."""
+        since = self._losses.since
+        return 0 if since is None else wall_ns() - round(1e9 * (monotonic() - since))
+
     def _take(self, timeout: float) -> bool:
         """Write all that has arrived; False if nothing came within `timeout` seconds."""
         first = self._bus.get(timeout)

@@ -13,7 +13,9 @@ from quadriga.shared.members import LEADS, ROUTER
 from quadriga.shared.security.tls import tls_files, tls_settings
 
 NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
+LEASE_MS: Final = 10_000  # of silence after which a link is given up: its process stands still
 _COMMON: Final = {
+    "transport/link/tx/lease": LEASE_MS,
     # Nobody is found by multicast, nothing goes through shared memory.
     "scouting/multicast/enabled": False,
     "transport/shared_memory/enabled": False,

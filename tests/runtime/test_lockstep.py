@@ -132,7 +132,7 @@ def test_real_time_says_what_came_late(make_team: Make) -> None:
         running.watch(lambda: False)
     last = team.log("sim").splitlines()[-1]
     # Whether the robot stands so long on a busy machine is not the subject.
-    assert re.fullmatch(r"\d+ ms: stop  .+; late ticks: .+; overruns of the world: \d+", last)
+    assert re.fullmatch(r"\d+ ms: time-over  .+; late ticks: .+; overruns of the world: \d+", last)
 
 
 def test_a_second_team_does_not_disturb_the_first(make_team: Make) -> None:

@@ -11,6 +11,7 @@ import pytest
 from quadriga.faults.outcome import Moment, describe_outcome, tick_at
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.writer import END
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Event, Message, State, Status
 from tests.quadriga.conftest import WALL, WALL_0, WriteRun, run_config
@@ -49,7 +50,7 @@ def test_nobody_notices_what_harms_nobody(write_run: WriteRun) -> None:
     assert row["detect_ms"] is row["stand_ms"] is None
     assert row["recover_ms"] is None  # nobody knows: the recording lacks the walk's end
     assert row["status"] == {"r1": "walk", "r2": "walk", "r3": "walk"}
-    assert row["end"] == "none recorded"
+    assert row["end"] == "none announced"
 
 
 def test_when_others_notice_and_stand(write_run: WriteRun) -> None:
@@ -145,3 +146,27 @@ def test_a_recording_that_ends_before_the_fault_has_lost_what_came_after(
 
     row = outcome(write_run(CONFIG, change=cut), Moment("r2", FAULT, wall(FAULT)))
     assert row["lost_messages"] == 2 * 3 * 51
+
+
+def test_what_the_recording_lacks_the_world_has_told(write_run: WriteRun) -> None:
+    told = [
+        Event.of(FAULT + 22, codes.GONE, "r2", "gone"),
+        Event.of(FAULT + 210, codes.LOWERED, "r2", "no command"),
+        Event.of(FAULT + 900, codes.FALL, "r3", "tilt"),
+        Event.of(FAULT + 4000, codes.TIME_OVER, "", "end of world.seconds"),
+    ]
+    recording = Recording(write_run(CONFIG) / "run.mcap")
+    moment = Moment("r2", FAULT)
+    row = describe_outcome(CONFIG, read_traces(recording), recording, moment, told)
+    assert (row["detect_ms"], row["falls"], row["lowered"]) == (22, ["r3"], ["r2"])
+    assert row["end"] == "time-over: end of world.seconds"
+    assert row["recover_ms"] is None  # what the robots did then nobody has recorded
+
+
+def test_a_world_that_is_gone_is_noticed_when_the_recorder_misses_it(write_run: WriteRun) -> None:
+    folder = write_run(CONFIG)
+    recording = Recording(folder / "run.mcap")
+    moment = Moment("r2", FAULT, wall(FAULT))
+    gone = {"code": codes.LEAD_GONE, "tick": "3010", "missed_ns": str(wall(FAULT) + 31_000_000)}
+    traces = replace(read_traces(recording), notes={END: gone})
+    assert describe_outcome(CONFIG, traces, recording, moment)["detect_ms"] == 31
