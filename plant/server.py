@@ -75,7 +75,8 @@ class PlantServer:
         self._put_clock = bus.publisher(CLOCK.key(team), droppable=realtime)
         self._put_status = bus.publisher(STATUS.key(team, name), droppable=True)
         self._put_event = bus.publisher(EVENT.key(team), droppable=realtime)
-        self._put_stop = bus.publisher(EVENT.key(team))  # all leave by it, no tick waits for it
+        # All leave by it. In lock-step it comes after all else, in real time it waits for nobody.
+        self._put_stop = bus.publisher(EVENT.key(team), urgent=realtime)
         self._periods = periods(config)
         self._last_tick = round(config.world.seconds * 1000)
         self._fallen: set[str] = set()

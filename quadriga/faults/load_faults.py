@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -22,6 +23,7 @@ from quadriga.team.run_folder import CONFIG
 
 _SLOW_S: Final = 2.0  # for which a process gets too little of the processor
 _TURN_S: Final = 0.04  # of which it runs for the second half
+_FULL_S: Final = 7.0  # world time that is walked after a bystander has been started
 _PATIENCE_S: Final = 10.0  # for a bystander to be on the bus
 _LOOK_S: Final = 0.01
 
@@ -66,11 +68,15 @@ class _Bystander:
 
 
 def _with_bystander(kind: str) -> SetStage:
+    """A team and a bystander at one router, long enough for that to be full."""
+
     @contextmanager
-    def stage(config: Config, _draw: Draw, _folder: Path) -> Iterator[Stage]:
+    def stage(config: Config, draw: Draw, _folder: Path) -> Iterator[Stage]:
         beside = _Bystander(kind)
+        seconds = max(config.world.seconds, 1e-3 * draw.tick + _FULL_S)
+        world, bus = replace(config.world, seconds=seconds), replace(config.bus, mode="client")
         try:
-            yield Stage(config, beside)
+            yield Stage(replace(config, world=world, bus=bus), beside)
         finally:
             beside.end()
 
@@ -90,12 +96,12 @@ LOAD_FAULTS: Final = (
     TeamFault("recorder-slow", f"the recorder {_HALF}", strike_with(_SlowDown(RECORDER))),
     TeamFault(
         "subscriber-slow",
-        "a process joins, hears everything and stands still for good",
+        "behind a router a process joins, hears all and stands still for good",
         _with_bystander(bystander.DEAF),
     ),
     TeamFault(
         "flood",
-        f"a process sends what it can for {bystander.FLOOD_S:g} s, on a key of its own",
+        f"a process sends what it can for {bystander.FLOOD_S:g} s, behind a router",
         _with_bystander(bystander.FLOOD),
     ),
     TeamFault("disk-full", "the recorder's disk is full", strike_with(_fill_disk)),

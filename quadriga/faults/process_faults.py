@@ -15,6 +15,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER, ROUTER, SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
 
+_FULL_S: Final = 6.0  # world time that is walked after it
 _RECONNECT_S: Final = 3.0  # for which a router is waited for that does not come back
 _PAUSE_S: Final = 0.3  # of a process that stands still for a while
 
@@ -44,13 +45,16 @@ class _Strike:
 
 def _stage(process: str, signals: _Signals) -> SetStage:
     strike = _Strike(process, signals)
-    if process != ROUTER:
+    if process != ROUTER and (process, signals) != (RECORDER, _STOP):
         return strike_with(strike)
 
     @contextmanager
-    def stage(config: Config, _draw: Draw, _folder: Path) -> Iterator[Stage]:
+    def stage(config: Config, draw: Draw, _folder: Path) -> Iterator[Stage]:
+        # A router that nobody replaces is waited for in vain; and who stands still behind a router
+        # might hold it up, but only once all that lies between them is full.
         bus = replace(config.bus, mode="client", reconnect_timeout=_RECONNECT_S)
-        yield Stage(replace(config, bus=bus), strike)
+        seconds = max(config.world.seconds, 1e-3 * draw.tick + _FULL_S)
+        yield Stage(replace(config, bus=bus, world=replace(config.world, seconds=seconds)), strike)
 
     return stage
 
@@ -66,7 +70,7 @@ PROCESS_FAULTS: Final = (
     TeamFault("operator-frozen", "it stands still", _stage(OPERATOR, _STOP)),
     TeamFault("operator-paused", _PAUSED, _stage(OPERATOR, _PAUSE)),
     TeamFault("recorder-killed", "the recorder is killed", _stage(RECORDER, _KILL)),
-    TeamFault("recorder-frozen", "it stands still", _stage(RECORDER, _STOP)),
+    TeamFault("recorder-frozen", "behind a router it stands still", _stage(RECORDER, _STOP)),
     TeamFault("recorder-paused", _PAUSED, _stage(RECORDER, _PAUSE)),
     TeamFault("sim-paused", "the world stands still", _stage(SIM, _PAUSE)),
     TeamFault("router-killed", _ROUTER_KILLED, _stage(ROUTER, _KILL)),

@@ -47,7 +47,7 @@ class EmergencyStop:
         rows = processes(config)
         self.wanted = frozenset(row.name for row in rows if row.role.name in (AGENT, SIM))
         self._bus = Bus.open(config.bus, config.team.name, members.ESTOP)
-        self._put = self._bus.publisher(ESTOP.key(config.team.name))
+        self._put = self._bus.publisher(ESTOP.key(config.team.name), urgent=True)
         for topic in topics_for(members.ESTOP):
             self._bus.subscribe(topic.key(config.team.name))
         self._time = 0, 0  # tick and stamp of the team's clock, as last heard

@@ -87,7 +87,11 @@ def _operate(config: Config, bus: Bus, stopped: Callable[[], bool], *, late: boo
 
     Who is `late` first waits for the time, and begins with the epoch that is in force.
     """
-    put, watch = bus.publisher(REFERENCE.key(bus.team)), LeadWatch(bus, config)
+    # In lock-step none may be lost. In real time one that stands still and hears nothing any more,
+    # as a frozen recorder, would hold up the router, and so everybody else.
+    realtime = config.world.mode == "realtime"
+    put = bus.publisher(REFERENCE.key(bus.team), droppable=realtime)
+    watch = LeadWatch(bus, config)
     time = TeamTicks(bus, round(1000 * config.world.seconds))
     while late and not (stopped() or time.over or time.known):
         _follow(time, watch)

@@ -30,7 +30,7 @@ def resume_team(config: Config) -> Mapping[str, Status]:
     """
     team, names = config.team.name, robot_names(config.team.robots)
     with Bus.open(config.bus, team, members.RESUME) as bus:
-        put = bus.publisher(RESUME.key(team))
+        put = bus.publisher(RESUME.key(team), urgent=True)
         for topic in topics_for(members.RESUME):
             bus.subscribe(topic.key(team))
         keys = {STATUS.key(team, name): name for name in names}

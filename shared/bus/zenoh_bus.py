@@ -57,18 +57,14 @@ class Bus:
         self._presence = Presence(self._me)
         self._declared: dict[str, zenoh.LivelinessToken] = {}
         self._closed = False
-        self._declarations: list[
-            Any
-        ] = []  # Zenoh drops publishers and subscribers nobody refers to
-        self._declarations.append(
+        tokens, ack = f"{team}/*/*/*", f"{team}/{name}/{RECEIVED}"
+        # Zenoh drops publishers and subscribers nobody refers to.
+        self._declarations: list[Any] = [
             session.liveliness().declare_subscriber(
-                f"{team}/*/*/*", _direct(self._note_token), history=True
-            )
-        )
-        ack = f"{team}/{name}/{RECEIVED}"
-        self._declarations.append(
-            session.declare_queryable(ack, _direct(lambda query: query.reply(ack, b"")))
-        )
+                tokens, _direct(self._note_token), history=True
+            ),
+            session.declare_queryable(ack, _direct(lambda query: query.reply(ack, b""))),
+        ]
 
     @classmethod
     def open(
@@ -151,22 +147,31 @@ class Bus:
         """
 
         def take(event: zenoh.LinkEvent) -> None:
-            link = event.link
-            note(str(link.zid), link.auth_identifier or link.dst)
+            note(str(event.link.zid), event.link.auth_identifier or event.link.dst)
 
         self._declarations.append(
             self._session.info.declare_link_events_listener(_direct(take), history=True)
         )
 
-    def publisher(self, key: str, *, droppable: bool = False) -> Callable[[bytes], None]:
+    def publisher(
+        self, key: str, *, droppable: bool = False, urgent: bool = False
+    ) -> Callable[[bytes], None]:
         """A function that sends a payload on `key`.
+
+        What is neither waits for whoever is slow, and a router keeps everybody waiting with it.
 
         Args:
             key: the full key, `<team>/…`.
             droppable: when a receiver is slow, drop (real time) instead of waiting for it.
+            urgent: overtake all else and never wait; dropped only where nothing goes through.
         """
-        control = zenoh.CongestionControl.DROP if droppable else zenoh.CongestionControl.BLOCK
-        publisher = self._session.declare_publisher(key, express=True, congestion_control=control)
+        control = zenoh.CongestionControl
+        publisher = self._session.declare_publisher(
+            key,
+            express=True,
+            congestion_control=control.DROP if droppable or urgent else control.BLOCK,
+            priority=zenoh.Priority.REAL_TIME if urgent else zenoh.Priority.DATA,
+        )
         self._declarations.append(publisher)
         put: Callable[[bytes], None] = publisher.put
         return put
@@ -252,16 +257,16 @@ class Bus:
             timeout=timeout,
             consolidation=zenoh.ConsolidationMode.NONE,
             express=True,
+            congestion_control=zenoh.CongestionControl.DROP,  # who is frozen holds up nobody
         )
         return answers
 
     def get(self, timeout: float) -> Packet | None:
         """The oldest packet of the inbox, waiting at most `timeout` seconds for one."""
-        try:
+        with suppress(Empty):
             sample = self._inbox.get(timeout=timeout)
-        except Empty:
-            return None
-        return str(sample.key_expr), sample.payload.to_bytes()
+            return str(sample.key_expr), sample.payload.to_bytes()
+        return None
 
     def drain(self) -> list[Packet]:
         """Everything in the inbox, oldest first, without waiting."""
@@ -341,10 +346,10 @@ class Bus:
         self.withdraw()
         if self._flush():
             self._session.close()  # type: ignore[no-untyped-call]
-            return
-        for declared in self._declarations:
-            declared.undeclare()
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._session))
+        else:
+            for declared in self._declarations:
+                declared.undeclare()
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._session))
 
     def __enter__(self) -> Self:
         return self
@@ -353,9 +358,8 @@ class Bus:
         self.close()
 
     def _likely_cause(self) -> str:
-        if self.linked:
-            return "not started, failed to start, or another bus.endpoint or team.name"
-        return "no link to anyone: is bus.endpoint right and reachable?"
+        there = "not started, failed to start, or another bus.endpoint or team.name"
+        return there if self.linked else "no link to anyone: is bus.endpoint right and reachable?"
 
     def _flush(self) -> bool:
         """Wait until all others have received what was published so far; whether they have.
