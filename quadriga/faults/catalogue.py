@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from quadriga.faults.attack_faults import ATTACK_FAULTS
 from quadriga.faults.clock_faults import CLOCK_FAULTS
 from quadriga.faults.component_faults import COMPONENT_FAULTS, given_fault
 from quadriga.faults.fault import TeamFault
@@ -13,6 +12,7 @@ from quadriga.faults.link_faults import LINK_FAULTS
 from quadriga.faults.load_faults import LOAD_FAULTS
 from quadriga.faults.process_faults import PROCESS_FAULTS
 from quadriga.faults.restart_faults import RESTART_FAULTS
+from quadriga.faults.security.attack_faults import ATTACK_FAULTS
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean
 

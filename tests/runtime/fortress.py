@@ -19,7 +19,7 @@ import zenoh
 
 from quadriga.certs.folder import CertificateFolder
 from quadriga.certs.secured import certificates_of, secure, utc_now
-from quadriga.faults.attacks import client_settings
+from quadriga.faults.security.attacks import client_settings
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config

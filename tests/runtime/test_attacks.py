@@ -18,10 +18,10 @@ import pytest
 import zenoh
 
 from quadriga.certs.folder import CertificateFolder
-from quadriga.faults import attacks
-from quadriga.faults.attack import Attack, AttackReport
-from quadriga.faults.attack_outcome import describe_attack
 from quadriga.faults.fault import Draw
+from quadriga.faults.security import attacks
+from quadriga.faults.security.attack import Attack, AttackReport
+from quadriga.faults.security.attack_outcome import describe_attack
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
@@ -299,7 +299,7 @@ def test_the_attackers_of_the_table_of_faults_are_refused_to_the_last(
 ) -> None:
     file = tmp_path / "attack.json"
     file.write_text(plan(fortress.config, Draw("r1", 3000, 1)).to_json(), encoding="utf-8")
-    command = [sys.executable, "-m", "quadriga.faults.attacker", str(file)]
+    command = [sys.executable, "-m", "quadriga.faults.security.attacker", str(file)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT, check=True)
     report = AttackReport.from_json(done.stdout)
     entries, deadline = list[ChunkEntry](), monotonic() + WAIT

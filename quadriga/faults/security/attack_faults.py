@@ -12,11 +12,11 @@ from tempfile import TemporaryDirectory
 from typing import Final, TypeAlias
 
 from quadriga.certs.secured import secure, utc_now
-from quadriga.faults import attacks
-from quadriga.faults.attack import Attack, AttackReport
-from quadriga.faults.attack_outcome import describe_attack
-from quadriga.faults.expiry_fault import EXPIRY_FAULT
 from quadriga.faults.fault import Draw, FaultScene, SetStage, Stage, TeamFault
+from quadriga.faults.security import attacks
+from quadriga.faults.security.attack import Attack, AttackReport
+from quadriga.faults.security.attack_outcome import describe_attack
+from quadriga.faults.security.expiry_fault import EXPIRY_FAULT
 from quadriga.recordings.summary import RECORDING
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError, RecordingError
@@ -55,7 +55,7 @@ class _AttackStrike:
         self._scene = scene
         plan = self._private / "attack.json"
         plan.write_text(self._attack.to_json(), encoding="utf-8")
-        command = [sys.executable, "-m", "quadriga.faults.attacker", str(plan)]
+        command = [sys.executable, "-m", "quadriga.faults.security.attacker", str(plan)]
         try:
             done = subprocess.run(
                 command, capture_output=True, text=True, timeout=_WAIT_S, check=False

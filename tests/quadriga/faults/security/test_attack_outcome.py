@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from quadriga.faults.attack import AttackReport, Shot, digest_of
-from quadriga.faults.attack_outcome import describe_attack
+from quadriga.faults.security.attack import AttackReport, Shot, digest_of
+from quadriga.faults.security.attack_outcome import describe_attack
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import EStop, Refusal

@@ -1,4 +1,4 @@
-"""What each attacker of the table does: plans for the process of `quadriga.faults.attacker`."""
+"""What each attacker of the table does: plans for the process of the module `attacker`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from quadriga.certs.folder import CertificateFolder
 from quadriga.certs.secured import certificates_of, utc_now
-from quadriga.faults.attack import Attack, Knock, StockClient
 from quadriga.faults.fault import Draw
+from quadriga.faults.security.attack import Attack, Knock, StockClient
 from quadriga.shared.config.endpoints import host_and_port
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import LAUNCHER, OBSERVER, OPERATOR, RECORDER, RESUME, SIM

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 from contextlib import suppress
 
-from quadriga.faults.attack import AttackReport, digest_of
+from quadriga.faults.security.attack import AttackReport, digest_of
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PROBE
 from quadriga.shared.recording.mcap_chunk import ChunkEntry

@@ -18,7 +18,7 @@ from typing import Any, Final
 
 import zenoh
 
-from quadriga.faults.attack import digest_of
+from quadriga.faults.security.attack import digest_of
 from quadriga.shared.runtime.clock import monotonic, sleep
 
 _BETWEEN: Final = 0.002  # s, between two messages: a flood of the processor is another fault

@@ -1,0 +1,1 @@
+"""Forgers, strangers and certificates that end: faults of who may say what."""
