@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import bdb
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from math import isfinite
 from pathlib import Path
@@ -24,6 +24,9 @@ from quadriga.warm_up import warm_up
 from quadriga.workers import run_each
 
 _JOBS: Final = 2  # robots side by side
+_SMALL: Final = 4_000_000  # bytes, some seconds: replayed before other processes have started
+
+_Results = Generator[tuple[ReplayJob, ReplayOutcome | QuadrigaError], None, None]
 
 
 def replay(
@@ -69,11 +72,11 @@ def _replay_alone(job: ReplayJob, console: Console) -> ReplayOutcome:
 
 
 def _replay_all(jobs: Sequence[ReplayJob], console: Console) -> list[ReplayOutcome]:
-    """Replay robots side by side; the first error that one of them met is raised at the end."""
+    """Replay robots; the first error that one of them met is raised at the end."""
     outcomes: dict[str, ReplayOutcome] = {}
     errors: list[QuadrigaError] = []
     bar = build_progress(console, elapsed=True, fleeting=True)
-    with closing(run_each(_try_replay, jobs, _JOBS)) as results, bar as progress:
+    with closing(_replay_each(jobs)) as results, bar as progress:
         for job, result in progress.track(results, len(jobs), description="replaying the team"):
             if isinstance(result, QuadrigaError):
                 errors.append(result)
@@ -82,6 +85,13 @@ def _replay_all(jobs: Sequence[ReplayJob], console: Console) -> list[ReplayOutco
     if errors:
         raise errors[0]
     return [outcomes[job.robot] for job in jobs]
+
+
+def _replay_each(jobs: Sequence[ReplayJob]) -> _Results:
+    """Jobs with what came of them: of a small recording one after the other, else side by side."""
+    if jobs[0].path.stat().st_size <= _SMALL:
+        return ((job, _try_replay(job)) for job in jobs)
+    return run_each(_try_replay, jobs, _JOBS)
 
 
 def replay_to_breakpoint(

@@ -19,6 +19,7 @@ from quadriga.agents.planner.checked_predictor import load_checked as load_predi
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.commands.parser import main
 from quadriga.identification.predictors import ensure_predictor
+from quadriga.replay import team_replay
 from quadriga.replay.outcome import ReplayOutcome
 from quadriga.replay.recorded_predictor import copy_predictor
 from quadriga.replay.saved_qp import load as load_qp
@@ -98,9 +99,12 @@ def check_exact(path: Path, outcomes: list[ReplayOutcome], *, plans: bool = True
 
 
 def test_lock_step_is_replayed_to_the_byte(
-    lockstep: Path, capsys: pytest.CaptureFixture[str]
+    lockstep: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert main(["replay", str(lockstep.parent), "--all"]) == 0
+    """By processes side by side, and by one."""
+    with monkeypatch.context() as patch:
+        patch.setattr(team_replay, "_SMALL", 0)
+        assert main(["replay", str(lockstep.parent), "--all"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line[:16] for line in lines] == ["r1: 1000 command", "r2: 1000 command"]
     assert all("measurements equal to the byte" in line for line in lines)
