@@ -12,7 +12,7 @@ from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter, Selection
 from quadriga.recorder.session import Session
 from quadriga.recordings.metadata import CONTINUES, build_metadata
-from quadriga.shared.bus.barrier import await_members, meet, members
+from quadriga.shared.bus.barrier import REJOINS, await_members, join, members
 from quadriga.shared.bus.introduction import Introduction
 from quadriga.shared.bus.lead_watch import loss_error
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
@@ -178,4 +178,8 @@ def _join(bus: Bus, config: Config, stopped: Callable[[], bool], me: Introductio
     walking, doubled = has_lead(bus.members_at(READY)), RECORDER in bus.members_at(HERE)
     if walking or doubled or not config.recorder.enabled:
         return LATE
-    return MEMBER if meet(bus, config, stopped, me) else ""
+    joined = join(bus, config, stopped, me)
+    if joined == REJOINS:  # a busy machine has let it know late that the team walks
+        bus.withdraw()
+        return LATE
+    return MEMBER if joined else ""

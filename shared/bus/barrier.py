@@ -18,7 +18,7 @@ from quadriga.shared.bus.watch import Watch, say
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
-from quadriga.shared.members import LEADS, OPERATOR, SIM, has_lead
+from quadriga.shared.members import LEADS, OPERATOR, RECORDER, SIM, has_lead
 from quadriga.shared.runtime.clock import sleep
 
 STARTS: Final = "starts"  # with its team
@@ -57,8 +57,8 @@ def join(
 ) -> str:
     """As `meet`, but take part in a team that walks already: `STARTS` or `REJOINS`.
 
-    "" if `stopped()` came first. In lock-step only an operator may be started again: what an agent
-    does depends on all that it has heard since the begin of the walk.
+    "" if `stopped()` came first. In lock-step only an operator or a recorder may be started again:
+    what an agent does depends on all that it has heard since the begin of the walk.
 
     Raises:
         BusError: as `meet`; or an agent is started again in lock-step.
@@ -66,7 +66,7 @@ def join(
     me = me or Introduction(bus, config)
     joined = _await_team(bus, config, stopped)
     lockstep = config.world.mode == "lockstep"
-    if joined == REJOINS and lockstep and bus.name != OPERATOR:
+    if joined == REJOINS and lockstep and bus.name not in (OPERATOR, RECORDER):
         cause = "in lock-step no agent can be started again: start the whole team"
         raise _walks_already(bus, config, cause)
     if not joined or not _introduce(bus, config, me):

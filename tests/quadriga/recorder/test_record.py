@@ -121,6 +121,19 @@ def test_joining_late_says_what_it_missed_and_counts_what_is_lost(
     assert recording.notes[SINCE] == {"band/r1/state": "4000"}
 
 
+def test_who_hears_late_that_the_team_walks_joins_late_all_the_same(
+    config: Config, start: Start, tmp_path: Path
+) -> None:
+    with Bus.open(config.bus, "band", SIM) as world:
+        world.declare(HERE)
+        recorder = start(world)
+        assert world.wait_for(HERE, {RECORDER}, WAIT, lambda: False), "it believes to be awaited"
+        world.declare(READY)
+        world.publisher("band/r1/state")(encode(state(4000)))
+        _, err = ended(recorder, world, tmp_path, 1)
+    assert "joined late, has state since tick 4000" in err
+
+
 def test_beside_a_team_s_own_recorder_nobody_is_doubled(
     config: Config, start: Start, tmp_path: Path
 ) -> None:
