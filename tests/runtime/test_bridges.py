@@ -36,6 +36,7 @@ PATIENT: dict[str, Any] = {
     "bridge.report_max_ms": 1000,
     "bridge.report_share": 0.05,
     "bridge.stand_s": 2.0,
+    "bridge.passive_s": 1.0,
     "bridge.speed_share": 1.5,
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from collections import defaultdict
@@ -20,6 +21,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Plan
+from quadriga.team.launch import Launch, process_table
 from tests.a1 import nominal_forces
 from tests.runtime.conftest import DATA
 
@@ -31,30 +33,42 @@ STEP_MS = 40
 
 @pytest.fixture(scope="module")
 def walks(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Run folders of one scenario walked twice, as a user would."""
+    """Run folders of one scenario walked as a user would, and by the same processes once more."""
     config = load(None, {"team.robots": ROBOTS, **DATA})
     ensure_predictor(config, Console(stderr=True))
-    folders = [tmp_path_factory.mktemp("walk") / "run" for _ in range(2)]
-    for folder in folders:
-        command = [
-            sys.executable,
-            "-m",
-            "quadriga",
-            "walk",
-            "--robots",
-            str(ROBOTS),
-            "--seconds",
-            str(SECONDS),
-            "--seed",
-            "3",
-            "--no-render",
-            *(f"--set={key}={value}" for key, value in DATA.items()),
-            "--out",
-            str(folder),
-        ]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
-        assert (done.returncode, done.stderr) == (0, "")
-    return folders
+    first, second = (tmp_path_factory.mktemp("walk") / "run" for _ in range(2))
+    command = [
+        sys.executable,
+        "-m",
+        "quadriga",
+        "walk",
+        "--robots",
+        str(ROBOTS),
+        "--seconds",
+        str(SECONDS),
+        "--seed",
+        "3",
+        "--no-render",
+        *(f"--set={key}={value}" for key, value in DATA.items()),
+        "--out",
+        str(first),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    walk_again(first, second)
+    return [first, second]
+
+
+def walk_again(first: Path, second: Path) -> None:
+    """The walk of one folder with all its processes into another, without the report on it."""
+    second.mkdir()
+    for name in ("config.toml", "predictor.npz"):
+        shutil.copy(first / name, second)
+    config = load(second / "config.toml")
+    sha256 = Recording(first / "run.mcap").metadata["predictor_sha256"]
+    table = process_table(config, second, second / "predictor.npz", sha256)
+    with Launch(table, second / "logs") as running:
+        running.watch(lambda: False)
 
 
 def summary(folder: Path) -> dict[str, float | dict[str, float]]:

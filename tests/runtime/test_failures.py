@@ -43,7 +43,7 @@ def test_a_frozen_robot_is_named_and_the_world_goes_on_until_it_returns(
 
 def test_who_is_frozen_to_the_end_is_named_and_nobody_else(make_team: Make) -> None:
     team = make_team(world__seconds=1.0, world__command_timeout=0.5)
-    rows = [replace(row, grace=3.0 if row.name == "r2" else row.grace) for row in team.rows()]
+    rows = [replace(row, grace=1.0 if row.name == "r2" else row.grace) for row in team.rows()]
     with launch.Launch(rows, team.folder / "logs") as running:
         team.await_log("sim", "start")
         os.kill(running.pids["r2"], signal.SIGSTOP)
