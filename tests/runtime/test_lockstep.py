@@ -6,6 +6,7 @@ import hashlib
 import re
 from collections import defaultdict
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import Any
 
@@ -136,14 +137,15 @@ def test_real_time_says_what_came_late(make_team: Make) -> None:
 
 
 def test_a_second_team_does_not_disturb_the_first(make_team: Make) -> None:
-    team = make_team(recorder__enabled=True, world__seconds=600.0)
+    team = make_team(team__robots=1, recorder__enabled=True, world__seconds=600.0)
     intruders = team.folder / "intruders"
     intruders.mkdir()
     second = Team(team.config, intruders)
     with team.launch() as running:
         team.await_log("sim", "start")
         rows = [row for row in second.rows(standing=False) if row.name in ("sim", "r1")]
-        (sim_status, sim_said), (agent_status, agent_said) = map(run_alone, rows)
+        with ThreadPoolExecutor() as side_by_side:
+            (sim_status, sim_said), (agent_status, agent_said) = side_by_side.map(run_alone, rows)
         running.watch(lambda: True)
     assert (sim_status, agent_status) == (2, 2)
     assert "Address already in use" in sim_said
