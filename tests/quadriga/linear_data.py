@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,8 @@ from quadriga.identification.cache import data_path
 from quadriga.identification.dataset import Dataset, write_data
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.runtime.places import cache_dir
 from tests.agents.conftest import LinearTeam
+from tests.quadriga.own_cache import use_own_cache
 
 # Short horizons, so that fits are cheap; the linear team's low level has no height integrator.
 OPTIONS: dict[str, Any] = {
@@ -45,16 +44,5 @@ def dataset(samples: int = 700) -> Dataset:
 
 def put_data(folder: Path, patch: pytest.MonkeyPatch, found: Dataset | None = None) -> None:
     """Make `folder` the cache, with the linear team's data in it."""
-    put_behaviour(folder)
-    patch.setenv("XDG_CACHE_HOME", str(folder))
+    use_own_cache(folder, patch)
     write_data(data_path(config_of()), found or dataset())
-
-
-def put_behaviour(folder: Path) -> None:
-    """Let a cache have what the present one knows of the code's behaviour.
-
-    Else each process that finds it empty walks all samples again, which takes many seconds.
-    """
-    known = cache_dir() / "behaviour"
-    if known.is_dir():
-        shutil.copytree(known, folder / "quadriga" / "behaviour")

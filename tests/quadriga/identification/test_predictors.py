@@ -24,6 +24,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from tests.agents.conftest import SMALL, LinearTeam
+from tests.quadriga.own_cache import use_own_cache
 
 # One robot with a short horizon: 13 · (10 + 4 + 12) − 1 = 337 samples are enough for a ridge fit.
 TINY = load(
@@ -49,7 +50,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A cache folder of this module's own, in which the tiny team has its predictor."""
     folder = tmp_path_factory.mktemp("cache")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(folder))
+        use_own_cache(folder, patch)
         # An edit of the code in the middle of the tests must not change the keys.
         ensure_predictor(TINY, silent())
         yield folder
@@ -280,7 +281,7 @@ def test_collected_data_are_kept_even_if_the_fit_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What took minutes to collect is there for the next attempt."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    use_own_cache(tmp_path, monkeypatch)
     known = LinearTeam(1)
 
     def collected(config: Config, jobs: int, progress: Callable[[int, int], None]) -> Dataset:

@@ -19,11 +19,11 @@ import pytest
 from quadriga.commands.parser import main
 from quadriga.experiments.campaign import walk_trials
 from quadriga.experiments.campaign.ledger import read_manifest, read_rows
-from quadriga.experiments.trial.origin import code_and_libraries
 from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.shared.runtime.clock import monotonic, sleep
 from tests.quadriga.experiments.processes import LONGEST, await_true, finished, start
-from tests.quadriga.linear_data import arguments, put_behaviour, put_data
+from tests.quadriga.linear_data import arguments, put_data
+from tests.quadriga.own_cache import share_behaviour
 
 Said = pytest.CaptureFixture[str]
 
@@ -31,7 +31,6 @@ Said = pytest.CaptureFixture[str]
 @pytest.fixture
 def words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Two linear robots without and with planners, two seeds of half a second."""
-    code_and_libraries()  # known to the user's cache from now on, if it was not
     put_data(tmp_path / "cache", monkeypatch)
     scenario = tmp_path / "flat.toml"
     scenario.write_text("[world]\nseconds = 0.5\n", encoding="utf-8")
@@ -99,8 +98,8 @@ def test_every_trial_is_finished_once_though_a_worker_is_killed(
         "--host",
         "127.0.0.1",
     )
+    share_behaviour(tmp_path / "elsewhere")
     elsewhere = {"XDG_CACHE_HOME": str(tmp_path / "elsewhere")}
-    put_behaviour(tmp_path / "elsewhere")
     with dask(*scheduler) as _, dask(*worker, **elsewhere) as first, dask(*worker, **elsewhere):
         process = start(*words, "--dask", await_address(file), "--out", str(out))
         await_true(lambda: len(finished(out)) >= 2, process)
