@@ -1,4 +1,4 @@
-"""A walk of which everything is known, with a fault at 3 s."""
+"""A walk of which everything is known, with a fault at 1 s."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Event, Message, State, Status
 from tests.quadriga.conftest import WALL, WALL_0, WriteRun, run_config
 
-FAULT = 3000  # tick
-CONFIG = run_config(robots=3, seconds=6.0)
-ENDS = [("team/sim/event", Event.of(6000, codes.TIME_OVER, "", "end of world.seconds"))]
+FAULT = 1000  # tick
+CONFIG = run_config(robots=3, seconds=3.0)
+ENDS = [("team/sim/event", Event.of(3000, codes.TIME_OVER, "", "end of world.seconds"))]
 
 
 def outcome(folder: Path, moment: Moment) -> dict[str, Any]:
@@ -54,14 +54,14 @@ def test_nobody_notices_what_harms_nobody(write_run: WriteRun) -> None:
 
 
 def test_when_others_notice_and_stand(write_run: WriteRun) -> None:
-    change = stop_from(3400, "stand", "peer-lost:r2", ("r1", "r3"))
+    change = stop_from(FAULT + 400, "stand", "peer-lost:r2", ("r1", "r3"))
     row = outcome(write_run(CONFIG, change=change), Moment("r2", FAULT))
     assert (row["detect_ms"], row["stand_ms"]) == (400, 400)
     assert row["status"]["r1"] == "stand peer-lost:r2"
 
 
 def test_who_only_slows_down_has_noticed_and_does_not_stand(write_run: WriteRun) -> None:
-    change = stop_from(3400, "stopping", "peer-lost:r2", ("r1", "r3"))
+    change = stop_from(FAULT + 400, "stopping", "peer-lost:r2", ("r1", "r3"))
     row = outcome(write_run(CONFIG, change=change), Moment("r2", FAULT))
     assert (row["detect_ms"], row["stand_ms"]) == (400, None)
 
@@ -70,7 +70,7 @@ def test_a_team_that_walks_again_has_recovered_when_the_last_robot_does(
     write_run: WriteRun,
 ) -> None:
     def change(key: str, message: Message) -> Message:
-        since = {"r1": 3400, "r3": 3500}.get(key.split("/")[1])
+        since = {"r1": FAULT + 400, "r3": FAULT + 500}.get(key.split("/")[1])
         if isinstance(message, Status) and since and since <= message.tick < since + 1000:
             return replace(message, mode="stand", reason="peer-lost:r2")
         return message
@@ -85,7 +85,7 @@ def test_a_team_of_which_nobody_stopped_had_nothing_to_recover_from(write_run: W
 
 
 def test_a_robot_that_stands_at_the_end_has_not_recovered(write_run: WriteRun) -> None:
-    stands = stop_from(3400, "stand", "peer-lost:r2", ("r1",))
+    stands = stop_from(FAULT + 400, "stand", "peer-lost:r2", ("r1",))
     row = outcome(write_run(CONFIG, change=stands, extra=ENDS), Moment("r2", FAULT))
     assert row["recover_ms"] is None
 
@@ -131,7 +131,7 @@ def test_messages_of_the_faulty_robot_are_not_missed(
     write_run: WriteRun, robot: str, lost: int
 ) -> None:
     def lose(key: str, message: Message) -> Message | None:
-        gone = isinstance(message, State) and 4000 <= message.tick < 4100
+        gone = isinstance(message, State) and FAULT + 1000 <= message.tick < FAULT + 1100
         return None if gone and key == f"team/{robot}/state" else message
 
     row = outcome(write_run(CONFIG, change=lose), Moment("r2", FAULT))

@@ -21,11 +21,11 @@ from quadriga.identification.behaviour import behaviour, digest_of, numbers
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.robot.conventions import Array
 
-# The first walk cut short: machine code for each copy of the package would take a minute.
+# A short walk of one robot: machine code for each copy of the package would take a minute.
 SHORT = """
 from quadriga.identification import sample_collection, sample_fits
 from quadriga.identification.behaviour import digest_of
-sample_collection._SECONDS, sample_collection._WALKS = 0.04, sample_collection._WALKS[:1]
+sample_collection._SECONDS, sample_collection._WALKS = 0.04, ({"team.robots": 1},)
 sample_fits._SAMPLES = 200
 print(digest_of(sample_collection.samples()), digest_of(sample_fits.samples()))
 """
