@@ -282,15 +282,16 @@ def trunk_from_truth(
     R = rotation_matrix(truth.base_quat_wxyz[index])
     position, velocity = truth.base_pos[index], truth.base_vel[index]
     p_leg, _, _ = leg_kinematics(state.q_joint, state.v_joint, geometry)
-    force = state.foot_force if rule.fused < 0.5 else truth.grf[index, :, 2].copy()
+    force = state.foot_force if rule.fused < 0.5 else truth.grf[index, :, 2]
+    # Copies can be written to, as what the filter gives: machine code is made for each type.
     return Estimate(
         position.copy(),
         velocity.copy(),
         R,
         R.T @ truth.base_omega[index],
         position + p_leg @ R.T,
-        state.q_joint,
-        state.v_joint,
-        FootLoad(force, force >= rule.least_force),
+        state.q_joint.copy(),
+        state.v_joint.copy(),
+        FootLoad(force.copy(), force >= rule.least_force),
         truth.base_quat_wxyz[index].copy(),
     )

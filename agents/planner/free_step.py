@@ -87,13 +87,15 @@ class FreeStep:
             own: the agent's own data for the step.
             effect: of the peers on its outputs, see `PeerTerms`.
         """
+        if not isinstance(effect, np.ndarray):  # one type: machine code is made for each
+            effect = np.full(len(self._prediction.Y_past), effect)
         forces, outputs, usable = _free_step(own, effect, self._prediction, self._minimiser)
         return FreePlan(forces[0], forces[1], outputs[0], outputs[1]) if usable else None
 
 
 @compiled
 def _free_step(
-    own: OwnWindow, effect: Array | float, prediction: _Prediction, minimiser: _Minimiser
+    own: OwnWindow, effect: Array, prediction: _Prediction, minimiser: _Minimiser
 ) -> tuple[Array, Array, bool]:
     """Forces u and du, (2, N, 12); outputs y and y_nominal, (2, N, 6); is the plan usable?"""
     # Unpacked before the loops: each access to a tuple in a loop costs a reference count.

@@ -295,7 +295,7 @@ def test_the_tick_in_one_piece_is_its_parts_one_by_one() -> None:
             estimate.p_foot,
             outputs.goal,
             controller.weights,
-            A1.torque_bounds,
+            A1.torque_bounds.copy(),
         )
     np.testing.assert_allclose(outputs.memory.mean, filtered.mean, atol=1e-12)
     np.testing.assert_allclose(outputs.memory.contact, contacts.feet.contact)

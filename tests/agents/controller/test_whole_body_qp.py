@@ -47,13 +47,13 @@ def random_goal(random: np.random.Generator, contact: Array, size: float) -> Goa
 
 def problem_of(pose: Pose, goal: Goal, weights: Weights = WEIGHTS) -> WholeBodyProblem:
     return build(
-        pose.terms(), pose.estimate.R, pose.estimate.p_foot, goal, weights, A1.torque_bounds
+        pose.terms(), pose.estimate.R, pose.estimate.p_foot, goal, weights, A1.torque_bounds.copy()
     )
 
 
 def solution_of(pose: Pose, goal: Goal, weights: Weights = WEIGHTS) -> WholeBodySolution:
     return solve_goal(
-        pose.terms(), pose.estimate.R, pose.estimate.p_foot, goal, weights, A1.torque_bounds
+        pose.terms(), pose.estimate.R, pose.estimate.p_foot, goal, weights, A1.torque_bounds.copy()
     )
 
 
