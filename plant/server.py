@@ -12,8 +12,9 @@ from quadriga.plant.late import damp_joints
 from quadriga.plant.lost import LostCommands
 from quadriga.plant.protocol import Plant
 from quadriga.plant.team_time import TeamTime
+from quadriga.shared.bus.barrier import members
 from quadriga.shared.bus.lead_watch import LossWatch, find_lost_link
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import ConfigError
@@ -135,9 +136,16 @@ class PlantServer:
             self.time.end = End(*loss)
         if before is not None and self._link.since is None:
             self._outage = now, now - before
-        if self._outage is not None and now - self._outage[0] > _TOLD_AFTER:
+        if self._outage is not None and self._others_are_back(now - self._outage[0]):
             seconds, self._outage = self._outage[1], None
             self.announce(codes.LINK_BACK, "", f"no link to the router for {seconds:.1f} s")
+
+    def _others_are_back(self, waited: float) -> bool:
+        """Whether the others have a link again, `waited` seconds after this one, or never will."""
+        if waited > self.config.bus.reconnect_timeout:
+            return True
+        here = {self.bus.name, *self.bus.members_at(HERE)}
+        return waited > _TOLD_AFTER and here.issuperset(members(self.config))
 
     def announce(self, code: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""

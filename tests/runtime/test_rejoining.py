@@ -97,8 +97,8 @@ def check_files(team: Team, capsys: pytest.CaptureFixture[str]) -> None:
     assert "differ" not in said
 
 
-def test_a_router(make_team: Make, watcher: Watcher) -> None:
-    team = make_team(bus__mode="client", **REAL)
+def test_a_router_and_the_word_to_go_on(make_team: Make, watcher: Watcher) -> None:
+    team = make_team(bus__mode="client", **REAL | {"team__auto_resume": False})
     rows = (router_row(team.config, team.folder), *team.rows(standing=False))
     with Launch(rows, team.folder / "logs") as running:
         team.await_log("router", "routing at")
@@ -106,8 +106,9 @@ def test_a_router(make_team: Make, watcher: Watcher) -> None:
         await_tick(bus, 1500)
         kill(running, "router")
         running.restart("router")
-        await_news(bus, ("r1", STANDS_AGAIN), ("r2", STANDS_AGAIN), *ALL_WALK)
-        await_news(bus, ("", LINK_BACK))
+        await_news(bus, ("r1", STANDS_AGAIN), ("r2", STANDS_AGAIN), ("", LINK_BACK))
+        assert main(["resume", "--config", str(team.folder / "config.toml")]) == 0
+        await_news(bus, *ALL_WALK)
         running.watch(lambda: True)
     told = {event.code for event in read_traces(team.recording()).events}
     assert LINK_BACK in told, "one recording, with a gap in its midst"
