@@ -36,8 +36,8 @@ def test_a_frozen_robot_is_named_and_the_world_goes_on_until_it_returns(
     with team.launch() as running:
         team.await_log("sim", "start")
         freeze(running, watcher(team), "r2", tick=100, ticks=100)
-        team.await_log("sim", f"fault r2 silent for {PATIENCE:g} s: the world goes on")
-        team.await_log("sim", "fault r2 answers again")
+        team.await_log("sim", f"silent r2 silent for {PATIENCE:g} s: the world goes on")
+        team.await_log("sim", "back r2 answers again")
         running.watch(lambda: True)
 
 
@@ -50,7 +50,7 @@ def test_who_is_frozen_to_the_end_is_named_and_nobody_else(make_team: Make) -> N
         with pytest.raises(ProcessError, match="process r2: got no end after the walk"):
             running.watch(never)
     last = team.log("sim").splitlines()[-1]
-    assert "stop  end of world.seconds" in last, "and then nothing, no traceback"
+    assert "time-over  end of world.seconds" in last, "and then nothing, no traceback"
 
 
 def test_in_real_time_the_world_waits_for_no_frozen_listener(
@@ -90,7 +90,7 @@ def test_kill_9_of_one_stops_the_walk_and_names_it(make_team: Make, name: str) -
         team.await_log("sim", "start")
         os.kill(pids[name], signal.SIGKILL)
         if name == "r2":  # the world notices by itself, if the launcher does not stop it before
-            team.await_log("sim", "fault r2 gone")
+            team.await_log("sim", "gone r2 gone")
         with pytest.raises(ProcessError, match=f"process {name}: got signal 9"):
             running.watch(never)
     assert not [pid for pid in pids.values() if os.path.exists(f"/proc/{pid}")]
@@ -105,7 +105,7 @@ def test_a_stopped_sim_server_ends_the_walk_for_all(
         team.await_log("sim", "start")
         os.kill(running.pids["sim"], number)
         running.watch(never)  # all leave by themselves, with exit status 0
-    assert team.log("sim").splitlines()[-1].endswith("stop  signal")
+    assert team.log("sim").splitlines()[-1].endswith("signal  signal")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -167,8 +167,8 @@ def test_the_world_obeys_an_emergency_stop_whatever_the_agents_do(
         team.await_log("sim", "start")
         command = (*launch.QUADRIGA, "estop", "--reason", "smoke", "--config", file)
         assert run_alone(launch.ProcessSpec("estop", command, 5.0)) == (0, "")
-        team.await_log("sim", "fault  smoke: every joint is damped")
-        team.await_log("sim", "stop  fall of r1, r2")
+        team.await_log("sim", "estop  smoke: every joint is damped")
+        team.await_log("sim", "fallen  fall of r1, r2")
         running.watch(never)
 
 

@@ -148,7 +148,7 @@ def test_a_plant_that_dies_stops_the_team_and_is_named(
         pids = running.pids
         await_clock(watcher(team), 100)
         os.kill(pids["plant_r2"], number)
-        team.await_log("plant_r1", "stop  plant_r2 gone")
+        team.await_log("plant_r1", "plant-gone  plant_r2 gone")
         with pytest.raises(ProcessError, match=r"process plant_r[12]"):
             running.watch(never)
     assert "got plant_r2 gone, expected the plants of all robots" in team.log("plant_r1")
@@ -175,7 +175,7 @@ def test_a_frozen_plant_stops_the_team_and_is_named(make_team: Make) -> None:
     with team.launch() as running:
         team.await_log("plant_r1", "start")
         os.kill(running.pids["plant_r2"], signal.SIGSTOP)
-        team.await_log("plant_r1", "stop  plant_r2 silent for 1 s")
+        team.await_log("plant_r1", "plant-gone  plant_r2 silent for 1 s")
         os.kill(running.pids["plant_r2"], signal.SIGCONT)
         with pytest.raises(ProcessError, match=r"process plant_r[12]"):
             running.watch(never)
@@ -207,9 +207,9 @@ def test_a_robot_that_leaves_is_led_down_by_its_own_plant_and_the_walk_goes_on(
     with team.launch() as running:
         team.await_log("plant_r1", "start")
         os.kill(running.pids["r2"], signal.SIGKILL)
-        team.await_log("plant_r2", "fault r2 gone: the world goes on")
-        team.await_log("plant_r2", "fault r2 no command: its joints are led down")
-        team.await_log("plant_r1", "stop  end of world.seconds")
+        team.await_log("plant_r2", "gone r2 gone: the world goes on")
+        team.await_log("plant_r2", "lowered r2 no command: its joints are led down")
+        team.await_log("plant_r1", "time-over  end of world.seconds")
 
 
 def test_a_walk_that_is_told_to_stop_leaves_no_plant_behind(make_team: Make) -> None:

@@ -26,8 +26,8 @@ def test_a_walk_with_a_frozen_robot_comes_out_equal(
     with team.launch() as running:
         team.await_log("sim", "start")
         freeze(running, watcher(team), "r2", tick=100, ticks=300)
-        team.await_log("sim", f"fault r2 silent for {PATIENCE:g} s")
-        team.await_log("sim", "fault r2 answers again")
+        team.await_log("sim", f"silent r2 silent for {PATIENCE:g} s")
+        team.await_log("sim", "back r2 answers again")
         os.kill(running.pids["sim"], signal.SIGTERM)
         running.watch(lambda: False)
     assert main(["resim", str(team.folder / "run.mcap")]) == 0
