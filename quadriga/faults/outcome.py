@@ -84,6 +84,11 @@ def describe_outcome(
     }
 
 
+def moment_at(recording: Recording, robot: str, wall_ns: int) -> Moment:
+    """The moment of a fault of which only the recorder's clock is known."""
+    return Moment(robot, tick_at(recording, wall_ns), wall_ns)
+
+
 def tick_at(recording: Recording, wall_ns: int) -> int:
     """World time at a moment of the recorder's clock: the newest state that had arrived."""
     newest = 0

@@ -18,7 +18,7 @@ from typing import Any, Final
 from quadriga.certs.certificate import read_certificate
 from quadriga.certs.secured import certificates_of, secure, utc_now
 from quadriga.faults.fault import Draw, FaultScene, Stage, TeamFault
-from quadriga.faults.outcome import Moment, describe_outcome
+from quadriga.faults.outcome import describe_outcome, moment_at
 from quadriga.recordings.summary import RECORDING
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.config.sections import Config
@@ -70,7 +70,7 @@ class _Expiry:
             return
         with suppress(RecordingError):
             recording = Recording(folder / RECORDING)
-            moment = Moment(scene.draw.robot, 0, self._at_ns)
+            moment = moment_at(recording, scene.draw.robot, self._at_ns)
             row = describe_outcome(scene.config, read_traces(recording), recording, moment)
             scene.facts.update({name: row[name] for name in _OF_MOMENT})
             scene.facts.update(_count_closed(recording, scene.draw.robot))

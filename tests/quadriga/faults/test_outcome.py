@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from quadriga.faults.outcome import Moment, describe_outcome, tick_at
+from quadriga.faults.outcome import Moment, describe_outcome, moment_at, tick_at
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import END
@@ -170,3 +170,14 @@ def test_a_world_that_is_gone_is_noticed_when_the_recorder_misses_it(write_run: 
     gone = {"code": codes.LEAD_GONE, "tick": "3010", "missed_ns": str(wall(FAULT) + 31_000_000)}
     traces = replace(read_traces(recording), notes={END: gone})
     assert describe_outcome(CONFIG, traces, recording, moment)["detect_ms"] == 31
+
+
+def test_a_fault_whose_tick_nobody_knows_is_where_the_walk_was_by_the_clock(
+    write_run: WriteRun,
+) -> None:
+    change = stop_from(FAULT + 200, "stand", "peer-lost:r2", ("r1", "r3"))
+    recording = Recording(write_run(CONFIG, change=change) / "run.mcap")
+    moment = moment_at(recording, "r2", wall(FAULT))
+    assert moment == Moment("r2", FAULT, wall(FAULT))
+    row = describe_outcome(CONFIG, read_traces(recording), recording, moment)
+    assert (row["tick"], row["detect_ms"], row["stand_ms"]) == (FAULT, 200, 200)
