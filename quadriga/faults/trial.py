@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 from contextlib import suppress
 from dataclasses import replace
@@ -48,13 +49,14 @@ def run_fault_trial(
         config: of a simulated world.
         fault: what goes wrong, at a moment and at a robot that the seed decides.
         seed: of the world.
-        folder: gets configuration, logs and recording.
+        folder: of this walk alone; gets configuration, logs and recording.
         predictor: its file; None without one.
 
     Raises:
         ProcessError: the team did not begin to walk.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(folder, ignore_errors=True)  # a walk of an earlier call, which was interrupted
+    folder.mkdir(parents=True)
     draw = draw_fault(config, seed) if fault.given is None else Draw(*fault.given, seed)
     with fault.stage(_walk_config(config, fault, draw), draw, folder) as stage:
         config = stage.config
