@@ -21,6 +21,9 @@ ARGUMENTS = (
 def test_a_killed_agent_and_a_dead_knee(tmp_path: Path) -> None:
     rows_file, folder = tmp_path / "rows.json", tmp_path / "out"
     faults = ("agent-killed", "knee-off")
+    interrupted = folder / f"agent-killed-{EARLY}" / "run.mcap"  # in an earlier call
+    interrupted.parent.mkdir(parents=True)
+    interrupted.touch()
     main(["fault", *faults, *ARGUMENTS, "--json", str(rows_file), "--out", str(folder)])
     rows = {row["fault"]: row for row in json.loads(rows_file.read_text(encoding="utf-8"))}
     assert set(rows) == set(faults)
