@@ -13,6 +13,7 @@ from quadriga.shared.bus.zenoh_log import ZenohLog
 from quadriga.shared.members import ROUTER
 from quadriga.shared.printable import printable_line
 from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.security.audit_line import AuditLine, format_refusal
 from quadriga.shared.security.past_refusals import RefusalMemory
 from quadriga.shared.security.refusals import (
     DENIED,
@@ -89,13 +90,9 @@ class Audit:
 
     def _tell(self, refused: Refused, count: int) -> None:
         key = truncate_text(printable_line(refused.key), _LONGEST)
-        what = f"{refused.action} {key}".rstrip()
-        print(
-            f"refused: {refused.who}: {what} ({refused.reason}, {count} times)",
-            file=sys.stderr,
-            flush=True,
-        )
         who, action, reason = refused.who, refused.action, refused.reason
+        line = AuditLine(who, f"{action} {key}".rstrip(), reason, count)
+        print(format_refusal(line), file=sys.stderr, flush=True)
         self._put(encode(Refusal(self._tick, self._stamp_ns, who, action, key, reason, count)))
 
     def _answer(self) -> bytes:

@@ -28,6 +28,7 @@ from quadriga.shared.errors import BusError
 from quadriga.shared.members import ESTOP as STOPPER
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
 from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.security.audit_line import parse_refusals
 from quadriga.shared.security.caps import capacity, largest
 from quadriga.shared.security.markdown import PAGE
 from quadriga.shared.security.tls import TlsFiles, tls_files, tls_settings
@@ -300,12 +301,13 @@ def test_the_attackers_of_the_table_of_faults_are_refused_to_the_last(
     file = tmp_path / "attack.json"
     file.write_text(plan(fortress.config, Draw("r1", 3000, 1)).to_json(), encoding="utf-8")
     command = [sys.executable, "-m", "quadriga.faults.security.attacker", str(file)]
+    since = len(fortress.said)
     done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT, check=True)
     report = AttackReport.from_json(done.stdout)
     entries, deadline = list[ChunkEntry](), monotonic() + WAIT
     while True:
         entries += [ChunkEntry(key, 0, 0, load) for key, load in heard(fortress, recorder)]
-        row = describe_attack(entries, report)
+        row = describe_attack(entries, parse_refusals(fortress.said[since:]), report)
         if row["refused"] >= row["forged"]:
             break
         assert monotonic() < deadline, row

@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import Final, TypeAlias
 
 from quadriga.certs.secured import secure, utc_now
+from quadriga.faults.aftermath import read_log
 from quadriga.faults.fault import Draw, FaultScene, SetStage, Stage, TeamFault
 from quadriga.faults.security import attacks
 from quadriga.faults.security.attack import Attack, AttackReport
@@ -20,7 +21,9 @@ from quadriga.faults.security.expiry_fault import EXPIRY_FAULT
 from quadriga.recordings.summary import RECORDING
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError, RecordingError
+from quadriga.shared.members import ROUTER
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.security.audit_line import parse_refusals
 
 _LASTS_S: Final = 4.0  # world time that the attack takes on a busy computer
 _WAIT_S: Final = 60.0  # wall time after which it is given up
@@ -68,12 +71,13 @@ class _AttackStrike:
         self._report = AttackReport.from_json(done.stdout)
 
     def conclude(self, folder: Path) -> None:
-        """Tell by the recording what came of it; whether it can be read is told elsewhere."""
+        """Tell what came of it; whether the recording can be read is told elsewhere."""
         if self._scene is None:
             return
         with suppress(RecordingError):
             entries = Recording(folder / RECORDING).entries()
-            self._scene.facts.update(describe_attack(entries, self._report))
+            audit = parse_refusals(read_log(folder, ROUTER))
+            self._scene.facts.update(describe_attack(entries, audit, self._report))
 
 
 ATTACK_FAULTS: Final = (

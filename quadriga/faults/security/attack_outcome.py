@@ -1,22 +1,27 @@
-"""What came of an attack, from the recording of the walk and what the attacker tells."""
+"""What came of an attack, from the recording, the router's log and what the attacker tells.
+
+The log has all that the router has refused. Of what it tells the recorder some is missing where the
+recorder could not keep up.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from contextlib import suppress
 
 from quadriga.faults.security.attack import AttackReport, digest_of
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PROBE
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.shared.security.audit_line import AuditLine
 from quadriga.shared.security.roll import split_common_name
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Refusal
-from quadriga.shared.wire.topics import REFUSED, find_topic
+from quadriga.shared.wire.topics import find_topic
 
 
-def describe_attack(entries: Iterable[ChunkEntry], report: AttackReport) -> dict[str, int]:
+def describe_attack(
+    entries: Iterable[ChunkEntry], audit: Iterable[AuditLine], report: AttackReport
+) -> dict[str, int]:
     """Fields of a trial's row.
 
     `forged` is all that the attacker has tried: messages, and connections that nobody may make.
@@ -27,13 +32,14 @@ def describe_attack(entries: Iterable[ChunkEntry], report: AttackReport) -> dict
 
     Args:
         entries: of the recording.
+        audit: of the router's log.
         report: of the attacker.
     """
+    told = sum(line.times for line in audit if split_common_name(line.who)[0] != PROBE)
     shots = {(shot.key, shot.digest): shot for shot in report.shots}
     keys = {shot.key for shot in report.shots}
-    readable, unreadable, told = Counter[tuple[str, str]](), 0, 0
+    readable, unreadable = Counter[tuple[str, str]](), 0
     for entry in entries:
-        told += _count_told(entry)
         if entry.key not in keys:
             continue
         at = entry.key, digest_of(entry.payload)
@@ -46,14 +52,6 @@ def describe_attack(entries: Iterable[ChunkEntry], report: AttackReport) -> dict
     passed = sum(max(count - shots[at].heard, 0) for at, count in readable.items())
     refused = told + unreadable
     return {"forged": report.total, "refused": refused, "told": told, "passed": passed}
-
-
-def _count_told(entry: ChunkEntry) -> int:
-    if find_topic(entry.key)[0] is REFUSED:
-        with suppress(MessageError):
-            refusal = decode(entry.payload, Refusal)
-            return 0 if split_common_name(refusal.who)[0] == PROBE else refusal.count
-    return 0
 
 
 def _can_be_read(entry: ChunkEntry) -> bool:

@@ -8,7 +8,7 @@ warns two weeks before.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -17,20 +17,20 @@ from typing import Any, Final
 
 from quadriga.certs.certificate import read_certificate
 from quadriga.certs.secured import certificates_of, secure, utc_now
+from quadriga.faults.aftermath import read_log
 from quadriga.faults.fault import Draw, FaultScene, Stage, TeamFault
 from quadriga.faults.outcome import describe_outcome, moment_at
 from quadriga.recordings.summary import RECORDING
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import MessageError, RecordingError
+from quadriga.shared.errors import RecordingError
+from quadriga.shared.members import ROUTER
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import sleep, wall_ns
+from quadriga.shared.security.audit_line import AuditLine, parse_refusals
 from quadriga.shared.security.refusals import EXPIRED
 from quadriga.shared.security.roll import split_common_name
 from quadriga.shared.security.tls import tls_files
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Refusal
-from quadriga.shared.wire.topics import REFUSED
 
 _LIVES_S: Final = 40.0  # wall time: a team starts within this, and walks when it is over
 _AFTER_S: Final = 6.0  # world time that is walked after it at least
@@ -73,17 +73,16 @@ class _Expiry:
             moment = moment_at(recording, scene.draw.robot, self._at_ns)
             row = describe_outcome(scene.config, read_traces(recording), recording, moment)
             scene.facts.update({name: row[name] for name in _OF_MOMENT})
-            scene.facts.update(_count_closed(recording, scene.draw.robot))
+            audit = parse_refusals(read_log(folder, ROUTER))
+            scene.facts.update(_count_closed(audit, scene.draw.robot))
 
 
-def _count_closed(recording: Recording, robot: str) -> dict[str, Any]:
+def _count_closed(audit: Iterable[AuditLine], robot: str) -> dict[str, Any]:
     """As of an attack: one link that may not stay. It is told again when Zenoh tries again."""
     closed = 0
-    for entry in recording.entries({REFUSED.name}):
-        with suppress(MessageError):
-            refusal = decode(entry.payload, Refusal)
-            own = split_common_name(refusal.who)[0] == robot
-            closed += refusal.count if own and refusal.reason == EXPIRED else 0
+    for line in audit:
+        own = split_common_name(line.who)[0] == robot
+        closed += line.times if own and line.reason == EXPIRED else 0
     refused = min(closed, 1)
     return {"forged": 1, "refused": refused, "told": closed, "passed": 1 - refused}
 
