@@ -20,7 +20,7 @@ from quadriga.agents.controller.whole_body.problem import (
     WholeBodyProblem,
     WholeBodySolution,
 )
-from quadriga.agents.healing import Healing, has_lost_input, may_resume, ramp, step_healing
+from quadriga.agents.healing import Healing, may_resume, ramp, step_healing
 from quadriga.agents.held_posture import held_row, hold_or_release
 from quadriga.agents.imu_bridge import ImuState, bridge_imu
 from quadriga.agents.modes import (
@@ -31,13 +31,17 @@ from quadriga.agents.modes import (
     NO_ESTIMATE,
     PEER_LOST,
     REFERENCE_LOST,
+    RISING,
     STAND,
+    STOPPED,
     STOPPING,
     WALK,
     Mode,
     Stop,
     resolve_stops,
+    rests,
     step_mode,
+    stop_safely,
 )
 from quadriga.agents.planner.qp_solver import SOLVED, SolvedQp
 from quadriga.agents.planning.interface import Expected, PlanningInputs, PlanningOutputs
@@ -163,23 +167,28 @@ class Agent:
         return new, outputs
 
     def gets_up(self, state: AgentState, inputs: Inputs) -> bool:
-        """Whether the robot, which has been led down, gets up in the step of these arguments."""
-        return state.rise is not None or self._was_led_down(state, inputs)
+        """Whether the robot, which has been down, gets up in the step of these arguments."""
+        return state.rise is not None or bool(self._why_rise(state, inputs))
 
-    def _was_led_down(self, state: AgentState, inputs: Inputs) -> bool:
-        return self._rising.is_due(state.mode, state.tick, inputs.state.tick)
+    def _why_rise(self, state: AgentState, inputs: Inputs) -> str:
+        """Why the robot begins to get up at this tick; "": it does not."""
+        return self._rising.why_now(
+            state.mode, state.tick, inputs.state.tick, inputs.reset, inputs.estop
+        )
 
     def _rise(self, state: AgentState, inputs: Inputs) -> tuple[AgentState, Outputs]:
         """Get up by a tick: nothing is estimated or planned before the robot stands."""
         tick, team = inputs.state.tick, self._look_around(state, inputs)
-        before = None if self._was_led_down(state, inputs) else state.rise  # maybe once more
-        since = tick if before is None else state.mode.since
-        still = self._watch.are_still(team, tick, since)
+        before, mode = state.rise, state.mode
+        if reason := self._why_rise(state, inputs):  # maybe once more
+            before, mode = None, Mode(RISING, tick, reason)
+        still = self._watch.are_still(team, tick, mode.since)
         mode, rise, command = self._rising.step(
-            state.mode, before, inputs.state, may_begin=still, estop=inputs.estop
+            mode, before, inputs.state, may_begin=still, estop=inputs.estop
         )
-        word = inputs.resume is not None
-        healing = step_healing(state.healing, mode, tick, whole_from=None, word=word)
+        if inputs.stop is not None:
+            mode = stop_safely(mode, tick, with_detail(STOPPED, inputs.stop.reason))
+        healing = self._heal(state.healing, mode, inputs, whole=False)
         references = remember_references(state.references, inputs.references, tick)
         new = AgentState(
             tick,
@@ -275,6 +284,8 @@ class Agent:
         stops, estop = list[Stop](), inputs.estop
         if estop is not None:
             stops.append(Stop(ESTOP, with_detail(ESTOP, estop.reason)))
+        if inputs.stop is not None:
+            stops.append(Stop(STOPPING, with_detail(STOPPED, inputs.stop.reason)))
         if course.name != WALK:
             return stops
         if reference_age > REFERENCE.max_age_ms:
@@ -285,21 +296,21 @@ class Agent:
         return stops
 
     def _is_whole(self, tick: int, mode: Mode, team: Teammates, planning: Any) -> bool:
-        """Whether a robot that stands after a loss has all plans, and the others can walk."""
-        if mode.name != STAND or not has_lost_input(mode):
+        """Whether a robot that stands, and may go on, has all plans, and the others can walk."""
+        if mode.name != STAND or not rests(mode):
             return False
         return self._watch.are_ready(team, tick) and self._planning.is_whole(planning, tick)
 
     def _heal(self, healing: Healing, mode: Mode, inputs: Inputs, *, whole: bool) -> Healing:
-        """The way back from a loss after a tick at which all inputs are `whole`, or not."""
+        """The way back from standing after a tick at which all inputs are `whole`, or not."""
         tick, whole_from = inputs.state.tick, None
         if whole:
             whole_from = tick + self._stance_ms - (tick - self._stand_ms) % self._stance_ms
-        word = inputs.resume is not None
-        return step_healing(healing, mode, tick, whole_from=whole_from, word=word)
+        word, stop = inputs.resume is not None, inputs.stop is not None
+        return step_healing(healing, mode, tick, whole_from=whole_from, word=word, stop=stop)
 
     def _course(self, state: AgentState, tick: int, blind_ms: float) -> tuple[Mode, Healing]:
-        """The mode if nothing stops the robot at this tick, and its way back from a loss."""
+        """The mode if nothing stops the robot at this tick, and its way back from standing."""
         mode, healing = state.mode, state.healing
         if blind_ms > self._blind_ms and mode.name in (WALK, STOPPING):
             return Mode(STAND, tick, IMU_LOST), healing

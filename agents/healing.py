@@ -1,10 +1,10 @@
-"""When a robot that stands because it lacked an input, or was led down, may walk again.
+"""When a robot that stands because it lacked an input, was led down or stopped, may walk again.
 
-It goes on at the begin of a half cycle, once all its inputs have been whole for a second: by itself
-if the team is configured so, else if the operator has said so lately. The second is counted from
-the begin of a half cycle, so that robots go on together which find their inputs whole a little
-apart. From then on they follow the commanded speed in a ramp. Falls, faults and emergency stops are
-for good.
+It goes on at the begin of a half cycle, once all its inputs have been whole for a second, if the
+operator has said so lately; after a loss also by itself, if the team is configured so. The second
+is counted from the begin of a half cycle, so that robots go on together which find their inputs
+whole a little apart. From then on they follow the commanded speed in a ramp. Falls, faults and
+emergency stops last until the operator releases them; then a robot gets up and stands.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from quadriga.agents.modes import LOSSES, RISING, STAND, STOPPING, WALK, WHOLE_MS, Mode
+from quadriga.agents.modes import COMMANDED, LOSSES, RISING, STAND, WALK, WHOLE_MS, Mode, rests
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import INPUT_LOST, RESUMED, RISES, STANDS_AGAIN, code_of
+from quadriga.shared.wire.codes import HALTS, INPUT_LOST, RESUMED, RISES, STANDS_AGAIN, code_of
 from quadriga.shared.wire.messages import Event, Reference
 
 WORD_MS: Final = 5000  # for which the operator's word is obeyed
@@ -37,13 +37,14 @@ class Healing:
     resumed: int = -1
 
 
-def has_lost_input(mode: Mode) -> bool:
-    """Whether a robot stands, slows down or gets up after a loss, and nothing graver is wrong."""
-    return mode.name in (STAND, STOPPING, RISING) and code_of(mode.reason) in LOSSES
-
-
 def step_healing(
-    healing: Healing, mode: Mode, tick: int, *, whole_from: int | None, word: bool
+    healing: Healing,
+    mode: Mode,
+    tick: int,
+    *,
+    whole_from: int | None,
+    word: bool,
+    stop: bool = False,
 ) -> Healing:
     """What is remembered after a tick.
 
@@ -53,22 +54,26 @@ def step_healing(
         tick: the present one.
         whole_from: if all inputs are there, the begin of the next half cycle; else None.
         word: whether the operator's word to go on has come.
+        stop: whether somebody has asked the team to stop: an earlier word counts no more.
     """
-    if not has_lost_input(mode):
+    if not rests(mode):
         idle = healing.whole_since < 0 and healing.word < 0
         return healing if idle else Healing(resumed=healing.resumed)
     since = -1
     if whole_from is not None:
         since = healing.whole_since if healing.whole_since >= 0 else whole_from
+    if stop:
+        return replace(healing, whole_since=since, word=-1)
     return replace(healing, whole_since=since, word=tick if word else healing.word)
 
 
 def may_resume(healing: Healing, mode: Mode, tick: int, *, auto: bool) -> bool:
-    """Whether a robot in `mode` may walk again; `auto`: without the operator's word."""
-    if mode.name != STAND or not has_lost_input(mode) or healing.whole_since < 0:
+    """Whether a robot in `mode` may walk again; `auto`: after a loss without the word."""
+    if mode.name != STAND or not rests(mode) or healing.whole_since < 0:
         return False
     told = healing.word >= 0 and tick - healing.word <= WORD_MS
-    return (auto or told) and tick - healing.whole_since >= WHOLE_MS
+    by_itself = auto and code_of(mode.reason) in LOSSES
+    return (by_itself or told) and tick - healing.whole_since >= WHOLE_MS
 
 
 def ramp(references: tuple[Reference, ...], healing: Healing, tick: int) -> tuple[Reference, ...]:
@@ -89,13 +94,14 @@ def _share(item: Reference, share: float) -> Reference:
 
 
 def change_event(before: Mode, after: Mode, tick: int, robot: str) -> Event | None:
-    """What an agent announces of a change of its mode: a loss of inputs, and its way back."""
+    """What an agent announces of a change of its mode: why it stops, and its way back."""
     if after.name == RISING and before.name != RISING:
-        return Event.of(tick, RISES, robot, "was led down, gets up where it is")
+        return Event.of(tick, RISES, robot, f"gets up where it is: {after.reason}")
     if before.name == RISING and after.name == STAND:
         return Event.of(tick, STANDS_AGAIN, robot, f"stands after {tick - before.since} ms")
-    if has_lost_input(after) and not before.reason:
-        return Event.of(tick, INPUT_LOST, robot, f"slows down and stands: {after.reason}")
-    if after.name == WALK and has_lost_input(before):
+    if rests(after) and not before.reason:
+        code = HALTS if code_of(after.reason) in COMMANDED else INPUT_LOST
+        return Event.of(tick, code, robot, f"slows down and stands: {after.reason}")
+    if after.name == WALK and rests(before):
         return Event.of(tick, RESUMED, robot, f"walks again after {before.reason}")
     return None

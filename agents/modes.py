@@ -1,7 +1,7 @@
 """What the robot is doing and why: the modes, their order, and the named reasons to leave them.
 
 stand → walk → stopping → stand; damping and estop are latched from anywhere. A robot that has been
-led down begins anew: rising → stand.
+led down, or that the operator has released from one of these, begins anew: rising → stand.
 """
 
 from __future__ import annotations
@@ -11,11 +11,12 @@ from dataclasses import replace
 from typing import Final
 
 from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.codes import code_of
 
 STAND: Final = "stand"
 WALK: Final = "walk"
 STOPPING: Final = "stopping"
-RISING: Final = "rising"  # in place, after it has been led down
+RISING: Final = "rising"  # in place, after it has been down
 DAMPING: Final = "damping"
 ESTOP: Final = "estop"
 
@@ -30,7 +31,12 @@ LOSSES: Final = frozenset(
     (REFERENCE_LOST, WINDOW_LOST, PEER_LOST, PLANNER_LOST, LED_DOWN, IMU_LOST)
 )
 
-# Reasons for which a robot is damped.
+# Reasons for which a robot stands because somebody has said so, and walks only when told to.
+STOPPED: Final = "stopped"  # somebody has asked the team to stop
+RESET: Final = "reset"  # the operator has released the emergency stop
+COMMANDED: Final = frozenset((STOPPED, RESET))
+
+# Reasons for which a robot is damped, until the operator releases it.
 NO_ESTIMATE: Final = "no-estimate"  # the orientation is not a number
 FALL: Final = "fall"  # the trunk is tilted beyond `controller.fall_tilt`
 NOT_UP: Final = "not-up"  # it got up, and does not stand
@@ -96,17 +102,33 @@ def resolve_stops(mode: Mode, tick: int, stops: Sequence[Stop]) -> Mode:
     return enter_passive(mode, tick, gravest.mode, gravest.reason)
 
 
+def rests(mode: Mode) -> bool:
+    """Whether a robot stands, slows down or gets up, and may walk again later."""
+    return mode.name in (STAND, STOPPING, RISING) and code_of(mode.reason) in LOSSES | COMMANDED
+
+
+def is_commanded(reason: str) -> bool:
+    """Whether a robot stopped, or is damped, because somebody has said so."""
+    return code_of(reason) in COMMANDED | {ESTOP}
+
+
 def stop_safely(mode: Mode, tick: int, reason: str) -> Mode:
-    """Slow down and stand, unless something graver is in force already."""
+    """Slow down and stand, unless something graver is in force already.
+
+    What somebody has asked for takes the place of a loss: a robot goes on by itself after none.
+    """
+    reason = reason[:REASON_MOST]
     if mode.name == WALK:
         return Mode(STOPPING, tick, reason)
     if mode.name == STAND and not mode.reason:
         return Mode(STAND, tick, reason)
+    if rests(mode) and code_of(mode.reason) in LOSSES and code_of(reason) in COMMANDED:
+        return replace(mode, reason=reason)
     return mode
 
 
 def enter_passive(mode: Mode, tick: int, name: str, reason: str) -> Mode:
-    """Damp the joints for good; an emergency stop outranks a fault, the first reason stays.
+    """Damp the joints; an emergency stop outranks a fault, the first reason stays.
 
     Of a long reason, which anyone may send, the first `REASON_MOST` characters are kept.
     """

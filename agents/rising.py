@@ -1,9 +1,9 @@
-"""A robot that has been led down gets up in place, before the whole-body QP takes charge of it.
+"""A robot that has been down gets up in place, before the whole-body QP takes charge of it.
 
 Its motors had no commands for so long that the plant has led them down: its agent was restarted,
-stood still or was cut off. The joints are held where they are until no other robot of the team
-walks, then led to the stand, with limited torques. Only once they are there, and the trunk is
-level, the robot stands.
+stood still or was cut off. Or its joints were damped, and the operator has released the stop. They
+are held where they are until no other robot of the team walks, then led to the stand, with limited
+torques. Only once they are there, and the trunk is level, the robot stands.
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.agents.modes import (
+    COMMANDED,
     DAMPING,
     ESTOP,
     FALL,
     LED_DOWN,
     NO_ESTIMATE,
     NOT_UP,
-    RISING,
+    REASON_MOST,
+    RESET,
     STAND,
     Mode,
     enter_passive,
@@ -29,8 +31,8 @@ from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.robot.conventions import N_JOINTS, Array
 from quadriga.shared.robot.motions import Motion, posture_at, way_up
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import with_detail
-from quadriga.shared.wire.messages import Command, EStop, State
+from quadriga.shared.wire.codes import code_of, with_detail
+from quadriga.shared.wire.messages import Command, EStop, Reset, State
 
 _SECONDS: Final = 1.5  # from lying on folded legs to the stand
 _SETTLE_MS: Final = 200  # at the stand, before it is looked at
@@ -72,8 +74,9 @@ class Rising:
     """
 
     def __init__(self, config: Config) -> None:
-        # In lock-step every command is waited for, and a bridge gets its robot up by itself.
-        self._rises = config.world.mode == "realtime" and config.team.plant != BRIDGED
+        # A bridge gets its robot up by itself, and in lock-step every command is waited for.
+        self._rises = config.team.plant != BRIDGED
+        self._is_led_down = self._rises and config.world.mode == "realtime"
         self._away_ms = config.world.command_damp_ms
         # Before the first command the motors are held: while the team stands that will do.
         self._latest_ms = max(self._away_ms, config.gait.stand_ms)
@@ -83,17 +86,28 @@ class Rising:
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
         self._damping = config.controller.damping
 
-    def is_due(self, mode: Mode, last: int, tick: int) -> bool:
-        """Whether a robot has been led down since the agent's last command.
+    def why_now(
+        self, mode: Mode, last: int, tick: int, reset: Reset | None, estop: EStop | None
+    ) -> str:
+        """Why a robot is to begin to get up at this tick; "": it is not.
+
+        It has been led down since the agent's last command, or the operator has released it.
 
         Args:
             mode: the agent's before this tick.
             last: tick of its last command, −1: it has given none.
             tick: the present one.
+            reset: the operator's release, if it came.
+            estop: an emergency stop, if one came: it outranks a release.
         """
-        if not self._rises or mode.passive:
-            return False
-        return tick > self._latest_ms if last < 0 else tick - last > self._away_ms
+        if mode.passive:
+            if reset is None or estop is not None or not self._rises:
+                return ""
+            return with_detail(RESET, reset.by)[:REASON_MOST]
+        away = tick > self._latest_ms if last < 0 else tick - last > self._away_ms
+        if not (self._is_led_down and away):
+            return ""
+        return mode.reason if code_of(mode.reason) in COMMANDED else LED_DOWN
 
     def step(
         self,
@@ -107,15 +121,15 @@ class Rising:
         """Get up by a tick.
 
         Args:
-            mode: before it.
-            rise: what is remembered; None: the agent is back since this tick.
+            mode: before it; of a robot that begins now, that it does and why.
+            rise: what is remembered; None: the robot begins at this tick.
             state: what the robot measures.
             may_begin: whether the others stand.
             estop: an emergency stop, if one came.
         """
         tick = state.tick
         if rise is None:
-            rise, mode = Rise(state.q_joint), Mode(RISING, tick, LED_DOWN)
+            rise = Rise(state.q_joint)
         if estop is not None:
             mode = enter_passive(mode, tick, ESTOP, with_detail(ESTOP, estop.reason))
         elif trouble := self._find_trouble(rise, state):
@@ -125,7 +139,7 @@ class Rising:
         if rise.begun < 0 and may_begin:
             rise = Rise(rise.held, tick, way_up(state.q_joint, self._robot, _SECONDS))
         if self._has_settled(rise, tick) and self._is_up(state):
-            mode, rise = Mode(STAND, tick, LED_DOWN), None
+            mode, rise = Mode(STAND, tick, mode.reason), None
         return RisingStep(mode, rise, self._lead(rise, state))
 
     def _find_trouble(self, rise: Rise, state: State) -> str:

@@ -13,7 +13,9 @@ from quadriga.shared.wire.messages import (
     Measurement,
     Plan,
     Reference,
+    Reset,
     Resume,
+    SafeStop,
     State,
     Status,
     Truth,
@@ -30,6 +32,8 @@ class Inputs:
         plans: plans of peers, or of whoever plans for the robot, with the sender's name.
         references: of the operator.
         estop: an emergency stop, if one came.
+        stop: somebody's wish that the team slow down and stand, if it came.
+        reset: the operator's release of an emergency stop, if it came.
         resume: the operator's word to go on, if it came.
         statuses: of the other robots, with their names.
         events: of the plant, about robots whose commands no longer come, or do again.
@@ -44,6 +48,8 @@ class Inputs:
     estop: EStop | None = None
     truth: Truth | None = None
     excitation: Array | None = None
+    stop: SafeStop | None = None
+    reset: Reset | None = None
     resume: Resume | None = None
     statuses: tuple[tuple[str, Status], ...] = ()
     events: tuple[Event, ...] = ()
@@ -52,8 +58,12 @@ class Inputs:
     def bare(self) -> bool:
         """Whether nothing but the state has come."""
         others = self.measurements or self.plans or self.references or self.statuses or self.events
-        words = self.estop is not None or self.resume is not None
-        return not (others or words) and self.truth is None
+        return not (others or any(self.words)) and self.truth is None
+
+    @property
+    def words(self) -> tuple[EStop | SafeStop | Reset | Resume | None, ...]:
+        """What people have said, in the order of `wire.topics.WORDS`."""
+        return self.estop, self.stop, self.reset, self.resume
 
 
 @record

@@ -14,11 +14,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import field
 from typing import Final
 
-from quadriga.agents.modes import LOSSES, STAND, STOPPING, WALK
+from quadriga.agents.modes import STAND, STOPPING, WALK, Mode, rests
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import BACK, GONE, SILENT, code_of
+from quadriga.shared.wire.codes import BACK, GONE, SILENT
 from quadriga.shared.wire.messages import Event, Status
 
 SILENCE_MS: Final = 500  # without a status, after which a robot is lost
@@ -96,7 +96,7 @@ class TeamWatch:
         )
 
     def are_ready(self, known: Teammates, tick: int) -> bool:
-        """Whether all others can walk: they stand for want of an input, or walk already."""
+        """Whether all others can walk: they stand and may walk again, or walk already."""
         if any(_is_lost(known, name) for name in self.names):
             return False
         return not self._hears or all(
@@ -142,5 +142,6 @@ def _has_stopped(heard: Heard, tick: int, since: int) -> bool:
 def _can_walk(heard: Heard, tick: int) -> bool:
     if tick - heard.tick > SILENCE_MS:
         return False
-    rests = heard.mode == STAND and (not heard.reason or code_of(heard.reason) in LOSSES)
-    return rests or heard.mode == WALK
+    if heard.mode == STAND:
+        return not heard.reason or rests(Mode(STAND, heard.tick, heard.reason))
+    return heard.mode == WALK

@@ -13,6 +13,7 @@ from quadriga.plant.realtime import run_realtime
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_pace import TeamPace, team_pace
 from quadriga.plant.team_time import team_time
+from quadriga.plant.words import listen_to_estops, listen_to_words
 from quadriga.shared.bus.barrier import await_agents, meet, start_together
 from quadriga.shared.bus.lead_watch import Loss, loss_error
 from quadriga.shared.bus.zenoh_bus import Bus
@@ -26,8 +27,8 @@ from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 from quadriga.shared.runtime.signals import interruptible, stop_on_signals
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import EStop, LiveFault
-from quadriga.shared.wire.topics import COMMAND, ESTOP, LIVE_FAULT
+from quadriga.shared.wire.messages import LiveFault
+from quadriga.shared.wire.topics import COMMAND, LIVE_FAULT
 
 _PAUSE: Final = 0.002  # s, between two looks of a simulated robot's plant that waits
 
@@ -62,15 +63,13 @@ def run(
     with Bus.open(config.bus, team, name, stopped) as bus:
         for key in sorted({*time.keys, *(COMMAND.key(team, own) for own in plant.names)}):
             bus.subscribe(key)
-        estops = _estops(bus)
+        words = listen_to_words(bus)
         if plant.is_robot:
-            plant.listen(estops)
+            plant.listen(listen_to_estops(bus))
         pace = team_pace(bus, config, robot, is_robot=plant.is_robot)
         with interruptible(stopped):
             server = PlantServer(config, plant, bus, time, name)
-        server.faults = _faults(bus)
-        if not plant.is_robot:
-            server.estops = estops
+        server.faults, server.words = _faults(bus), words
         if not meet(bus, config, stopped):
             return
         end_collection()
@@ -109,21 +108,6 @@ def _start(server: PlantServer, pace: TeamPace | None, stopped: Callable[[], boo
     if pace is None:
         return start_together(bus, config, stopped, pause)
     return pace.start(pause or _pause, stopped)
-
-
-def _estops(bus: Bus) -> Callable[[], str]:
-    """A function that tells why the team's emergency stop was pressed; "" until it is."""
-    take = bus.collect(ESTOP.key(bus.team))
-
-    def reason() -> str:
-        for _, _, payload in take():
-            try:
-                return decode(payload, EStop).reason or ESTOP.name
-            except MessageError:
-                return "unreadable"  # somebody wanted to stop the team
-        return ""
-
-    return reason
 
 
 def _faults(bus: Bus) -> Callable[[], list[str]]:

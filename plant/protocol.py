@@ -74,8 +74,13 @@ class Plant(Protocol):
         cause = "no sensor or motor of a real robot is made faulty on purpose"
         raise ConfigError("fault", repr(fault), "a simulated world", cause)
 
-    def expect_down(self, names: Collection[str]) -> None:
-        """Hear which robots are led to the ground, since their commands are lost: no falls."""
+    def expect_down(self, lowered: Collection[str], stopped: Collection[str] = ()) -> None:
+        """Hear which robots go to the ground without a fall, until they are up again.
+
+        Args:
+            lowered: led there, since their commands are lost; they may not tip over.
+            stopped: damped by an emergency stop, from whatever they were doing.
+        """
         return
 
     def truth(self) -> Truth | None:

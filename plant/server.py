@@ -12,6 +12,7 @@ from quadriga.plant.late import damp_joints
 from quadriga.plant.lost import LostCommands
 from quadriga.plant.protocol import Plant
 from quadriga.plant.team_time import TeamTime
+from quadriga.plant.words import NO_WORDS, Words
 from quadriga.shared.bus.barrier import members
 from quadriga.shared.bus.lead_watch import LossWatch, find_lost_link
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
@@ -24,11 +25,14 @@ from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import encode, truncate_text
 from quadriga.shared.wire.event_line import format_event
-from quadriga.shared.wire.messages import Clock, Command, Event, Status
+from quadriga.shared.wire.messages import Clock, Command, Event, Reset, SafeStop, Status
 from quadriga.shared.wire.topics import CLOCK, EVENT, STATE, STATUS, TRUTH
 
 _TOLD_AFTER: Final = 5.0  # s; a process looks for a router that is gone at least every 4 s
 FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first simulated fall
+# World time in which a team that has been asked to stop slows down, comes to stand and settles.
+STOP_LINGER_MS: Final = 2000
+_ANSWER_MS: Final = 100  # least time between two answers to an emergency stop that is in force
 
 
 class PlantServer:
@@ -42,8 +46,8 @@ class PlantServer:
         name: of this process.
 
     Attributes:
-        estops: tells why the team's emergency stop was pressed; "" if it was not. For a robot,
-            which sees to it itself, nobody presses it.
+        words: gives what people have said since it was called last. A robot sees to an emergency
+            stop itself.
         faults: gives the faults that somebody has asked for since it was called last.
         commands: the newest command of every robot of the plant.
         silent: robots that are not waited for.
@@ -60,9 +64,13 @@ class PlantServer:
         self.silent: set[str] = set()
         self.late_ms: dict[str, int] = {}
         self._lost, self._lowered = LostCommands(config), frozenset[str]()
-        self.estops: Callable[[], str] = lambda: ""
+        self.words: Callable[[], Words] = lambda: NO_WORDS
         self.faults: Callable[[], Sequence[str]] = tuple
-        self._stopped = False
+        self._estopped = -1  # tick of the last answer to the emergency stop in force; −1: none is
+        self._stop = ""  # why somebody has asked the team to stop, and the walk to end
+        # What is said may come twice; a release may end no stop that was pressed meanwhile.
+        self._heard: SafeStop | None = None
+        self._released: Reset | None = None
         self._outage: tuple[float, float] | None = None  # when the link was back, and after what
         self._link = LossWatch(lambda: find_lost_link(bus, config), config, grace=0.0)
         self._put_state = {
@@ -158,6 +166,7 @@ class PlantServer:
     def step(self, commands: Mapping[str, Command]) -> End | None:
         """Advance the plant by one tick; why the walk ends, if it does."""
         self._report_invalid()
+        self._hear(self.words())
         for fault in self.faults():
             self._inject(fault)
         for event in self.plant.step(self._final_commands(commands)):
@@ -174,16 +183,40 @@ class PlantServer:
         fallen = [name for name in robot_names(self.config.team.robots) if name in self._fallen]
         if fallen:
             return End(codes.FALLEN, f"fall of {', '.join(fallen)}")
+        if self._stop:
+            return End(codes.STOPPED, self._stop)
         return End(codes.TIME_OVER, "end of world.seconds")
+
+    def _hear(self, words: Words) -> None:
+        """Obey what people have said; an emergency stop outranks its release."""
+        plant, tick = self.plant, self.plant.tick
+        robot = "" if self.time.alone else plant.names[0]
+        stop = words.stop
+        if stop is not None and stop != self._heard and self.time.drives:
+            self._heard = stop
+            end = "; the walk ends" if stop.ends else ""
+            self.announce(codes.STOP_ASKED, "", f"{stop.reason}{end}")
+            if stop.ends and not self._stop:
+                self._stop = stop.reason or codes.STOPPED
+                self._last_tick = min(self._last_tick, tick + STOP_LINGER_MS)
+        if plant.is_robot:
+            return
+        reset = words.reset
+        if reset is not None and reset != self._released:
+            self._released = reset
+            if self._estopped >= 0 and not words.estop:
+                self._estopped = -1
+                self.announce(codes.RESET, robot, f"by {reset.by}: robots may get up")
+                plant.expect_down(self._lowered)
+        if words.estop and (self._estopped < 0 or tick >= self._estopped + _ANSWER_MS):
+            self._estopped = tick
+            self.announce(codes.ESTOPPED, robot, f"{words.estop}: every joint is damped")
+            plant.expect_down(self._lowered, stopped=plant.names)
 
     def _final_commands(self, commands: Mapping[str, Command]) -> Mapping[str, Command]:
         """What the motors get: the commands, unless the team is stopped or some are lost."""
         plant = self.plant
-        if not self._stopped and (reason := self.estops()):
-            self._stopped = True
-            robot = "" if self.time.alone else plant.names[0]
-            self.announce(codes.ESTOPPED, robot, f"{reason}: every joint is damped")
-        if self._stopped:
+        if self._estopped >= 0:
             return {name: damp_joints(plant.tick) for name in plant.names}
         filled = self._lost.fill(plant.tick, plant.names, commands, plant.states)
         if self._lost.lowered != self._lowered:

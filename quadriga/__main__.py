@@ -29,6 +29,11 @@ def run() -> int:
 
     if sys.argv[1:2] == [_STOP]:  # what it imports must not wait for those that it stops
         go_first()
+        from quadriga.drive.quick_stop import stop_quickly
+
+        status = stop_quickly(sys.argv[2:])
+        if status is not None:
+            return status
 
     try:
         from quadriga.commands.parser import main as command_line

@@ -26,16 +26,7 @@ from quadriga.shared.members import OPERATOR, PLANNER, SIM
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import (
-    EStop,
-    Event,
-    Message,
-    Plan,
-    Reference,
-    Resume,
-    State,
-    Truth,
-)
+from quadriga.shared.wire.messages import EStop, Event, Message, Plan, Reference, State, Truth
 from quadriga.shared.wire.tick_gate import TickGate
 from quadriga.shared.wire.topics import (
     ESTOP,
@@ -43,11 +34,14 @@ from quadriga.shared.wire.topics import (
     MEASUREMENT,
     PLAN,
     REFERENCE,
+    RESET,
     RESUME,
     SAMPLE_MS,
     STATE,
     STATUS,
+    STOP,
     TRUTH,
+    WORDS,
     Topic,
 )
 
@@ -91,9 +85,8 @@ class Inbox:
         self.topics: dict[str, tuple[Topic, str]] = {
             STATE.key(team, robot): (STATE, robot),
             REFERENCE.key(team): (REFERENCE, OPERATOR),
-            ESTOP.key(team): (ESTOP, ""),
-            RESUME.key(team): (RESUME, ""),
             EVENT.key(team): (EVENT, SIM),
+            **{word.key(team): (word, "") for word in WORDS},
         }
         if config.estimator.kind == "truth":
             self.topics[TRUTH.key(team)] = (TRUTH, SIM)
@@ -121,8 +114,8 @@ class Inbox:
         self._measurable = measured_limits(config.robot)
         self._state: State | None = None
         self._sample_end: State | None = None  # older than `_state`
-        self._estop: EStop | None = None
-        self._resume: Resume | None = None
+        self._words: dict[Topic, Any] = {}  # the last of each
+        self._released: Message | None = None
         self._events: list[Event] = []
 
     @property
@@ -141,7 +134,7 @@ class Inbox:
         if message is None or not _is_believable(message, self._robot, self._measurable):
             self.counters[f"dropped_{topic.name}"] += 1
             return
-        if topic not in (STATE, ESTOP, EVENT, RESUME) and self._is_ahead(message):
+        if topic not in (STATE, EVENT, *WORDS) and self._is_ahead(message):
             self.counters[f"ahead_{topic.name}"] += 1
             self.refused = True
             return
@@ -159,10 +152,12 @@ class Inbox:
     def _keep(self, topic: Topic, sender: str, message: Message) -> None:
         if isinstance(message, State):
             self._keep_newest(message)
-        elif isinstance(message, EStop):
-            self._estop = message
-        elif isinstance(message, Resume):
-            self._resume = message
+        elif topic in WORDS:
+            # What is said may come twice; a release may end no stop that was pressed meanwhile.
+            if topic is not RESET or message != self._released:
+                self._words[topic] = message
+            if topic is RESET:
+                self._released = message
         elif isinstance(message, Event):
             self.ended = self.ended or message.kind == "stop"
             if concerns_robot(message) and len(self._events) < _HELD:
@@ -232,25 +227,25 @@ class Inbox:
 
     def pop_inputs(self, state: State, expected: Expected) -> Inputs:
         """All that is due at the step of `state`, sorted by robot, then tick; it is removed."""
-        words = self._estop is not None or self._resume is not None or self._events
-        if self._lockstep and expected is NOTHING and not words:
+        if self._lockstep and expected is NOTHING and not (self._words or self._events):
             return Inputs(state)
         plans = self._pop_due(PLAN, expected.plan)
         measurements = self._pop_due(MEASUREMENT, _tick(expected.measurement_tick))
         references = self._pop_due(REFERENCE, _tick(expected.reference_tick))
         truths = self._pop_due(TRUTH, _tick(state.tick if expected.truth else None))
         statuses = self._pop_due(STATUS, None)
-        estop, self._estop = self._estop, None
-        resume, self._resume = self._resume, None
+        words, self._words = self._words, {}
         events, self._events = self._events, []
         return Inputs(
             state,
             tuple(measurements),
             tuple(plans),
             tuple(self._slew.limit(reference) for _, reference in references),
-            estop,
+            words.get(ESTOP),
             truths[-1][1] if truths else None,
-            resume=resume,
+            stop=words.get(STOP),
+            reset=words.get(RESET),
+            resume=words.get(RESUME),
             statuses=tuple(statuses),
             events=tuple(events),
         )

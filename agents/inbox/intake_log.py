@@ -12,18 +12,18 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, SIM
 from quadriga.shared.wire.messages import Consumed, Message
 from quadriga.shared.wire.topics import (
-    ESTOP,
     EVENT,
     MEASUREMENT,
     PLAN,
     REFERENCE,
     REFERENCE_EPOCH_MS,
-    RESUME,
     STATUS,
     TRUTH,
+    WORDS,
 )
 
-ANYONE: Final = "anyone"  # who sent an emergency stop, or the word to go on
+ANYONE: Final = "anyone"  # who stopped the team, released a stop or had it go on
+_UNRULED: Final = frozenset((EVENT.name, *(word.name for word in WORDS)))
 _FIRST: Final = (-1, 0)
 
 
@@ -89,12 +89,12 @@ class Intake:
 def has_rule(source: Source, order: Order) -> bool:
     """Whether the rules of lock-step speak of such a message.
 
-    They know nothing of an emergency stop, of the word to go on, of what the plant says of robots,
-    nor of a second operator's words between those of the first.
+    They know nothing of what people say, of what the plant says of robots, nor of a second
+    operator's references between those of the first.
     """
     if source[0] == REFERENCE.name:
         return order[0] % REFERENCE_EPOCH_MS == 0
-    return source[0] not in (ESTOP.name, RESUME.name, EVENT.name)
+    return source[0] not in _UNRULED
 
 
 def list_messages(inputs: Inputs) -> list[tuple[Source, Order]]:
@@ -106,13 +106,12 @@ def list_messages(inputs: Inputs) -> list[tuple[Source, Order]]:
         *((STATUS.name, name, status) for name, status in inputs.statuses),
         *((EVENT.name, SIM, event) for event in inputs.events),
     ]
-    if inputs.estop is not None:
-        messages.append((ESTOP.name, ANYONE, inputs.estop))
-    if inputs.resume is not None:
-        messages.append((RESUME.name, ANYONE, inputs.resume))
+    for topic, word in zip(WORDS, inputs.words, strict=True):
+        if word is not None:
+            messages.append((topic.name, ANYONE, word))
     if inputs.truth is not None:
         messages.append((TRUTH.name, SIM, inputs.truth))
-    return [((topic, sender), order_of(message)) for topic, sender, message in messages]
+    return [((name, sender), order_of(message)) for name, sender, message in messages]
 
 
 def format_message_id(source: Source, order: Order) -> str:

@@ -18,6 +18,7 @@ from quadriga.commands import (
     config,
     desk,
     doctor,
+    drive,
     echo,
     estop,
     experiments,
@@ -35,11 +36,13 @@ from quadriga.commands import (
     recover,
     replay,
     report,
+    reset,
     resim,
     resume,
     router,
     scenarios,
     sim,
+    stop,
     tune,
     version,
     walk,
@@ -61,7 +64,7 @@ _COMMANDS: Final = (
     record.add, report.add, play.add, resim.add, whatif.add, export.add, info.add, recover.add,
     check.add, echo.add, hz.add, replay.add, router.add, certs.add, doctor.add, prepare.add,
     operate.add, collect.add, fit.add, probe.add, campaign.add, experiments.add, tune.add,
-    estop.add, resume.add, config.add, version.add,
+    drive.add, estop.add, stop.add, reset.add, resume.add, config.add, version.add,
 )  # fmt: skip
 
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, Final
 
 from quadriga.commands.command import AddCommand, Given
 from quadriga.commands.options import add_no_render
+from quadriga.shared.config.reference import BY_HAND
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ConfigError
+
+_DRIVEN_SECONDS: Final = 3600.0
 
 
 def add(add_command: AddCommand) -> None:
@@ -19,6 +23,12 @@ def add(add_command: AddCommand) -> None:
         "--armed",
         action="store_true",
         help="bridges command their robots (team.plant 'robots'); without, nothing is ever sent",
+    )
+    command.add_argument(
+        "--drive",
+        action="store_true",
+        help="by hand, from a page whose URL is printed, or by `quadriga drive`: in real time and "
+        "for an hour, unless said otherwise",
     )
     add_no_render(command)
 
@@ -35,6 +45,8 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     # Several walks on one machine are the rule; only who names an endpoint wants that one.
     if config.bus.mode == "peer" and "endpoint" not in given.get("bus", {}):
         config = replace(config, bus=replace(config.bus, endpoint=free_endpoint()))
+    if arguments.drive:
+        config = _driven(config, given)
     if arguments.armed and config.team.plant != BRIDGED:
         plant = config.team.plant
         raise ConfigError("--armed", f"with team.plant {plant!r}", f"team.plant {BRIDGED!r}")
@@ -44,4 +56,17 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
         pictures=not arguments.no_render,
         console=Console(),
         armed=arguments.armed,
+    )
+
+
+def _driven(config: Config, given: Given) -> Config:
+    """The configuration of a team that is driven by hand."""
+    world = {"mode": "realtime", "seconds": _DRIVEN_SECONDS}
+    changes: dict[str, Any] = {
+        name: value for name, value in world.items() if name not in given.get("world", {})
+    }
+    return replace(
+        config,
+        world=replace(config.world, **changes),
+        reference=replace(config.reference, driver=BY_HAND),
     )

@@ -86,7 +86,7 @@ def build_layout(
         if shape is None:
             if of is dict:
                 maps.append((item.name, entries.get(item.name, ())))
-            elif of in (int, float, str) and item.name not in ("tick", "stamp_ns"):
+            elif of in (bool, int, float, str) and item.name not in ("tick", "stamp_ns"):
                 plain.append((item.name, of))
         elif not item.metadata["entries"]:
             lists.append(item.name)

@@ -14,7 +14,7 @@ from quadriga.export.columns import Columns, TickReached, build_columns, list_ro
 from quadriga.export.source import ExportedMessage, Source
 
 _BATCH: Final = 10_000  # rows that are kept in memory
-_TYPES: Final = {int: pa.int64(), float: pa.float64(), str: pa.string()}
+_TYPES: Final = {bool: pa.bool_(), int: pa.int64(), float: pa.float64(), str: pa.string()}
 
 
 def write_parquet(source: Source, out: Path, on_tick: TickReached) -> tuple[Path, ...]:

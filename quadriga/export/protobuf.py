@@ -17,6 +17,7 @@ _PACKAGE: Final = "quadriga"
 _SAMPLES: Final = "samples"
 _Field: Final = descriptor_pb2.FieldDescriptorProto
 _TYPES: Final[Mapping[type, int]] = {
+    bool: _Field.TYPE_BOOL,
     int: _Field.TYPE_INT64,
     float: _Field.TYPE_DOUBLE,
     str: _Field.TYPE_STRING,

@@ -10,7 +10,7 @@ from typing import Final
 from rich.console import Console
 from rich.progress import TaskID
 
-from quadriga.playback.keyboard import PAUSE, QUIT, STEP, Keyboard
+from quadriga.keyboard import Keyboard
 from quadriga.playback.timeline import Timeline
 from quadriga.playback.transport import Transport
 from quadriga.progress import build_progress
@@ -23,6 +23,8 @@ from quadriga.shared.runtime.clock import monotonic, sleep
 PLAYER: Final = "player"
 _SETTLE: Final = 0.6  # s, for listeners that try again to connect, and to see who is there
 _LOOK: Final = 0.1  # s, between looks at keys, status line and presence while messages flow
+_PAUSE, _STEP, _QUIT = "pause", "step", "quit"
+_KEYS: Final = {b"\x1b[C": _STEP, b"\x1bOC": _STEP, b" ": _PAUSE, b"q": _QUIT, b"Q": _QUIT}
 _SLACK: Final = 0.2  # s of delay that is made up for; a longer one is left behind
 _MEMBER: Final = re.compile(rf"(plant_)?r\d+|{SIM}|{OPERATOR}|{PLANNER}|{PLAYER}")
 
@@ -61,7 +63,7 @@ def play(
             f"at most {timeline.last / 1000:g} s",
             "the recording ends there",
         )
-    with Bus.join(bus, timeline.team, PLAYER) as joined, Keyboard() as keys:
+    with Bus.join(bus, timeline.team, PLAYER) as joined, Keyboard(_KEYS) as keys:
         sleep(_SETTLE)
         _refuse_live(joined, bus.endpoint)
         joined.declare(HERE)  # only now: a player that came before must not be the one to leave
@@ -140,11 +142,11 @@ class _Player:
                 self._transport.fall_behind(at, _SLACK, now)
             key = self._keys.get(min(left, _LOOK))
             now = monotonic()
-            if key == QUIT:
+            if key == _QUIT:
                 return False
-            if key == PAUSE:
+            if key == _PAUSE:
                 self._transport.toggle(now)
-            elif key == STEP:
+            elif key == _STEP:
                 self._transport.step(self._timeline.step, now)
 
 

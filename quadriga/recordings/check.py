@@ -9,6 +9,7 @@ from quadriga.recordings.checks.continuation import Continuation
 from quadriga.recordings.checks.delay import Delay
 from quadriga.recordings.checks.ending import Ending
 from quadriga.recordings.checks.finding import Check, CheckedMessage, Finding
+from quadriga.recordings.checks.getting_up import GettingUp
 from quadriga.recordings.checks.limits import Friction, Torques
 from quadriga.recordings.checks.sequence import Ages, Gaps, Order
 from quadriga.recordings.metadata import CONTINUES, read_counts
@@ -37,19 +38,21 @@ def check(path: Path) -> list[Finding]:
     config = recorded_config(source)
     filtered = "topics" in source.metadata or "exclude" in source.metadata
     schema = Finding("schema", "messages")
+    getting_up = GettingUp()
     checks: tuple[Check, ...] = (
         Order(config),
-        Gaps(config, filtered=filtered),
+        Gaps(config, getting_up, filtered=filtered),
         Delay(config, whole=error is None),
         Friction(config),
-        Torques(config),
-        Ages(config),
+        Torques(config, getting_up),
+        Ages(config, getting_up),
         Ending(source.notes),
     )
     if before := source.metadata.get(CONTINUES, ""):
         checks = (*checks, Continuation(path, before))
     times = Finding("log times", "messages")
     for item in _decode_valid(source.entries(), schema, times):
+        getting_up.look(item)
         for each in checks:
             each.look(item)
     for each in checks:

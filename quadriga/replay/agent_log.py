@@ -23,9 +23,9 @@ from quadriga.shared.wire.topics import (
     INPUTS,
     MEASUREMENT,
     PLAN,
-    RESUME,
     SAMPLE_MS,
     STATE,
+    WORDS,
     Topic,
 )
 
@@ -113,7 +113,7 @@ def _build_handlers(
     handlers: dict[str, Callable[[ChunkEntry], None]] = {}
     for key, (topic, sender) in inbox.topics.items():
         if topic is not STATE:
-            sent_by = ANYONE if topic in (ESTOP, RESUME) else sender
+            sent_by = ANYONE if topic in WORDS else sender
             handlers[key] = _keep_received(log, topic, sent_by)
     handlers[STATE.key(team, robot)] = _keep_states(log, config)
     handlers[COMMAND.key(team, robot)] = keep_command

@@ -13,9 +13,10 @@ from quadriga.agents.planning.interface import NOTHING
 from quadriga.replay.agent_log import AgentLog, Packet
 from quadriga.shared.config.sections import Config
 from quadriga.shared.wire.messages import Consumed, State
-from quadriga.shared.wire.topics import INPUTS, MEASUREMENT, SAMPLE_MS, STATE
+from quadriga.shared.wire.topics import INPUTS, MEASUREMENT, SAMPLE_MS, STATE, WORDS
 
 _BEFORE: Final = (-1, 0)
+_WORDS: Final = frozenset(word.name for word in WORDS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,20 +96,26 @@ class RecordedInputs:
         """Hand over what a record lists; names of what of it is not there."""
         missing = []
         for text in record.taken:
-            packets = self._find_packets(text)
-            if packets:
-                self._inbox.take(*packets.pop(0))
-            else:
+            packet = self._find_packet(text)
+            if packet is None:
                 missing.append(text)
+            else:
+                self._inbox.take(*packet)
         return missing
 
-    def _find_packets(self, text: str) -> list[Packet]:
-        """The recorded packets that a record refers to, without those already handed over."""
+    def _find_packet(self, text: str) -> Packet | None:
+        """The next recorded packet that a record refers to.
+
+        What people say they may say twice, the same to the byte, and the recorder hear once.
+        """
         reference = parse_message_id(text)
         if reference is None:
-            return []
+            return None
         source, order = reference
-        return self._log.received.get(source, {}).get(order, [])
+        packets = self._log.received.get(source, {}).get(order, [])
+        if packets and not (len(packets) == 1 and source[0] in _WORDS):
+            return packets.pop(0)
+        return packets[0] if packets else None
 
     def _pass_over(self, wanted: list[Due]) -> None:
         """Drop what a step with a record awaited and did not get: the agent never got it later."""

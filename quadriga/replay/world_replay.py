@@ -46,7 +46,8 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
     """Recompute the world tick by tick; the last value is the outcome.
 
     A robot that the world had given up on at a tick, by the recorded events, is silent at
-    that tick again, even if its late command was recorded. An emergency stop damps all again.
+    that tick again, even if its late command was recorded. An emergency stop damps all again,
+    until it is released.
 
     Raises:
         RecordingError: not of a lock-step world, or with commands missing from the file.
@@ -138,7 +139,7 @@ class _Heard:
 
     Attributes:
         silent: robots that it does not wait for.
-        estop: whether the emergency stop has been pressed.
+        estop: whether an emergency stop is in force.
         faults: that somebody has asked for, as in `world.faults`.
     """
 
@@ -158,7 +159,8 @@ class _Heard:
                 self.silent.discard(event.robot)
             elif event.code in (codes.SILENT, codes.GONE):
                 self.silent.add(event.robot)
-            self.estop = self.estop or event.code == codes.ESTOPPED
+            if event.code in (codes.ESTOPPED, codes.RESET):
+                self.estop = event.code == codes.ESTOPPED
             if event.code == codes.FAULT_ASKED:
                 self.faults.append(event.detail)
 

@@ -7,21 +7,18 @@ import select
 from collections.abc import Callable
 from typing import Final, Self
 
+from quadriga.drive.stop_proof import unconfirmed
 from quadriga.shared import members
-from quadriga.shared.bus.barrier import processes
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import BusError
-from quadriga.shared.members import AGENT, SIM
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.codec import encode, truncate_text
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import truncate_text
 from quadriga.shared.wire.messages import EStop
-from quadriga.shared.wire.topics import ESTOP, topics_for
+from quadriga.shared.wire.topics import ESTOP
+from quadriga.team.talk import SEARCH, TeamTalk
 
-_SEARCH: Final = 5.0  # s, longest search for the team
 _LOOK: Final = 0.005  # s, between two looks at who is there
 _ARMED_LOOK: Final = 0.05  # s, likewise, of a process that waits; a key interrupts it
+_PATIENCE: Final = 0.5  # s, in which all that hear it must have stopped
 _LONGEST_REASON: Final = 200  # characters; it becomes part of every agent's status
 _LINE: Final = 4096  # bytes that are read at once from the keyboard
 
@@ -44,63 +41,83 @@ class EmergencyStop:
     """
 
     def __init__(self, config: Config) -> None:
-        rows = processes(config)
-        self.wanted = frozenset(row.name for row in rows if row.role.name in (AGENT, SIM))
-        self._bus = Bus.open(config.bus, config.team.name, members.ESTOP)
-        self._put = self._bus.publisher(ESTOP.key(config.team.name), urgent=True)
-        for topic in topics_for(members.ESTOP):
-            self._bus.subscribe(topic.key(config.team.name))
-        self._time = 0, 0  # tick and stamp of the team's clock, as last heard
+        self._talk = TeamTalk(config, members.ESTOP)
+        self._plant_each = config.team.plants == "each"
+        self._say = self._talk.publisher(ESTOP)
+        self.wanted = self._talk.wanted
 
     def look(self, timeout: float = 0.0) -> frozenset[str]:
         """Which agents and plants hear this process now, after up to `timeout` seconds."""
-        first = self._bus.get(timeout)
-        for packet in (first, *self._bus.drain()) if first else ():
-            self._time = envelope(packet[1]) or self._time
-        return self.wanted & self._bus.members_at(HERE)
+        return self._talk.look(timeout)
 
     def press(self, reason: str) -> None:
         """Stop the team: whoever hears it damps every joint."""
-        self._put(encode(EStop(*self._time, truncate_text(reason, _LONGEST_REASON))))
+        self._say(EStop(*self._talk.time, truncate_text(reason, _LONGEST_REASON)))
 
-    def press_until_all_heard(self, reason: str) -> None:
+    def press_until_all_heard(self, reason: str) -> str:
         """Stop the team, and again whenever somebody turns up who had been absent.
 
+        Returns:
+            What came of it, in a line.
+
         Raises:
-            BusError: some were not there within 5 s; the others have heard it at once.
+            BusError: some were not there within 5 s, while the others have heard it at once; or
+                they were, and have not stopped within 0.5 s.
         """
-        reached, deadline = frozenset[str](), monotonic() + _SEARCH
-        while reached < self.wanted and monotonic() < deadline:
+        self._talk.statuses.clear()
+        self._talk.events.clear()
+        reached, begun = frozenset[str](), monotonic()
+        pressed = begun
+        while reached < self.wanted and monotonic() < begun + SEARCH:
             there = self.look(_LOOK)
-            if there - reached:  # at once, whoever is still absent: to hear it twice is no harm
+            if there and not reached:  # at once, whoever is still absent: they hear it later
+                pressed = monotonic()
                 self.press(reason)
-                reached |= there
+            reached |= there
         absent = sorted(self.wanted - reached)
         if absent:
             self.press(reason)  # for one who is there but does not say so
             others = ", ".join(sorted(reached)) or "nobody"
-            raise BusError(
-                f"emergency stop of team {self._bus.team!r}",
-                f"no {', '.join(absent)} on the bus after {_SEARCH:g} s",
+            raise self._talk.error(
+                "emergency stop",
+                f"no {', '.join(absent)} on the bus after {SEARCH:g} s",
                 f"all of {', '.join(sorted(self.wanted))}",
                 f"{others} heard it at once; another bus.endpoint, team.name or team.robots?",
             )
+        if not self._talk.follow(lambda: not self._unconfirmed(), _PATIENCE):
+            described = self._talk.describe().replace("\n", ", ")
+            raise self._talk.error(
+                "emergency stop",
+                f"no word of {', '.join(self._unconfirmed())} after {_PATIENCE:g} s; {described}",
+                "all stopped",
+                "all of them have got the message: cut the power of a robot that moves",
+            )
+        return (
+            f"stopped {', '.join(self._talk.agents)} within {1e3 * (monotonic() - pressed):.0f} ms:"
+            " every joint is damped, until `quadriga reset`"
+        )
+
+    def _unconfirmed(self) -> list[str]:
+        """Who has not said yet that it has stopped."""
+        talk = self._talk
+        return unconfirmed(talk.agents, talk.statuses, talk.events, plant_each=self._plant_each)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._bus.close()
+        self._talk.bus.close()
 
 
-def stop_team(config: Config, reason: str) -> None:
-    """Send one emergency stop to every robot of the team.
+def stop_team(config: Config, reason: str) -> str:
+    """Send one emergency stop to every robot of the team; what came of it, in a line.
 
     Raises:
-        BusError: the bus cannot be opened, or some agents or plants were not reached.
+        BusError: the bus cannot be opened, some agents or plants were not reached, or they have
+            not stopped.
     """
     with EmergencyStop(config) as stop:
-        stop.press_until_all_heard(reason)
+        return stop.press_until_all_heard(reason)
 
 
 def wait_and_stop(config: Config, reason: str, keyboard: int, say: Say) -> bool:
@@ -116,7 +133,8 @@ def wait_and_stop(config: Config, reason: str, keyboard: int, say: Say) -> bool:
         Whether the team was stopped; False: the keyboard is gone.
 
     Raises:
-        BusError: the bus cannot be opened, or some agents or plants were not reached.
+        BusError: the bus cannot be opened, some agents or plants were not reached, or they have
+            not stopped.
     """
     with EmergencyStop(config) as stop:
         known: frozenset[str] | None = None
@@ -127,8 +145,7 @@ def wait_and_stop(config: Config, reason: str, keyboard: int, say: Say) -> bool:
                 say(_describe(there, stop.wanted))
         if not os.read(keyboard, _LINE):
             return False
-        stop.press_until_all_heard(reason)
-    say(f"stopped: {', '.join(sorted(stop.wanted))}")
+        say(stop.press_until_all_heard(reason))
     return True
 
 

@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 from typing import Final
 
+from quadriga.drive.client import socket_path
+from quadriga.drive.controls import Controls
+from quadriga.drive.server import DriveServer
 from quadriga.shared import members
 from quadriga.shared.bus.barrier import REJOINS, join
 from quadriga.shared.bus.lead_watch import LeadWatch
 from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
+from quadriga.shared.config.reference import BY_HAND
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
+from quadriga.shared.runtime.places import make_runtime_dir
 from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Clock, Event, Reference
 from quadriga.shared.wire.tick_gate import TickGate
-from quadriga.shared.wire.topics import CLOCK, REFERENCE, topics_for
+from quadriga.shared.wire.topics import CLOCK, EVENT, REFERENCE
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
+from quadriga.team.driven import LOOK, DrivenReferences
 
 _AHEAD: Final = 4  # epochs; agents in lock-step wait for the one in force
+_DRIVEN_AHEAD: Final = 1  # likewise, of who is driven by hand in real time: not to be felt
 # Of the clock's tick against the newest; a longer jump must be confirmed. References of such a lead
 # are still believed: see `agents.planning.operator_references.AHEAD_MS`.
 _GAP_MS: Final = 500
@@ -69,50 +79,78 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
     stopped = stopped or stop_on_signals()
     team = config.team.name
     with Bus.open(config.bus, team, members.OPERATOR, stopped) as bus:
-        for topic in topics_for(members.OPERATOR):
+        for topic in (CLOCK, EVENT):
             bus.subscribe(topic.key(team))
-        joined = join(bus, config, stopped)
-        if not joined:
-            return
-        # Without a reference the robots stop.
-        take_priority(config.runtime.priority)
-        try:
-            _operate(config, bus, stopped, late=joined == REJOINS)
-        finally:
-            leave_priority()
+        controls = Controls(config, bus, drivable=config.reference.driver == BY_HAND)
+        port = config.reference.page_port if controls.drivable else None
+        with DriveServer(controls, port, _socket_path(team)) as server:
+            if server.url:
+                print(f"drive from {server.url}", flush=True)
+            joined = join(bus, config, stopped)
+            if not joined:
+                return
+            # Without a reference the robots stop.
+            take_priority(config.runtime.priority)
+            try:
+                _Operator(config, bus, controls).operate(stopped, late=joined == REJOINS)
+            finally:
+                leave_priority()
 
 
-def _operate(config: Config, bus: Bus, stopped: Callable[[], bool], *, late: bool) -> None:
-    """Publish the reference of each epoch that the team's time comes near to.
-
-    Who is `late` first waits for the time, and begins with the epoch that is in force.
-    """
-    # In lock-step none may be lost. In real time one that stands still and hears nothing any more,
-    # as a frozen recorder, would hold up the router, and so everybody else.
-    realtime = config.world.mode == "realtime"
-    put = bus.publisher(REFERENCE.key(bus.team), droppable=realtime)
-    watch = LeadWatch(bus, config)
-    time = TeamTicks(bus, round(1000 * config.world.seconds))
-    while late and not (stopped() or time.over or time.known):
-        _follow(time, watch)
-    epoch = time.tick // EPOCH_MS
-    while not stopped():
-        if EPOCH_MS * epoch <= time.tick + EPOCH_MS * _AHEAD:
-            put(encode(reference_at(config, EPOCH_MS * epoch)))
-            epoch += 1
-            continue
-        if time.over:
-            return
-        bus.declare(READY)
-        _follow(time, watch)
+def _socket_path(team: str) -> Path | None:
+    """Where programs of this user reach this operator; None if there is no place for it."""
+    folder = make_runtime_dir()
+    return None if folder is None else socket_path(folder, team, os.getpid())
 
 
-def _follow(time: TeamTicks, watch: LeadWatch) -> None:
-    """Take in the team's time; see who is gone where there is none."""
-    if time.follow():
-        watch.hear()
-    else:
-        watch.look(time.tick)
+class _Operator:
+    """Sends references, and what drivers say."""
+
+    def __init__(self, config: Config, bus: Bus, controls: Controls) -> None:
+        # In lock-step none may be lost. In real time one that stands still and hears nothing any
+        # more, as a frozen recorder, would hold up the router, and so everybody else.
+        realtime = config.world.mode == "realtime"
+        self._put = bus.publisher(REFERENCE.key(bus.team), droppable=realtime)
+        self._bus, self._watch = bus, LeadWatch(bus, config)
+        self._time = TeamTicks(bus, round(1000 * config.world.seconds))
+        controls.time = lambda: (self._time.tick, 1_000_000 * self._time.tick)
+        self._controls = controls
+        self._driven = DrivenReferences(config, controls) if controls.drivable else None
+        self._at: Callable[[int], Reference] = partial(reference_at, config)
+        self._ahead, self._look = _AHEAD, POLL
+        if self._driven is not None:
+            self._at, self._look = self._driven.at, LOOK
+            self._ahead = _DRIVEN_AHEAD if realtime else _AHEAD
+
+    def operate(self, stopped: Callable[[], bool], *, late: bool) -> None:
+        """Publish the reference of each epoch that the team's time comes near to.
+
+        Who is `late` first waits for the time, and begins with the epoch that is in force.
+        """
+        time = self._time
+        while late and not (stopped() or time.over or time.known):
+            self._follow()
+        epoch = time.tick // EPOCH_MS
+        while not stopped():
+            if EPOCH_MS * epoch <= time.tick + EPOCH_MS * self._ahead:
+                self._put(encode(self._at(EPOCH_MS * epoch)))
+                epoch += 1
+                continue
+            if time.over:
+                return
+            self._bus.declare(READY)
+            self._follow()
+            if self._driven is not None:
+                self._driven.attend()
+            else:
+                self._controls.statuses()  # what nobody asks for must not be kept for ever
+
+    def _follow(self) -> None:
+        """Take in the team's time; see who is gone where there is none."""
+        if self._time.follow(self._look):
+            self._watch.hear()
+        else:
+            self._watch.look(self._time.tick)
 
 
 class TeamTicks:
@@ -144,13 +182,13 @@ class TeamTicks:
         """As far as time has come."""
         return max(self._gate.newest, 0)
 
-    def follow(self) -> bool:
-        """Take in what has come; False if for a while nothing has.
+    def follow(self, patience: float = POLL) -> bool:
+        """Take in what has come; False if for `patience` seconds nothing has.
 
         A walk ends at the same tick for an operator who is behind: equal walks have equal
         references.
         """
-        packet = self._bus.get(POLL)
+        packet = self._bus.get(patience)
         if packet is None:
             return False
         for key, payload in (packet, *self._bus.drain()):

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from rich.console import Console
 
+from quadriga.agents.modes import is_commanded
 from quadriga.pictures.render import render
 from quadriga.recordings.summary import RECORDING, summarise
 from quadriga.recordings.summary_table import print_summary
@@ -80,8 +81,9 @@ def report_file(path: Path, page: Path | None, *, console: Console) -> dict[str,
 
 
 def has_failed(summary: dict[str, Any]) -> bool:
-    """Whether a robot of the summary fell, or stopped for a reason of its own before the end."""
-    return bool(summary["fell"] or summary["stop_reasons"])
+    """Whether a robot of the summary fell, or stopped before the end though nobody said so."""
+    reasons = summary["stop_reasons"].values()
+    return bool(summary["fell"]) or not all(map(is_commanded, reasons))
 
 
 def _check_end(summary: dict[str, Any]) -> None:

@@ -11,10 +11,12 @@ from rich.console import Console
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.members import OPERATOR
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.runtime.signals import stop_flag
 from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
+from quadriga.team.drive_page import DrivePage
 from quadriga.team.launch import Launch, ProcessSpec, process_table
 from quadriga.team.plants import check_plant
 from quadriga.team.progress import WalkProgress
@@ -100,8 +102,10 @@ def watch_walk(
         ProcessError: a process failed or left too early.
     """
     with Launch(rows, run_dir / "logs") as launch, WalkProgress(config, console) as progress:
+        page = DrivePage(config, launch.pids.get(OPERATOR, 0), console)
 
         def update() -> bool:
+            page.tell_once()
             progress.update()
             return stopped()
 

@@ -39,6 +39,8 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "world.faults": "",
         "world.live_faults": False,
         "world.lost_command": "damp",
+        "reference.driver": "configured",
+        "reference.page_port": 0,
         "motors.preset": "ideal",
         "motors.torque_speed": False,
         "motors.friction": 0.0,

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from quadriga.shared.config.key import key
+
+CONFIGURED: Final = "configured"
+BY_HAND: Final = "hand"
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +26,20 @@ class ReferenceConfig:
         "CSV with columns t [s], vx, vy, wz that replaces these three, repeated as long as the "
         "walk lasts: a path with a '/', whose lines are read at once and stored here, separated "
         "by ';'; or the name of a file beside the scenarios",
+    )
+    driver: str = key(
+        CONFIGURED,
+        "-",
+        "who asks: configured: these keys; hand: whoever takes the controls, and until then the "
+        "team stands, see docs/driving.md",
+        choices=(CONFIGURED, BY_HAND),
+    )
+    page_port: int = key(
+        0,
+        "-",
+        "hand: port on the loopback of the page to drive from; 0: any that is free",
+        low=0,
+        high=65535,
     )
     trace_shift: float = key(
         0.0,

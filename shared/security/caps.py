@@ -41,7 +41,7 @@ _ANSWER: Final = 256  # bytes of a question whether all has arrived, and of the 
 
 def largest(kind: type[Message]) -> int:
     """Bytes that a message of a type takes at most."""
-    sizes = {int: _NUMBER, float: _NUMBER, str: _TEXT, list: _LISTED, dict: _LISTED}
+    sizes = {bool: 1, int: _NUMBER, float: _NUMBER, str: _TEXT, list: _LISTED, dict: _LISTED}
     total = _FRAME
     for item in fields(kind):
         meta = item.metadata

@@ -21,9 +21,11 @@ from quadriga.shared.members import (
     LAUNCHER,
     OBSERVER,
     PROBE,
+    RESET,
     RESUME,
     ROLES,
     ROUTER,
+    STOP,
     team_members,
 )
 from quadriga.shared.robot.conventions import robot_names
@@ -32,7 +34,7 @@ from quadriga.shared.wire.topics import TABLE
 REVOKED: Final = "revoked.json"  # in the router's folder: by identity the last number revoked
 # Certificates of one identity that are valid at a time; more are given only after a revocation.
 MOST_VALID: Final = 32
-_OTHERS: Final = (LAUNCHER, ESTOP, RESUME, DOCTOR, OBSERVER, PROBE, ROUTER)
+_OTHERS: Final = (LAUNCHER, ESTOP, STOP, RESET, RESUME, DOCTOR, OBSERVER, PROBE, ROUTER)
 _LOOKS_ON: Final = re.compile(r".+-\d+")  # such as echo-4711
 
 

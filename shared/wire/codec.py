@@ -195,6 +195,11 @@ def _checker(kind: type[Message], name: str, of: type, annotation: Any) -> Calla
             raise wrong(value, f"text of at most {MAX_TEXT} characters")
         return value
 
+    def truth(value: Any) -> bool:
+        if type(value) is not bool:
+            raise wrong(value, "true or false")
+        return value
+
     def names(value: Any) -> tuple[str, ...]:
         if not isinstance(value, list):
             raise wrong(value, "a list of text")
@@ -206,7 +211,15 @@ def _checker(kind: type[Message], name: str, of: type, annotation: Any) -> Calla
         each = integer if "int" in str(annotation) else number
         return {text(key): each(item) for key, item in value.items()}
 
-    return {int: integer, float: number, str: text, list: names, dict: mapping}[of]
+    checks: dict[type, Callable[[Any], Any]] = {
+        bool: truth,
+        int: integer,
+        float: number,
+        str: text,
+        list: names,
+        dict: mapping,
+    }
+    return checks[of]
 
 
 def _describe(value: Any) -> str:

@@ -36,13 +36,18 @@ MALFORMED: Final = "malformed"
 TIME_OVER: Final = "time-over"
 FALLEN: Final = "fallen"
 SIGNAL: Final = "signal"
+STOPPED: Final = "stopped"
 PLANT_GONE: Final = "plant-gone"
 PLANT_FAILED: Final = "plant-failed"
 LINK_LOST: Final = "link-lost"
 LEAD_GONE: Final = "lead-gone"
 ESTOPPED: Final = "estop"
+LIES: Final = "lies"
+STOP_ASKED: Final = "stop-asked"
+RESET: Final = "reset"
 LOWERED: Final = "lowered"
 INPUT_LOST: Final = "input-lost"
+HALTS: Final = "halts"
 RESUMED: Final = "resumed"
 RISES: Final = "rises"
 STANDS_AGAIN: Final = "stands-again"
@@ -68,11 +73,15 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         BACK: EventCode("fault", "a robot answers again: the world waits for it"),
         MALFORMED: EventCode("fault", "commands that are none, or that nobody can mean"),
         ESTOPPED: EventCode("fault", "the emergency stop: simulated joints are damped from now on"),
+        LIES: EventCode("fault", "a robot that is stopped has sunk to the ground: no fall"),
+        STOP_ASKED: EventCode("fault", "somebody has asked the team to slow down and stand"),
+        RESET: EventCode("fault", "the operator has released the emergency stop"),
         LOWERED: EventCode("fault", "a simulated robot without commands is led down: no fall"),
         INPUT_LOST: EventCode("fault", "an agent slows down and stands: it lacks an input"),
+        HALTS: EventCode("fault", "an agent slows down and stands, as somebody has asked"),
         RESUMED: EventCode("fault", "an agent walks again: its inputs have been whole for 1 s"),
-        RISES: EventCode("fault", "an agent gets its robot up, which was led down"),
-        STANDS_AGAIN: EventCode("fault", "an agent's robot stands that had been led down"),
+        RISES: EventCode("fault", "an agent gets its robot up, which was led down or stopped"),
+        STANDS_AGAIN: EventCode("fault", "an agent's robot stands that had been down"),
         LINK_BACK: EventCode("fault", "the link to the router was gone for a while"),
         BRIDGE_MODE: EventCode("bridge", "a bridge's robot begins to stand up, walk or lie down"),
         ROBOT_STOPPED: EventCode("fault", "a bridge has stopped its robot: damped, then limp"),
@@ -80,6 +89,7 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         TIME_OVER: EventCode("stop", "the walk is over: world.seconds have passed"),
         FALLEN: EventCode("stop", "the walk is over: a robot fell"),
         SIGNAL: EventCode("stop", "the walk is over: the world was told to stop"),
+        STOPPED: EventCode("stop", "the walk is over: somebody has asked the team to stop"),
         PLANT_GONE: EventCode("stop", "the walk is over: one of several plants left or is silent"),
         PLANT_FAILED: EventCode("stop", "the walk is over: the plant failed"),
         LINK_LOST: EventCode("stop", "the walk is over: the link to the router is gone"),

@@ -222,8 +222,23 @@ class EStop(Message):
 
 
 @record
+class SafeStop(Message):
+    """The team is to slow down and stand, until the operator has it go on."""
+
+    reason: str = plain(str, "who stopped the team and why")
+    ends: bool = plain(bool, "whether the walk is over once the team stands")
+
+
+@record
+class Reset(Message):
+    """The operator releases an emergency stop: robots get up where they are, and stand."""
+
+    by: str = plain(str, "who releases it")
+
+
+@record
 class Resume(Message):
-    """The operator's word to go on, to robots that stand because an input had been lost."""
+    """The operator's word to go on, to robots that stand after a loss, a stop or a reset."""
 
 
 @record

@@ -7,7 +7,14 @@ from typing import Any
 
 from quadriga.shared.wire.messages import Message
 
-_PLAIN = {int: "integer", float: "number", str: "string", list: "array", dict: "object"}
+_PLAIN = {
+    bool: "boolean",
+    int: "integer",
+    float: "number",
+    str: "string",
+    list: "array",
+    dict: "object",
+}
 
 
 def json_schema(kind: type[Message]) -> dict[str, Any]:

@@ -22,6 +22,8 @@ STATUS_MS: Final = 100  # so often an agent gives account of itself in lock-step
 RECEIVED: Final = "received"  # ends the key of the question whether all before it has arrived
 
 _PLANS: Final = (AGENT, PLANNER)  # who plans
+# Processes that say one word to a team, and see what comes of it.
+_SPEAKERS: Final = (members.ESTOP, members.STOP, members.RESET, members.RESUME)
 
 STATE: Final = Topic(
     "state", msg.State, (SIM,), (AGENT, SIM), per_robot=True, period_ms=1, max_age_ms=20
@@ -38,7 +40,7 @@ PLAN: Final = Topic(
     per_robot=True, period_ms=CONFIGURED, max_age_ms=CONFIGURED,
 )  # fmt: skip
 STATUS: Final = Topic(
-    "status", msg.Status, (*_PLANS, SIM), (AGENT,),
+    "status", msg.Status, (*_PLANS, SIM), (AGENT, OPERATOR, *_SPEAKERS),
     per_robot=True, period_ms=CONFIGURED, max_age_ms=1000, repeats=True,
 )  # fmt: skip
 INPUTS: Final = Topic("inputs", msg.Consumed, (AGENT,), (), per_robot=True, period_ms=0)
@@ -47,11 +49,30 @@ REFERENCE: Final = Topic(
     period_ms=REFERENCE_EPOCH_MS, max_age_ms=500, repeats=True,
 )  # fmt: skip
 ESTOP: Final = Topic("estop", msg.EStop, (members.ESTOP,), (AGENT, SIM), period_ms=0)
-RESUME: Final = Topic("resume", msg.Resume, (members.RESUME,), (AGENT,), period_ms=0, repeats=True)
+STOP: Final = Topic(
+    "stop", msg.SafeStop, (OPERATOR, members.STOP), (AGENT, SIM), period_ms=0, repeats=True
+)
+RESET: Final = Topic(
+    "reset", msg.Reset, (OPERATOR, members.RESET), (AGENT, SIM), period_ms=0, repeats=True
+)
+RESUME: Final = Topic(
+    "resume",
+    msg.Resume,
+    (OPERATOR, members.RESET, members.RESUME),
+    (AGENT,),
+    period_ms=0,
+    repeats=True,
+)
+WORDS: Final = (ESTOP, STOP, RESET, RESUME)  # of people, who may not know the team's time
 LIVE_FAULT: Final = Topic("fault", msg.LiveFault, (LAUNCHER,), (SIM,), period_ms=0, repeats=True)
 TRUTH: Final = Topic("sim/truth", msg.Truth, (SIM,), (AGENT, LAUNCHER), period_ms=CONFIGURED)
 EVENT: Final = Topic(
-    "sim/event", msg.Event, (SIM,), (*_PLANS, OPERATOR, LAUNCHER, SIM), period_ms=0, repeats=True
+    "sim/event",
+    msg.Event,
+    (SIM,),
+    (*_PLANS, OPERATOR, LAUNCHER, *_SPEAKERS, SIM),
+    period_ms=0,
+    repeats=True,
 )
 # What an agent tells of itself beside its status; never of the kind `stop`, which ends a walk.
 AGENT_EVENT: Final = Topic(
@@ -59,7 +80,7 @@ AGENT_EVENT: Final = Topic(
 )
 # Not recorded: the states of every tick tell the same.
 CLOCK: Final = Topic(
-    "clock", msg.Clock, (SIM,), (OPERATOR, LAUNCHER, members.ESTOP, members.RESUME, SIM),
+    "clock", msg.Clock, (SIM,), (OPERATOR, LAUNCHER, *_SPEAKERS, SIM),
     period_ms=CONFIGURED, recorded=False,
 )  # fmt: skip
 # In real time between plants of single robots; clocks of computers, so not of a replay. They tell
@@ -75,7 +96,7 @@ CLOCK_ANSWER: Final = Topic(
 REFUSED: Final = Topic("refused", msg.Refusal, (ROUTER,), (), period_ms=0, repeats=True)
 
 _OWN: Final = (
-    STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, ESTOP, RESUME, LIVE_FAULT, TRUTH,
+    STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, *WORDS, LIVE_FAULT, TRUTH,
     EVENT, AGENT_EVENT, CLOCK, CLOCK_ASK, CLOCK_ANSWER, REFUSED,
 )  # fmt: skip
 TABLE: Final = (*_OWN, *plugin_topics(_OWN))

@@ -14,7 +14,7 @@ from quadriga.plant.protocol import Plant
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, N_LEGS, Array
-from quadriga.shared.wire.codes import FALL, FAULT_ASKED
+from quadriga.shared.wire.codes import FALL, FAULT_ASKED, LIES
 from quadriga.shared.wire.messages import Command, Event, State, Truth
 from quadriga.sim_server.terrain.relief import FOLLOW_MS
 from quadriga.sim_server.world import layout
@@ -85,8 +85,10 @@ class World(Plant):
         self._feet_under_hips = config.robot.feet_under_hips
         self._fallen = [False] * n
         self._down: tuple[str, ...] = ()  # names of these
-        # Names of those that are led down, and with them of those that have not risen since.
+        # Names of those that go down, and with them of those that have not risen since.
         self._led_down, self._lying = frozenset[str](), frozenset[str]()
+        self._stopped = frozenset[str]()  # by an emergency stop that is in force
+        self._sunk, self._tipped = set[str](), set[str]()  # of these, those that have since
         self._surely_up = _FALL_HEIGHT + self.team.terrain.top
         # Compiled functions are compiled, or loaded, now and not in the first tick.
         Motors(config.robot, config.motors, n, _DAMPED).drive(
@@ -189,9 +191,10 @@ class World(Plant):
         """Robots that have fallen so far."""
         return self._down
 
-    def expect_down(self, names: Collection[str]) -> None:
-        self._led_down = frozenset(names)
+    def expect_down(self, lowered: Collection[str], stopped: Collection[str] = ()) -> None:
+        self._led_down = frozenset((*lowered, *stopped))
         self._lying |= self._led_down
+        self._stopped = frozenset(stopped)
 
     def _measure(self) -> dict[str, State]:
         states = self._sensors.measure(
@@ -214,7 +217,7 @@ class World(Plant):
             cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
             if cosine >= _FALL_COSINE and z >= self._surely_up:
                 if self._lying and z >= self._surely_up + _RISEN:
-                    self._lying -= {self.names[i]} - self._led_down
+                    self._note_up(self.names[i])
                 continue
             if self._fallen[i]:
                 continue
@@ -225,12 +228,27 @@ class World(Plant):
                     np.array(x), np.array(y), np.array(yaw), self._feet_under_hips
                 )
             )
-            may_stay = above >= _FALL_HEIGHT or self.names[i] in self._lying
+            name = self.names[i]
             # With these comparisons a state that is not a number counts as a fall too.
-            if not (cosine >= _FALL_COSINE and may_stay):
+            may_tip = name in self._tipped or (name in self._stopped and math.isfinite(cosine))
+            level, high = cosine >= _FALL_COSINE, above >= _FALL_HEIGHT
+            detail = f"tilt {math.acos(max(-1.0, cosine)):.2f} rad, height {above:.3f} m"
+            if not ((level or may_tip) and (high or name in self._lying)):
                 self._fallen[i] = True
                 pairs = zip(self.names, self._fallen, strict=True)
                 self._down = tuple(name for name, down in pairs if down)
-                detail = f"tilt {math.acos(max(-1.0, cosine)):.2f} rad, height {above:.3f} m"
-                events.append(Event.of(self.tick, FALL, self.names[i], detail))
+                events.append(Event.of(self.tick, FALL, name, detail))
+            elif name in self._stopped and not (level and high):
+                if not level:
+                    self._tipped.add(name)
+                if name not in self._sunk:
+                    self._sunk.add(name)
+                    events.append(Event.of(self.tick, LIES, name, f"{detail}: no fall"))
         return events
+
+    def _note_up(self, name: str) -> None:
+        """A robot is up again, unless it is being led down."""
+        if name not in self._led_down:
+            self._lying -= {name}
+            self._sunk.discard(name)
+            self._tipped.discard(name)

@@ -19,11 +19,11 @@ from quadriga.agents.healing import (
     step_healing,
 )
 from quadriga.agents.imu_bridge import BELIEVED_AFTER_MS
-from quadriga.agents.modes import LOSSES, STAND, STOPPING, WALK, WHOLE_MS, Mode
+from quadriga.agents.modes import COMMANDED, LOSSES, STAND, STOPPING, WALK, WHOLE_MS, Mode
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.codes import INPUT_LOST, RESUMED
-from quadriga.shared.wire.messages import EStop, Resume
+from quadriga.shared.wire.codes import HALTS, INPUT_LOST, RESUMED
+from quadriga.shared.wire.messages import EStop, Resume, SafeStop
 from tests.agents.duet import CONFIG, asked, every_100_ms, simple_predictor
 from tests.agents.lone_robot import ALONE, Robot, tilted
 
@@ -43,6 +43,13 @@ def test_after_a_loss_it_may_go_on_once_all_has_been_whole_for_a_second(reason: 
     assert not may_resume(healed(2000), mode, 2000 + WHOLE_MS, auto=False)
     assert may_resume(healed(2000, word=1900), mode, 2000 + WHOLE_MS, auto=False)
     assert not may_resume(healed(2000, word=1900), mode, 1901 + WORD_MS, auto=False)
+
+
+@pytest.mark.parametrize("reason", sorted(COMMANDED))
+def test_after_a_stop_or_its_release_it_goes_on_only_when_told_to(reason: str) -> None:
+    mode = Mode(STAND, 1700, f"{reason}:ann")
+    assert not may_resume(healed(2000), mode, 2000 + WHOLE_MS, auto=True)
+    assert may_resume(healed(2000, word=1900), mode, 2000 + WHOLE_MS, auto=False)
 
 
 @pytest.mark.parametrize(
@@ -135,6 +142,32 @@ def test_on_the_operators_word() -> None:
     robot = stood(ALONE)
     robot.run(3500)
     assert modes(robot, 4000, resume=Resume(3500, 0)) == {"stand": 3500, "walk": 3700}
+
+
+@pytest.mark.parametrize("config", [ALONE, AUTO], ids=["ALONE", "AUTO"])
+def test_who_is_told_to_stop_stands_until_it_is_told_to_go_on(config: Config) -> None:
+    robot = Robot(config)
+    robot.run(1000)
+    halts = robot.step(stop=SafeStop(1000, 0, "dog", False))
+    assert (halts.mode, halts.reason) == (STOPPING, "stopped:dog")
+    assert modes(robot, 5000) == {STOPPING: 1001, STAND: 1500}
+    assert modes(robot, 6000, resume=Resume(5000, 0)) == {STAND: 5000, WALK: 5100}
+
+
+def test_a_word_to_go_on_before_a_stop_counts_no_more() -> None:
+    robot = stood(ALONE)
+    robot.step(resume=Resume(2000, 0))
+    robot.step(stop=SafeStop(2001, 0, "dog", False))
+    assert robot.state.mode == Mode(STAND, robot.state.mode.since, "stopped:dog")
+    assert modes(robot, 8000) == {STAND: 2002}
+    both = {"stop": SafeStop(8000, 0, "dog", False), "resume": Resume(8000, 0)}
+    assert modes(robot, 14000, **both) == {STAND: 8000}, "of both in one tick the stop counts"
+
+
+def test_a_stop_is_announced_as_what_it_is() -> None:
+    told = change_event(Mode(WALK, 300), Mode(STOPPING, 900, "stopped:dog"), 900, "r1")
+    assert told is not None
+    assert (told.code, told.detail) == (HALTS, "slows down and stands: stopped:dog")
 
 
 def test_a_word_while_all_is_well_is_forgotten() -> None:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from quadriga.agents.modes import (
     DAMPING,
     ESTOP,
+    RISING,
     SLOW_DOWN_MS,
     STAND,
     STOPPING,
@@ -63,6 +64,15 @@ def test_a_stop_before_walking_keeps_the_robot_standing() -> None:
 )
 def test_a_later_reason_to_stop_does_not_replace_the_first(mode: Mode) -> None:
     assert stop_safely(mode, 10, "b") is mode
+
+
+@pytest.mark.parametrize("name", [STAND, STOPPING, RISING])
+def test_what_somebody_asks_for_takes_the_place_of_a_loss_and_no_loss_of_it(name: str) -> None:
+    lost, asked = Mode(name, 5, "peer-lost:r2"), Mode(name, 5, "stopped:ann")
+    assert stop_safely(lost, 10, "stopped:ann") == asked
+    assert stop_safely(lost, 10, "reference-lost") is lost
+    assert stop_safely(asked, 10, "peer-lost:r2") is asked
+    assert stop_safely(asked, 10, "stopped:bob") is asked
 
 
 @pytest.mark.parametrize("mode", [Mode(STAND, 0), Mode(WALK, 1), Mode(STOPPING, 2, "a")])

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from quadriga.agents.agent import Agent, Inputs
-from quadriga.agents.modes import DAMPING, ESTOP, RISING, STAND, WALK, Mode
+from quadriga.agents.modes import DAMPING, ESTOP, RISING, STAND, STOPPING, WALK, Mode
 from quadriga.agents.rising import Rise, Rising
+from quadriga.plant.late import damp_joints
 from quadriga.plant.lost import LostCommands
 from quadriga.shared.config.load import load
-from quadriga.shared.wire.messages import EStop, State
+from quadriga.shared.wire.codes import LIES
+from quadriga.shared.wire.messages import EStop, Event, Reset, State
 from quadriga.sim_server.world.world import World
 from tests.a1 import standing
 from tests.sim_server.standing import stand
@@ -46,19 +48,20 @@ def rolled(angle: float) -> np.ndarray:
 def test_it_gets_up_after_its_motors_were_led_down(
     mode: Mode, last: int, tick: int, due: bool
 ) -> None:
-    assert Rising(CONFIG).is_due(mode, last, tick) is due
+    assert Rising(CONFIG).why_now(mode, last, tick, None, None) == ("led-down" if due else "")
 
 
 @pytest.mark.parametrize("keys", [{"world.mode": "lockstep"}, {"team.plant": "robots"}])
 def test_never_in_lockstep_and_never_a_real_robot(keys: dict[str, str]) -> None:
     each = {"team.plants": "each", "team.yokes": "none"} if "team.plant" in keys else {}
     given = {"team.robots": 1, "world.mode": "realtime", "planner.kind": "none"}
-    assert not Rising(load(None, given | each | keys)).is_due(Mode(STAND, 0), -1, FROM)
+    rising = Rising(load(None, given | each | keys))
+    assert not rising.why_now(Mode(STAND, 0), -1, FROM, None, None)
 
 
 def test_it_stays_where_it_is_until_the_others_stand_and_asks_for_no_great_torque() -> None:
     rising, limit = Rising(CONFIG), 0.8 * ROBOT.torque_limit
-    mode, rise, command = rising.step(Mode(STAND, 0), None, lying(FROM), may_begin=False)
+    mode, rise, command = rising.step(RISES, None, lying(FROM), may_begin=False)
     assert mode == RISES
     assert np.array_equal(command.q_des, ROBOT.q_lying)
     tick = FROM
@@ -75,7 +78,7 @@ def test_it_stays_where_it_is_until_the_others_stand_and_asks_for_no_great_torqu
 
 def test_it_stands_only_once_its_joints_are_there_and_the_trunk_is_level() -> None:
     rising = Rising(CONFIG)
-    mode, rise, _ = rising.step(Mode(STAND, 0), None, lying(FROM), may_begin=True)
+    mode, rise, _ = rising.step(RISES, None, lying(FROM), may_begin=True)
     end = FROM + 1500 + 200
     early = rising.step(mode, rise, standing(end - 10), may_begin=True)
     assert early.mode == RISES
@@ -140,3 +143,59 @@ def test_a_simulated_robot_that_was_led_down_stands_again_without_a_fall(
     while not world.fallen() and world.tick < 10_000:
         world.step({})
     assert world.fallen() == ("r1",), "from now on it may fall"
+
+
+RELEASE = Reset(FROM, 0, "ann")
+STOPPED_WALK = Mode(ESTOP, 700, "estop:dog")
+
+
+@pytest.mark.parametrize("mode", [STOPPED_WALK, Mode(DAMPING, 700, "not-up")])
+@pytest.mark.parametrize("walk", ["lockstep", "realtime"])
+def test_who_is_damped_gets_up_when_the_operator_releases_it_by_name(walk: str, mode: Mode) -> None:
+    rising = Rising(replace(CONFIG, world=replace(CONFIG.world, mode=walk)))
+    assert rising.why_now(mode, FROM - 1, FROM, RELEASE, None) == "reset:ann"
+    assert not rising.why_now(mode, FROM - 1, FROM, RELEASE, EStop(FROM, 0, "dog"))
+    assert not rising.why_now(mode, FROM - 1, FROM, None, None)
+    for other in (Mode(WALK, 300), Mode(STAND, 0), Mode(STOPPING, 5, "stopped:ann"), RISES):
+        assert not rising.why_now(other, FROM - 1, FROM, RELEASE, None)
+
+
+def test_a_real_robot_is_not_released_over_the_bus() -> None:
+    keys = {"team.plant": "robots", "team.plants": "each", "team.yokes": "none"}
+    given = {"team.robots": 1, "world.mode": "realtime", "planner.kind": "none"}
+    assert not Rising(load(None, given | keys)).why_now(STOPPED_WALK, 4999, FROM, RELEASE, None)
+
+
+def test_who_was_told_to_stop_before_it_was_led_down_does_not_go_on_by_itself() -> None:
+    asked = Mode(STAND, 900, "stopped:ann")
+    assert Rising(CONFIG).why_now(asked, 1000, FROM, None, None) == "stopped:ann"
+    lost = Mode(STAND, 900, "peer-lost:r2")
+    assert Rising(CONFIG).why_now(lost, 1000, FROM, None, None) == "led-down"
+
+
+@pytest.mark.parametrize("lies_ms", [30, 2000], ids=["sinking", "lying"])
+def test_a_simulated_robot_that_was_stopped_gets_up_after_its_release(lies_ms: int) -> None:
+    world, agent = World(CONFIG), Agent(CONFIG, "r1", None)
+    memory, modes, events = agent.initial(), list[str](), list[Event]()
+
+    def step(count: int, **first: object) -> None:
+        nonlocal memory
+        for _ in range(count):
+            inputs = Inputs(world.states()["r1"], **first)  # type: ignore[arg-type]
+            memory, outputs = agent.step(memory, inputs)
+            first = {}
+            modes.extend([] if outputs.mode in modes[-1:] else [outputs.mode])
+            damped = {"r1": damp_joints(world.tick)}
+            events.extend(world.step(damped if memory.mode.passive else {"r1": outputs.command}))
+
+    step(300)
+    world.expect_down((), stopped=("r1",))
+    step(lies_ms, estop=EStop(300, 0, "dog"))
+    world.expect_down(())
+    step(3000, reset=RELEASE)
+    assert modes == [STAND, ESTOP, RISING, STAND]
+    assert memory.mode.reason == "reset:ann"
+    sunk = [event.code for event in events if event.kind == "fault"]
+    assert sunk == ([LIES] if lies_ms > 1000 else [])
+    height = world.truth().base_pos[0, 2]
+    assert height == pytest.approx(CONFIG.reference.height, abs=0.02)

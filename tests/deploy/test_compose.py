@@ -14,7 +14,7 @@ import yaml
 from quadriga.commands.parser import build_parser
 from quadriga.shared.config.endpoints import host_and_port, is_tls
 from quadriga.shared.config.load import load
-from quadriga.shared.members import DOCTOR, ESTOP, LAST, RESUME, ROUTER
+from quadriga.shared.members import DOCTOR, ESTOP, LAST, RESET, RESUME, ROUTER, STOP
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.security.roll import team_roll
 from quadriga.team.launch import ProcessSpec, process_table
@@ -140,7 +140,7 @@ def test_the_team_meets_at_the_router_with_certificates() -> None:
 
 @pytest.mark.parametrize("service", ON_THE_BUS)
 def test_a_service_sees_its_own_certificates_and_cannot_change_them(service: str) -> None:
-    own = {"operator": {"operator", ESTOP, RESUME}}.get(service, {service})
+    own = {"operator": {"operator", ESTOP, STOP, RESET, RESUME}}.get(service, {service})
     assert secrets_of(service) == own
     entries = [entry for entry in SERVICES[service]["volumes"] if "/secrets/" in entry]
     assert set(entries) == {f"secret-{name}:/secrets/{name}:ro" for name in own}

@@ -166,10 +166,14 @@ def test_the_world_obeys_an_emergency_stop_whatever_the_agents_do(
     with team.launch() as running:
         team.await_log("sim", "start")
         command = (*launch.QUADRIGA, "estop", "--reason", "smoke", "--config", file)
-        assert run_alone(launch.ProcessSpec("estop", command, 5.0)) == (0, "")
+        status, errors = run_alone(launch.ProcessSpec("estop", command, 5.0))
+        assert status == 2, "no agent says that it has stopped"
+        assert "no word of r1, r2 after 0.5 s; r1: says nothing, r2: says nothing" in errors
         team.await_log("sim", "estop  smoke: every joint is damped")
-        team.await_log("sim", "fallen  fall of r1, r2")
-        running.watch(never)
+        team.await_log("sim", "lies r1")
+        team.await_log("sim", "lies r2")
+        running.watch(lambda: True)
+    assert "fall of" not in team.log("sim")
 
 
 @pytest.mark.usefixtures("_compiled")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
+from quadriga.recordings.checks.getting_up import Doubts, GettingUp
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import JOINT_NAMES, Array, Leg, robot_names
 from quadriga.shared.wire.messages import Command, Plan
@@ -68,10 +69,15 @@ def _excess(
 
 
 class Torques:
-    """No commanded torque exceeds what the motor gives, and no gain adds more than damping."""
+    """No commanded torque exceeds what the motor gives, and no gain adds more than damping.
 
-    def __init__(self, config: Config) -> None:
+    A robot that gets up is led there by stiff joints, with gains of its bridge's stand.
+    """
+
+    def __init__(self, config: Config, getting_up: GettingUp) -> None:
         self.finding = Finding("torques", "commands")
+        self._doubts = Doubts(self.finding, getting_up)
+        self._stand = config.bridge.stand_kp, config.bridge.stand_kd
         self._damping = config.controller.damping
         self._limit = config.robot.torque_limit
         self._largest = 0.0
@@ -93,14 +99,15 @@ class Torques:
             )
         kp, kd = float(np.abs(command.kp).max()), float(command.kd.max())
         if kp > 0.0 or kd > self._damping or float(command.kd.min()) < 0.0:
-            self.finding.add_objection(
-                command.tick,
-                item.key,
-                f"gains kp up to {kp:.6g}, kd up to {kd:.6g}",
-                f"no kp, kd from 0 to {self._damping:g}",
-            )
+            got = f"gains kp up to {kp:.6g}, kd up to {kd:.6g}"
+            limit = f"no kp, kd from 0 to {self._damping:g}"
+            if (kp, kd) == self._stand:
+                self._doubts.add(item.robot, command.tick, command.tick, item.key, got, limit)
+            else:
+                self.finding.add_objection(command.tick, item.key, got, limit)
 
     def finish(self) -> None:
         """Say how large the largest is."""
+        self._doubts.resolve()
         if self.finding.looked:
             self.finding.notes.append(f"at most {self._largest:.1f} N·m")

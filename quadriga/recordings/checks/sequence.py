@@ -5,20 +5,21 @@ from __future__ import annotations
 from typing import Final
 
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
+from quadriga.recordings.checks.getting_up import Doubts, GettingUp
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import max_ages, periods
 from quadriga.shared.members import AGENT, PLANNER
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Event, Plan, Status
-from quadriga.shared.wire.topics import COMMAND, ESTOP, MEASUREMENT, REFUSED, STATE, TABLE
+from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, REFUSED, STATE, TABLE, WORDS
 
 _MAY_REPEAT: Final = frozenset(topic.name for topic in TABLE if topic.repeats)
 # What is never passed over, not even in real time: agents and planners skip steps, others do not.
 _WHOLE: Final = frozenset(t.name for t in TABLE if not {AGENT, PLANNER} & {*t.senders})
 _EVERYONE_S: Final = (STATE, COMMAND, MEASUREMENT)
 # Sent by who only hears of the time, if somebody walks at all.
-_UNTIMED: Final = (ESTOP.name, REFUSED.name)
+_UNTIMED: Final = (REFUSED.name, *(word.name for word in WORDS))
 _TAIL_MS: Final = 20  # a world that was stopped may end in the middle of a sample
 
 
@@ -60,20 +61,23 @@ class Gaps:
     """No message is missing between the first and the last tick, and no robot's keys are.
 
     In real time an agent answers the newest state and passes over older ones, so there only what
-    others send must be without gaps.
+    others send must be without gaps. A robot that gets up measures and plans nothing.
     """
 
-    def __init__(self, config: Config, *, filtered: bool) -> None:
+    def __init__(self, config: Config, getting_up: GettingUp, *, filtered: bool) -> None:
         self.finding = Finding("gaps", "messages expected")
+        self._doubts = Doubts(self.finding, getting_up)
         self._config, self._filtered = config, filtered
         self._periods = periods(config)
         self._tracks: dict[str, tuple[str, TickTrack]] = {}
+        self._robots: dict[str, str] = {}  # by key
 
     def look(self, item: CheckedMessage) -> None:
         row = self._tracks.get(item.key)
         if row is None:
             row = item.topic, TickTrack(self._periods[item.topic])
             self._tracks[item.key] = row
+            self._robots[item.key] = item.robot
         row[1].note(item.message.tick)
 
     def finish(self) -> None:
@@ -85,7 +89,9 @@ class Gaps:
             if lockstep or topic in _WHOLE:
                 for before, after in track.gaps:
                     count = (after - before - 1) // self._periods[topic]
-                    self.finding.add_objection(
+                    self._doubts.add(
+                        self._robots[key],
+                        before,
                         after,
                         key,
                         f"{count} missing after tick {before}",
@@ -94,6 +100,7 @@ class Gaps:
                     )
             else:
                 passed_over += track.lost
+        self._doubts.resolve()
         if passed_over:
             self.finding.notes.append(f"{passed_over} passed over by agents in real time")
         self._compare_robots()
@@ -124,11 +131,15 @@ class Gaps:
 
 
 class Ages:
-    """Nothing is older than it may be: between two messages, and as the agents report it."""
+    """Nothing is older than it may be: between two messages, and as the agents report it.
 
-    def __init__(self, config: Config) -> None:
+    A robot that gets up measures and plans nothing.
+    """
+
+    def __init__(self, config: Config, getting_up: GettingUp) -> None:
         """Of a recording made with this configuration."""
         self.finding = Finding("ages", "messages")
+        self._doubts = Doubts(self.finding, getting_up)
         self._limits = max_ages(config)
         self._last: dict[str, int] = {}
         self._oldest: dict[str, float] = {}
@@ -138,9 +149,8 @@ class Ages:
         self.finding.looked += 1
         age = tick - self._last.get(item.key, tick)
         if limit and age > limit:
-            self.finding.add_objection(
-                tick, item.key, f"{age} ms since the one before", f"{limit} ms"
-            )
+            got = f"{age} ms since the one before"
+            self._doubts.add(item.robot, tick - age, tick, item.key, got, f"{limit} ms")
         self._last[item.key] = tick
         if isinstance(item.message, Status) and item.message.mode == "walk":
             self._check_status(item, item.message)
@@ -159,6 +169,7 @@ class Ages:
 
     def finish(self) -> None:
         """Say how old what the agents used was at most."""
+        self._doubts.resolve()
         ages = ", ".join(f"{name} {age:g} ms" for name, age in sorted(self._oldest.items()))
         if ages:
             self.finding.notes.append(f"agents' inputs at most: {ages}")

@@ -13,8 +13,18 @@ from quadriga.agents.inbox.inbox import Inbox
 from quadriga.agents.planning.interface import Expected
 from quadriga.shared.config.load import load
 from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import EStop, Event, Measurement, Message, Plan, Reference, Truth
-from quadriga.shared.wire.topics import ESTOP, TABLE, Topic
+from quadriga.shared.wire.messages import (
+    EStop,
+    Event,
+    Measurement,
+    Message,
+    Plan,
+    Reference,
+    Reset,
+    SafeStop,
+    Truth,
+)
+from quadriga.shared.wire.topics import ESTOP, TABLE, WORDS, Topic
 from tests.a1 import standing
 
 NOTHING = Expected()
@@ -53,7 +63,8 @@ def feed(box: Inbox, *messages: tuple[str, Message]) -> None:
 
 
 def test_subscribes_to_what_it_needs_and_no_more() -> None:
-    alone = {"team/r2/state", "team/reference", "team/estop", "team/resume", "team/sim/event"}
+    alone = {"team/r2/state", "team/reference", "team/sim/event"}
+    alone |= {f"team/{word.name}" for word in WORDS}
     peers = {f"team/{r}/{t}" for r in ("r1", "r3") for t in ("plan", "measurement")}
     assert {*arrivals(planner="none").keys} == alone
     assert {*arrivals(planner="centralised").keys} == alone | {"team/r2/plan"}
@@ -375,3 +386,14 @@ def test_a_state_that_no_sensor_can_tell_is_dropped(field: str, number: float) -
     assert box.counters["dropped_state"] == 1
     feed(box, ("r2/state", good))
     assert box.pop_state() is not None, "the robot's own still counts"
+
+
+def test_a_release_that_comes_twice_is_one_and_another_is_another() -> None:
+    box = arrivals()
+    resets = []
+    for message in (Reset(5, 5, "ann"), Reset(5, 5, "ann"), Reset(6, 6, "ann")):
+        feed(box, ("reset", message))
+        resets.append(box.pop_inputs(standing(7), NOTHING).reset)
+    assert resets == [Reset(5, 5, "ann"), None, Reset(6, 6, "ann")]
+    feed(box, ("stop", SafeStop(5, 5, "ann", False)), ("stop", SafeStop(5, 5, "ann", False)))
+    assert box.pop_inputs(standing(8), NOTHING).stop == SafeStop(5, 5, "ann", False)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Thread
 
+import numpy as np
 import pytest
 
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
@@ -16,14 +19,20 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import SIM
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import EStop
-from quadriga.shared.wire.topics import ESTOP
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.codes import ESTOPPED
+from quadriga.shared.wire.messages import EStop, Event, Status
+from quadriga.shared.wire.topics import ESTOP, EVENT, STATUS
 from quadriga.team import emergency_stop
-from quadriga.team.emergency_stop import wait_and_stop
+from quadriga.team.emergency_stop import stop_team, wait_and_stop
 from quadriga.team.endpoint import free_endpoint
 
 WAIT = 20.0  # s
+_NONE = np.zeros(0)
+ANSWERS = {
+    STATUS.key("team", "r1"): Status(5, 0, "estop", "estop:dog", "kalman", {}, {}, _NONE, _NONE),
+    EVENT.key("team"): Event.of(5, ESTOPPED, "", "dog: every joint is damped"),
+}
 
 
 @pytest.fixture
@@ -65,11 +74,39 @@ def test_enter_stops_whom_an_armed_process_has_found(
         process.stdin.write("\n")
         process.stdin.flush()
         packets = [bus.get(WAIT) for bus in team.values()]
+        for key, answer in ANSWERS.items():
+            team[SIM].publisher(key)(encode(answer))
         assert process.wait(WAIT) == 0
-        assert "stopped: r1, sim" in process.stderr.read()
+        assert "stopped r1 within " in process.stderr.read()
     for packet in packets:
         assert packet is not None
         assert decode(packet[1], EStop).reason == "dog"
+
+
+@pytest.mark.parametrize("silent", [*ANSWERS, ""])
+def test_what_came_of_it_is_told_and_who_has_not_stopped_is_an_error(
+    config: Config, team: dict[str, Bus], silent: str
+) -> None:
+    team["r1"].declare(HERE)
+    puts = {key: team[SIM].publisher(key) for key in ANSWERS if key != silent}
+
+    def answer() -> None:
+        if team[SIM].get(WAIT) is not None:
+            for key, put in puts.items():
+                put(encode(ANSWERS[key]))
+
+    thread = Thread(target=answer)
+    thread.start()
+    try:
+        if silent:
+            said = "no word of r1 after .* r1: says" if "r1" in silent else "no word of plant after"
+            with pytest.raises(BusError, match=said):
+                stop_team(config, "dog")
+        else:
+            said = r"stopped r1 within \d+ ms: every joint is damped, until `quadriga reset`"
+            assert re.fullmatch(said, stop_team(config, "dog"))
+    finally:
+        thread.join()
 
 
 def test_a_keyboard_that_is_gone_stops_nobody(config: Config, team: dict[str, Bus]) -> None:
@@ -86,8 +123,8 @@ def test_a_keyboard_that_is_gone_stops_nobody(config: Config, team: dict[str, Bu
 def test_who_is_not_there_is_named_and_the_others_stop(
     config: Config, team: dict[str, Bus], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(emergency_stop, "_SEARCH", 0.3)
+    monkeypatch.setattr(emergency_stop, "SEARCH", 0.3)
     match = r"no r1 on the bus after 0.3 s.*\(sim heard it at once"
     with pytest.raises(BusError, match=match):
-        emergency_stop.stop_team(config, "dog")
+        stop_team(config, "dog")
     assert team[SIM].get(WAIT) is not None

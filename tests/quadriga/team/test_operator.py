@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from threading import Event as Flag
 from threading import Thread
@@ -12,6 +13,7 @@ import pytest
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus, Packet
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import BusError
 from quadriga.shared.members import OPERATOR, SIM
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.wire.codec import MAX_TEXT, MAX_TICK, decode, encode
@@ -166,7 +168,11 @@ def said_stop(reason: str, tick: int) -> EStop:
             while not over.wait(0.02):
                 put(event)
 
-        threads = [Thread(target=tell), Thread(target=stop_team, args=(config, reason))]
+        def stop() -> None:
+            with suppress(BusError):  # nobody here says that it has stopped
+                stop_team(config, reason)
+
+        threads = [Thread(target=tell), Thread(target=stop)]
         for thread in threads:
             thread.start()
         try:

@@ -35,6 +35,8 @@ def test_a_robot_hears_its_own_state_and_what_the_others_plan_measure_and_do() -
         "team/*/status",
         "team/reference",
         "team/estop",
+        "team/stop",
+        "team/reset",
         "team/resume",
         "team/sim/truth",
         "team/sim/event",
@@ -42,12 +44,23 @@ def test_a_robot_hears_its_own_state_and_what_the_others_plan_measure_and_do() -
 
 
 def test_the_operator_asks_for_speeds_and_may_stop_the_team() -> None:
-    assert {*rights()["operator"].publishes} == {"team/reference", "team/estop"}
+    sent = {"team/reference", "team/estop", "team/stop", "team/reset", "team/resume"}
+    assert {*rights()["operator"].publishes} == sent
 
 
-def test_only_who_resumes_a_walk_may_say_so() -> None:
-    senders = {name for name, each in rights().items() if "team/resume" in each.publishes}
-    assert senders == {"resume"}
+@pytest.mark.parametrize(
+    ("word", "speakers"),
+    [
+        ("resume", {"operator", "reset", "resume"}),
+        ("stop", {"operator", "stop"}),
+        ("reset", {"operator", "reset"}),
+    ],
+)
+def test_only_who_has_that_task_may_say_a_word(word: str, speakers: set[str]) -> None:
+    may = {name for name, each in rights().items() if f"team/{word}" in each.publishes}
+    assert may == speakers
+    for name in speakers - {"operator"}:
+        assert {"team/*/status", "team/sim/event", "team/clock"} <= {*rights()[name].hears}
 
 
 def test_anyone_in_the_team_may_stop_it_and_who_only_hears_says_nothing() -> None:

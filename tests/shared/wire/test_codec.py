@@ -33,6 +33,7 @@ few = settings(max_examples=40)
 _finite = st.floats(allow_nan=False, allow_infinity=False)
 _text = st.text(max_size=20)
 _PLAIN: dict[tuple[type, bool], st.SearchStrategy[Any]] = {
+    (bool, False): st.booleans(),
     (int, True): st.integers(0, MAX_INTEGER - 1),
     (float, False): _finite,
     (str, False): _text,
@@ -144,6 +145,8 @@ def test_every_field_refuses_a_foreign_value(kind: type[Message], data: st.DataO
     wrong: Any = data.draw(st.sampled_from([None, True, [1], b"short", {"a": "b"}, -1, 1 << 63]))
     if item.metadata.get("kind") is float and type(wrong) is int:
         wrong = float("nan")
+    if item.metadata.get("kind") is bool and wrong is True:
+        wrong = 1
     body = {**body_of(kind), item.name: wrong}
     with pytest.raises(MessageError, match=rf"{kind.__name__.lower()}\.{item.name}"):
         decode(msgpack.packb(body), kind)

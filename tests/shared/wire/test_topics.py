@@ -37,7 +37,8 @@ def test_a_row_is_plausible(topic: Topic) -> None:
     assert topic.period_ms >= 0 or topic.period_ms == CONFIGURED
     assert topic.max_age_ms >= 0 or topic.max_age_ms == CONFIGURED
     roles = {role.name for role in members.ROLES}
-    roles |= {members.LAUNCHER, members.ESTOP, members.RESUME, members.ROUTER}
+    roles |= {members.LAUNCHER, members.ESTOP, members.STOP, members.RESET, members.RESUME}
+    roles |= {members.ROUTER}
     assert topic.senders
     assert {*topic.senders, *topic.receivers} <= roles
 
@@ -96,6 +97,8 @@ def test_the_keys_are_the_contract_with_other_tools() -> None:
         "team/r1/inputs",
         "team/reference",
         "team/estop",
+        "team/stop",
+        "team/reset",
         "team/resume",
         "team/fault",
         "team/sim/truth",

@@ -7,26 +7,26 @@ import select
 import sys
 import termios
 import tty
-from typing import Any, Final, Self
+from collections.abc import Mapping
+from typing import Any, Self
 
 from quadriga.shared.runtime.clock import sleep
 
-PAUSE: Final = "pause"
-STEP: Final = "step"
-QUIT: Final = "quit"
-_KEYS: Final = {b"\x1b[C": STEP, b"\x1bOC": STEP, b" ": PAUSE, b"q": QUIT, b"Q": QUIT}
-
 
 class Keyboard:
-    """The keys of `_KEYS`, without echo or return key while the context lasts.
+    """Some keys, without echo or return key while the context lasts.
 
     Without a terminal on stdin, or in the background, no key ever comes.
+
+    Args:
+        keys: the meaning of each, by the bytes that it sends; a longer one before its beginning.
 
     Attributes:
         listens: whether keys can come.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, keys: Mapping[bytes, str]) -> None:
+        self._keys = keys
         self._before: list[Any] = []
         self._unread = b""
         self.listens = False
@@ -40,7 +40,7 @@ class Keyboard:
             if not select.select([self._stdin], [], [], max(timeout, 0.0))[0]:
                 return ""
             self._unread = self._read()
-        for key, meaning in _KEYS.items():
+        for key, meaning in self._keys.items():
             if self._unread.startswith(key):
                 self._unread = self._unread[len(key) :]
                 return meaning

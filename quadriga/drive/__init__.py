@@ -1,0 +1,1 @@
+"""Driving a team by hand: who is in charge, what is asked for, and the page in the browser."""

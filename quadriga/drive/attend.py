@@ -1,0 +1,79 @@
+"""One driver's connection, whatever it comes over: what it says is done, and answered."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections import Counter
+from collections.abc import AsyncIterable, Awaitable, Callable
+from typing import Final
+
+from quadriga.drive.controls import Controls
+from quadriga.drive.said import ESTOP, NEWS, WHERE, DriverWord, read_said
+from quadriga.drive.tell import Stopping, tell_news
+from quadriga.shared.errors import MessageError
+
+_NEWS: Final = 0.1  # s, between two of what drivers are told
+_LOOK: Final = 0.005  # s, between two looks at whether all have stopped
+
+Send = Callable[[str], Awaitable[None]]
+
+
+class Attendant:
+    """Attends to drivers; all of them in one thread.
+
+    Args:
+        controls: what drivers say goes there.
+
+    Attributes:
+        url: of the page with its token; "" if there is none.
+    """
+
+    def __init__(self, controls: Controls) -> None:
+        self._controls = controls
+        self.url = ""
+        self._counts: Counter[str] = Counter()
+
+    async def attend(
+        self, kind: str, texts: AsyncIterable[str | bytes], send: Send, *, news: bool = False
+    ) -> None:
+        """Do what a driver says until it leaves.
+
+        Args:
+            kind: of driver; with a number behind it, it is the driver's name.
+            texts: what it says.
+            send: sends it a text.
+            news: whether it is told the news all the time; else when it asks for them.
+        """
+        self._counts[kind] += 1
+        driver = f"{kind} {self._counts[kind]}"
+        telling = asyncio.ensure_future(self._tell(driver, send)) if news else None
+        try:
+            async for text in texts:
+                try:
+                    said = read_said(text)
+                except MessageError as error:
+                    await send(json.dumps({"kind": "error", "text": str(error)}))
+                else:
+                    self._controls.hear(driver, said)
+                    await self._answer(driver, said, send)
+        finally:
+            self._controls.leave(driver)
+            if telling is not None:
+                telling.cancel()
+
+    async def _answer(self, driver: str, said: DriverWord, send: Send) -> None:
+        if said.kind == NEWS:
+            await send(tell_news(driver, self._controls))
+        elif said.kind == WHERE:
+            await send(json.dumps({"kind": WHERE, "url": self.url}))
+        elif said.kind == ESTOP:  # once all have stopped, or it has taken too long
+            stopping = Stopping(self._controls)
+            while not stopping.is_over():
+                await asyncio.sleep(_LOOK)
+            await send(stopping.tell(said.number))
+
+    async def _tell(self, driver: str, send: Send) -> None:
+        while True:
+            await send(tell_news(driver, self._controls))
+            await asyncio.sleep(_NEWS)

@@ -1,0 +1,89 @@
+"""SHELL: a program of this machine speaks to the operator of a team over its Unix socket.
+
+It imports little, so that a stop is on its way before most programs have begun.
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+from pathlib import Path
+from typing import Any, Final, Self
+
+from quadriga.shared.errors import BusError
+
+SUFFIX: Final = ".sock"
+_TIMEOUT: Final = 2.0  # s, longest wait for an answer
+_LONGEST: Final = 65_536  # bytes of one
+
+
+def socket_path(folder: Path, team: str, pid: int) -> Path:
+    """Where the operator with process id `pid` of a team listens.
+
+    Args:
+        folder: the user's folder of what is true while processes run.
+        team: its name.
+        pid: of the operator's process.
+    """
+    return folder / f"{team}-{pid}{SUFFIX}"
+
+
+class ControlLink:
+    """A connection to an operator; a context.
+
+    Args:
+        path: of its socket.
+
+    Raises:
+        OSError: nobody listens there.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._socket = socket.socket(socket.AF_UNIX)
+        self._socket.settimeout(_TIMEOUT)
+        try:
+            self._socket.connect(str(path))
+        except OSError:
+            self._socket.close()
+            raise
+        self._rest = b""
+
+    def say(self, kind: str, **fields: Any) -> None:
+        """Say something, see `quadriga.drive.said`."""
+        self._socket.sendall(json.dumps({"kind": kind, **fields}).encode() + b"\n")
+
+    def ask(self, kind: str, **fields: Any) -> dict[str, Any]:
+        """Say something, and wait for the answer.
+
+        Raises:
+            BusError: none comes, or it is none.
+        """
+        try:
+            self.say(kind, **fields)
+            while b"\n" not in self._rest:
+                received = self._socket.recv(_LONGEST)
+                if not received or len(self._rest) > _LONGEST:
+                    raise self._wrong("no answer")
+                self._rest += received
+            line, _, self._rest = self._rest.partition(b"\n")
+            answer = json.loads(line)
+        except (TimeoutError, ConnectionError):
+            raise self._wrong(f"no answer within {_TIMEOUT:g} s") from None
+        except ValueError:
+            raise self._wrong("an answer that is no JSON") from None
+        if not isinstance(answer, dict):
+            raise self._wrong("an answer that is no JSON object")
+        return answer
+
+    def _wrong(self, got: str) -> BusError:
+        return BusError("the operator of the team", got, "an answer", "is its process frozen?")
+
+    def close(self) -> None:
+        """Leave."""
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

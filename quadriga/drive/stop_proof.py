@@ -1,0 +1,35 @@
+"""Whether a team that was told to stop at once has done so, by its own words. A pure function."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Final
+
+from quadriga.agents.modes import ESTOP
+from quadriga.shared.wire import codes
+from quadriga.shared.wire.messages import Event, Status
+
+PLANT: Final = "plant"
+_AT_REST: Final = frozenset((codes.ESTOPPED, codes.ROBOT_STOPPED))  # what plants announce
+
+
+def unconfirmed(
+    robots: Iterable[str],
+    statuses: Mapping[str, Status],
+    events: Iterable[Event],
+    *,
+    plant_each: bool,
+) -> list[str]:
+    """Who has not said that it has stopped: robots' agents by name, and plants.
+
+    Args:
+        robots: of the team.
+        statuses: the newest of each agent since the stop.
+        events: of the plants since then.
+        plant_each: whether each robot has a plant of its own.
+    """
+    names = tuple(robots)
+    agents = [n for n in names if n not in statuses or statuses[n].mode != ESTOP]
+    at_rest = {event.robot for event in events if event.code in _AT_REST}
+    plants = names if plant_each else ("",)
+    return agents + [f"{PLANT} {name}".rstrip() for name in plants if name not in at_rest]

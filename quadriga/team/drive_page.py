@@ -1,0 +1,37 @@
+"""SHELL: tells who has started a walk where it is driven from."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from rich.console import Console
+
+from quadriga.drive.client import ControlLink, socket_path
+from quadriga.drive.said import WHERE
+from quadriga.shared.config.reference import BY_HAND
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import BusError
+from quadriga.shared.runtime.places import runtime_dir
+
+
+class DrivePage:
+    """The page of a team that is driven by hand, once its operator has one.
+
+    Args:
+        config: the team's configuration.
+        pid: of its operator.
+        console: where to tell it.
+    """
+
+    def __init__(self, config: Config, pid: int, console: Console) -> None:
+        self._path = socket_path(runtime_dir(), config.team.name, pid)
+        self._console = console
+        self._waits = config.reference.driver == BY_HAND
+
+    def tell_once(self) -> None:
+        """Tell it as soon as it is known."""
+        if not (self._waits and self._path.exists()):
+            return
+        with suppress(OSError, BusError), ControlLink(self._path) as link:
+            self._console.print(f"drive from {link.ask(WHERE).get('url')}", markup=False)
+            self._waits = False

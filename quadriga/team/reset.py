@@ -1,0 +1,45 @@
+"""SHELL of the operator's release of an emergency stop: robots get up where they are, and stand."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from quadriga.agents.modes import STAND, WALK
+from quadriga.shared import members
+from quadriga.shared.config.sections import Config
+from quadriga.shared.wire.codec import truncate_text
+from quadriga.shared.wire.messages import Reset, Resume
+from quadriga.shared.wire.topics import RESET, RESUME
+from quadriga.team.resume import PATIENCE
+from quadriga.team.talk import TeamTalk
+
+_UP: Final = 15.0  # s, in which robots have got up; a world may be slower than real time
+_LONGEST_NAME: Final = 60  # characters; it becomes part of every agent's status
+
+
+def reset_team(config: Config, by: str, *, stand: bool) -> tuple[bool, str]:
+    """Release an emergency stop; once all robots stand, have them go on unless they are to stay.
+
+    Args:
+        config: the team's configuration.
+        by: who releases it.
+        stand: whether the robots are to stay where they stand.
+
+    Returns:
+        Whether all robots do what was asked, and what each does.
+
+    Raises:
+        BusError: the bus cannot be opened, or some agents or plants are not there: then nobody is
+            told.
+    """
+    with TeamTalk(config, members.RESET) as talk:
+        release, go_on = talk.publisher(RESET), talk.publisher(RESUME)
+        talk.await_all("release")
+        release(Reset(*talk.time, truncate_text(by, _LONGEST_NAME)))
+        talk.statuses.clear()  # what came before the release says nothing
+        stands = talk.follow(lambda: talk.all_are(STAND, WALK), _UP)
+        if stand or not stands:
+            return stands, talk.describe()
+        go_on(Resume(*talk.time))
+        walks = talk.follow(lambda: talk.all_are(WALK), PATIENCE)
+        return walks, talk.describe()

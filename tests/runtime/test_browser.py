@@ -1,0 +1,145 @@
+"""A team is driven and stopped from a real browser, whose mouse, keys and gamepad are simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from quadriga.commands.parser import main
+from quadriga.recordings.traces import read_traces
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.codes import FALL
+from quadriga.shared.wire.messages import Reference, Status
+from quadriga.shared.wire.topics import REFERENCE, STATUS
+from quadriga.team.launch import Launch
+from tests.browser import CHROMIUM, WHY_NOT, Browser, browser
+from tests.runtime.conftest import WAIT, Make, Team
+
+pytestmark = [
+    pytest.mark.usefixtures("_compiled"),
+    pytest.mark.skipif(CHROMIUM is None, reason=WHY_NOT),
+]
+Watcher = Callable[..., Bus]
+# A gamepad that the test holds: its buttons and axes are `window.stick`.
+GAMEPAD = """
+window.stick = {connected: true, axes: [0, 0, 0, 0],
+              buttons: Array.from({length: 17}, () => ({pressed: false, value: 0}))};
+navigator.getGamepads = () => [window.stick, null, null, null];
+"""
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with browser(tmp_path_factory.mktemp("profile")) as running:
+        yield running
+
+
+def await_message(bus: Bus, key: str, kind: type, wanted: Callable[[object], bool]) -> None:
+    deadline, last = monotonic() + WAIT, object()
+    while monotonic() < deadline:
+        packet = bus.get(1.0)
+        if packet is not None and packet[0] == key:
+            last = decode(packet[1], kind)
+            if wanted(last):
+                return
+    raise AssertionError(f"never on {key}; last {last}")
+
+
+def asks(bus: Bus, **least: float) -> None:
+    """Wait until a reference asks for no less than that, by sign."""
+
+    def wanted(message: object) -> bool:
+        assert isinstance(message, Reference)
+        values = {name: getattr(message, name) for name in least}
+        return all(abs(v) >= abs(least[n]) and v * least[n] > 0 for n, v in values.items())
+
+    await_message(bus, REFERENCE.key("team"), Reference, wanted)
+
+
+def is_in(bus: Bus, mode: str, reason: str = "") -> None:
+    """Wait until both robots are in a mode for a reason that begins so."""
+    for robot in ("r1", "r2"):
+        await_message(
+            bus,
+            STATUS.key("team", robot),
+            Status,
+            lambda s: getattr(s, "mode") == mode and getattr(s, "reason").startswith(reason),  # noqa: B009
+        )
+
+
+def url_of(team: Team) -> str:
+    team.await_log("operator", "drive from http://")
+    return team.log("operator").partition("drive from ")[2].split()[0]
+
+
+def test_a_team_is_driven_stopped_and_released_from_a_page(
+    make_team: Make, watcher: Watcher, chromium: Browser, tmp_path: Path
+) -> None:
+    team = make_team(
+        reference__driver="hand",
+        world__mode="realtime",
+        world__seconds=600.0,
+        recorder__enabled=True,
+    )
+    with team.launch(standing=False) as running:
+        drive(team, running, watcher(team), chromium, tmp_path)
+        running.watch(lambda: True)
+    traces = read_traces(team.recording())
+    assert FALL not in {event.code for event in traces.events}
+    for robot in ("r1", "r2"):
+        assert main(["replay", str(team.folder / "run.mcap"), "--robot", robot]) == 0
+
+
+def drive(team: Team, running: Launch, bus: Bus, chromium: Browser, folder: Path) -> None:
+    with chromium.open(url_of(team), GAMEPAD) as page:
+        is_in(bus, "stand", "stopped:driver: nobody drives")
+        page.await_true("document.body.innerText.includes('nobody drives')")
+        page.click("#take")
+        page.await_true("document.body.innerText.includes('you have the controls')")
+        # The keyboard.
+        page.key("keyDown", "KeyW")
+        is_in(bus, "walk")
+        asks(bus, vx=0.3)
+        page.key("keyUp", "KeyW")
+        is_in(bus, "stand", "stopped:driver: page 1 does not hold on")
+        # The gamepad.
+        page.evaluate("stick.buttons[5].pressed = true; stick.axes[1] = stick.axes[2] = -0.5")
+        asks(bus, vx=0.3, wz=0.3)
+        # A second page hides the first, and cannot drive once that is back.
+        with chromium.open(url_of(team)) as second:
+            is_in(bus, "stand", "stopped:driver: page 1")
+            page.call("Page.bringToFront")
+            page.click("#take")
+            asks(bus, vx=0.3, wz=0.3)
+            second.await_true("document.body.innerText.includes('page 1 has the controls')")
+            second.evaluate("document.getElementById('take').click()")
+            asks(bus, vx=0.3, wz=0.3)
+            assert second.evaluate("news.driver") == "page 1"
+            assert not second.complaints
+        page.evaluate("stick.buttons[5].pressed = false; stick.axes[1] = stick.axes[2] = 0")
+        is_in(bus, "stand")
+        # A slider, with the button that holds.
+        page.evaluate("document.getElementById('vx').value = 0.25")
+        page.mouse("mousePressed", page.point("#hold"))
+        asks(bus, vx=0.2)
+        # The stop button, while it walks.
+        page.screenshot(folder / "page.png")
+        page.evaluate("document.getElementById('estop').onpointerdown()")
+        is_in(bus, "estop", "estop:page")
+        page.await_true("document.getElementById('answer').innerText.startsWith('all stopped')")
+        page.mouse("mouseReleased", page.point("#hold"))
+        page.evaluate("document.getElementById('by').value = 'ann'")
+        page.click("#reset button")
+        is_in(bus, "stand", "reset:ann")
+        page.click("#go-on")
+        is_in(bus, "walk")
+        page.mouse("mousePressed", page.point("#hold"))
+        asks(bus, vx=0.2)
+        assert not page.complaints
+    # The tab is closed.
+    is_in(bus, "stand", "stopped:driver: page 1 gave the controls back")
+    assert running.alive

@@ -1,0 +1,66 @@
+"""A team that walks is stopped, released and sent on, by name; what was recorded replays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from quadriga.commands.parser import main
+from quadriga.recordings.traces import read_traces
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.wire.codes import (
+    ESTOPPED,
+    FALL,
+    HALTS,
+    LIES,
+    RESET,
+    RESUMED,
+    RISES,
+    STANDS_AGAIN,
+    STOP_ASKED,
+    STOPPED,
+)
+from tests.runtime.conftest import Make
+from tests.runtime.frozen import await_tick
+
+pytestmark = pytest.mark.usefixtures("_compiled")
+
+Watcher = Callable[..., Bus]
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_stopped_released_and_sent_on(
+    make_team: Make, watcher: Watcher, capsys: pytest.CaptureFixture[str], mode: str
+) -> None:
+    team = make_team(world__mode=mode, world__seconds=600.0, recorder__enabled=True)
+    file = str(team.folder / "config.toml")
+
+    def said(command: str, *options: str) -> str:
+        assert main([command, *options, "--config", file]) == 0
+        return capsys.readouterr().out
+
+    with team.launch(standing=False) as running:
+        await_tick(watcher(team), 1500)
+        assert said("estop", "--reason", "dog").startswith("stopped r1, r2 within")
+        team.await_log("sim", "lies r1")
+        team.await_log("sim", "lies r2")
+        assert "r1: walk\nr2: walk" in said("reset", "--by", "ann")
+        assert "r1: stand stopped:lunch\nr2: stand stopped:lunch" in said(
+            "stop", "--stand", "--reason", "lunch"
+        )
+        assert "r1: walk\nr2: walk" in said("resume")
+        assert "the walk is over" in said("stop", "--reason", "night")
+        running.watch(lambda: False)
+    traces = read_traces(team.recording())
+    told = [event.code for event in traces.events]
+    assert FALL not in told
+    for code in (ESTOPPED, LIES, RESET, RISES, STANDS_AGAIN, RESUMED, STOP_ASKED, HALTS):
+        assert code in told, code
+    assert (told[-1], traces.events[-1].detail.partition(";")[0]) == (STOPPED, "night")
+    path = str(team.folder / "run.mcap")
+    for robot in ("r1", "r2"):
+        assert main(["replay", path, "--robot", robot]) == 0
+    assert main(["check", path]) == 0
+    if mode == "lockstep":
+        assert main(["resim", path]) == 0
