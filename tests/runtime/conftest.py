@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from quadriga.replay.outcome import format_outcome
+from quadriga.replay.team_replay import replay
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
@@ -68,6 +70,12 @@ class Team:
         with self.launch(standing=standing) as running:
             running.watch(lambda: False)
         return self.recording()
+
+    def replay(self) -> None:
+        """Compute each agent again: nothing may differ, as far as the recorder has heard all."""
+        for outcome in replay(self.folder / "run.mcap", (), {}, None, None, Console(quiet=True)):
+            assert outcome.verdict.first is None, format_outcome(outcome)
+            assert sum(outcome.verdict.equal.values()) > 1000, format_outcome(outcome)
 
     def recording(self) -> Recording:
         """What was recorded."""

@@ -169,13 +169,16 @@ function letGo() {
 }
 
 element("pad").onpointerdown = (event) => {
-  event.target.setPointerCapture(event.pointerId);
+  event.currentTarget.setPointerCapture(event.pointerId);
   movePad(event);
 };
 element("pad").onpointermove = (event) => pad && movePad(event);
 element("pad").onpointerup = element("pad").onpointercancel = letGo;
-element("hold").onpointerdown = () => (held = true);
-element("hold").onpointerup = element("hold").onpointerleave = letGo;
+element("hold").onpointerdown = (event) => {
+  event.currentTarget.setPointerCapture(event.pointerId);
+  held = true;
+};
+element("hold").onpointerup = element("hold").onpointercancel = letGo;
 element("estop").onpointerdown = pressStop; // not onclick: that waits for the button's release
 element("take").onclick = () => drive.say({ kind: "take" });
 element("release").onclick = () => drive.say({ kind: "release" });
