@@ -18,6 +18,12 @@ settings.register_profile("search", settings.get_profile("same"), derandomize=Fa
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _own_runtime_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Teams of other tests, and of this machine's user, are not found."""
+    os.environ["XDG_RUNTIME_DIR"] = str(tmp_path_factory.mktemp("runtime"))
+
+
 # Folders whose tests start processes and take long.
 _LONG: Final = ("docs", "plugins", "runtime", "quadriga/experiments", "deploy")
 

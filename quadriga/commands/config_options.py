@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from quadriga.commands.command import Given
+from quadriga.commands.running import at_its_place, find_running
 from quadriga.shared.config.load import build, layers, parse_assignment
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
@@ -104,10 +105,11 @@ def build_config_options(command: str) -> argparse.ArgumentParser:
 def read_config(arguments: argparse.Namespace) -> tuple[Config, Given]:
     """The configuration in force, and what of it is given explicitly.
 
-    Sets `arguments.overrides` to the keys of single options, by their full name.
+    Sets `arguments.overrides` to the keys of single options, by their full name. A command for a
+    team that runs takes the configuration of the one on this machine, if none is given.
 
     Raises:
-        ConfigError: a key or a value is wrong, or a file cannot be read.
+        ConfigError: a key or a value is wrong, a file cannot be read, or several teams run.
     """
     overrides = dict(parse_assignment(text) for text in arguments.assignments)
     for name, value in vars(arguments).items():
@@ -116,7 +118,10 @@ def read_config(arguments: argparse.Namespace) -> tuple[Config, Given]:
     overrides |= _connection(arguments, overrides)
     arguments.overrides = overrides
     scenario = arguments.scenario
-    if scenario is None:
+    running = find_running(arguments, overrides)
+    if running is not None:
+        given = at_its_place(running, layers(Path(running.config), overrides))
+    elif scenario is None:
         given = layers(arguments.config, overrides)
     else:
         from quadriga.team.scenarios import LABEL, label, path

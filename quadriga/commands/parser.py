@@ -50,6 +50,7 @@ from quadriga.commands import (
 )
 from quadriga.commands.command import Run
 from quadriga.commands.config_options import build_config_options, read_config
+from quadriga.commands.running import registered
 from quadriga.shared.errors import ConfigError, ProcessError, QuadrigaError, system_reason
 from quadriga.shared.printable import printable, printable_line
 from quadriga.shared.runtime.signals import die_with_parent, interrupt_on_sigterm, kill_if_orphaned
@@ -78,7 +79,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         if arguments.parent:
             die_with_parent(arguments.parent)
             kill_if_orphaned(arguments.parent)
-        status: int = arguments.call(arguments, *read_config(arguments))
+        config, given = read_config(arguments)
+        with registered(arguments, config):
+            status: int = arguments.call(arguments, config, given)
     except ProcessError as error:
         return _complain(error, FAILED)
     except QuadrigaError as error:
@@ -113,7 +116,7 @@ def build_parser() -> argparse.ArgumentParser:
             parents=[build_config_options(name)],
             allow_abbrev=False,
         )
-        command.set_defaults(call=run)
+        command.set_defaults(call=run, command=name)
         return command
 
     for add in _COMMANDS:

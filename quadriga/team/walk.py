@@ -20,6 +20,7 @@ from quadriga.team.drive_page import DrivePage
 from quadriga.team.launch import Launch, ProcessSpec, process_table
 from quadriga.team.plants import check_plant
 from quadriga.team.progress import WalkProgress
+from quadriga.team.registry import team_registered
 from quadriga.team.run_folder import CONFIG, make_run_dir
 from quadriga.warm_up import warm_up
 
@@ -54,7 +55,7 @@ def walk(
         predictor, sha256 = _take_predictor(config, run_dir, console)
     (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
     rows = process_table(config, run_dir, predictor, sha256, armed=armed)
-    with stop_flag() as stopped:
+    with stop_flag() as stopped, team_registered(config, run_dir):
         fallen = watch_walk(config, rows, run_dir, stopped, console)
         if stopped():
             console.print(f"interrupted; what was recorded is in {run_dir}", markup=False)
