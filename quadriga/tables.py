@@ -6,12 +6,13 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from rich.console import Console
-from rich.markup import escape
+from rich.console import Console, RenderableType
 from rich.table import Table as RichTable
+from rich.text import Text
 
 from quadriga.shared.printable import printable, printable_line
 from quadriga.shared.robot.conventions import OUTPUTS
+from quadriga.table_layout import TablePart, is_prose, lay_out, least_widths, total
 
 NOTHING: Final = "–"
 _WIDE: Final = 180  # characters a line may have where no terminal says how many there are
@@ -51,14 +52,25 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     notes: Sequence[str] = ()
 
-    def to_rich(self) -> RichTable:
-        """For a terminal, without the notes."""
-        table = RichTable(title=escape(self.title), title_justify="left")
-        for k, column in enumerate(self.columns):
-            table.add_column(escape(column), justify="right" if k else "left", no_wrap=not k)
-        for row in self.rows:
-            table.add_row(*(escape(printable(cell)) for cell in row))
-        return table
+    def to_rich(self, width: int) -> list[RenderableType]:
+        """For a terminal of so many characters: what to print, one below the other.
+
+        No number is cut: what does not fit is turned, or shown some columns at a time.
+        """
+        rows = [tuple(printable(cell) for cell in row) for row in self.rows]
+        layout = lay_out(self.columns, rows, width)
+        first, *others = layout.parts
+        notes = [*([layout.note] if layout.note else []), *self.notes]
+        return [
+            _build_rich(first, self.title),
+            *(_build_rich(part, "") for part in others),
+            *(Text(note, style="dim") for note in notes),
+        ]
+
+    @property
+    def least_width(self) -> int:
+        """Characters of a line at which all columns stand side by side and nothing is cut."""
+        return total(least_widths(self.columns, self.rows))
 
     def to_markdown(self, level: int = 2) -> str:
         """With a heading of this level."""
@@ -71,12 +83,11 @@ class Table:
 def print_tables(tables: Iterable[Table]) -> None:
     """Print tables to stdout, as wide as the terminal or, without one, as they need."""
     console = Console()
-    if not console.is_terminal:
-        console = Console(width=_WIDE)
     for table in tables:
-        console.print(table.to_rich())
-        for note in table.notes:
-            console.print(note, style="dim", markup=False, highlight=False)
+        width = console.width if console.is_terminal else max(_WIDE, table.least_width)
+        for part in table.to_rich(width):
+            # Two columns may need more than the terminal has: it wraps them, and cuts nothing.
+            Console(width=max(width, _width_of(part))).print(part)
 
 
 def format_number(value: float | None, digits: str = ".3g", factor: float = 1.0) -> str:
@@ -109,6 +120,24 @@ def align_columns(
         ]
         lines.append((indent + "  ".join(padded)).rstrip())
     return lines
+
+
+def _width_of(part: RenderableType) -> int:
+    """Characters of a line of a table whose columns have widths; 0: no table."""
+    if not isinstance(part, RichTable):
+        return 0
+    return total([column.width or 0 for column in part.columns])
+
+
+def _build_rich(part: TablePart, title: str) -> RichTable:
+    table = RichTable(title=Text(title, style="table.title") if title else None)
+    table.title_justify = "left"
+    for k, (column, width) in enumerate(zip(part.columns, part.widths, strict=True)):
+        is_text = not k or any(is_prose(row[k]) for row in part.rows)
+        table.add_column(Text(column), justify="left" if is_text else "right", width=width)
+    for row in part.rows:
+        table.add_row(*map(Text, row))
+    return table
 
 
 def _row(cells: Sequence[str]) -> str:

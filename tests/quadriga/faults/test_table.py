@@ -77,8 +77,9 @@ def test_the_tables_fit_a_terminal_of_120_columns() -> None:
     worst = row(fault="encoder-intermittent", detect_ms=12_000, stand_ms=4000, recover_ms=12_000)
     for table in build_team_fault_tables([worst | {"lost_messages": 10_000}]):
         console = Console(width=120, file=StringIO(), record=True)
-        console.print(table.to_rich())
+        console.print(*table.to_rich(120))
         text = console.export_text()
+        assert "characters:" not in text  # it stands as it is, neither turned nor in parts
         assert "encoder-intermittent" in text
         for cell in table.rows[0]:
             assert cell in text  # no line is broken within it
