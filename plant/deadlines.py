@@ -13,6 +13,8 @@ from quadriga.shared.wire.messages import Status
 
 PERIOD_MS: Final = 1000
 MODE: Final = "realtime"
+DUE: Final = "due"  # ends the name of a counter, behind a robot's name: see `Deadlines.status`
+LATE_COUNT: Final = "late"
 LATE: Final = ""
 HELD: Final = "held"
 DAMPED: Final = "damped"
@@ -62,8 +64,8 @@ class Deadlines:
         for robot, histogram in self._ages.items():
             ages |= histogram.quantiles(f"{robot}.command")
         counters = {"overruns": overruns, "ticks": tick}
-        counters |= {f"{robot}.due": count for robot, count in sorted(self._due.items())}
+        counters |= {f"{robot}.{DUE}": count for robot, count in sorted(self._due.items())}
         for (robot, grade), count in sorted(self.late.items()):
-            counters[f"{robot}.{grade or 'late'}"] = count
+            counters[f"{robot}.{grade or LATE_COUNT}"] = count
         lateness, self._lateness_us = np.array(self._lateness_us), []
         return Status(tick, tick * 1_000_000, MODE, "", "", ages, counters, np.zeros(0), lateness)

@@ -41,20 +41,8 @@ KEYS_OF: Final = {"bridge": {"interface": "bridge.interface"}}
 # Commands that take a place on a bus, and `--connect`: reach it through a router elsewhere.
 _CONNECTING: Final = frozenset(
     (
-        "sim",
-        "bridge",
-        "agent",
-        "plan",
-        "operate",
-        "record",
-        "estop",
-        "stop",
-        "reset",
-        "resume",
-        "doctor",
-        "echo",
-        "hz",
-        "play",
+        *("sim", "bridge", "agent", "plan", "operate", "record", "estop", "stop", "reset"),
+        *("resume", "doctor", "echo", "hz", "top", "status", "play"),
     )
 )
 

@@ -42,7 +42,9 @@ from quadriga.commands import (
     router,
     scenarios,
     sim,
+    status,
     stop,
+    top,
     tune,
     version,
     walk,
@@ -63,8 +65,8 @@ INTERRUPTED: Final = 130
 _COMMANDS: Final = (
     walk.add, scenarios.add, sim.add, bridge.add, desk.add, fault.add, agent.add, plan.add,
     record.add, report.add, play.add, resim.add, whatif.add, export.add, info.add, recover.add,
-    check.add, echo.add, hz.add, replay.add, router.add, certs.add, doctor.add, prepare.add,
-    operate.add, collect.add, fit.add, probe.add, campaign.add, experiments.add, tune.add,
+    check.add, echo.add, hz.add, top.add, status.add, replay.add, router.add, certs.add, doctor.add,
+    prepare.add, operate.add, collect.add, fit.add, probe.add, campaign.add, experiments.add, tune.add,
     drive.add, estop.add, stop.add, reset.add, resume.add, config.add, version.add,
 )  # fmt: skip
 

@@ -51,7 +51,8 @@ def find_running(arguments: argparse.Namespace, overrides: Mapping[str, Any]) ->
 
 def _asks_for_one(arguments: argparse.Namespace) -> bool:
     command, given = arguments.command, vars(arguments)
-    live = command in _LIVE or bool(given.get(_LIVE_IF.get(command, "")))
+    switch = _LIVE_IF.get(command, "")
+    live = command in _LIVE or bool(given.get(switch))
     named = arguments.parent or arguments.config is not None or arguments.scenario is not None
     return live and not named and not any(given.get(name) for name in _ELSEWHERE)
 
@@ -67,7 +68,7 @@ def at_its_place(team: RunningTeam, given: dict[str, Any]) -> dict[str, Any]:
 def registered(arguments: argparse.Namespace, config: Config) -> Iterator[None]:
     """Within the block others find the team of a member that was started by hand."""
     started_by_hand = arguments.command in _MEMBERS and not arguments.parent
-    if not started_by_hand or getattr(arguments, "native", ""):
+    if not started_by_hand or vars(arguments).get("native"):  # who speaks a robot's protocol
         yield
         return
     from quadriga.team.registry import team_registered

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from quadriga.shared.recording.mcap_chunk import ChunkEntry, name_of
 from quadriga.shared.recording.sequence import TickTrack
-from quadriga.tables import NOTHING, align_columns
+from quadriga.tables import NOTHING, align_columns, format_number
 
 _HEADS = ("key", "messages", "per world s", "world ms", "per wall s", "wall ms", "lost")
 
@@ -38,6 +38,25 @@ class KeyRate:
         if tick >= 0 and self.last[0] >= 0:
             self.ticks = _widen(self.ticks, tick - self.last[0])
         self.last = (tick if tick >= 0 else self.last[0]), wall_ns
+
+
+@dataclass(frozen=True, slots=True)
+class RateFigures:
+    """How often the messages of one key came.
+
+    Attributes:
+        key: theirs.
+        messages: how many came since the last restart.
+        per_world_s, per_wall_s: messages a second of world time, and of the wall clock; None where
+            it takes two messages to tell.
+        lost: messages that did not come, since the first one.
+    """
+
+    key: str
+    messages: int
+    per_world_s: float | None
+    per_wall_s: float | None
+    lost: int
 
 
 class Rates:
@@ -75,30 +94,41 @@ class Rates:
         """Count anew, each key from its last message on; what is lost stays counted."""
         self._rates = {key: KeyRate(0, rate.last, rate.last) for key, rate in self._rates.items()}
 
+    def figures(self) -> tuple[RateFigures, ...]:
+        """Of each key, sorted."""
+        return tuple(
+            _figures_of(key, self._rates[key], self._tracks[key].lost)
+            for key in sorted(self._rates)
+        )
+
     def format_table(self) -> list[str]:
         """A line for each key: rates, shortest and longest intervals, what is lost."""
-        rows = [
-            _format_row(key, self._rates[key], self._tracks[key]) for key in sorted(self._rates)
-        ]
+        rows = [_format_row(of, self._rates[of.key]) for of in self.figures()]
         return align_columns([_HEADS, *rows], right=range(1, 7), indent="")
 
 
-def _format_row(key: str, rate: KeyRate, track: TickTrack) -> tuple[str, ...]:
+def _figures_of(key: str, rate: KeyRate, lost: int) -> RateFigures:
     world = rate.last[0] - rate.first[0]
     wall = 1e-6 * (rate.last[1] - rate.first[1])
-    return (
-        key,
-        f"{rate.count:,}",
-        _format_rate(rate.steps, world),
-        _format_span(rate.ticks, ".0f"),
-        _format_rate(rate.steps, wall),
-        _format_span(rate.walls, ".1f"),
-        f"{track.lost:,}",
+    return RateFigures(
+        key, rate.count, _per_second(rate.steps, world), _per_second(rate.steps, wall), lost
     )
 
 
-def _format_rate(steps: int, ms: float) -> str:
-    return f"{1000 * steps / ms:.1f}" if steps and ms > 0 else NOTHING
+def _per_second(steps: int, ms: float) -> float | None:
+    return 1000 * steps / ms if steps and ms > 0 else None
+
+
+def _format_row(of: RateFigures, rate: KeyRate) -> tuple[str, ...]:
+    return (
+        of.key,
+        f"{of.messages:,}",
+        format_number(of.per_world_s, ".1f"),
+        _format_span(rate.ticks, ".0f"),
+        format_number(of.per_wall_s, ".1f"),
+        _format_span(rate.walls, ".1f"),
+        f"{of.lost:,}",
+    )
 
 
 def _format_span(between: tuple[float, float] | None, digits: str) -> str:

@@ -1,0 +1,1 @@
+"""How a team is at this moment: gathered from what it sends and says, judged, and shown."""

@@ -1,0 +1,144 @@
+"""SHELL: hears a team without being one of it, and looks at its processes on this computer."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+from quadriga.doctor.health import Health, judge_team
+from quadriga.doctor.watch_team import RecentRefusals, WalkEnd
+from quadriga.shared.bus.absence import TeamView
+from quadriga.shared.bus.inquiry import ask, view_of
+from quadriga.shared.bus.introduction import describe_process
+from quadriga.shared.bus.roster import processes
+from quadriga.shared.bus.zenoh_bus import HERE, Arrival, Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.timing import periods
+from quadriga.shared.members import OBSERVER
+from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
+from quadriga.shared.runtime.process_use import read_use
+from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.topics import TABLE
+from quadriga.status.gather import StatusFold
+from quadriga.status.judge import find_problems
+from quadriga.status.record import MachineUse, MemberStatus, TeamStatus
+
+_FAST_MS: Final = 10  # a topic with a shorter period costs who hears it a good part of a core
+_ASK_EVERY: Final = 5.0  # s between two questions, each of which costs every process an answer
+_LINK_TIMEOUT: Final = 2.0  # s, in which a link to those that are there has come about
+_PAUSE: Final = 0.05  # s between two looks at what has come
+
+
+class TeamListener:
+    """A look at a team again and again.
+
+    Args:
+        config: the team's configuration.
+        bus: opened with a name of those who only look on.
+        every_topic: hear states and commands too, 1000 a second of each robot.
+    """
+
+    def __init__(self, config: Config, bus: Bus, *, every_topic: bool) -> None:
+        self._config, self._bus = config, bus
+        self._team = processes(config)
+        self._fold, self._end = StatusFold(config), WalkEnd(bus)
+        self._refusals = RecentRefusals(bus)
+        fast = periods(config)
+        self._takes: list[Callable[[], list[Arrival]]] = [
+            bus.collect(topic.key(bus.team, "*"))
+            for topic in TABLE
+            if every_topic or not 0 < fast[topic.name] < _FAST_MS
+        ]
+        self._view: TeamView | None = None
+        self._asked = 0.0
+        self._uses: dict[int, tuple[float, float]] = {}  # by process: when, and its time by then
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the walk that was seen is over, or nobody can be seen any more."""
+        return self._end.is_over()
+
+    def hear(self, seconds: float, stopped: Callable[[], bool]) -> None:
+        """Listen for a while, or until `stopped()`."""
+        until = monotonic() + seconds
+        while not stopped() and monotonic() < until:
+            sleep(min(_PAUSE, max(until - monotonic(), 0.0)))
+            arrived = [arrival for take in self._takes for arrival in take()]
+            for at_ns, key, payload in sorted(arrived, key=lambda arrival: arrival[0]):
+                head = envelope(payload)
+                self._fold.add(key, payload, -1 if head is None else head[0], at_ns)
+
+    def look(self) -> TeamStatus:
+        """How the team is now, by what was heard since the last look."""
+        bus, config = self._bus, self._config
+        if self._view is None or monotonic() - self._asked > _ASK_EVERY:
+            self._asked = monotonic()
+            self._view = view_of(bus, config, ask(bus), describe_process(config, OBSERVER))
+        view, here = self._view, bus.members_at(HERE)
+        health = {of.name: of for of in judge_team(self._team, view, self._refusals.recent())}
+        reading = self._fold.look(monotonic_ns())
+        members = tuple(
+            MemberStatus(
+                member.name,
+                member.name in here,
+                self._health_of(health[member.name], here=member.name in here),
+                self._use_of(view, member.name),
+                reading.accounts.get(member.name),
+            )
+            for member in self._team
+        )
+        problems = find_problems(config, bus.linked, reading, members)
+        name, endpoint = config.team.name, config.bus.endpoint
+        return TeamStatus(name, endpoint, bus.linked, reading, members, problems)
+
+    def _health_of(self, health: Health, *, here: bool) -> str:
+        """A process that has gone since all were asked is not well any more."""
+        return "not well: gone" if health.reason == "" and not here else health.line
+
+    def _use_of(self, view: TeamView, name: str) -> MachineUse | None:
+        about = view.about(name)
+        if about is None:
+            return None
+        use = read_use(about.pid) if about.host == socket.gethostname() else None
+        if use is None or not _is_quadriga(about.pid):
+            return MachineUse(about.host, about.pid)
+        now = monotonic()
+        before = self._uses.get(about.pid)
+        self._uses[about.pid] = now, use.cpu_s
+        cpu = None if before is None else (use.cpu_s - before[1]) / max(now - before[0], 1e-3)
+        return MachineUse(about.host, about.pid, cpu, use.memory)
+
+
+@contextmanager
+def listening(
+    config: Config, name: str, stopped: Callable[[], bool], *, every_topic: bool = False
+) -> Iterator[TeamListener]:
+    """A listener that has a link to the team, if there is one.
+
+    Args:
+        config: the team's configuration.
+        name: of the command that looks on.
+        stopped: asked often whether to stop.
+        every_topic: see `TeamListener`.
+
+    Raises:
+        BusError: the bus cannot be opened.
+    """
+    with Bus.open(config.bus, config.team.name, f"{name}-{os.getpid()}", stopped) as bus:
+        listener = TeamListener(config, bus, every_topic=every_topic)
+        until = monotonic() + _LINK_TIMEOUT
+        while not bus.linked and not stopped() and monotonic() < until:
+            sleep(_PAUSE)
+        yield listener
+
+
+def _is_quadriga(pid: int) -> bool:
+    """Whether it is one of this project's: a container may have the same host name and numbers."""
+    try:
+        return b"quadriga" in (Path("/proc") / str(pid) / "cmdline").read_bytes()
+    except OSError:
+        return False
