@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -46,20 +47,43 @@ _CONNECTING: Final = frozenset(
     )
 )
 
+# Commands that look at none of it, and do not mention it in their help.
+_UNCONFIGURED: Final = frozenset(
+    ("scenarios", "info", "check", "recover", "version", "completion", "experiments")
+)
+_DEFAULTS: Final = Config()
+_ABOUT: Final = (
+    "--scenario NAME, --config FILE, --set SECTION.KEY=VALUE and an option for each key that is "
+    "often set, such as --robots: see --help-all, docs/configuration.md."
+)
 
-def build_config_options(command: str) -> argparse.ArgumentParser:
-    """The parent of a command's parser."""
+
+def build_config_options(command: str, *, hidden: bool) -> argparse.ArgumentParser:
+    """The parent of a command's parser.
+
+    Args:
+        command: its name.
+        hidden: show in its help a line instead of these options.
+    """
     options = argparse.ArgumentParser(add_help=False)
     options.add_argument("--parent", type=int, default=0, help=argparse.SUPPRESS)
-    group = options.add_argument_group("configuration")
-    group.add_argument(
+    options.add_argument(
+        "--help-all", action="help", help="show the options of the configuration, too, and exit"
+    )
+    about = _ABOUT if hidden and command not in _UNCONFIGURED else None
+    group = options.add_argument_group("configuration", about)
+
+    def add(*names: str, help: str, **named: Any) -> None:
+        group.add_argument(*names, help=argparse.SUPPRESS if hidden else help, **named)
+
+    add(
         "--scenario",
         metavar="NAME",
         help="start from a scenario's keys; see `quadriga scenarios`; --config and "
         "all other options win over it; a TOML file will do, too",
     )
-    group.add_argument("--config", type=Path, metavar="FILE", help="TOML; see `quadriga config`")
-    group.add_argument(
+    add("--config", type=Path, metavar="FILE", help="TOML; see `quadriga config`")
+    add(
         "--set",
         action="append",
         default=[],
@@ -68,26 +92,29 @@ def build_config_options(command: str) -> argparse.ArgumentParser:
         help="set any key; may be repeated",
     )
     if command in _CONNECTING:
-        group.add_argument(
+        add(
             "--connect",
             metavar="ENDPOINT",
             help="through the router at tls/HOST:PORT: sets bus.mode to client, and bus.endpoint",
         )
-    defaults = Config()
     for option, name in (KEYS | KEYS_OF.get(command, {})).items():
-        section, _, key = name.partition(".")
-        values = getattr(defaults, section)
-        meta = type(values).__dataclass_fields__[key].metadata
-        default = getattr(values, key)
-        unit = "" if meta["unit"] in ("-", "1") else f" [{meta['unit']}]"
-        group.add_argument(
-            f"--{option}",
-            type=type(default),
-            dest=name,
-            metavar="|".join([*meta["choices"], *(["…"] if meta["more"] else [])]) or "X",
-            help=f"{meta['doc']}{unit} ({default})".replace("%", "%%"),
-        )
+        add(f"--{option}", dest=name, **_describe_key(name))
     return options
+
+
+@cache
+def _describe_key(name: str) -> Mapping[str, Any]:
+    """Type, placeholder and help of the option of a key."""
+    section, _, key = name.partition(".")
+    values = getattr(_DEFAULTS, section)
+    meta = type(values).__dataclass_fields__[key].metadata
+    default = getattr(values, key)
+    unit = "" if meta["unit"] in ("-", "1") else f" [{meta['unit']}]"
+    return {
+        "type": type(default),
+        "metavar": "|".join([*meta["choices"], *(["…"] if meta["more"] else [])]) or "X",
+        "help": f"{meta['doc']}{unit} ({default})".replace("%", "%%"),
+    }
 
 
 def read_config(arguments: argparse.Namespace) -> tuple[Config, Given]:

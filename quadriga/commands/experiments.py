@@ -32,6 +32,7 @@ def add(add_command: AddCommand) -> None:
     )
     option = command.add_argument
     option("names", nargs="*", metavar="NAME", help="of deploy/experiments, or a TOML file (all)")
+    option("--list", action="store_true", help="list all experiments, and walk none")
     option(
         "--only-publish",
         action="store_true",
@@ -74,9 +75,19 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
 
     _check_options(arguments)
     every, asked = load_experiments(arguments.names)
+    if arguments.list:
+        _list(every)
+        return 0
     chosen = [experiment for experiment in every if experiment.name in asked]
     outcomes = _look(arguments, chosen) if arguments.seeds else _publish(arguments, every, asked)
     return int(arguments.require and not all(_meets(one, results) for one, results in outcomes))
+
+
+def _list(experiments: Iterable[Experiment]) -> None:
+    from quadriga.tables import Table, print_tables
+
+    rows = tuple((experiment.name, experiment.title) for experiment in experiments)
+    print_tables([Table("Experiments", ("name", "what"), rows)])
 
 
 def _look(

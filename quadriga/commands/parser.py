@@ -5,54 +5,15 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
-from quadriga.commands import (
-    agent,
-    bridge,
-    campaign,
-    certs,
-    check,
-    collect,
-    config,
-    desk,
-    doctor,
-    drive,
-    echo,
-    estop,
-    experiments,
-    export,
-    fault,
-    fit,
-    hz,
-    info,
-    operate,
-    plan,
-    play,
-    prepare,
-    probe,
-    record,
-    recover,
-    replay,
-    report,
-    reset,
-    resim,
-    resume,
-    router,
-    scenarios,
-    sim,
-    status,
-    stop,
-    top,
-    tune,
-    version,
-    walk,
-    whatif,
-)
 from quadriga.commands.command import Run
+from quadriga.commands.command_table import GROUPS
 from quadriga.commands.config_options import build_config_options, read_config
+from quadriga.commands.mistakes import check_words
 from quadriga.commands.running import registered
+from quadriga.commands.version import ShowVersion
 from quadriga.shared.errors import ConfigError, ProcessError, QuadrigaError, system_reason
 from quadriga.shared.printable import printable, printable_line
 from quadriga.shared.runtime.signals import die_with_parent, interrupt_on_sigterm, kill_if_orphaned
@@ -60,23 +21,37 @@ from quadriga.shared.runtime.signals import die_with_parent, interrupt_on_sigter
 FAILED: Final = 1  # a robot fell or a process failed
 WRONG: Final = 2  # the command, the configuration or a file is wrong
 INTERRUPTED: Final = 130
+_ALL: Final = "--help-all"
+_ABOUT: Final = "A team of yoked quadrupeds that walk as one."
+_MORE: Final = (
+    "`quadriga COMMAND --help` shows the options of a command. Every command reads one\n"
+    "configuration: defaults, then --scenario, then --config, then options."
+)
 
-# In the order of `quadriga --help`.
-_COMMANDS: Final = (
-    walk.add, scenarios.add, sim.add, bridge.add, desk.add, fault.add, agent.add, plan.add,
-    record.add, report.add, play.add, resim.add, whatif.add, export.add, info.add, recover.add,
-    check.add, echo.add, hz.add, top.add, status.add, replay.add, router.add, certs.add, doctor.add,
-    prepare.add, operate.add, collect.add, fit.add, probe.add, campaign.add, experiments.add, tune.add,
-    drive.add, estop.add, stop.add, reset.add, resume.add, config.add, version.add,
-)  # fmt: skip
+
+class CommandLine(argparse.ArgumentParser):
+    """The parser of the whole command line.
+
+    Attributes:
+        commands: the parser of each command by its name, in the order of the help.
+    """
+
+    commands: Mapping[str, argparse.ArgumentParser]
+
+    def list_options(self) -> dict[str, tuple[str, ...]]:
+        """By command its options, as they are typed."""
+        return {name: tuple(list_options(of)) for name, of in self.commands.items()}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; its exit status. A user's mistake costs one line, not a traceback."""
     typed = sys.argv[1:] if argv is None else list(argv)
-    arguments = build_parser().parse_args(typed)
-    arguments.typed = shlex.join(["quadriga", *typed])
+    parser = build_parser(everything=_ALL in typed)
     try:
+        check_words(typed, parser.list_options())
+        arguments = parser.parse_args(typed)
+        arguments.typed = shlex.join(["quadriga", *typed])
+        arguments.every_command = lambda: build_parser(everything=True).commands
         interrupt_on_sigterm()
         if arguments.parent:
             die_with_parent(arguments.parent)
@@ -100,30 +75,62 @@ def main(argv: Sequence[str] | None = None) -> int:
     return status
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """The parser of the whole command line."""
-    top = argparse.ArgumentParser(
+def build_parser(*, everything: bool = False) -> CommandLine:
+    """The parser of the whole command line.
+
+    Args:
+        everything: show in each command's help the options of the configuration, too.
+    """
+    top = CommandLine(
         prog="quadriga",
-        description="A team of yoked quadrupeds that walk as one.",
-        epilog="Every command reads one configuration: defaults, then --scenario, then --config, "
-        "then options.",
+        usage="quadriga [-h] [--version] COMMAND …",
+        description=_ABOUT,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    commands = top.add_subparsers(metavar="command", required=True)
+    top.add_argument("--version", action=ShowVersion, help="print the version")
+    commands = top.add_subparsers(
+        metavar="COMMAND",
+        required=True,
+        prog="quadriga",
+        help=argparse.SUPPRESS,
+        parser_class=argparse.ArgumentParser,
+    )
+    told: dict[str, str] = {}
 
     def add_command(name: str, run: Run, doc: str) -> argparse.ArgumentParser:
         command = commands.add_parser(
             name,
-            help=doc,
             description=doc,
-            parents=[build_config_options(name)],
+            parents=[build_config_options(name, hidden=not everything)],
             allow_abbrev=False,
         )
         command.set_defaults(call=run, command=name)
+        told[name] = doc
         return command
 
-    for add in _COMMANDS:
-        add(add_command)
+    groups = []
+    for title, adds in GROUPS.items():
+        before = len(told)
+        for add in adds:
+            add(add_command)
+        groups.append((title, list(told.items())[before:]))
+    top.commands = commands.choices
+    top.epilog = _format_groups(groups)
     return top
+
+
+def list_options(parser: argparse.ArgumentParser) -> list[str]:
+    """All options of a parser, also those that its help does not show."""
+    return [option for action in parser._actions for option in action.option_strings]
+
+
+def _format_groups(groups: Sequence[tuple[str, Sequence[tuple[str, str]]]]) -> str:
+    width = max(len(name) for _, commands in groups for name, _ in commands)
+    parts = [
+        "\n".join([f"{title}:", *(f"  {name:{width}}  {doc}" for name, doc in commands)])
+        for title, commands in groups
+    ]
+    return "\n\n".join([*parts, _MORE])
 
 
 def _complain(error: QuadrigaError, status: int) -> int:

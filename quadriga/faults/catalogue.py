@@ -39,8 +39,8 @@ def find_fault(name: str, config: Config) -> TeamFault:
     if "/" in name:
         return given_fault(name, config)
     if name not in BY_NAME:
-        hint = did_you_mean(name, BY_NAME)
-        raise ConfigError("fault", repr(name), f"all, {', '.join(BY_NAME)}", hint)
+        hint = did_you_mean(name, (ALL, *BY_NAME)) or "`quadriga fault --list` lists them"
+        raise ConfigError("fault", repr(name), "the name of a fault, or all", hint)
     return BY_NAME[name]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from quadriga.shared.errors import ConfigError, name_file_errors
+from quadriga.shared.errors import ConfigError, did_you_mean, name_file_errors
 from quadriga.shared.runtime.places import scenario_folder
 
 LABEL: Final = "world.scenario"  # the key that carries a scenario's name
@@ -32,8 +32,8 @@ def path(name: str) -> Path:
         raise ConfigError(
             "--scenario",
             repr(name),
-            f"one of {', '.join(names())}, or a TOML file",
-            "`quadriga scenarios` describes them",
+            "the name of a scenario, or a TOML file",
+            did_you_mean(name, names()) or "`quadriga scenarios` lists them",
         )
     return scenario_folder() / f"{name}{_SUFFIX}"
 

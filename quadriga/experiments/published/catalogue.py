@@ -8,7 +8,7 @@ from typing import Final
 
 from quadriga.experiments.published.experiment import Experiment
 from quadriga.experiments.published.experiment_file import read_experiment
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import ConfigError, did_you_mean
 from quadriga.shared.runtime.places import SOURCE
 
 CHECKOUT: Final = SOURCE
@@ -55,8 +55,8 @@ def load_experiments(given: Sequence[str]) -> tuple[list[Experiment], list[str]]
             raise ConfigError(
                 "experiments",
                 repr(word),
-                f"names of {', '.join(known) or 'none'}, or a TOML file",
-                "they stand in deploy/experiments of a checkout",
+                "the name of an experiment, or a TOML file",
+                did_you_mean(word, known) or "`quadriga experiments --list` lists them",
             )
         asked[name] = None
     if not asked:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from quadriga.commands.command_table import GROUPS
 from quadriga.commands.config_options import KEYS, read_config
 from quadriga.commands.parser import build_parser, main
 from quadriga.shared.config.load import load
@@ -105,7 +107,76 @@ def test_mistakes(
     assert err.count("\n") == 1
 
 
-@pytest.mark.parametrize("arguments", [[], ["wlak"], ["walk", "--robots", "three"], ["agent"]])
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        (["wlak"], "quadriga: got 'wlak', expected a command (did you mean 'walk'?)"),
+        (["xyzzy"], "quadriga: got 'xyzzy', expected a command (`quadriga --help` lists them)"),
+        (
+            ["walk", "--robts", "3"],
+            "quadriga walk: got --robts, expected an option that it has (did you mean '--robots'?)",
+        ),
+        (
+            ["agent", "--robto=r1"],
+            "quadriga agent: got --robto, expected an option that it has (did you mean '--robot'?)",
+        ),
+        (
+            ["walk", "--qqq"],
+            "quadriga walk: got --qqq, expected an option that it has "
+            "(`quadriga walk --help-all` lists them)",
+        ),
+        (
+            ["fault", "agent-kiled"],
+            "fault: got 'agent-kiled', expected the name of a fault, or all "
+            "(did you mean 'agent-killed'?)",
+        ),
+        (
+            ["fault", "xyzzy"],
+            "fault: got 'xyzzy', expected the name of a fault, or all "
+            "(`quadriga fault --list` lists them)",
+        ),
+    ],
+)
+def test_what_was_likely_meant_is_told(
+    capsys: pytest.CaptureFixture[str], words: list[str], error: str
+) -> None:
+    assert run(capsys, *words) == (2, "", f"quadriga: {error}\n")
+
+
+def test_what_stands_behind_two_dashes_is_no_option(capsys: pytest.CaptureFixture[str]) -> None:
+    status, _, err = run(capsys, "info", "--", "--robts")
+    assert (status, err) == (
+        2,
+        "quadriga: --robts: got No such file or directory, expected a recording\n",
+    )
+
+
+def test_help_is_in_groups_and_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="0"):
+        main(["--help"])
+    out = capsys.readouterr().out
+    titles = re.findall(r"^(\w.*):$", out, re.MULTILINE)
+    assert [title for title in GROUPS if title not in titles] == []
+    assert re.findall(r"^  ([a-z]+)  ", out, re.MULTILINE) == [*build_parser().commands]
+    assert max(map(len, out.splitlines())) < 110
+
+
+@pytest.mark.parametrize("command", [*build_parser().commands])
+def test_a_command_shows_its_own_options(capsys: pytest.CaptureFixture[str], command: str) -> None:
+    """Those of the configuration are told of in a line, and shown when asked for."""
+    with pytest.raises(SystemExit, match="0"):
+        main([command, "--help"])
+    own = capsys.readouterr().out
+    assert "--terrain-height" not in own
+    assert "--parent" not in own
+    with pytest.raises(SystemExit, match="0"):
+        main([command, "--help-all"])
+    every = capsys.readouterr().out
+    assert "--terrain-height" in every
+    assert set(re.findall("--[a-z-]+", own)) - {"--set"} <= set(re.findall("--[a-z-]+", every))
+
+
+@pytest.mark.parametrize("arguments", [[], ["walk", "--robots", "three"], ["agent"]])
 def test_a_wrong_command_line_shows_the_usage(
     capsys: pytest.CaptureFixture[str], arguments: list[str]
 ) -> None:
@@ -161,6 +232,9 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = run(capsys, "version")
     assert status == 0
     assert out.startswith("quadriga")
+    with pytest.raises(SystemExit, match="0"):
+        main(["--version"])
+    assert capsys.readouterr().out == out
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -111,12 +111,20 @@ def test_any_file_is_a_scenario(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     assert 'scenario = "mine"\n' in out
 
 
-def test_a_wrong_name_is_one_error_that_lists_the_right_ones(
-    capsys: pytest.CaptureFixture[str],
+@pytest.mark.parametrize(
+    ("name", "cause"),
+    [("gravel", "did you mean 'gravel-3'?"), ("qqq", "`quadriga scenarios` lists them")],
+)
+def test_a_wrong_name_is_one_error_that_tells_the_right_one(
+    capsys: pytest.CaptureFixture[str], name: str, cause: str
 ) -> None:
-    status, out, err = run(capsys, "walk", "--scenario", "gravel")
-    assert (status, out, err.count("\n")) == (2, "", 1)
-    assert "--scenario: got 'gravel', expected one of asymmetric-5, blocks-3, chain-5" in err
+    status, out, err = run(capsys, "walk", "--scenario", name)
+    assert (status, out) == (2, "")
+    expected = "expected the name of a scenario, or a TOML file"
+    assert err == f"quadriga: --scenario: got '{name}', {expected} ({cause})\n"
+
+
+def test_a_file_that_is_not_there_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     status, _, err = run(capsys, "walk", "--scenario", "/nowhere/mine.toml")
     assert status == 2
     assert "/nowhere/mine.toml: got No such file" in err

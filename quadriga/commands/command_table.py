@@ -1,0 +1,76 @@
+"""All commands, in the groups and the order of `quadriga --help`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Final
+
+from quadriga.commands import (
+    agent,
+    bridge,
+    campaign,
+    certs,
+    check,
+    collect,
+    completion,
+    config,
+    desk,
+    doctor,
+    drive,
+    echo,
+    estop,
+    experiments,
+    export,
+    fault,
+    fit,
+    hz,
+    info,
+    operate,
+    plan,
+    play,
+    prepare,
+    probe,
+    record,
+    recover,
+    replay,
+    report,
+    reset,
+    resim,
+    resume,
+    router,
+    scenarios,
+    sim,
+    status,
+    stop,
+    top,
+    tune,
+    version,
+    walk,
+    whatif,
+)
+from quadriga.commands.command import AddCommand
+
+# What each adds is its module's `add`: a command, its options and its call.
+GROUPS: Final[Mapping[str, tuple[Callable[[AddCommand], None], ...]]] = MappingProxyType(
+    {
+        "walk and watch": (
+            walk.add, scenarios.add, drive.add, top.add, status.add, echo.add, hz.add, doctor.add,
+        ),
+        "stop and go on": (estop.add, stop.add, reset.add, resume.add),
+        "look into recordings": (
+            report.add, info.add, check.add, play.add, export.add, recover.add,
+        ),
+        "walk recordings again": (replay.add, resim.add, whatif.add),
+        "experiments": (
+            campaign.add, experiments.add, fault.add, desk.add, probe.add, tune.add,
+        ),
+        "data and predictors": (prepare.add, collect.add, fit.add),
+        "processes of a team, one by one": (
+            sim.add, bridge.add, agent.add, plan.add, operate.add, record.add, router.add,
+        ),
+        "certificates, configuration, shell": (
+            certs.add, config.add, completion.add, version.add,
+        ),
+    }
+)  # fmt: skip
