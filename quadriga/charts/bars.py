@@ -25,7 +25,7 @@ def draw_bars(axes: Axes, panel: Panel, span: tuple[float, float], width: float)
     for k, row in enumerate(panel.rows):
         for style in dict.fromkeys(style for *_, style in row.bars):
             # Bars of what is true lie as a thin line in those of what is scheduled.
-            inset = 0.36 if style == "contact" else 0.12
+            inset = 0.36 if style.endswith("contact") else 0.12
             wider = 1.5 * point if style in ("event", "trouble") else 0.0
             sides = np.array(
                 [

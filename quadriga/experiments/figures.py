@@ -10,24 +10,12 @@ from typing import Final, Literal
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from quadriga.charts.colours import series_colour
 from quadriga.experiments.measures import MEASURES, Interval, name_ratio
 from quadriga.experiments.results import COST, POOLED, Results, World
 from quadriga.experiments.sweep import to_number
 from quadriga.tables import error_text
 
-_COLOURS: Final = (
-    "#1f77b4",
-    "#d62728",
-    "#2ca02c",
-    "#9467bd",
-    "#ff7f0e",
-    "#17becf",
-    "#8c564b",
-    "#e377c2",
-    "#7f7f7f",
-    "#bcbd22",
-    "#000000",
-)
 _WIDTH: Final = 10.0  # inch
 _ABREAST: Final = 6  # panels of rows whose titles have room beside each other
 _CURVES_ABREAST: Final = 4  # panels of curves that have room beside each other
@@ -225,7 +213,7 @@ def _reach(interval: Interval) -> tuple[float, float]:
 
 def _colours(results: Results) -> dict[str, str]:
     """Of each variant the colour that it has in every figure."""
-    return {name: _COLOURS[k % len(_COLOURS)] for k, name in enumerate(results.variants)}
+    return {name: series_colour(k) for k, name in enumerate(results.variants)}
 
 
 def _clean(panel: Axes, axis: Literal["x", "both"]) -> None:

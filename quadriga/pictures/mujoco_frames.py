@@ -19,19 +19,19 @@ from PIL import Image
 from quadriga.pictures.frames import FRAME, clip_ticks, save_clip, save_sheet, sheet_ticks
 from quadriga.pictures.link_mesh import LinkMeshes
 from quadriga.pictures.meshes import link_meshes
+from quadriga.pictures.name_tags import write_names
 from quadriga.pictures.poses import PosedTeam, Poses, read_poses, truth_ticks
 from quadriga.pictures.robot_shapes import dress
+from quadriga.pictures.viewpoint import AZIMUTH, ELEVATION, FIELD, viewpoints
 from quadriga.shared.errors import MeshError, QuadrigaError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.colours import robot_rgb
 from quadriga.shared.robot.conventions import Array, robot_names
 
-_AZIMUTH: Final = 145.0  # deg, seen from ahead and the left of a team that walks along x
-_ELEVATION: Final = -24.0  # deg
-_BELOW: Final = 0.11  # m under the middle of the trunks: there the camera looks
 _FORCE_SCALE: Final = 0.005  # m per N
 _FORCE_RADIUS: Final = 0.008  # m
-_FORCE_RGBA: Final = np.array([0.95, 0.75, 0.1, 0.9], dtype=np.float32)
+_FORCE_OPACITY: Final = 0.9
 _STREWN: Final = 0.3  # m around the team in which loose stones are drawn
 _COARSE: Final = (10, 6)  # facets around and along a round body
 # Shadow map [texels] and samples per pixel: what a frame's time goes into.
@@ -79,18 +79,20 @@ def frames(poses: Poses, quality: tuple[int, int], meshes: LinkMeshes) -> Iterat
         team.model.vis.quality.numslices, team.model.vis.quality.numstacks = _COARSE
     _light(team.model, 3.0 + 2.0 * poses.radius())
     camera = mujoco.MjvCamera()
-    camera.azimuth, camera.elevation = _AZIMUTH, _ELEVATION
-    camera.distance = 0.6 + 1.3 * poses.radius()
+    camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
+    team.model.vis.global_.fovy = FIELD
     renderer = mujoco.Renderer(team.model, FRAME[1], FRAME[0])
     try:
-        for qpos, grf, centre in zip(poses.qpos, poses.grf, poses.centre(), strict=True):
-            team.set(qpos)
-            team.physics.light_xpos[0, :2] = centre[:2]
-            camera.lookat[:] = [*centre[:2], centre[2] - _BELOW]
+        for k, view in enumerate(viewpoints(poses)):
+            team.set(poses.qpos[k])
+            team.physics.light_xpos[0, :2] = view.target[:2]
+            camera.lookat[:], camera.distance = view.target, view.distance
             renderer.update_scene(team.physics, camera)
-            relief.draw(renderer.scene, centre, poses.radius() + _STREWN)
-            _add_forces(renderer.scene, team.feet(), grf)
-            yield Image.fromarray(renderer.render())
+            relief.draw(renderer.scene, poses.centre()[k], poses.radius() + _STREWN)
+            _add_forces(renderer.scene, team.feet(), poses.grf[k])
+            picture = Image.fromarray(renderer.render())
+            write_names(picture, team.names, team.trunks(), view)
+            yield picture
     finally:
         renderer.close()
 
@@ -107,12 +109,14 @@ def _light(model: Any, height: float) -> None:
 
 
 def _add_forces(scene: Any, feet: Array, grf: Array) -> None:
-    """Arrows of the ground reaction forces, from each foot upwards."""
-    for foot, force in zip(feet.reshape(-1, 3), grf.reshape(-1, 3), strict=True):
+    """Arrows of the ground reaction forces (n, 4, 3), from each foot upwards."""
+    for robot, leg in np.ndindex(grf.shape[:2]):
+        foot, force = feet[robot, leg], grf[robot, leg]
         if np.linalg.norm(force) < 1.0 or scene.ngeom >= scene.maxgeom:
             continue
         geom, kind = scene.geoms[scene.ngeom], mujoco.mjtGeom.mjGEOM_ARROW
-        mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), _FORCE_RGBA)
+        rgba = np.array([*robot_rgb(robot), _FORCE_OPACITY], dtype=np.float32)
+        mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), rgba)
         mujoco.mjv_connector(geom, kind, _FORCE_RADIUS, foot, foot + _FORCE_SCALE * force)
         scene.ngeom += 1
 

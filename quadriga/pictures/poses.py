@@ -129,6 +129,10 @@ class PosedTeam:
         self.physics.qpos[: len(qpos)] = qpos
         mujoco.mj_forward(self.model, self.physics)
 
+    def trunks(self) -> Array:
+        """Positions of all trunks, shape (n, 3), m, world frame."""
+        return np.array([self.physics.body(f"{name}/trunk").xpos for name in self.names])
+
     def feet(self) -> Array:
         """Positions of all feet, shape (n, 4, 3), m, world frame."""
         return self._places("{leg}_foot")

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from quadriga.charts.colours import contact_style, truth_style
 from quadriga.charts.draw import draw_panels
 from quadriga.charts.panels import Bars, Curve, Panel, PanelGrid
 from quadriga.charts.thinning import find_spells
@@ -73,7 +74,7 @@ def build_gait_panel(run: Run, index: int) -> Panel:
             leg.name,
             [
                 *_build_bars(samples.tick, samples.stance[:, leg], "stance", shift=-SAMPLE_MS),
-                *_build_bars(samples.tick, samples.contact[:, leg], "contact"),
+                *_build_bars(samples.tick, samples.contact[:, leg], contact_style(index)),
             ],
         )
         for leg in Leg
@@ -84,7 +85,7 @@ def build_gait_panel(run: Run, index: int) -> Panel:
 def gait_legend(run: Run) -> list[tuple[str, str]]:
     """What the bars of the gait mean."""
     contact = "true contact" if run.has_truth else "contact by the foot sensor"
-    return [("stance", "scheduled stance"), ("contact", contact)]
+    return [("stance", "scheduled stance"), ("contact", f"{contact}, in the robot's colour")]
 
 
 def four_strides(run: Run) -> tuple[float, float]:
@@ -99,17 +100,18 @@ def four_strides(run: Run) -> tuple[float, float]:
 def _force_legend(run: Run) -> list[tuple[str, str]]:
     unit = "N" if run.traces.config.feet_measure_newtons else "counts"
     source = "ground reaction (truth)" if run.has_truth else f"by the foot sensor, {unit}"
-    return [("true", source), ("planned", "planned, as applied")]
+    return [("true", f"{source}, in the robot's colour"), ("planned", "planned, as applied")]
 
 
 def _build_force_panel(run: Run, index: int, leg: Leg, title: str) -> Panel:
     traces, robot = run.traces, run.traces.robots[index]
     begin, forces, _ = join_applied_samples(traces.plans[robot], traces.config.planner.applied)
+    style = truth_style(index)
     if run.has_truth:
-        true = Curve(traces.truth.tick / 1000, traces.truth.grf[:, index, leg, 2], "true", gap=0.05)
+        true = Curve(traces.truth.tick / 1000, traces.truth.grf[:, index, leg, 2], style, gap=0.05)
     else:
         samples = run.samples[robot]
-        true = Curve(samples.tick / 1000, samples.foot_force[:, leg], "true", gap=0.05)
+        true = Curve(samples.tick / 1000, samples.foot_force[:, leg], style, gap=0.05)
     plan = Curve(begin, forces[:, 3 * leg + 2], "planned", "step", gap=_GAP)
     return Panel(title, [true, plan], span=80.0, floor=0.0, ceiling=_STRONG)
 

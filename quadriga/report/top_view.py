@@ -8,10 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from quadriga.charts.colours import LINES, PALETTE, robot_colour, robot_style
+from quadriga.charts.colours import LINES, PALETTE, robot_style
 from quadriga.charts.draw import POINTS_PER_INCH, TEXT, WIDTH, add_legend, tidy_axes
 from quadriga.recordings.traces import Traces
 from quadriga.shared.config.yokes import yoke_pairs
+from quadriga.shared.robot.colours import robot_colour
 from quadriga.shared.robot.conventions import Array
 
 _INSTANTS: Final = 6  # at which yokes and times are drawn

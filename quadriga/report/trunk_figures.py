@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from quadriga.charts.colours import robot_style
+from quadriga.charts.colours import robot_style, truth_style, yoke_style
 from quadriga.charts.draw import Legend, draw_panels
 from quadriga.charts.panels import Curve, Mark, Panel, PanelGrid
 from quadriga.recordings.applied_plans import join_applied_samples
@@ -72,7 +72,8 @@ def draw_trajectory(run: Run, index: int, part: tuple[float, float] | None = Non
     for i in _ORDER:
         curves = []
         if run.has_truth:
-            curves.append(Curve(truth.tick / 1000, truth.y[:, index, i], "true", gap=_GAP))
+            true = truth.y[:, index, i]
+            curves.append(Curve(truth.tick / 1000, true, truth_style(index), gap=_GAP))
         curves.append(Curve(own.tick / 1000, own.y[:, i], "own", gap=_GAP))
         curves.append(
             Curve(begin + SAMPLE_MS / 1000, planned[:, i], "planned", gap=1.5e-3 * SAMPLE_MS)
@@ -81,7 +82,7 @@ def draw_trajectory(run: Run, index: int, part: tuple[float, float] | None = Non
         span = _SPANS[i] if part is None else 0.5 * _SPANS[i]
         panels.append(Panel(NAMES[i], curves, span=span, until=first_fall(run)))
     legend = [
-        *([("true", "measured (truth)")] if run.has_truth else []),
+        *([(truth_style(index), "measured (truth)")] if run.has_truth else []),
         ("own", "estimated by the agent"),
         ("planned", "planned"),
         ("asked", "asked for"),
@@ -135,12 +136,12 @@ def draw_yokes(run: Run) -> Figure:
         ("force in the yokes [N], positive pushes apart", truth.yoke_force, 10.0),
     ):
         curves = [
-            Curve(truth.tick / 1000, values[:, k], robot_style(k), gap=_GAP)
+            Curve(truth.tick / 1000, values[:, k], yoke_style(k), gap=_GAP)
             for k in range(values.shape[1])
         ]
         panels.append(Panel(title, curves, span=span, until=first_fall(run)))
     legend = [
-        (robot_style(k), f"{robots[i]}–{robots[j]}")
+        (yoke_style(k), f"{robots[i]}–{robots[j]}")
         for k, (i, j) in enumerate(yoke_pairs(team.robots, team.yokes))
     ]
     return draw_over_run(run, panels, legend, most=_share_points(run, 4), height=120.0)

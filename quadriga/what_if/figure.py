@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
+from quadriga.charts.colours import truth_style
 from quadriga.charts.draw import draw_panels
 from quadriga.charts.files import save_png
 from quadriga.charts.panels import Curve, Mark, Panel, PanelGrid
@@ -47,7 +48,7 @@ def draw_branch(
             f"{robot}: {name}",
             [
                 Curve(trace.tick / 1000, _values(trace, index)[row], style)
-                for trace, style in ((recorded.truth, _RECORDED), (branch.truth, _BRANCH))
+                for trace, style in ((recorded.truth, truth_style(index)), (branch.truth, _BRANCH))
             ],
             span=span,
         )

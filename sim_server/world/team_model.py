@@ -12,6 +12,7 @@ import numpy as np
 from quadriga.shared.config.friction import friction_of_robots
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
+from quadriga.shared.robot.colours import robot_rgb
 from quadriga.shared.robot.conventions import FOOT_FRAMES, GRAVITY, Array, robot_names
 from quadriga.sim_server.terrain.contact import NO_CONTACT
 from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
@@ -27,12 +28,6 @@ _YOKE_SOLIMP: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
 _YOKE_RGBA: Final = (0.85, 0.65, 0.13, 1.0)
 _PAYLOAD_BOX: Final = (0.2, 0.15, 0.04)  # m, full lengths; its base lies near the trunk's top
 _PAYLOAD_RGBA: Final = (0.55, 0.36, 0.2, 1.0)
-_TRUNK_RGBA: Final = (
-    (0.84, 0.15, 0.16, 1.0), (0.12, 0.47, 0.71, 1.0), (0.17, 0.63, 0.17, 1.0),
-    (1.00, 0.50, 0.05, 1.0), (0.58, 0.40, 0.74, 1.0), (0.55, 0.34, 0.29, 1.0),
-    (0.89, 0.47, 0.76, 1.0), (0.50, 0.50, 0.50, 1.0), (0.74, 0.74, 0.13, 1.0),
-    (0.09, 0.75, 0.81, 1.0),
-)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,9 +110,8 @@ def build_team_model(
     lying = config.world.spawn == "lying"
     height = robot.lying_height if lying else robot.stand_height
     for name, i in robots.items():
-        colour = _TRUNK_RGBA[i % len(_TRUNK_RGBA)]
         place = (*places[i], height)
-        trunk = body.add_to(spec, f"{name}/", place, friction[i], colour)
+        trunk = body.add_to(spec, f"{name}/", place, friction[i], (*robot_rgb(i), 1.0))
         if name == next(iter(robots)):
             _add_sun(trunk)
         trunk.add_site(name=f"{name}/yoke", pos=robot.yoke, group=4)

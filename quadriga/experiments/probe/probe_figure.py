@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from quadriga.charts.colours import LINES, robot_colour
+from quadriga.charts.colours import LINES, series_colour
 from quadriga.charts.draw import tidy_axes
 from quadriga.charts.files import save_png
 from quadriga.experiments.probe.outcome import ProbeOutcome
@@ -64,9 +64,9 @@ def _draw_response(
     factor = UNITS[OUTPUTS[output]][1]
     ahead = SAMPLE_MS * np.arange(1, true.shape[3] + 1)
     axes.plot(ahead, factor * true[p, j, d, :, i, output], label="true", **LINES["true"])
-    for number, each in enumerate(outcome.predictors, start=1):
+    for number, each in enumerate(outcome.predictors):
         predicted = factor * each.predicted[p, j, d, :, i, output]
-        axes.plot(ahead, predicted, color=robot_colour(number), linewidth=1.3, label=each.name)
+        axes.plot(ahead, predicted, color=series_colour(number), linewidth=1.3, label=each.name)
     axes.set_title(f"{DIRECTIONS[d]} of {names[j]} → {names[i]}", fontsize=10)
     axes.set_ylabel(LABELS[output])
     axes.set_xlabel("since the pulse began [ms]")
@@ -74,11 +74,11 @@ def _draw_response(
 
 def _draw_errors(axes: Axes, outcome: ProbeOutcome, output: int) -> None:
     name = OUTPUTS[output]
-    for number, each in enumerate(outcome.predictors, start=1):
+    for number, each in enumerate(outcome.predictors):
         for figure, style in (("own_error", "-"), ("peers_error", "--")):
             errors = [phase[figure][name] for phase in each.comparison.by_phase]
             values = [np.nan if error is None else error for error in errors]
-            axes.plot(outcome.phase_ms, values, style, color=robot_colour(number), linewidth=1.3)
+            axes.plot(outcome.phase_ms, values, style, color=series_colour(number), linewidth=1.3)
     axes.axhline(1.0, **LINES["level"])
     axes.set_ylim(0.0, 1.5)
     axes.set_title("— own, – – peers'", fontsize=10)

@@ -74,10 +74,10 @@ def test_a_picture_has_something_on_it(tmp_path: Path) -> None:
 
 def test_a_curve_goes_through_its_points_to_a_tenth_of_a_point() -> None:
     values = np.sin(7 * TIME)
-    figure = draw_panels([Panel("y", [Curve(TIME, values, "own")])], PanelGrid(0.0, 10.0))
+    figure = draw_panels([Panel("y", [Curve(TIME, values, "planned")])], PanelGrid(0.0, 10.0))
     (axes,) = figure.axes
     drawn = to_svg(figure, "a")
-    (path,) = re.findall(r'd="M([^"]*)" clip-path="[^"]*" style="[^"]*--green', drawn)
+    (path,) = re.findall(r'd="M([^"]*)" clip-path="[^"]*" style="[^"]*--purple', drawn)
     (places,) = re.findall(r'data-panels="([^"]*)"', drawn)
     numbers = re.findall(r"-?\d*\.?\d+", path)
     corners = np.cumsum(np.array(numbers, dtype=float).reshape(-1, 2), axis=0)

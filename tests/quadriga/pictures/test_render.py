@@ -68,8 +68,9 @@ def test_renders_sheet_and_clip(write_run: WriteRun) -> None:
     assert pixels.shape == (4 * 360 + 3 * 6, 2 * 640 + 6, 3)
     if messages:
         pytest.skip(messages[0])
-    red = (pixels[..., 0] > 90) & (pixels[..., 1:].max(axis=2) < 60)
-    assert red.mean() > 0.002  # robot 1's trunk
+    red, green, blue = (pixels[..., k] for k in range(3))
+    assert ((blue > 90) & (red < 0.3 * blue)).mean() > 0.002  # robot 1's trunk
+    assert ((red > 90) & (blue < 0.3 * red) & (green < 0.6 * red)).mean() > 0.002  # robot 2's
     with Image.open(paths[1]) as clip:
         assert clip.size == (640, 360)
         assert getattr(clip, "n_frames", 1) == 7

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.axes import Axes
 from PIL import Image
 
-from quadriga.charts.colours import LINES, robot_colour, robot_style
+from quadriga.charts.colours import LINES, robot_style, truth_style
 from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.report.figure_files import write_figures
 from quadriga.report.foot_figures import draw_forces_of_first
@@ -17,6 +17,7 @@ from quadriga.report.process_figures import draw_time_histograms
 from quadriga.report.run import Run, read_run
 from quadriga.report.top_view import draw_top_view
 from quadriga.report.trunk_figures import draw_trajectory
+from quadriga.shared.robot.colours import robot_colour
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire import messages as msg
 from tests.quadriga.conftest import WriteRun, outputs, run_config
@@ -31,7 +32,8 @@ def run(known_run: Path) -> Run:
 
 def curve(panel: Axes, style: str) -> Array:
     """Points of the curve of a style. Shape (2, k)."""
-    line = next(line for line in panel.lines if line.get_color() == LINES[style]["color"])
+    drawn = {(line.get_color(), line.get_linewidth()): line for line in reversed(panel.lines)}
+    line = drawn[LINES[style]["color"], LINES[style]["linewidth"]]
     return np.array(line.get_data(), dtype=float)
 
 
@@ -69,7 +71,7 @@ def test_trajectory_shows_truth_plan_and_reference(run: Run) -> None:
     panels = draw_trajectory(run, 0).axes
     height, speed = panels[0], panels[2]  # z above vx in the left column
     assert (height.get_title("left"), speed.get_title("left")) == ("z [m]", "vx [m/s]")
-    for style, first in (("true", run.traces.truth.tick[0]), ("planned", 410)):
+    for style, first in ((truth_style(0), run.traces.truth.tick[0]), ("planned", 410)):
         time, z = curve(height, style)
         assert time[0] == pytest.approx(first / 1000)
         known = np.isfinite(time)
@@ -82,7 +84,7 @@ def test_trajectory_shows_truth_plan_and_reference(run: Run) -> None:
 
 def test_forces_show_the_front_right_leg_of_robot_1(run: Run) -> None:
     whole, part = draw_forces_of_first(run).axes
-    time, true = curve(whole, "true")
+    time, true = curve(whole, truth_style(0))
     np.testing.assert_allclose(true, run.traces.truth.grf[:, 0, 1, 2])
     begin, planned = (values[:-1] for values in curve(whole, "planned"))  # the last is held
     at = np.searchsorted(time, begin - 1e-9)
@@ -96,7 +98,7 @@ def test_forces_show_the_front_right_leg_of_robot_1(run: Run) -> None:
 
 def test_top_view_shows_every_path_and_yoke(run: Run) -> None:
     (panel,) = draw_top_view(run.traces).axes
-    path = curve(panel, "r1").T
+    path = curve(panel, robot_style(1)).T
     np.testing.assert_allclose(path, run.traces.truth.base_pos[::5, 1, :2])
     yokes = [line for line in panel.lines if len(np.atleast_1d(line.get_xdata())) == 2]
     assert len(yokes) == 6  # one yoke at six instants
