@@ -1,4 +1,4 @@
-"""One MCAP file for Foxglove and Rerun: protobuf with named fields, and the team to look at."""
+"""One MCAP file for Foxglove: protobuf with named fields, and the team to look at."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final
 
 import foxglove
 import foxglove.messages as fox
@@ -14,20 +13,20 @@ from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateCha
 
 from quadriga.export.columns import TickReached
 from quadriga.export.layout import Layout
+from quadriga.export.planned_forces import PlannedForces
 from quadriga.export.protobuf import ProtobufType, build_type
-from quadriga.export.scene import Scene, path_ticks, stamp_of
-from quadriga.export.source import ExportedMessage, Source
+from quadriga.export.scene import Scene, stamp_of
+from quadriga.export.source import WARNINGS, ExportedMessage, Source
+from quadriga.export.team_scene import PERIOD_MS, path_ticks
 from quadriga.export.tracking import NAMES, Tracking
 from quadriga.pictures.poses import Poses, read_poses, truth_ticks
+from quadriga.recordings.traces import read_traces
 from quadriga.shared.wire.messages import Event, Measurement, Message, Truth
-from quadriga.shared.wire.topics import MEASUREMENT, TRUTH
-
-_PICTURE: Final = 10  # ms, least time between two poses of the team
-_WARNINGS: Final = ("fall", "fault")
+from quadriga.shared.wire.topics import MEASUREMENT, PLAN, TRUTH
 
 
 def write_foxglove(source: Source, out: Path, on_tick: TickReached) -> tuple[Path, ...]:
-    """Write a recording for Foxglove and Rerun.
+    """Write a recording for Foxglove.
 
     Times are the world's: a message of 12.3 s stands at 12.3 s since 1970.
 
@@ -114,9 +113,10 @@ class _Drawing:
         self._row: dict[int, int] = {}
         self._drawn = False
         if TRUTH.name in source.topics:
-            ticks = path_ticks(truth_ticks(source.recording), _PICTURE)
+            ticks = path_ticks(truth_ticks(source.recording), PERIOD_MS)
             self._poses: Poses = read_poses(source.recording, ticks)
             self._scene = Scene(source.config)
+            self._planned = PlannedForces(read_traces(source.recording, {PLAN.name, TRUTH.name}))
             self._row = {tick: i for i, tick in enumerate(ticks.tolist())}
 
     def log(self, tick: int, time: int) -> None:
@@ -129,7 +129,8 @@ class _Drawing:
             self._terrain.log(self._scene.terrain(tick, self._poses.centre()), log_time=time)
         self._scene.set(self._poses.qpos[at])
         self._frames.log(self._scene.frames(tick), log_time=time)
-        self._forces.log(self._scene.forces(tick, self._poses.grf[at]), log_time=time)
+        forces = self._scene.forces(tick, self._poses.grf[at], self._planned.at(tick))
+        self._forces.log(forces, log_time=time)
 
 
 def _read_plain(message: Message, layout: Layout) -> dict[str, object]:
@@ -140,7 +141,7 @@ def _read_plain(message: Message, layout: Layout) -> dict[str, object]:
 
 
 def _build_log(event: Event) -> fox.Log:
-    level = fox.LogLevel.Warning if event.kind in _WARNINGS else fox.LogLevel.Info
+    level = fox.LogLevel.Warning if event.kind in WARNINGS else fox.LogLevel.Info
     return fox.Log(
         timestamp=stamp_of(event.tick),
         level=level,

@@ -2,52 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import foxglove.messages as fox
-import mujoco
 import numpy as np
 
-from quadriga.pictures.poses import PosedTeam
-from quadriga.recordings.truth import Ticks
+from quadriga.export.team_scene import (
+    GROUND,
+    LEAST,
+    NEWTON,
+    PLANNED,
+    PLANNED_NAME,
+    TAG,
+    YOKE,
+    Solid,
+    TeamScene,
+)
+from quadriga.pictures.link_mesh import LinkMesh
 from quadriga.shared.config.sections import Config
+from quadriga.shared.robot.colours import Rgb, robot_rgb
 from quadriga.shared.robot.conventions import Array
-from quadriga.sim_server.terrain.terrain import Terrain
 
 WORLD: Final = "world"
-_NEWTON: Final = 0.002  # m of arrow per N
-_LEAST: Final = 1.0  # N; a smaller force is not drawn
-_YOKE: Final = fox.Color(r=0.85, g=0.65, b=0.13, a=1.0)
-_FORCE: Final = fox.Color(r=0.1, g=0.55, b=0.95, a=1.0)
-_GROUND: Final = fox.Color(r=0.60, g=0.54, b=0.42, a=1.0)
-_CELL: Final = 0.05  # m, grid of the terrain
-_MARGIN: Final = 1.5  # m of terrain around the team's path
+_THICK, _THIN = 0.012, 0.007  # m, shafts of true and of planned forces
+_FONT: Final = 0.07  # m
 
 
 class Scene:
     """Frames and drawings of a recorded team."""
 
     def __init__(self, config: Config) -> None:
-        self._posed = PosedTeam(config)
-        self._model = self._posed.model
-        # Body 0 is the world itself; then come the robots' links, named r1/trunk and so on; then
-        # loose stones, if any, of which nothing is recorded.
-        names = [self._model.body(i).name for i in range(1, self._model.nbody)]
-        self._links = [name for name in names if "/" in name]
-        self._trunks = self._posed.team.trunks
-        self._yokes = self._posed.team.yokes
+        self._team = TeamScene(config)
 
     def set(self, qpos: Array) -> None:
         """Put the team where positions (19 n,) have it."""
-        self._posed.set(qpos)
+        self._team.set(qpos)
 
     def frames(self, tick: int) -> fox.FrameTransforms:
         """Pose of every link in the world."""
-        physics, stamp = self._posed.physics, stamp_of(tick)
-        of_links = slice(1, 1 + len(self._links))
-        places, turns = physics.xpos[of_links].tolist(), physics.xquat[of_links].tolist()
-        poses = zip(self._links, places, turns, strict=True)
+        stamp = stamp_of(tick)
+        places, turns = (values.tolist() for values in self._team.link_poses())
+        poses = zip(self._team.links, places, turns, strict=True)
         return fox.FrameTransforms(
             transforms=[
                 fox.FrameTransform(
@@ -63,136 +59,143 @@ class Scene:
 
     def bodies(self, tick: int) -> fox.SceneUpdate:
         """What the links look like; drawn once, they move with their frames."""
-        entities = []
-        for i, link in enumerate(self._links, start=1):
-            shapes = _Shapes()
-            for geom in np.flatnonzero(self._model.geom_bodyid == i).tolist():
-                shapes.add(self._model, geom)
-            if shapes:
-                entities.append(
-                    fox.SceneEntity(
-                        timestamp=stamp_of(tick),
-                        frame_id=link,
-                        id=link,
-                        frame_locked=True,
-                        cubes=shapes.cubes,
-                        spheres=shapes.spheres,
-                        cylinders=shapes.cylinders,
-                    )
-                )
-        return fox.SceneUpdate(entities=entities)
+        entities = [self._body(link, tick) for link in self._team.links]
+        return fox.SceneUpdate(entities=[entity for entity in entities if entity is not None])
+
+    def _body(self, link: str, tick: int) -> fox.SceneEntity | None:
+        """The looks of one link, its robot's name with that of its trunk; None if it has none."""
+        solids = list(self._team.solids(link))
+        surfaces = [_surface(mesh) for mesh in self._team.surfaces(link)]
+        if not solids and not surfaces:
+            return None
+        robot, _, body = link.partition("/")
+        return fox.SceneEntity(
+            timestamp=stamp_of(tick),
+            frame_id=link,
+            id=link,
+            frame_locked=True,
+            triangles=surfaces,
+            cubes=[_cube(solid) for solid in solids if solid.kind == "box"],
+            spheres=[_sphere(solid) for solid in solids if solid.kind == "sphere"],
+            cylinders=[_cylinder(solid) for solid in solids if solid.kind == "capsule"],
+            texts=[_tag(robot, self._team.names.index(robot))] if body == "trunk" else [],
+        )
 
     def terrain(self, tick: int, path: Array) -> fox.SceneUpdate:
         """The ground around a path (F, 3), if it is not flat."""
-        terrain: Terrain = self._posed.team.terrain
-        if not terrain.top:
+        ground = self._team.terrain(path)
+        if ground is None:
             return fox.SceneUpdate(entities=[])
-        low = np.floor((path[:, :2].min(axis=0) - _MARGIN) / _CELL) * _CELL
-        high = path[:, :2].max(axis=0) + _MARGIN
-        x, y = np.meshgrid(*(np.arange(low[k], high[k], _CELL) for k in (0, 1)))
-        points = np.stack([x, y, terrain.height(x, y)], axis=-1).reshape(-1, 3)
+        points, triangles = ground
         surface = fox.TriangleListPrimitive(
             pose=_pose(),
-            color=_GROUND,
-            indices=_triangles(*x.shape).tolist(),
-            points=[fox.Point3(x=a, y=b, z=c) for a, b, c in points.tolist()],
+            color=_color(GROUND),
+            indices=triangles.ravel().tolist(),
+            points=_points(points),
         )
         entity = fox.SceneEntity(
             timestamp=stamp_of(tick), frame_id=WORLD, id="terrain", triangles=[surface]
         )
         return fox.SceneUpdate(entities=[entity])
 
-    def forces(self, tick: int, grf: Array) -> fox.SceneUpdate:
-        """Yokes as lines, true contact forces (n, 4, 3) on the feet as arrows."""
-        anchors = self._anchors()
-        points = [_point(anchors[i]) for pair in self._yokes for i in pair]
+    def forces(self, tick: int, grf: Array, planned: Mapping[str, Array]) -> fox.SceneUpdate:
+        """Yokes as lines, forces on the feet as arrows.
+
+        Args:
+            tick: when, ms.
+            grf: true contact forces (n, 4, 3), N, world: arrows in the robots' colours.
+            planned: forces (12,), N, yaw frame, of the robots that have a plan: thinner arrows.
+        """
+        anchors = self._team.anchors()
         lines = fox.LinePrimitive(
             type=fox.LinePrimitiveLineType.LineList,
             pose=_pose(),
             thickness=0.02,
-            points=points,
-            color=_YOKE,
+            points=_points(anchors[[i for pair in self._team.yokes for i in pair]]),
+            color=_color(YOKE),
         )
+        colours = [robot_rgb(index) for index in range(len(self._team.names))]
+        plans = self._team.ground_forces(planned)
+        arrows = {
+            "forces": self._arrows(grf, colours, _THICK),
+            PLANNED_NAME: self._arrows(plans, [PLANNED] * len(colours), _THIN),
+        }
         stamp = stamp_of(tick)
         return fox.SceneUpdate(
             entities=[
                 fox.SceneEntity(timestamp=stamp, frame_id=WORLD, id="yokes", lines=[lines]),
-                fox.SceneEntity(
-                    timestamp=stamp, frame_id=WORLD, id="forces", arrows=list(self._arrows(grf))
+                *(
+                    fox.SceneEntity(timestamp=stamp, frame_id=WORLD, id=name, arrows=list(drawn))
+                    for name, drawn in arrows.items()
                 ),
             ]
         )
 
-    def _anchors(self) -> Array:
-        """Where the yokes' ball joints are, shape (n, 3), m, world."""
-        sites = [self._posed.physics.site(f"{name}/yoke").xpos for name in self._posed.names]
-        return np.array(sites)
-
-    def _arrows(self, grf: Array) -> Iterator[fox.ArrowPrimitive]:
-        for foot, force in zip(self._posed.feet().reshape(-1, 3), grf.reshape(-1, 3), strict=True):
+    def _arrows(
+        self, forces: Array, colours: Sequence[Rgb], thickness: float
+    ) -> Iterator[fox.ArrowPrimitive]:
+        """Arrows from the feet along forces (n, 4, 3), in one colour for each robot."""
+        feet = self._team.feet()
+        for robot, leg in np.ndindex(forces.shape[:2]):
+            force = forces[robot, leg]
             size = float(np.linalg.norm(force))
-            if size >= _LEAST:
-                length = _NEWTON * size
+            if size >= LEAST:
+                length = NEWTON * size
                 yield fox.ArrowPrimitive(
-                    pose=_pose(foot, _along(force / size)),
+                    pose=_pose(feet[robot, leg], _along(force / size)),
                     shaft_length=0.8 * length,
-                    shaft_diameter=0.012,
+                    shaft_diameter=thickness,
                     head_length=0.2 * length,
-                    head_diameter=0.03,
-                    color=_FORCE,
+                    head_diameter=2.5 * thickness,
+                    color=_color(colours[robot]),
                 )
 
 
-class _Shapes:
-    """Primitives of one link."""
+def _surface(mesh: LinkMesh) -> fox.TriangleListPrimitive:
+    return fox.TriangleListPrimitive(
+        pose=_pose(),
+        color=_color(mesh.rgba),
+        indices=mesh.faces.ravel().tolist(),
+        points=_points(mesh.vertices),
+    )
 
-    def __init__(self) -> None:
-        self.cubes: list[fox.CubePrimitive] = []
-        self.spheres: list[fox.SpherePrimitive] = []
-        self.cylinders: list[fox.CylinderPrimitive] = []
 
-    def __bool__(self) -> bool:
-        return bool(self.cubes or self.spheres or self.cylinders)
+def _cube(solid: Solid) -> fox.CubePrimitive:
+    pose = _pose(solid.position, solid.quat_wxyz)
+    return fox.CubePrimitive(pose=pose, size=_vector(2 * solid.size), color=_color(solid.rgba))
 
-    def add(self, model: Any, geom: int) -> None:
-        """Add a geom; a capsule becomes a cylinder."""
-        size, kind = model.geom_size[geom], model.geom_type[geom]
-        pose = _pose(model.geom_pos[geom], model.geom_quat[geom])
-        r, g, b, a = model.geom_rgba[geom].tolist()
-        color = fox.Color(r=r, g=g, b=b, a=a)
-        if kind == mujoco.mjtGeom.mjGEOM_BOX:
-            self.cubes.append(fox.CubePrimitive(pose=pose, size=_vector(2 * size), color=color))
-        elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-            full = _vector(np.full(3, 2 * size[0]))
-            self.spheres.append(fox.SpherePrimitive(pose=pose, size=full, color=color))
-        elif kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-            full = _vector(np.array([2 * size[0], 2 * size[0], 2 * size[1]]))
-            self.cylinders.append(
-                fox.CylinderPrimitive(
-                    pose=pose, size=full, bottom_scale=1.0, top_scale=1.0, color=color
-                )
-            )
+
+def _sphere(solid: Solid) -> fox.SpherePrimitive:
+    size = _vector(np.full(3, 2 * solid.size[0]))
+    return fox.SpherePrimitive(pose=_pose(solid.position), size=size, color=_color(solid.rgba))
+
+
+def _cylinder(solid: Solid) -> fox.CylinderPrimitive:
+    """A capsule as the cylinder between its ends."""
+    radius, half = solid.size[:2]
+    return fox.CylinderPrimitive(
+        pose=_pose(solid.position, solid.quat_wxyz),
+        size=_vector(np.array([2 * radius, 2 * radius, 2 * half])),
+        bottom_scale=1.0,
+        top_scale=1.0,
+        color=_color(solid.rgba),
+    )
+
+
+def _tag(robot: str, index: int) -> fox.TextPrimitive:
+    """A robot's name over its trunk, which faces whoever looks."""
+    return fox.TextPrimitive(
+        pose=_pose((0.0, 0.0, TAG)),
+        billboard=True,
+        font_size=_FONT,
+        color=_color(robot_rgb(index)),
+        text=robot,
+    )
 
 
 def stamp_of(tick: int) -> fox.Timestamp:
     """World time as Foxglove's timestamp: seconds since 1970 are seconds since the start."""
     return fox.Timestamp(sec=tick // 1000, nsec=tick % 1000 * 1_000_000)
-
-
-def path_ticks(ticks: Ticks, period: int) -> Ticks:
-    """Those of `ticks` that are at least `period` ms apart."""
-    chosen: list[int] = []
-    for tick in ticks.tolist():
-        if not chosen or tick - chosen[-1] >= period:
-            chosen.append(tick)
-    return np.array(chosen, dtype=np.int64)
-
-
-def _triangles(rows: int, columns: int) -> Any:
-    """Corners of the two triangles of each cell of a grid, by the grid's row-major index."""
-    index = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
-    return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1)
 
 
 def _along(direction: Array) -> Array:
@@ -217,6 +220,12 @@ def _vector(values: Array) -> fox.Vector3:
     return fox.Vector3(x=x, y=y, z=z)
 
 
-def _point(values: Array) -> fox.Point3:
-    x, y, z = values.tolist()
-    return fox.Point3(x=x, y=y, z=z)
+def _points(values: Any) -> list[fox.Point3]:
+    """Points of shape (k, 3)."""
+    return [fox.Point3(x=x, y=y, z=z) for x, y, z in values.tolist()]
+
+
+def _color(rgba: Sequence[float]) -> fox.Color:
+    """Of red, green, blue and, unless opaque, opacity, 0 … 1."""
+    red, green, blue, *rest = rgba
+    return fox.Color(r=red, g=green, b=blue, a=rest[0] if rest else 1.0)

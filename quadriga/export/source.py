@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import fields
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from quadriga.export.layout import Layout, build_layout
 from quadriga.shared.errors import MessageError
@@ -15,6 +15,8 @@ from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Message
 from quadriga.shared.wire.topics import TABLE, topic_of
+
+WARNINGS: Final = ("fall", "fault")  # kinds of events that are shown as warnings
 
 
 class ExportedMessage(NamedTuple):

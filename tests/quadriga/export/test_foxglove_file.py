@@ -17,9 +17,13 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from quadriga.commands.parser import main
+from quadriga.export import team_scene
+from quadriga.pictures.meshes import link_meshes
 from quadriga.shared.config.sections import WorldConfig
-from quadriga.shared.errors import MessageError
+from quadriga.shared.errors import MeshError, MessageError
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.a1 import A1
+from quadriga.shared.robot.colours import robot_rgb
 from quadriga.shared.robot.conventions import FOOT_FRAMES, Array
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Measurement, Plan, Reference, State, Truth
@@ -134,6 +138,39 @@ def test_bodies_are_drawn_once_on_their_frames(topics: Topics) -> None:
     frames = {f.child_frame_id for f in topics["/frames"][0][1].transforms}
     assert {e.frame_id for e in first.entities} <= frames
     assert all(entity.frame_locked for entity in first.entities)
+    meshes = link_meshes(A1.urdf_path())
+    links = {f"{robot}/{link}" for robot in ("r1", "r2") for link in meshes}
+    assert {entity.id for entity in first.entities} == links
+    for entity in first.entities:
+        drawn = entity.triangles
+        assert not [*entity.cubes, *entity.spheres, *entity.cylinders]
+        known = meshes[entity.id.partition("/")[2]]
+        assert [len(one.points) for one in drawn] == [len(mesh.vertices) for mesh in known]
+        assert [len(one.indices) for one in drawn] == [mesh.faces.size for mesh in known]
+        corner = array(drawn[0].points[-1])
+        np.testing.assert_allclose(corner, known[0].vertices[-1])
+
+
+def test_trunks_have_their_robots_colour_and_name(topics: Topics) -> None:
+    ((_, first),) = topics["/scene/robots"]
+    trunks = {e.id.partition("/")[0]: e for e in first.entities if e.id.endswith("/trunk")}
+    for index, robot in enumerate(("r1", "r2")):
+        hull, (tag,) = trunks[robot].triangles[0], trunks[robot].texts
+        assert (tag.text, tag.billboard) == (robot, True)
+        for colour in (hull.color, tag.color):
+            np.testing.assert_allclose(array(colour, "rgba"), [*robot_rgb(index), 1.0])
+
+
+def test_without_meshes_links_are_boxes_balls_and_cylinders(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def find_none(_urdf: Path) -> None:
+        raise MeshError("mesh trunk.dae", "no such file", "a file")
+
+    monkeypatch.setattr(team_scene, "link_meshes", find_none)
+    out = tmp_path / "out.mcap"
+    assert main(["export", str(file), "--to", "foxglove", "-o", str(out)]) == 0
+    ((_, first),) = read(out)["/scene/robots"]
     shapes = Counter(
         kind
         for e in first.entities
@@ -161,9 +198,24 @@ def test_arrows_stand_on_the_feet_along_the_forces(topics: Topics, truths: list[
             along = rotation(arrow.pose.orientation)[:, 0]
             length = arrow.shaft_length + arrow.head_length
             np.testing.assert_allclose(along * length, 0.002 * force, atol=1e-9)
+        colours = {tuple(array(arrow.color, "rgb")) for arrow in by_id["forces"].arrows}
+        assert colours == {robot_rgb(0), robot_rgb(1)}
         (rod,) = by_id["yokes"].lines
         first, last = (array(point) for point in rod.points)
         assert np.linalg.norm(first - last) == pytest.approx(0.9, abs=0.01)
+
+
+def test_planned_forces_are_arrows_turned_into_the_world(topics: Topics) -> None:
+    assert not {e.id: e for e in topics["/scene/forces"][3][1].entities}["planned"].arrows
+    update = topics["/scene/forces"][76][1]
+    arrows = {entity.id: entity for entity in update.entities}["planned"].arrows
+    turn = pin.utils.rotate("z", 0.3)
+    of_r1 = PLAN.u[0].reshape(4, 3) @ turn.T
+    lengths = [arrow.shaft_length + arrow.head_length for arrow in arrows[:4]]
+    np.testing.assert_allclose(lengths, 0.002 * np.linalg.norm(of_r1, axis=1))
+    for arrow, force in zip(arrows[:4], of_r1, strict=True):
+        along = rotation(arrow.pose.orientation)[:, 0]
+        np.testing.assert_allclose(along, force / np.linalg.norm(force), atol=1e-9)
 
 
 def test_events_are_log_lines(topics: Topics) -> None:
