@@ -17,7 +17,7 @@ def add(add_command: AddCommand) -> None:
         "--to",
         required=True,
         choices=("foxglove", "rerun", "csv", "parquet"),
-        help="MCAP for Foxglove or Rerun, or one table per key",
+        help="MCAP for Foxglove, RRD for Rerun, or one table per key",
     )
     command.add_argument(
         "-o", "--output", type=Path, metavar="OUT", help="a new file or folder (beside FILE)"

@@ -259,7 +259,7 @@ def test_loose_stones_are_no_part_of_the_scene(write_run: WriteRun, tmp_path: Pa
 def test_a_recording_of_real_robots_has_no_scene(write_run: WriteRun, tmp_path: Path) -> None:
     lose: Callable[..., Any] = lambda key, m: None if key == "team/sim/truth" else m  # noqa: E731
     folder, out = write_run(run_config(1, 0.5), change=lose), tmp_path / "out.mcap"
-    assert main(["export", str(folder / "run.mcap"), "--to", "rerun", "-o", str(out)]) == 0
+    assert main(["export", str(folder / "run.mcap"), "--to", "foxglove", "-o", str(out)]) == 0
     found = read(out)
     assert len(found["/r1/tracking"]) == 50
     assert np.isnan(found["/r1/tracking"][0][1].true.z)

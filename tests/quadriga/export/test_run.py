@@ -52,7 +52,13 @@ def test_mistakes(capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    ("form", "package"), [("foxglove", "foxglove"), ("rerun", "google"), ("parquet", "pyarrow")]
+    ("form", "package", "extra"),
+    [
+        ("foxglove", "foxglove", "export"),
+        ("foxglove", "google", "export"),
+        ("rerun", "rerun", "rerun"),
+        ("parquet", "pyarrow", "export"),
+    ],
 )
 def test_a_package_that_is_not_installed_is_named_with_its_remedy(
     capsys: pytest.CaptureFixture[str],
@@ -61,6 +67,7 @@ def test_a_package_that_is_not_installed_is_named_with_its_remedy(
     tmp_path: Path,
     form: str,
     package: str,
+    extra: str,
 ) -> None:
     for name in list(sys.modules):
         if name.partition(".")[0] == package or name.startswith("quadriga.export."):
@@ -68,10 +75,10 @@ def test_a_package_that_is_not_installed_is_named_with_its_remedy(
     monkeypatch.setitem(sys.modules, package, None)
     output = failed(capsys, file, "--to", form, "-o", tmp_path / "out")
     assert f"--to {form}: got no Python package {package}" in output
-    assert "pip install -e '.[export]'" in output
+    assert f"pip install -e '.[{extra}]'" in output
 
 
-@pytest.mark.parametrize("form", ["foxglove", "csv", "parquet"])
+@pytest.mark.parametrize("form", ["foxglove", "rerun", "csv", "parquet"])
 def test_a_full_disk_is_one_clear_error_and_leaves_nothing(
     file: Path, tmp_path: Path, form: str
 ) -> None:
