@@ -66,6 +66,7 @@ class Session:
             seen: the plant has been there; its leaving is the end.
         """
         self._seen = seen
+        self._say(f"recording team {self._bus.team!r} to {self._parts.paths[0]}")
         self._flushed = self._begun = monotonic()
         while not (self._stopped() or self._ended):
             self._take(max(0.0, self._flushed + FLUSH - monotonic()))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Self
+from collections.abc import Mapping
+from typing import Final, Self
 
 import numpy as np
 from rich.console import Console
 
+from quadriga.plant.deadlines import MODE as REALTIME
 from quadriga.progress import build_progress
+from quadriga.recordings.late_commands import late_shares, overloaded
 from quadriga.shared.bus.roster import members
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
@@ -17,8 +20,12 @@ from quadriga.shared.printable import printable_line
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.codes import DOWN
-from quadriga.shared.wire.messages import Clock, Event, Truth
-from quadriga.shared.wire.topics import CLOCK, TRUTH, topics_for
+from quadriga.shared.wire.messages import Clock, Event, Status, Truth
+from quadriga.shared.wire.topics import CLOCK, STATUS, TRUTH, topics_for
+
+_TELL_EVERY: Final = 10.0  # s wall between two lines of how far a walk has come, without a terminal
+_ABSENT_EVERY: Final = 2.0  # s wall between two lines of who is awaited
+_COMPLAIN_EVERY: Final = 5.0  # s of the world between two complaints that commands come late
 
 
 class WalkProgress:
@@ -35,7 +42,10 @@ class WalkProgress:
             self._bus.subscribe(topic.key(config.team.name, "*"))
         self._bar = build_progress(console, "{task.fields[text]}", hidden=False)
         self._task = self._bar.add_task("starting", total=config.world.seconds, text="")
-        self._begun = 0.0
+        self._begun = self._told = 0.0
+        self._text, self._walks = "", False
+        self._counted: dict[str, Mapping[str, int]] = {}  # by plant what it had counted
+        self._complained = -1000 * _COMPLAIN_EVERY  # tick of the last complaint
         self._speed = ""  # unknown of robots whose plant does not know it
         self.fallen: list[str] = []
 
@@ -49,6 +59,8 @@ class WalkProgress:
                 elif key == TRUTH.key(self._bus.team):
                     velocity = decode(payload, Truth).base_vel.mean(axis=0)
                     self._speed = f"{float(np.linalg.norm(velocity[:2])):.2f} m/s  "
+                elif key.endswith(f"/{STATUS.name}"):
+                    self._note_status(key.split("/")[1], decode(payload, Status))
                 else:
                     self._show_event(decode(payload, Event))
             except MessageError:
@@ -65,23 +77,42 @@ class WalkProgress:
             line = f"{event.tick / 1000:.2f} s: {event.kind} {event.robot} {event.detail}"
             self._bar.console.print(printable_line(line), markup=False)
 
+    def _note_status(self, name: str, status: Status) -> None:
+        """Of a plant in real time: complain while commands come late too often."""
+        if status.mode != REALTIME:
+            return
+        late = overloaded(late_shares(self._counted.get(name, {}), status.counters))
+        self._counted[name] = status.counters
+        if late and status.tick - self._complained >= 1000 * _COMPLAIN_EVERY:
+            self._complained = status.tick
+            shares = ", ".join(f"{share:.0%} of {robot}'s" for robot, share in late.items())
+            line = f"{status.tick / 1000:.2f} s: overload: {shares} commands come late"
+            self._bar.console.print(printable_line(line), style="yellow", markup=False)
+
+    def _tell(self, text: str) -> None:
+        """Without a terminal a bar is seen at its end alone: say how far it is in a line."""
+        if not self._console.is_terminal and text != self._text:
+            self._text, self._told = text, monotonic()
+            self._console.print(printable_line(text), markup=False, highlight=False)
+
     def _show_absent(self) -> None:
         team = members(self._config)
         absent = team - self._bus.members_at(HERE) or team - LEADS - self._bus.members_at(READY)
         text = f"waiting for {', '.join(sorted(absent))}" if absent else ""
         self._bar.update(self._task, text=text)
+        if monotonic() - self._told > _ABSENT_EVERY:
+            self._tell(text)
 
     def _show_time(self, seconds: float) -> None:
         now = monotonic()
         self._begun = self._begun or now - seconds
         pace = seconds / max(now - self._begun, 1e-3)
-        self._bar.update(
-            self._task,
-            description="walking",
-            completed=seconds,
-            text=f"{seconds:.1f}/{self._config.world.seconds:g} s  {self._speed}"
-            f"{pace:.2f} × real time",
-        )
+        so_far = f"{seconds:.1f}/{self._config.world.seconds:g} s  {self._speed}"
+        text = f"{so_far}{pace:.2f} × real time"
+        self._bar.update(self._task, description="walking", completed=seconds, text=text)
+        if not self._walks or now - self._told > _TELL_EVERY:
+            self._tell(f"walking {text}" if self._walks else "walking")
+            self._walks = True
 
     def __enter__(self) -> Self:
         self._bar.start()

@@ -33,7 +33,7 @@ _CAUSES: Final = {
 
 
 def report_folder(run_dir: Path, *, pictures: bool, console: Console) -> dict[str, Any]:
-    """Sum up the recording in `run_dir`, draw its figures, write its page, show its table.
+    """Sum up the recording in `run_dir`, show its table, draw its figures, write its page.
 
     Returns:
         The summary.
@@ -45,13 +45,13 @@ def report_folder(run_dir: Path, *, pictures: bool, console: Console) -> dict[st
     recording = Recording(run_dir / RECORDING)
     traces = read_traces(recording)
     summary = summarise(run_dir, traces)
+    print_summary(summary, console)  # before what takes long
     run = build_run(recording, traces, summary)
     write_figures(run, run_dir)
     write_page(run, run_dir / PAGE)
     if pictures and run.has_truth:  # nobody else knows where the trunks were
         with console.status("rendering"):
             render(run_dir)
-    print_summary(summary, console)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False)
     _check_end(summary)
     return summary

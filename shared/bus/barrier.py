@@ -83,10 +83,12 @@ def _await_team(bus: Bus, config: Config, stopped: Callable[[], bool]) -> str:
         return has_lead(bus.members_at(READY))
 
     bus.declare(HERE)
+    say(f"{bus.name} of team {bus.team!r} is at {config.bus.endpoint}, waits until all are there")
     here = await_members(bus, config, HERE, members(config), lambda: stopped() or walks())
     if stopped():
         return ""
     if here:
+        say(f"{bus.name}: all {len(members(config))} processes are there")
         pause()  # who is ready has said so right behind that it is here
     if not walks():
         return STARTS

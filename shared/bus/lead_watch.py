@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from quadriga.shared.bus.barrier import lead
+from quadriga.shared.bus.watch import say
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import waits_for_router
@@ -109,6 +110,7 @@ class LeadWatch:
 
     def __init__(self, bus: Bus, config: Config) -> None:
         self._watch = LossWatch(lambda: find_loss(bus, config), config, LAST_WORDS)
+        self._name, self._walks = bus.name, False
 
     def look(self, tick: int) -> None:
         """See whether the others are there; called while nothing arrives.
@@ -124,6 +126,9 @@ class LeadWatch:
             raise loss_error(loss, max(tick, 0))
 
     def hear(self) -> None:
-        """Something has arrived: who was gone is back."""
+        """Something has arrived: the team walks, and who was gone is back."""
+        if not self._walks:
+            self._walks = True
+            say(f"{self._name}: the team walks")
         if self._watch.since is not None:
             self._watch.clear()

@@ -15,7 +15,7 @@ from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.clock import monotonic
 
-_QUIET: Final = 5.0  # s of waiting that need no word
+_QUIET: Final = 2.0  # s of waiting that need no word
 _EVERY: Final = 5.0  # s, between two looks at those that are awaited
 
 

@@ -40,7 +40,7 @@ PLAN: Final = Topic(
     per_robot=True, period_ms=CONFIGURED, max_age_ms=CONFIGURED,
 )  # fmt: skip
 STATUS: Final = Topic(
-    "status", msg.Status, (*_PLANS, SIM), (AGENT, OPERATOR, *_SPEAKERS),
+    "status", msg.Status, (*_PLANS, SIM), (AGENT, OPERATOR, LAUNCHER, *_SPEAKERS),
     per_robot=True, period_ms=CONFIGURED, max_age_ms=1000, repeats=True,
 )  # fmt: skip
 INPUTS: Final = Topic("inputs", msg.Consumed, (AGENT,), (), per_robot=True, period_ms=0)

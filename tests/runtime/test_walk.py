@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import pytest
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.wire.messages import Command
+from quadriga.team.registry import running_teams
 from tests.runtime.conftest import WAIT
 
 Start = Callable[..., subprocess.Popen[str]]
@@ -89,6 +91,8 @@ def test_a_walk_ends_with_its_figures_and_status_0(out: Path, start: Start) -> N
     walk = start("--seconds", "1.5")
     output, errors = walk.communicate(timeout=4 * WAIT)
     assert (walk.returncode, errors) == (0, "")
+    assert output.startswith(f"run folder: {out}\n")
+    assert re.search(r"^waiting for |^walking$", output, re.MULTILINE)  # not silent in a pipe
     assert "falls" in output
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["fell"], summary["gaps"], summary["robots"]) == (False, 0, 2)
@@ -121,9 +125,11 @@ def test_ctrl_c_and_sigterm_stop_all_cleanly(
 ) -> None:
     walk = start("--seconds", "600")
     await_walking(out)
+    assert [team.folder for team in running_teams()] == [str(out)]  # so live commands find it
     walk.send_signal(number)
     output, errors = walk.communicate(timeout=WAIT)
     assert (walk.returncode, errors) == (130, "")
+    assert running_teams() == ()
     assert "interrupted; what was recorded is in" in output
     assert not processes_of(out)
     recording = Recording(out / "run.mcap")

@@ -148,7 +148,7 @@ def test_beside_a_team_s_own_recorder_nobody_is_doubled(
         await_recorded(tmp_path, 1)
         assert world.duplicates(HERE) == frozenset()
         _, err = ended(recorder, world, tmp_path, 1)
-    assert err == ""
+    assert err == f"recording team 'band' to {tmp_path / 'run.mcap'}\n"
     assert len(list(Recording(tmp_path / "run.mcap").entries())) == 1
 
 
@@ -264,7 +264,7 @@ def test_a_full_disk_is_one_clear_error(start: Start, world: Bus, tmp_path: Path
             await_recorded(tmp_path / "run.mcap", 101)
     out, err = recorder.communicate(timeout=WAIT)
     assert (recorder.returncode, out) == (2, "")
-    assert err.count("\n") == 1
+    assert err.count("\n") == 2  # that it records, and this
     assert "run.mcap: got File too large, expected room for the recording" in err
     assert survey(tmp_path / "run.mcap").tracks["band/r1/state"].count > 100
 
@@ -286,7 +286,7 @@ def test_a_full_file_system_is_named(start: Start, world: Bus, tmp_path: Path) -
         _, err = recorder.communicate(timeout=WAIT)
         assert recorder.returncode == 2
         assert "got No space left on device, expected room for the recording" in err
-        assert err.count("\n") == 1
+        assert err.count("\n") == 2  # that it records, and this
         assert survey(small / "run.mcap").tracks["band/r1/state"].count > 100
     finally:
         if recorder is not None:
@@ -344,4 +344,4 @@ def test_a_team_without_recorder_is_recorded_from_the_start(
         for tick in range(10):
             put(encode(state(tick)))
         _, err = ended(recorder, world, tmp_path, 10)
-    assert err == ""
+    assert err == f"recording team 'band' to {tmp_path / 'run.mcap'}\n"

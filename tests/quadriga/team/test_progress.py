@@ -14,10 +14,11 @@ from quadriga.shared.config.load import load
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Clock, Event, Truth
-from quadriga.shared.wire.topics import CLOCK, EVENT, TRUTH
+from quadriga.shared.wire.messages import Clock, Event, Status, Truth
+from quadriga.shared.wire.topics import CLOCK, EVENT, STATUS, TRUTH
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.progress import WalkProgress
+from tests.listening import await_listener
 
 WAIT = 20.0  # s
 
@@ -83,3 +84,45 @@ def test_before_the_walk_those_who_are_awaited_are_named() -> None:
         for name in ("r1", "recorder"):
             buses[name].declare(READY)
         await_text("waiting for operator")
+
+
+def test_without_a_terminal_lines_tell_what_a_bar_would_show() -> None:
+    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint(), "world.seconds": 8.0})
+    text = io.StringIO()
+    console = Console(file=text, force_terminal=False, width=120)
+    with ExitStack() as stack:
+        sim = stack.enter_context(Bus.open(config.bus, "team", SIM))
+        progress = stack.enter_context(WalkProgress(config, console))
+        sim.declare(HERE)
+        put, deadline = sim.publisher(CLOCK.key("team")), monotonic() + WAIT
+        while "walking" not in text.getvalue():
+            assert monotonic() < deadline, text.getvalue()
+            if "waiting for operator, r1, recorder\n" in text.getvalue():
+                put(encode(Clock(2500, 0)))
+            progress.update()
+            sleep(0.02)
+
+
+def test_commands_that_come_too_late_are_complained_of_while_it_happens() -> None:
+    keys = {"team.robots": 2, "bus.endpoint": free_endpoint(), "world.mode": "realtime"}
+    config = load(None, keys)
+    text = io.StringIO()
+    console = Console(file=text, force_terminal=False, width=120)
+    none = np.zeros(0)
+    with Bus.open(config.bus, "team", SIM) as sim, WalkProgress(config, console) as progress:
+        await_listener(sim, STATUS.key("team", SIM))
+        put = sim.publisher(STATUS.key("team", SIM))
+        late = {1000: 20, 2000: 420, 3000: 900, 9000: 4000}  # so many of r2's, counted by tick
+        for tick, count in late.items():
+            counters = {"r1.due": tick, "r1.late": 9, "r2.due": tick, "r2.late": count}
+            put(encode(Status(tick, 0, "realtime", "", "", {}, counters, none, none)))
+        deadline = monotonic() + WAIT
+        while text.getvalue().count("overload") < 2:
+            assert monotonic() < deadline, text.getvalue()
+            progress.update()
+            sleep(0.02)
+    lines = [line for line in text.getvalue().splitlines() if "overload" in line]
+    assert lines == [  # one in five seconds of the world
+        "2.00 s: overload: 40% of r2's commands come late",
+        "9.00 s: overload: 52% of r2's commands come late",
+    ]
