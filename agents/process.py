@@ -12,9 +12,9 @@ from quadriga.agents.inbox.intake_log import Intake
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256
-from quadriga.agents.rehearsal import rehearse
 from quadriga.agents.telemetry import Telemetry
-from quadriga.shared.bus.barrier import join
+from quadriga.agents.tick_cost import rehearse_in_time
+from quadriga.shared.bus.barrier import STARTS, join
 from quadriga.shared.bus.introduction import Introduction
 from quadriga.shared.bus.lead_watch import LeadWatch
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
@@ -61,7 +61,8 @@ def run(
         BusError: the bus cannot be opened, or the team is not complete in time, has something
             else in common, or walks already in lock-step; or for 3 s no state has come that is
             newer than those before.
-        ProcessError: who drives time, or the link to the router, has vanished.
+        ProcessError: who drives time, or the link to the router, has vanished; or this computer
+            cannot keep up in real time.
         KeyboardInterrupt: it is stopped before it is ready.
     """
     stopped = stopped or stop_on_signals()
@@ -72,10 +73,11 @@ def run(
     with Bus.open(config.bus, config.team.name, robot, stopped) as bus:
         for key in inbox.keys:
             bus.subscribe(key)
-        if not join(bus, config, stopped, Introduction(bus, config, sha256)):
+        joined = join(bus, config, stopped, Introduction(bus, config, sha256))
+        if not joined:
             return
         with interruptible(stopped):
-            rehearse(config, Agent(config, robot, predictor))
+            rehearse_in_time(config, Agent(config, robot, predictor), refuse=joined == STARTS)
         shell = _Shell(config, agent, inbox, bus)
         end_collection()
         take_priority(config.runtime.priority)

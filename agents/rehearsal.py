@@ -5,6 +5,8 @@ First calls compile, load and allocate; they must not fall into the first steps 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from quadriga.agents.agent import Agent, AgentState, Inputs
@@ -30,10 +32,11 @@ from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 _LEAN = 0.8  # of the tilt that is a fall
 
 
-def rehearse(config: Config, agent: Agent) -> AgentState:
+def rehearse(config: Config, agent: Agent, note: Callable[[], None] = lambda: None) -> AgentState:
     """Step `agent` through standing, the first walking ticks and some planning steps.
 
-    What it takes in and what it commands goes over the wire's bytes.
+    What it takes in and what it commands goes over the wire's bytes. After each tick `note()` is
+    called.
 
     For the last two of them it leans, so far that limits of both its QPs are active. It leans some
     ticks earlier: an attitude that jumps is not believed at once.
@@ -45,6 +48,7 @@ def rehearse(config: Config, agent: Agent) -> AgentState:
         inputs = Inputs(decode(sent, State), references=(_stay(config, tick),))
         memory, outputs = agent.step(memory, inputs)
         encode(outputs.command)
+        note()
     return memory
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from quadriga.commands.command import AddCommand, Given
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.runtime.scheduling import count_cores
 
 if TYPE_CHECKING:
     from quadriga.experiments.campaign.walk_trials import Workers
@@ -76,7 +76,7 @@ def add_workers(command: argparse.ArgumentParser) -> None:
     option(
         "--jobs",
         type=_parse_jobs,
-        default=_count_cores(),
+        default=count_cores(),
         metavar="N|auto",
         help="walks side by side (auto: one for each core)",
     )
@@ -191,11 +191,7 @@ def _build_plan(arguments: argparse.Namespace) -> CampaignPlan:
 
 
 def _parse_jobs(text: str) -> int:
-    jobs = _count_cores() if text == "auto" else int(text)
+    jobs = count_cores() if text == "auto" else int(text)
     if jobs < 1:
         raise argparse.ArgumentTypeError(f"got {jobs}, expected auto or at least 1")
     return jobs
-
-
-def _count_cores() -> int:
-    return len(os.sched_getaffinity(0))

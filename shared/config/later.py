@@ -22,6 +22,7 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "bus.reconnect_timeout": 30.0,
         "bus.certificates": "certs",
         "bus.plaintext": False,
+        "runtime.refuse_overload": True,
         "planner.options": "",
         "planner.cost": "own",
         "planner.tracked": "speeds",

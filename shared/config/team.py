@@ -126,3 +126,9 @@ class RuntimeConfig:
         "ordinary processes (SCHED_RR) if the user may do so; ordinary: as any other",
         choices=("realtime", "ordinary"),
     )
+    refuse_overload: bool = key(
+        True,
+        "-",
+        "realtime: refuse to begin on a computer that the agents' ticks alone would keep busier "
+        "than it can be, as measured before",
+    )

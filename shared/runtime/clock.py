@@ -16,6 +16,11 @@ def monotonic_ns() -> int:
     return time.monotonic_ns()
 
 
+def thread_ns() -> int:
+    """Nanoseconds of processor time that this thread has had; only differences mean anything."""
+    return time.thread_time_ns()
+
+
 def wall_ns() -> int:
     """Nanoseconds since 1970: for log times and names of run folders, never for control.
 

@@ -65,3 +65,8 @@ def _schedule(policy: int, level: int) -> None:
     for thread in Path("/proc/self/task").iterdir():
         with suppress(ProcessLookupError):  # it has ended meanwhile
             os.sched_setscheduler(int(thread.name), policy, os.sched_param(level))
+
+
+def count_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0))
