@@ -9,8 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from quadriga.pictures import software_frames
 from quadriga.pictures.frames import CLIP, SHEET
-from quadriga.pictures.stick_figures import draw_stick_figures
 
 _TIMEOUT: Final = 120.0  # s
 
@@ -19,18 +19,19 @@ def render(run_dir: Path, say: Callable[[str], None] = print) -> tuple[Path, ...
     """Draw the run in `run_dir`; returns the files written.
 
     MuJoCo draws `walk.png` and `walk.webp` off-screen, in a process of its own that chooses EGL
-    unless MUJOCO_GL says otherwise. Where that fails, `walk.png` shows stick figures and `say`
-    gets one line about it; likewise where it must do without the robots' meshes.
+    unless MUJOCO_GL says otherwise. Where that fails, they are painted without OpenGL, more simply,
+    and `say` gets one line about it; likewise where they must do without the robots' meshes.
 
     Raises:
         RecordingError: the recording is missing, empty or holds no truth.
     """
     problem = _draw_offscreen(run_dir, say)
-    if not problem:
-        return run_dir / SHEET, run_dir / CLIP
-    draw_stick_figures(run_dir)
-    say(f"no off-screen OpenGL, so {SHEET} shows stick figures: {problem}")
-    return (run_dir / SHEET,)
+    if problem:
+        without_meshes = software_frames.draw(run_dir)
+        say(f"no off-screen OpenGL, so pictures have no shadows: {problem}")
+        if without_meshes:
+            say(f"robots are drawn as boxes and lines: {without_meshes}")
+    return run_dir / SHEET, run_dir / CLIP
 
 
 def _draw_offscreen(run_dir: Path, say: Callable[[str], None]) -> str:

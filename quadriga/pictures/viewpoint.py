@@ -29,6 +29,11 @@ class Viewpoint:
     target: Array
     distance: float
 
+    @property
+    def eye(self) -> Array:
+        """Where the camera is, shape (3,), m, world."""
+        return self.target - self.distance * _ahead()
+
     def project(self, points: Array) -> Array:
         """Where points (k, 3) [m, world] are in a picture of the size `FRAME`.
 
@@ -36,10 +41,9 @@ class Viewpoint:
             Shape (k, 3): pixels from the left and from above, and the distance in front of the
             camera, m. What lies behind the camera has no pixels: NaN.
         """
-        turn, tilt = np.deg2rad(AZIMUTH), np.deg2rad(ELEVATION)
-        ahead = np.array([np.cos(tilt) * np.cos(turn), np.cos(tilt) * np.sin(turn), np.sin(tilt)])
+        turn, ahead = np.deg2rad(AZIMUTH), _ahead()
         right = np.array([np.sin(turn), -np.cos(turn), 0.0])
-        along = points - (self.target - self.distance * ahead)
+        along = points - self.eye
         depth = along @ ahead
         width, height = FRAME
         scale = 0.5 * height / np.tan(np.deg2rad(FIELD) / 2)
@@ -48,6 +52,12 @@ class Viewpoint:
         shares[:, depth <= 0.0] = np.nan
         x, y = scale * shares + 0.5 * np.array([[width], [height]])
         return np.stack([x, y, depth], axis=1)
+
+
+def _ahead() -> Array:
+    """The direction in which the camera looks, shape (3,)."""
+    turn, tilt = np.deg2rad(AZIMUTH), np.deg2rad(ELEVATION)
+    return np.array([np.cos(tilt) * np.cos(turn), np.cos(tilt) * np.sin(turn), np.sin(tilt)])
 
 
 def viewpoints(poses: Poses) -> list[Viewpoint]:
