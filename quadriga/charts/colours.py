@@ -11,7 +11,7 @@ from quadriga.shared.robot.colours import N_ROBOT_COLOURS, robot_colour
 PALETTE: Final = {
     "paper": "#ffffff", "ink": "#1b1b1b", "soft": "#666666", "line": "#d4d4d4", "grid": "#ececec",
     "blue": "#0072b2", "orange": "#d55e00", "green": "#009e73", "purple": "#b0508c",
-    "yellow": "#b8860b", "bad": "#b3261e", "stance": "#dfe3e6",
+    "yellow": "#b8860b", "bad": "#b3261e", "stance": "#dfe3e6", "walk": "#bfe0cf",
     **{f"robot-{i + 1}": robot_colour(i) for i in range(N_ROBOT_COLOURS)},
 }  # fmt: skip
 # Of what is compared and is no robot: variants, predictors.
@@ -36,9 +36,9 @@ LINES: Final[dict[str, dict[str, Any]]] = {
 }
 # Colours of bars by their style.
 BARS: Final[dict[str, str]] = {
-    "mode-stand": PALETTE["line"], "mode-walk": PALETTE["stance"],
+    "mode-stand": PALETTE["line"], "mode-walk": PALETTE["walk"],
     "mode-stopping": PALETTE["yellow"], "mode-damping": PALETTE["bad"],
-    "mode-estop": PALETTE["bad"], "mode-plan": PALETTE["stance"], "mode-other": PALETTE["soft"],
+    "mode-estop": PALETTE["bad"], "mode-plan": PALETTE["walk"], "mode-other": PALETTE["soft"],
     "stance": PALETTE["stance"], "contact": PALETTE["soft"], "faded": PALETTE["yellow"],
     "nominal": PALETTE["orange"], "gap": PALETTE["bad"], "count": PALETTE["soft"],
     "event": PALETTE["ink"], "trouble": PALETTE["bad"],

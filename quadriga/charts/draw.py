@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,6 +22,8 @@ WIDTH: Final = 1000.0  # points; a page scales it
 POINTS_PER_INCH: Final = 72.0
 TEXT: Final = 12.0  # points
 _RIGHT, _ABOVE, _BETWEEN, _BELOW = 14.0, 20.0, 8.0, 36.0
+_BESIDE: Final = 42.0  # more at the right, for values in another unit
+_TITLE: Final = 14.0  # size of its letters
 _ROW: Final = 15.0  # of bars
 _LEGEND: Final = 24.0
 _LETTER: Final = 7.0  # width of one, about
@@ -55,10 +57,11 @@ def draw_panels(
     top = head + _LEGEND * len(lines)
     total = top + sum(_ABOVE + tall + _BETWEEN for tall in heights) + _BELOW - _BETWEEN
     figure = Figure(figsize=(WIDTH / POINTS_PER_INCH, total / POINTS_PER_INCH))
-    figure.text(LEFT / WIDTH, 1.0 - 0.5 * head / total, title, va="center", fontsize=TEXT)
+    add_title(figure, title, 0.5 * head)
     for k, line in enumerate(lines):
         add_legend(figure, line, above=1.0 - (head + _LEGEND * k) / total)
-    width = WIDTH / grid.columns - LEFT - _RIGHT
+    right = _RIGHT + (_BESIDE if any(panel.beside for panel in panels) else 0.0)
+    width = WIDTH / grid.columns - LEFT - right
     for number, (row, tall) in enumerate(zip(rows, heights, strict=True)):
         top += _ABOVE + tall
         for k, panel in enumerate(row):
@@ -70,11 +73,27 @@ def draw_panels(
             free = _LETTER * len(panel.title) / width if number == 0 else np.inf
             _draw_marks(axes, marks, free, width)
             if number * grid.columns + k + grid.columns >= len(panels):
-                axes.set_xlabel(grid.across, fontsize=TEXT, color=PALETTE["soft"], labelpad=2.0)
+                across = panel.across or grid.across
+                axes.set_xlabel(across, fontsize=TEXT, color=PALETTE["soft"], labelpad=2.0)
             else:
                 axes.xaxis.set_major_locator(NullLocator())
         top += _BETWEEN
     return figure
+
+
+def add_title(figure: Figure, title: str, below: float) -> None:
+    """The title of a figure, `below` points under its upper edge; empty for none."""
+    if title:
+        high = 1.0 - below / (POINTS_PER_INCH * figure.get_figheight())
+        figure.text(
+            LEFT / WIDTH,
+            high,
+            title,
+            va="center",
+            fontsize=_TITLE,
+            fontweight="bold",
+            color=PALETTE["ink"],
+        )
 
 
 def add_legend(figure: Figure, entries: Legend, above: float = 1.0) -> None:
@@ -169,13 +188,32 @@ def _draw_curves(axes: Axes, panel: Panel, points: int, tall: float) -> None:
         axes.yaxis.set_major_locator(MaxNLocator(max(2, int(tall // 15)), steps=_STEPS))
     axes.yaxis.set_major_formatter(StrMethodFormatter("{x:,.9g}"))
     axes.set_ylim(low, high)
+    if panel.beside is not None:
+        _add_beside(axes, *panel.beside, max(2, int(tall // 25)))
     for level, name in panel.levels:
         if low < level < high:
             axes.axhline(level, **LINES["level"])
             axes.annotate(
                 name, (1.0, level), (-4.0, 2.0), xycoords=("axes fraction", "data"),
                 textcoords="offset points", ha="right", fontsize=TEXT, color=PALETTE["soft"],
+                bbox={"facecolor": PALETTE["paper"], "edgecolor": "none", "pad": 1.0},
             )  # fmt: skip
+
+
+def _add_beside(axes: Axes, factor: float, sign: str, ticks: int) -> None:
+    """The same values in another unit at the right, with `ticks` numbers or fewer."""
+
+    def convert(values: Any) -> Any:
+        return factor * np.asarray(values)
+
+    def convert_back(values: Any) -> Any:
+        return np.asarray(values) / factor
+
+    other = axes.secondary_yaxis("right", functions=(convert, convert_back))
+    other.spines["right"].set_visible(False)
+    other.yaxis.set_major_locator(MaxNLocator(ticks, steps=_STEPS))
+    other.yaxis.set_major_formatter(StrMethodFormatter(f"{{x:g}}{sign}"))
+    other.tick_params(right=False, labelsize=TEXT, labelcolor=PALETTE["soft"])
 
 
 def _draw_marks(axes: Axes, marks: Sequence[Mark], free: float, width: float) -> None:

@@ -15,7 +15,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from quadriga.charts.colours import PALETTE
-from quadriga.charts.draw import POINTS_PER_INCH
+from quadriga.charts.draw import POINTS_PER_INCH, TEXT
 from quadriga.charts.panels import TIME
 
 _DPI: Final = 110
@@ -25,7 +25,9 @@ _NO_METADATA: Final = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 _POINT: Final = re.compile(r"-?\d+\.\d+")
 _CURVED: Final = re.compile("[QC]")
 _LETTER: Final = re.compile("[Lz]")
-_DROPPED: Final = re.compile(r"(font-size|font-family|stroke-linecap|stroke-linejoin):[^;]*;?")
+_DROPPED: Final = re.compile(
+    rf"(font-size:{TEXT:g}px|(font-family|stroke-linecap|stroke-linejoin):[^;]*);?"
+)
 
 
 def save_png(figure: Figure, path: Path) -> None:

@@ -10,6 +10,7 @@ from typing import Final
 from quadriga.shared.robot.conventions import Array
 
 TIME: Final = "time [s]"
+DEGREES: Final = (180.0 / math.pi, "°")  # beside rad and rad/s
 LEFT: Final = 58.0  # points, for the values of the vertical axis
 
 
@@ -53,6 +54,9 @@ class Panel:
         log: whether values are drawn logarithmically.
         levels: horizontal lines at (value, name).
         part: its own first and last time, s, instead of the grid's.
+        across: its own horizontal axis, with its unit, instead of the grid's.
+        beside: for values that are also read in another unit, at the right: how many of it are
+            one, and its sign.
     """
 
     title: str
@@ -65,6 +69,8 @@ class Panel:
     log: bool = False
     levels: Sequence[tuple[float, str]] = ()
     part: tuple[float, float] | None = None
+    across: str = ""
+    beside: tuple[float, str] | None = None
 
 
 @dataclass(frozen=True, slots=True)

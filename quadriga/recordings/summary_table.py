@@ -18,6 +18,7 @@ _ERRORS = {
     "z": ("mm", 1e3), "z-over-stance-feet": ("mm", 1e3), "vx": ("m/s", 1.0),
     "vy": ("m/s", 1.0), "roll": ("rad", 1.0), "pitch": ("rad", 1.0), "wz": ("rad/s", 1.0),
 }  # fmt: skip
+_DEGREES = 57.2957795  # in a rad
 
 
 def print_summary(summary: dict[str, Any], console: Console) -> None:
@@ -125,7 +126,10 @@ def _format_errors(rmse: Mapping[str, float | None]) -> str:
     for name, value in rmse.items():
         unit, factor = _ERRORS[name]
         digits = ".1f" if factor > 1.0 else ".4f"
-        parts.append(f"{error_text(name)} {format_number(value, digits, factor)} {unit}")
+        text = f"{error_text(name)} {format_number(value, digits, factor)} {unit}"
+        if unit.startswith("rad"):
+            text += f" ({format_number(value, '.2f', _DEGREES)}°{unit.removeprefix('rad')})"
+        parts.append(text)
     half = (len(parts) + 1) // 2
     return ", ".join(parts[:half]) + "\n" + ", ".join(parts[half:])
 

@@ -74,7 +74,7 @@ def _assess_trunk(window: Samples) -> Iterator[tuple[str, bool]]:
         yield from [("not recorded", False)] * 2
         return
     for tilt in (float(window.tilt[-1]), float(window.tilt.max())):
-        yield f"{tilt:.2f} rad", tilt > TILT
+        yield f"{tilt:.2f} rad ({np.rad2deg(tilt):.0f}°)", tilt > TILT
 
 
 def _assess_feet(window: Samples) -> Iterator[tuple[str, bool]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -66,16 +67,38 @@ class PageTable:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A figure, and what it shows: a name that is unique within the page."""
+    """A figure, and what it shows: a name that is unique within the page, and words below it."""
 
     kind: ClassVar = "drawing"
     figure: Figure
     name: str
+    caption: str = ""
 
     @property
     def svg(self) -> Markup:
         """For the template."""
         return Markup(to_svg(self.figure, self.name))
+
+
+@dataclass(frozen=True, slots=True)
+class Clip:
+    """Moving pictures, which become part of the page.
+
+    Attributes:
+        content: of a WebP file.
+        name: what they show, for those who do not see them.
+        caption: words below them.
+    """
+
+    kind: ClassVar = "clip"
+    content: bytes
+    name: str
+    caption: str
+
+    @property
+    def source(self) -> str:
+        """For the template."""
+        return f"data:image/webp;base64,{b64encode(self.content).decode()}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +111,7 @@ class Fold:
     opened: bool
 
 
-Part = Paragraph | Subtitle | PageTable | Drawing | Fold
+Part = Paragraph | Subtitle | PageTable | Drawing | Clip | Fold
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,8 @@ def draw_forces(run: Run) -> Figure:
         for i, robot in enumerate(run.traces.robots)
     ]
     grid = PanelGrid(run.begin / 1000, run.end / 1000, height=80.0, points=1200)
-    return draw_panels(panels, grid, marks=mark_falls(run), legend=_force_legend(run))
+    title = "Vertical forces of the front right feet"
+    return draw_panels(panels, grid, marks=mark_falls(run), legend=_force_legend(run), title=title)
 
 
 def draw_forces_enlarged(run: Run) -> Figure:
@@ -44,15 +45,19 @@ def draw_forces_enlarged(run: Run) -> Figure:
         for leg in Leg
     ]
     grid = PanelGrid(*four_strides(run), columns=len(Leg), height=70.0)
-    return draw_panels(panels, grid, marks=mark_falls(run))
+    title = "Vertical forces of all feet in four strides"
+    return draw_panels(panels, grid, marks=mark_falls(run), legend=_force_legend(run), title=title)
 
 
 def draw_forces_of_first(run: Run) -> Figure:
     """Vertical force of the first robot's front-right foot: the whole run, and four strides."""
-    panel = _build_force_panel(run, 0, Leg.FR, f"{run.traces.robots[0]} front right [N]")
+    robot = run.traces.robots[0]
+    panel = _build_force_panel(run, 0, Leg.FR, f"{robot} front right [N]")
     part = replace(panel, title="four strides, enlarged", part=four_strides(run))
     grid = PanelGrid(run.begin / 1000, run.end / 1000, columns=2, height=200.0)
-    return draw_panels([panel, part], grid, marks=mark_falls(run), legend=_force_legend(run))
+    title = f"{robot}: vertical force of the front right foot"
+    legend = _force_legend(run)
+    return draw_panels([panel, part], grid, marks=mark_falls(run), legend=legend, title=title)
 
 
 def draw_gait(run: Run) -> tuple[Figure, float, float]:
@@ -61,7 +66,8 @@ def draw_gait(run: Run) -> tuple[Figure, float, float]:
     begin = max(run.begin / 1000, end - _SHOWN)
     panels = [build_gait_panel(run, index) for index in range(len(run.traces.robots))]
     grid = PanelGrid(begin, end)
-    figure = draw_panels(panels, grid, marks=mark_falls(run), legend=gait_legend(run))
+    title, legend = "Gait: which feet were to stand, and which touched the ground", gait_legend(run)
+    figure = draw_panels(panels, grid, marks=mark_falls(run), legend=legend, title=title)
     return figure, begin, end
 
 

@@ -6,11 +6,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
+from quadriga.pictures.frames import CLIP
 from quadriga.recordings.summary_table import list_figures
-from quadriga.report import about, foot_figures, process_figures, trunk_figures
+from quadriga.report import about, captions, foot_figures, process_figures, trunk_figures
 from quadriga.report.conditions import COLUMNS
 from quadriga.report.document import (
     Cell,
+    Clip,
     Document,
     Drawing,
     Fold,
@@ -43,33 +45,53 @@ _TRAFFIC: Final = ("key", "messages", "rate [Hz]", "from … to [s]", "missing",
 
 
 def write_page(run: Run, path: Path) -> Path:
-    """Write the page of a run.
+    """Write the page of a run, with the clip that lies beside the recording, if any.
 
     Raises:
         RecordingError: the file cannot be written.
     """
+    clip = _read_clip(run.path)
     with name_file_errors(RecordingError, path, "a file that can be written"):
-        path.write_text(build_page(run), encoding="utf-8")
+        path.write_text(build_page(run, clip), encoding="utf-8")
     return path
 
 
-def build_page(run: Run) -> str:
-    """The whole page as HTML; it loads nothing from anywhere."""
+def _read_clip(recording: Path) -> bytes:
+    """The clip of a recording, nothing if there is none or if it is older than the recording."""
+    clip = recording.with_name(CLIP)
+    try:
+        if clip.stat().st_mtime_ns >= recording.stat().st_mtime_ns:
+            return clip.read_bytes()
+    except OSError:  # not drawn, or not for our eyes: the page does without
+        pass
+    return b""
+
+
+def build_page(run: Run, clip: bytes = b"") -> str:
+    """The whole page as HTML; it loads nothing from anywhere.
+
+    Args:
+        run: what it is about.
+        clip: moving pictures of the run, WebP; none if empty.
+    """
     lead, good = about.judge(run)
     return Document(
         title=about.build_title(run),
         lead=lead,
-        sections=list(_build_sections(run)),
+        sections=list(_build_sections(run, clip)),
         verdict="good" if good else "bad",
         notes=about.describe_missing(run),
         clock=True,
     ).to_html()
 
 
-def _build_sections(run: Run) -> Iterator[Section]:
+def _build_sections(run: Run, clip: bytes = b"") -> Iterator[Section]:
     yield Section("run", "The run", _build_run(run))
     summary = PageTable((), list_figures(run.summary), named=True)
     yield Section("summary", "Summary", [summary])
+    if clip:
+        shown = Clip(clip, "the team walking", captions.CLIP)
+        yield Section("clip", "The walk to look at", [shown])
     troubles = find_troubles(run)
     if troubles:
         yield Section("look", "What to look at", list(_build_troubles(run, troubles)))
@@ -157,7 +179,7 @@ def _build_trunks(run: Run) -> Iterator[Section]:
         yield Section("reference", "Reference against measured", [Paragraph([text]), drawing])
     if not run.has_truth:
         return
-    drawing = Drawing(draw_top_view(run.traces), "paths from above")
+    drawing = Drawing(draw_top_view(run.traces), "paths from above", captions.PATHS)
     yield Section("paths", "Paths from above", [drawing])
     if any(len(measured.tick) for measured in run.traces.measurements.values()):
         text = "What the agent estimated, less the truth at the same tick."
@@ -174,7 +196,8 @@ def _build_trunks(run: Run) -> Iterator[Section]:
 
 def _build_trajectories(run: Run) -> Iterator[Part]:
     for i, robot in enumerate(run.traces.robots):
-        whole = Drawing(trunk_figures.draw_trajectory(run, i), f"trajectories of {robot}")
+        figure, caption = trunk_figures.draw_trajectory(run, i), "" if i else captions.outputs(run)
+        whole = Drawing(figure, f"trajectories of {robot}", caption)
         yield Fold(robot, [whole], opened=i < 3)
         near = trunk_figures.draw_trajectory(run, i, foot_figures.four_strides(run))
         name = f"{robot}, four strides enlarged"
@@ -189,7 +212,7 @@ def _build_feet(run: Run) -> Iterator[Section]:
     if run.has_truth or sensed:
         begin, end = foot_figures.four_strides(run)
         parts: list[Part] = [
-            Drawing(foot_figures.draw_forces(run), "vertical forces"),
+            Drawing(foot_figures.draw_forces(run), "vertical forces", captions.forces(run)),
             Subtitle([f"All feet in four strides, {begin:.2f} … {end:.2f} s"]),
             Drawing(foot_figures.draw_forces_enlarged(run), "vertical forces, four strides"),
         ]

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from quadriga.agents.planning.fade import FADED
 from quadriga.agents.time_grid import step_ms
-from quadriga.charts.colours import BARS, robot_style
+from quadriga.charts.colours import BARS, robot_style, truth_style
 from quadriga.charts.draw import draw_panels
 from quadriga.charts.panels import Bars, Curve, Mark, Panel, PanelGrid
 from quadriga.recordings.traces import quantile_of, times_of
@@ -60,7 +60,8 @@ def draw_timeline(run: Run) -> Figure:
         )
     stops = [Mark(e.tick / 1000, "stopped", "") for e in run.timeline if e.kind == "stopped"]
     grid = PanelGrid(run.begin / 1000, last)
-    return draw_panels(panels, grid, marks=[*stops, *mark_falls(run)], legend=_LEGEND)
+    marks, title = [*stops, *mark_falls(run)], "Modes, plans and what went missing"
+    return draw_panels(panels, grid, marks=marks, legend=_LEGEND, title=title)
 
 
 def _build_mode_bars(
@@ -93,7 +94,8 @@ def draw_times(run: Run) -> Figure:
     legend = robot_legend(run)
     if find_kind(run.traces.config.planner.kind).central:
         legend.append(("asked", PLANNER))
-    return draw_over_run(run, panels, legend, height=130.0)
+    title = "Planner solves and control ticks, by the wall clock"
+    return draw_over_run(run, panels, legend, title, height=130.0)
 
 
 def _build_worst(statuses: tuple[Status, ...], values: list[Array], style: str) -> Curve:
@@ -122,7 +124,7 @@ def draw_ages(run: Run) -> Figure:
     traces, step = run.traces, step_ms(run.traces.config)
     panels = []
     for robot in traces.robots:
-        curves = []
+        curves: list[Curve] = []
         for index, peer in enumerate(traces.robots):
             used = [
                 (plan.tick, step * (plan.step - plan.used[peer]))
@@ -131,7 +133,8 @@ def draw_ages(run: Run) -> Figure:
             ]
             if used:
                 time, age = np.array(used, dtype=float).T
-                style = robot_style(index)
+                # Ages are often equal: every other curve is wide, so that none hides another.
+                style = (truth_style if len(curves) % 2 == 0 else robot_style)(index)
                 curves.append(Curve(time / 1000, age, style, "step", gap=2.1e-3 * step))
         for name, style in (("reference", "asked"), ("plan", "planned")):
             ages = [(s.tick, s.ages_ms[name]) for s in traces.statuses[robot] if name in s.ages_ms]
@@ -139,31 +142,36 @@ def draw_ages(run: Run) -> Figure:
                 time, age = np.array(ages, dtype=float).T
                 curves.append(Curve(time / 1000, age, style, "step", gap=_SENT_S))
         levels = [(float(REFERENCE.max_age_ms), "reference: stops")]
-        panels.append(Panel(f"{robot}: age [ms]", curves, span=100.0, floor=0.0, levels=levels))
+        title = f"{robot}: age of what it goes by [ms]"
+        panels.append(Panel(title, curves, span=100.0, floor=0.0, levels=levels))
     central = find_kind(traces.config.planner.kind).central
     legend = [("planned", "central plan")] if central else robot_legend(run)
-    return draw_over_run(run, panels, [*legend, ("asked", "reference")], height=70.0)
+    title = "Ages of plans and of the reference, by world time"
+    return draw_over_run(run, panels, [*legend, ("asked", "reference")], title, height=70.0)
 
 
 def draw_time_histograms(run: Run) -> Figure:
     """Distribution of planner solve times and control tick times of every robot."""
     panels = []
-    for field, title in (
-        ("planner_ms", "planner solves by ms"),
-        ("tick_us", "control ticks by µs"),
+    for field, what, unit in (
+        ("planner_ms", "planner solve", "ms"),
+        ("tick_us", "control tick", "µs"),
     ):
+        title, across = f"number of {what}s", f"time of a {what} [{unit}]"
         times = [times_of(run.traces.statuses[robot], field) for robot in run.traces.robots]
         every = np.concatenate(times)
         if not len(every):
-            panels.append(Panel(f"{title}: none recorded", span=1.0))
+            panels.append(Panel(f"{title}: none recorded", span=1.0, across=across))
             continue
         # Beyond the 99.5 % quantile lie single outliers that would flatten the rest.
         edges = np.linspace(0.0, 1.1 * float(np.quantile(every, 0.995)) + 1e-9, _BINS + 1)
-        curves = []
+        curves: list[Curve] = []
         for index, values in enumerate(times):
             counts, _ = np.histogram(np.minimum(values, edges[-1]), edges)
             style, held = robot_style(index), 1.4 * float(edges[1])  # the last bin is drawn too
             curves.append(Curve(edges[:-1], counts.astype(float), style, "step", gap=held))
-        panels.append(Panel(title, curves, floor=0.0, part=(0.0, float(edges[-1]))))
-    grid = PanelGrid(0.0, 1.0, columns=2, height=200.0, across="time")
-    return draw_panels(panels, grid, legend=robot_legend(run))
+        part = (0.0, float(edges[-1]))
+        panels.append(Panel(title, curves, floor=0.0, part=part, across=across))
+    grid = PanelGrid(0.0, 1.0, columns=2, height=200.0)
+    title = "How long planner solves and control ticks took, by the wall clock"
+    return draw_panels(panels, grid, legend=robot_legend(run), title=title)

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from quadriga.charts.colours import LINES, PALETTE, robot_style
-from quadriga.charts.draw import POINTS_PER_INCH, TEXT, WIDTH, add_legend, tidy_axes
+from quadriga.charts.colours import LINES, PALETTE, robot_style, yoke_style
+from quadriga.charts.draw import POINTS_PER_INCH, TEXT, WIDTH, add_legend, add_title, tidy_axes
 from quadriga.recordings.traces import Traces
 from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robot.colours import robot_colour
@@ -18,7 +18,8 @@ from quadriga.shared.robot.conventions import Array
 _INSTANTS: Final = 6  # at which yokes and times are drawn
 _MARGIN: Final = 0.3  # m
 _HIGHEST: Final = 420.0  # points
-_FRAME: Final = (58.0, 14.0, 30.0, 44.0)  # points left, right, above and below the axes
+_FRAME: Final = (58.0, 14.0, 58.0, 44.0)  # points left, right, above and below the axes
+_HEAD: Final = 24.0  # points of the title
 _NEAR: Final = (36.0, 14.0)  # points between the times at two instants, at least
 _STRIDE: Final = 5  # samples between the points of a path
 
@@ -51,7 +52,11 @@ def draw_top_view(traces: Traces) -> Figure:
                 f"{tick[k] / 1000:.1f} s", tuple(point), (0.0, 8.0), textcoords="offset points",
                 ha="center", fontsize=TEXT, color=PALETTE["soft"],
             )  # fmt: skip
-    add_legend(figure, [(robot_style(i), robot) for i, robot in enumerate(traces.robots)])
+    legend = [(robot_style(i), robot) for i, robot in enumerate(traces.robots)]
+    if traces.config.team.robots > 1 and traces.config.team.yokes != "none":
+        legend.append((yoke_style(0), "yokes, at some instants"))
+    add_title(figure, "Paths of the trunks from above", 0.5 * _HEAD)
+    add_legend(figure, legend, above=1.0 - _HEAD / total)
     return figure
 
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from quadriga.charts.colours import robot_style
 from quadriga.charts.draw import draw_panels
-from quadriga.charts.panels import Curve, Mark, Panel, PanelGrid
+from quadriga.charts.panels import DEGREES, Curve, Mark, Panel, PanelGrid
 from quadriga.report.foot_figures import build_gait_panel, gait_legend
 from quadriga.report.run import Run
 from quadriga.report.samples import find_slip
@@ -34,7 +34,7 @@ def draw_trouble(run: Run, trouble: Trouble) -> Figure:
         torque.append(Curve(time, 100 * samples.torque, style, gap=_GAP))
     falling = [(TILT, "unusual"), (run.traces.config.controller.fall_tilt, "fall")]
     panels = [
-        Panel("tilt [rad]", tilt, span=0.3, floor=0.0, levels=falling),
+        Panel("tilt [rad]", tilt, span=0.3, floor=0.0, levels=falling, beside=DEGREES),
         Panel(
             "fastest foot in stance and contact [m/s]", slip, span=0.4, floor=0.0,
             levels=[(SLIP, "slips")],
@@ -47,7 +47,11 @@ def draw_trouble(run: Run, trouble: Trouble) -> Figure:
     end = min(run.end, trouble.tick + _AFTER_MS) / 1000
     legend = [*robot_legend(run), *gait_legend(run)]
     return draw_panels(
-        panels, PanelGrid(begin, end, height=75.0), marks=_build_marks(run), legend=legend
+        panels,
+        PanelGrid(begin, end, height=75.0),
+        marks=_build_marks(run),
+        legend=legend,
+        title=f"The second before {trouble.tick / 1000:.2f} s",
     )
 
 

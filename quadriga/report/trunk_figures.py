@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from quadriga.charts.colours import robot_style, truth_style, yoke_style
 from quadriga.charts.draw import Legend, draw_panels
-from quadriga.charts.panels import Curve, Mark, Panel, PanelGrid
+from quadriga.charts.panels import DEGREES, Curve, Mark, Panel, PanelGrid
 from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.recordings.traces import demanded_outputs, estimate_errors
 from quadriga.recordings.truth import Ticks
@@ -18,8 +18,10 @@ from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.tables import LABELS, UNITS
 
 NAMES: Final = ("z [m]", "vx [m/s]", "vy [m/s]", "roll [rad]", "pitch [rad]", "wz [rad/s]")
+_BESIDE: Final = (None, None, None, DEGREES, DEGREES, (DEGREES[0], "°/s"))
 _SPANS: Final = (0.04, 0.3, 0.2, 0.1, 0.1, 0.4)
 _ORDER: Final = (0, 3, 1, 4, 2, 5)  # of the panels, two in a row: z roll, vx pitch, vy wz
 _GAP: Final = 0.05  # s without a sample, after which a curve is not joined
@@ -48,11 +50,17 @@ def robot_legend(run: Run) -> list[tuple[str, str]]:
 
 
 def draw_over_run(
-    run: Run, panels: list[Panel], legend: Legend, *, most: int = _MOST, height: float = 90.0
+    run: Run,
+    panels: list[Panel],
+    legend: Legend,
+    title: str,
+    *,
+    most: int = _MOST,
+    height: float = 90.0,
 ) -> Figure:
     """Panels over the whole run, two in a row."""
     grid = PanelGrid(run.begin / 1000, run.end / 1000, columns=2, height=height, points=most)
-    return draw_panels(panels, grid, marks=mark_falls(run), legend=legend)
+    return draw_panels(panels, grid, marks=mark_falls(run), legend=legend, title=title)
 
 
 def draw_trajectory(run: Run, index: int, part: tuple[float, float] | None = None) -> Figure:
@@ -80,17 +88,19 @@ def draw_trajectory(run: Run, index: int, part: tuple[float, float] | None = Non
         )
         curves.append(Curve(reference_tick / 1000, commanded[:, i], "asked"))
         span = _SPANS[i] if part is None else 0.5 * _SPANS[i]
-        panels.append(Panel(NAMES[i], curves, span=span, until=first_fall(run)))
+        until = first_fall(run)
+        panels.append(Panel(NAMES[i], curves, span=span, until=until, beside=_BESIDE[i]))
     legend = [
         *([(truth_style(index), "measured (truth)")] if run.has_truth else []),
         ("own", "estimated by the agent"),
         ("planned", "planned"),
         ("asked", "asked for"),
     ]
+    title = f"{robot}: height, speeds and angles of the trunk"
     if part is None:
-        return draw_over_run(run, panels, legend, most=_share_points(run, 24))
-    grid = PanelGrid(*part, columns=2)
-    return draw_panels(panels, grid, marks=mark_falls(run), legend=legend)
+        return draw_over_run(run, panels, legend, title, most=_share_points(run, 24))
+    grid, title = PanelGrid(*part, columns=2), f"{title}, four strides enlarged"
+    return draw_panels(panels, grid, marks=mark_falls(run), legend=legend, title=title)
 
 
 def draw_reference(run: Run) -> Figure:
@@ -106,9 +116,11 @@ def draw_reference(run: Run) -> Figure:
             mean = average_over_period(tick, y[:, i], period)
             curves.append(Curve(tick / 1000, mean, robot_style(index), gap=_GAP))
         curves.append(Curve(reference_tick / 1000, commanded[:, i], "asked"))
-        panels.append(Panel(NAMES[i], curves, span=_SPANS[i] / 2, until=first_fall(run)))
+        span, until = _SPANS[i] / 2, first_fall(run)
+        panels.append(Panel(NAMES[i], curves, span=span, until=until, beside=_BESIDE[i]))
     legend = [*robot_legend(run), ("asked", "asked for")]
-    return draw_over_run(run, panels, legend, most=_share_points(run, 10))
+    title = "What was asked for, and each robot's mean over one gait period"
+    return draw_over_run(run, panels, legend, title, most=_share_points(run, 10))
 
 
 def draw_estimator_errors(run: Run) -> Figure:
@@ -118,13 +130,17 @@ def draw_estimator_errors(run: Run) -> Figure:
     for i in _ORDER:
         if OUTPUTS[i] == "z" and run.traces.config.world.uneven:
             continue  # these are heights over two different things
+        factor = UNITS[OUTPUTS[i]][1]  # they are small
         curves = [
-            Curve(tick / 1000, error[:, i], robot_style(index), gap=_GAP)
+            Curve(tick / 1000, factor * error[:, i], robot_style(index), gap=_GAP)
             for index, (tick, error) in enumerate(errors)
         ]
-        panels.append(Panel(NAMES[i], curves, span=0.02 * _SPANS[i], until=first_fall(run)))
-    most = _share_points(run, 12)
-    return draw_over_run(run, panels, robot_legend(run), most=most, height=70.0)
+        turned = _BESIDE[i]
+        beside = None if turned is None else (turned[0] / factor, turned[1])
+        span, until = 0.02 * factor * _SPANS[i], first_fall(run)
+        panels.append(Panel(LABELS[i], curves, span=span, until=until, beside=beside))
+    most, title = _share_points(run, 12), "Estimated less true"
+    return draw_over_run(run, panels, robot_legend(run), title, most=most, height=70.0)
 
 
 def draw_yokes(run: Run) -> Figure:
@@ -144,7 +160,8 @@ def draw_yokes(run: Run) -> Figure:
         (yoke_style(k), f"{robots[i]}–{robots[j]}")
         for k, (i, j) in enumerate(yoke_pairs(team.robots, team.yokes))
     ]
-    return draw_over_run(run, panels, legend, most=_share_points(run, 4), height=120.0)
+    most, title = _share_points(run, 4), "Stretch of the yokes, and the forces in them"
+    return draw_over_run(run, panels, legend, title, most=most, height=120.0)
 
 
 def average_over_period(tick: Ticks, values: Array, period_ms: int) -> Array:

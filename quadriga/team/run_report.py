@@ -48,10 +48,12 @@ def report_folder(run_dir: Path, *, pictures: bool, console: Console) -> dict[st
     print_summary(summary, console)  # before what takes long
     run = build_run(recording, traces, summary)
     write_figures(run, run_dir)
-    write_page(run, run_dir / PAGE)
-    if pictures and run.has_truth:  # nobody else knows where the trunks were
-        with console.status("rendering"):
-            render(run_dir)
+    try:
+        if pictures and run.has_truth:  # nobody else knows where the trunks were
+            with console.status("rendering"):
+                render(run_dir)
+    finally:  # with the clip, or without it where drawing it failed or was interrupted
+        write_page(run, run_dir / PAGE)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False)
     _check_end(summary)
     return summary

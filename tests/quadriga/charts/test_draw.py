@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import re
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from quadriga.charts.colours import BARS, LINES
 from quadriga.charts.draw import WIDTH, draw_panels
 from quadriga.charts.files import to_svg
-from quadriga.charts.panels import Bars, Curve, Mark, Panel, PanelGrid
+from quadriga.charts.panels import DEGREES, Bars, Curve, Mark, Panel, PanelGrid
 
 TIME = np.linspace(0.0, 10.0, 101)
 GRID = PanelGrid(0.0, 10.0, height=100.0)
@@ -122,3 +124,23 @@ def test_a_legend_takes_as_many_lines_as_it_needs() -> None:
     assert all(box.x1 <= WIDTH * scale for box in boxes)
     assert all(upper.y0 >= lower.y1 - 8 for upper, lower in pairwise(boxes))
     assert boxes[-1].y0 > figure.axes[0].get_window_extent().y1
+
+
+def test_a_figure_has_a_title_and_a_panel_its_own_axis() -> None:
+    panel = Panel("count", [Curve(TIME, TIME, "own")], across="time of a solve [ms]")
+    figure = draw_panels([panel], GRID, title="How long it took")
+    assert [text.get_text() for text in figure.texts] == ["How long it took"]
+    assert figure.axes[0].get_xlabel() == "time of a solve [ms]"
+
+
+def test_degrees_stand_beside_radians() -> None:
+    panel = Panel("roll [rad]", [Curve(TIME, 0.1 * TIME, "own")], beside=DEGREES)
+    figure = draw_panels([panel], GRID)
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    ((axes,), (other,)) = figure.axes, figure.axes[0].child_axes
+    low, high = axes.get_ylim()
+    assert other.get_ylim() == pytest.approx(np.rad2deg([low, high]))
+    shown = [label.get_text() for label in other.get_yticklabels()]
+    assert "0°" in shown
+    assert len(shown) > 2

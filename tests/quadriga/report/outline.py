@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 
-_EMPTY = {"meta", "br"}  # closed at once
+_EMPTY = {"meta", "br", "img"}  # closed at once
 _PATH = re.compile(r"[MlLQCz0-9 \n.-]*")
 
 
@@ -18,6 +18,7 @@ class Outline(HTMLParser):
         self.links: list[str] = []
         self.anchors: set[str] = set()
         self.figures: list[str] = []
+        self.pictures: list[str] = []
         self.drawn: list[str] = []
         self.marked: list[str] = []
         self.paths = 0
@@ -34,7 +35,7 @@ class Outline(HTMLParser):
 
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         values = {name: value or "" for name, value in attrs}
-        assert "src" not in values, "nothing is loaded"
+        assert values.get("src", "data:").startswith("data:"), "nothing is loaded"
         assert tag != "link", "nothing is loaded"
         assert values.get("xlink:href", "#").startswith("#"), "nothing is loaded"
         if tag == "section":
@@ -44,6 +45,8 @@ class Outline(HTMLParser):
             self.links.append(values["href"])
         if tag == "svg":
             self.figures.append(values["aria-label"])
+        if tag == "img":
+            self.pictures.append(values["src"])
         if tag == "path":
             self.paths += 1
             assert _PATH.fullmatch(values["d"]), values["d"][:80]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from base64 import b64encode
 from collections.abc import Container, Iterator
 from dataclasses import fields, replace
 from pathlib import Path
@@ -58,6 +60,33 @@ def test_a_run_without_trouble_has_every_section_but_what_to_look_at(known_run: 
         assert f"{robot} front right [N]" in found.drawn
     assert {link[1:] for link in found.links if not link.startswith("#t=")} <= found.anchors
     assert found.paths > 100
+
+
+def test_the_page_shows_the_clip_beside_the_recording(write_run: WriteRun) -> None:
+    folder = write_run(run_config(1, 0.5))
+    recording, clip = folder / "run.mcap", folder / "walk.webp"
+    without = Outline(write_page(read_run(recording), folder / "a.html").read_text("utf-8"))
+    assert not without.pictures
+    assert "clip" not in without.sections
+    clip.write_bytes(b"RIFFabcdWEBP")
+    found = Outline(write_page(read_run(recording), folder / "a.html").read_text("utf-8"))
+    assert found.pictures == [f"data:image/webp;base64,{b64encode(clip.read_bytes()).decode()}"]
+    assert found.sections[2] == "clip"
+    os.utime(clip, (1.0, 1.0))  # of a walk before this one
+    stale = Outline(write_page(read_run(recording), folder / "a.html").read_text("utf-8"))
+    assert not stale.pictures
+
+
+@pytest.mark.parametrize(
+    ("interface", "said"),
+    [("feedforward", "handed on, as an acceleration"), ("force", "tracks planned")],
+)
+def test_why_planned_and_true_forces_differ_is_said(
+    write_run: WriteRun, interface: str, said: str
+) -> None:
+    config = run_config(1, 0.6)
+    config = replace(config, planner=replace(config.planner, interface=interface))
+    assert said in outline(write_run(config)).text
 
 
 def test_a_page_is_small_however_many_robots_walk_however_long(write_run: WriteRun) -> None:

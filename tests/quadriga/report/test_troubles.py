@@ -87,8 +87,8 @@ def test_tilt_torque_and_a_foot_without_ground_are_found(write_run: WriteRun) ->
         return message
 
     trouble = find_only(write_short(write_run, change, extra=fallen(FALL)))
-    assert cell(trouble, "r2", "greatest tilt") == ("0.30 rad", True)
-    assert cell(trouble, "r1", "greatest tilt") == ("0.00 rad", False)
+    assert cell(trouble, "r2", "greatest tilt") == ("0.30 rad (17°)", True)
+    assert cell(trouble, "r1", "greatest tilt") == ("0.00 rad (0°)", False)
     assert cell(trouble, "r2", "torque at most") == ("100 %", True)
     text, marked = cell(trouble, "r2", "stance without ground")
     assert marked
