@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.wire.messages import Truth
-from quadriga.sim_server.terrain.terrain import build_terrain
+from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
 from quadriga.sim_server.world.team_model import formation
 
 Ticks = NDArray[np.int64]
@@ -62,19 +63,8 @@ def build_truth_trace(messages: Sequence[Truth], config: Config) -> TruthTrace:
     n = config.team.robots
     pos, vel = stack(messages, "base_pos", n, 3), stack(messages, "base_vel", n, 3)
     quat = stack(messages, "base_quat_wxyz", n, 4)
-    w, x, y, z = np.moveaxis(quat, -1, 0)
-    yaw = yaw_of(quat)
-    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    feet = config.robot.feet_under_hips
     terrain = build_terrain(config, formation(n, config.team.spacing))
-    outputs = [
-        pos[..., 2] - terrain.height_under_hips(pos[..., 0], pos[..., 1], yaw, feet),
-        cos * vel[..., 0] + sin * vel[..., 1],
-        cos * vel[..., 1] - sin * vel[..., 0],
-        roll, pitch, stack(messages, "base_omega", n, 3)[..., 2],
-    ]  # fmt: skip
+    y = true_outputs((pos, quat), (vel, stack(messages, "base_omega", n, 3)), terrain, config.robot)
     return TruthTrace(
         tick=ticks_of(messages),
         base_pos=pos,
@@ -83,9 +73,39 @@ def build_truth_trace(messages: Sequence[Truth], config: Config) -> TruthTrace:
         grf=stack(messages, "grf", n, 4, 3),
         yoke_error=stack(messages, "yoke_error", 0),
         yoke_force=stack(messages, "yoke_force", 0),
-        y=np.stack(outputs, axis=-1),
-        tilt=np.arccos(np.clip(np.cos(roll) * np.cos(pitch), -1.0, 1.0)),
+        y=y,
+        tilt=np.arccos(np.clip(np.cos(y[..., 3]) * np.cos(y[..., 4]), -1.0, 1.0)),
     )
+
+
+def true_outputs(
+    pose: tuple[Array, Array], motion: tuple[Array, Array], terrain: Terrain, robot: RobotSpec
+) -> Array:
+    """The planner's outputs z, vx, vy, roll, pitch, wz of trunks.
+
+    Args:
+        pose: positions (…, 3), m, and quaternions wxyz (…, 4), trunk to world.
+        motion: velocities (…, 3), m/s, and angular velocities (…, 3), rad/s, world frame.
+        terrain: the ground, over which z is.
+        robot: their kind.
+
+    Returns:
+        Shape (…, 6).
+    """
+    (pos, quat), (vel, omega) = pose, motion
+    w, x, y, z = np.moveaxis(quat, -1, 0)
+    yaw = yaw_of(quat)
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    ground = terrain.height_under_hips(pos[..., 0], pos[..., 1], yaw, robot.feet_under_hips)
+    outputs = [
+        pos[..., 2] - ground,
+        cos * vel[..., 0] + sin * vel[..., 1],
+        cos * vel[..., 1] - sin * vel[..., 0],
+        np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+        np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0)),
+        omega[..., 2],
+    ]
+    return np.stack(outputs, axis=-1)
 
 
 def distance(truth: TruthTrace, stride_ms: int, before: int | None = None) -> float | None:

@@ -22,6 +22,7 @@ from quadriga.team.plants import check_plant
 from quadriga.team.progress import WalkProgress
 from quadriga.team.registry import team_registered
 from quadriga.team.run_folder import CONFIG, make_run_dir
+from quadriga.team.spectator import view_beside
 from quadriga.warm_up import warm_up
 
 OK: Final = 0
@@ -30,7 +31,13 @@ INTERRUPTED: Final = 130
 
 
 def walk(
-    config: Config, out: Path | None, *, pictures: bool, console: Console, armed: bool = False
+    config: Config,
+    out: Path | None,
+    *,
+    pictures: bool,
+    console: Console,
+    armed: bool = False,
+    view: int | None = None,
 ) -> int:
     """Walk the team once; 0 if all walked to the end, 1 if one fell or stopped, 130 if interrupted.
 
@@ -40,6 +47,7 @@ def walk(
         pictures: whether to render the walk.
         console: where to show it.
         armed: whether bridges may command their robots.
+        view: port of a page that shows the walk; None: none does.
 
     Raises:
         ProcessError: a process failed or left too early, or the walk did not come to its end.
@@ -56,7 +64,11 @@ def walk(
         predictor, sha256 = _take_predictor(config, run_dir, console)
     (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
     rows = process_table(config, run_dir, predictor, sha256, armed=armed)
-    with stop_flag() as stopped, team_registered(config, run_dir):
+    with (
+        stop_flag() as stopped,
+        team_registered(config, run_dir),
+        view_beside(run_dir, view, console),
+    ):
         fallen = watch_walk(config, rows, run_dir, stopped, console)
         if stopped():
             console.print(f"interrupted; what was recorded is in {run_dir}", markup=False)

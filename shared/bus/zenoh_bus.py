@@ -13,6 +13,7 @@ from typing import Any, Final, Self
 import zenoh
 
 from quadriga.shared.bus.answers import Answers
+from quadriga.shared.bus.newest import Newest
 from quadriga.shared.bus.presence import Presence
 from quadriga.shared.bus.router_wait import RouterWait
 from quadriga.shared.bus.trust import check_trust
@@ -191,13 +192,7 @@ class Bus:
             else:
                 self._inbox.put(sample)
 
-        self._declarations.append(
-            self._session.declare_subscriber(
-                key,
-                _direct(put if largest else self._inbox.put),
-                allowed_origin=zenoh.Locality.REMOTE,
-            )
-        )
+        self._hear(key, _direct(put if largest else self._inbox.put))
 
     @property
     def oversized(self) -> int:
@@ -218,16 +213,15 @@ class Bus:
             now = monotonic_ns()
             kept.put((now, str(sample.key_expr), sample.payload.to_bytes()))
 
-        self._declarations.append(
-            self._session.declare_subscriber(
-                key, _direct(keep), allowed_origin=zenoh.Locality.REMOTE
-            )
-        )
+        self._hear(key, _direct(keep))
+        return lambda: [kept.get_nowait() for _ in range(kept.qsize())]
 
-        def take() -> list[Arrival]:
-            return [kept.get_nowait() for _ in range(kept.qsize())]
+    def keep_newest(self, key: str, most: int) -> Newest:
+        """Keep the newest `most` of what others publish on `key`, apart from the inbox.
 
-        return take
+        Zenoh does that by itself: nobody waits for this process, however rarely it looks.
+        """
+        return Newest(self._hear(key, zenoh.handlers.RingChannel(most)).try_recv)
 
     def answer(self, key: str, call: Callable[[], bytes]) -> None:
         """Answer whoever asks on `key` with what `call()` gives.
@@ -270,11 +264,8 @@ class Bus:
 
     def drain(self) -> list[Packet]:
         """Everything in the inbox, oldest first, without waiting."""
-        packets = []
-        while not self._inbox.empty():
-            sample = self._inbox.get_nowait()
-            packets.append((str(sample.key_expr), sample.payload.to_bytes()))
-        return packets
+        samples = [self._inbox.get_nowait() for _ in range(self._inbox.qsize())]
+        return [(str(sample.key_expr), sample.payload.to_bytes()) for sample in samples]
 
     def declare(self, stage: str) -> None:
         """Tell everyone that this process has reached `stage`; again has no effect."""
@@ -375,6 +366,12 @@ class Bus:
             express=True,
         )
         return all(reply.ok is not None for reply in asked)
+
+    def _hear(self, key: str, handler: Any) -> Any:
+        remote = zenoh.Locality.REMOTE
+        heard = self._session.declare_subscriber(key, handler, allowed_origin=remote)
+        self._declarations.append(heard)
+        return heard
 
     def _note_token(self, sample: zenoh.Sample) -> None:
         self._presence.note(str(sample.key_expr), there=sample.kind == zenoh.SampleKind.PUT)

@@ -1,0 +1,164 @@
+"""SHELL of `quadriga view`: a running team in the browser. It listens, and never says a word."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+from quadriga.shared.bus.newest import Newest
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import MessageError
+from quadriga.shared.runtime.clock import Rate, monotonic
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Event
+from quadriga.shared.wire.topic import Topic
+from quadriga.shared.wire.topics import (
+    AGENT_EVENT,
+    EVENT,
+    MEASUREMENT,
+    PLAN,
+    REFERENCE,
+    STATE,
+    STATUS,
+    TRUTH,
+)
+from quadriga.view.gather import Gatherer
+from quadriga.view.port import url_of
+from quadriga.view.stage import FRAME_S, TeamStage
+from quadriga.view.team_shape import TeamShape, build_team_shape
+from quadriga.view.traffic import Traffic
+from quadriga.view.viser_server import open_server
+
+_KEPT: Final = 512  # messages of a key between two looks: half a second of a thousand a second
+_EVENTS: Final = 20  # that are remembered
+_QUIET_S: Final = 2.0  # without a message after which the heading says so
+_REPORT_S: Final = 1.0  # between two reports of the traffic
+_POLITE: Final = 10  # added to the nice value: a team on the same machine comes first
+_NEWEST: Final = (STATE, TRUTH, PLAN, STATUS, REFERENCE)  # of which the newest message is enough
+
+
+class _Source(NamedTuple):
+    """A key that is listened to."""
+
+    name: str
+    topic: Topic
+    robot: str
+    newest: Newest
+
+
+class _Feed:
+    """What a team sends, taken in whenever somebody asks.
+
+    Attributes:
+        gatherer: has the newest of all.
+        traffic: counts.
+        happenings: what was announced, by tick and text, the newest last.
+    """
+
+    def __init__(self, bus: Bus, shape: TeamShape, now: float) -> None:
+        self.gatherer, self.traffic = Gatherer(shape), Traffic(now)
+        self.happenings: list[tuple[int, str]] = []
+        per_robot = (STATE, MEASUREMENT, PLAN, STATUS, AGENT_EVENT)
+        wanted = [(topic, "") for topic in (TRUTH, REFERENCE, EVENT)]
+        wanted += [(topic, robot) for robot in shape.robots for topic in per_robot]
+        self._sources = [
+            _Source(key.partition("/")[2], topic, robot, bus.keep_newest(key, _KEPT))
+            for topic, robot in wanted
+            if (key := topic.key(bus.team, robot))
+        ]
+
+    def read(self, now: float) -> bool:
+        """Take in what has come; whether anything has."""
+        any_came = False
+        for source in self._sources:
+            most = 1 if source.topic in _NEWEST else _KEPT
+            fresh = source.newest.take(most)
+            tick = -1
+            for payload in fresh.payloads:
+                try:
+                    message = decode(payload, source.topic.type)
+                except MessageError:
+                    continue  # the recorder keeps it
+                tick = max(tick, message.tick)
+                if isinstance(message, Event):
+                    text = " ".join((message.kind, message.robot, message.detail))
+                    self.happenings = [*self.happenings[1 - _EVENTS :], (message.tick, text)]
+                else:
+                    self.gatherer.take(message, source.robot)
+            self.traffic.note(source.name, fresh.messages, tick, now)
+            any_came |= fresh.messages > 0
+        return any_came
+
+
+def view_live(
+    config: Config, port: int, stopped: Callable[[], bool], say: Callable[[str], None]
+) -> None:
+    """Show a team until this is stopped.
+
+    Args:
+        config: the team's configuration.
+        port: of the web server.
+        stopped: whether to stop.
+        say: tells the user where to look.
+
+    Raises:
+        ConfigError: the port is in use, or what it takes to draw the robots is missing.
+        BusError: the bus cannot be opened.
+    """
+    os.nice(_POLITE)
+    team = config.team.name
+    with open_server(port, f"quadriga · {team}") as server:
+        stage = TeamStage(server, build_team_shape(config))
+        say(f"team {team!r} at {config.bus.endpoint} in the browser: {url_of(server.get_port())}")
+        with Bus.open(config.bus, team, f"view-{os.getpid()}", stopped) as bus:
+            _show(bus, stage, stopped)
+
+
+def _show(bus: Bus, stage: TeamStage, stopped: Callable[[], bool]) -> None:
+    rate, begun = Rate(FRAME_S), monotonic()
+    feed, pace = _Feed(bus, stage.shape, begun), _Pace(begun)
+    while not stopped():
+        rate.wait()
+        now = monotonic()
+        pace.note(feed.read(now), feed.gatherer.tick, now)
+        if not stage.has_audience:
+            continue
+        state = pace.describe(now) or _describe_silence(bus)
+        if stage.show(feed.gatherer.snapshot(), state, now):
+            stage.panels.show_happenings(feed.happenings)
+        if pace.is_report_due(now):
+            stage.panels.show_traffic(feed.traffic.report(now))
+
+
+def _describe_silence(bus: Bus) -> str:
+    there = ", ".join(sorted(bus.members_at(HERE)))
+    return f"nothing is heard; here are {there}" if there else "nobody is heard yet"
+
+
+class _Pace:
+    """How fast the team's time passes, and whether it passes at all."""
+
+    def __init__(self, now: float) -> None:
+        self._heard, self._since, self._tick, self._newest = now - _QUIET_S, now, 0, 0
+        self._speed = ""
+
+    def note(self, any_came: bool, tick: int, now: float) -> None:
+        """Whether anything has come, and the newest tick by now, ms."""
+        if any_came:
+            self._heard = now
+        self._newest = tick
+
+    def describe(self, now: float) -> str:
+        """What the heading says; empty if nothing is heard."""
+        return "" if now - self._heard > _QUIET_S else f"live{self._speed}"
+
+    def is_report_due(self, now: float) -> bool:
+        """Whether a second has passed since this was true last; the speed is renewed then."""
+        if now - self._since < _REPORT_S:
+            return False
+        passed = 1e-3 * (self._newest - self._tick) / (now - self._since)
+        self._speed = f", {passed:.2f} × real time" if passed > 0.0 else ""
+        self._since, self._tick = now, self._newest
+        return True

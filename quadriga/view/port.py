@@ -1,0 +1,49 @@
+"""Where on this machine a view is found."""
+
+from __future__ import annotations
+
+import socket
+from typing import Final
+
+from quadriga.shared.errors import ConfigError, system_reason
+
+HOST: Final = "127.0.0.1"
+PORT: Final = 8090
+
+
+def check_port(port: int, option: str = "--port") -> int:
+    """The port, if a server can listen on it now; 0 stands for any that is free.
+
+    Raises:
+        ConfigError: it is in use, not permitted, or none.
+    """
+    with socket.socket() as probe:
+        # A server that has just ended leaves its port in a state in which this permits it.
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except (OSError, OverflowError) as error:
+            reason = system_reason(error) if isinstance(error, OSError) else str(error)
+            raise taken_error(port, reason, option) from None
+        found: int = probe.getsockname()[1]
+        return found
+
+
+def free_port() -> int:
+    """The usual port, or another one if that is in use."""
+    try:
+        return check_port(PORT)
+    except ConfigError:
+        return check_port(0)
+
+
+def taken_error(port: int, reason: str, option: str = "--port") -> ConfigError:
+    """What is said of a port that cannot be had."""
+    return ConfigError(
+        option, f"{port} ({reason})", "a port that is free", "is another view open there?"
+    )
+
+
+def url_of(port: int) -> str:
+    """What to open in a browser."""
+    return f"http://{HOST}:{port}"

@@ -1,0 +1,160 @@
+"""`quadriga view` as a process: its page is looked at through the socket that a browser opens."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import takewhile
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from quadriga.commands.parser import main
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.config.sections import BusConfig, Config
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.wire.codec import encode
+from quadriga.team.endpoint import free_endpoint
+from quadriga.team.launch import QUADRIGA
+from quadriga.team.spectator import view_beside
+from quadriga.view.port import check_port, url_of
+from tests.golden.scenario import RECORDING
+from tests.listening import await_listener
+from tests.quadriga.conftest import packets, run_config
+from tests.quadriga.view.page import WAIT, Page, labelled, named, updates
+
+
+@contextmanager
+def viewing(*options: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """A view's process and its URL."""
+    command = [*QUADRIGA, "view", "--port", "0", *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            line = process.stdout.readline()
+            assert "http://127.0.0.1:" in line
+            yield process, line.split()[-1]
+        finally:
+            process.kill()
+
+
+def end(process: subprocess.Popen[str], number: signal.Signals) -> None:
+    """Ask it to leave; it does so without an error and without a word more."""
+    process.send_signal(number)
+    out, _ = process.communicate(timeout=WAIT)
+    assert (process.returncode, out) == (0, "")
+
+
+def test_a_recording_plays_and_pauses() -> None:
+    with viewing(str(RECORDING)) as (process, url), Page(url) as page:
+        trunk = page.await_message(named("/team/links/0", "BatchedMeshes"))["props"]
+        assert trunk["vertices"]
+        page.await_message(named("/team/links/0", "Update"))
+        page.await_message(named("/team/paths", "Update"))
+        page.await_message(named("/team", "SetPosition"))
+        heading = page.await_message(lambda sent: "dead reckoning" in str(sent.get("updates")))
+        assert "2 × Unitree A1" in heading["updates"]["content"]
+        push = page.await_message(labelled("go to"))["props"]["options"]
+        assert push[0].startswith("0.30 s push r2")
+        button = page.await_message(labelled("pause"))["uuid"]
+        page.await_message(updates(button, label="play"))  # at the end of 0.6 s
+        page.forget()
+        page.click(button)
+        page.await_message(updates(button, label="pause"))
+        page.await_message(named("/team/links/0", "Update"))
+        end(process, signal.SIGINT)
+
+
+def test_a_running_team_is_shown_and_hears_nothing(tmp_path: Path) -> None:
+    bus = BusConfig(endpoint=free_endpoint(), plaintext=True)
+    config = replace(run_config(), bus=bus)
+    file = tmp_path / "config.toml"
+    file.write_text(to_toml(config), encoding="utf-8")
+    with (
+        viewing("--config", str(file)) as (process, url),
+        Bus.open(bus, "team", "sim") as team,
+        Page(url) as page,
+    ):
+        page.await_message(lambda sent: "nobody is heard yet" in str(sent.get("updates")))
+        put = {}
+        for key, _ in takewhile(lambda packet: packet[1].tick < 401, packets(config, 0.3)):
+            if key not in put:  # a thousand commands a second are not asked for
+                await_listener(team, key, there=not key.endswith("command"))
+                put[key] = team.publisher(key)
+        team.subscribe("team/**")
+        for key, message in takewhile(lambda packet: packet[1].tick < 600, packets(config, 0.3)):
+            put[key](encode(message))
+        page.await_message(lambda sent: "simulator's truth" in str(sent.get("updates")))
+        page.await_message(lambda sent: "r1/state" in str(sent.get("updates")))
+        page.await_message(named("/team/links/0", "Update"))
+        assert not team.drain()
+        end(process, signal.SIGTERM)
+
+
+def line_of(capsys: pytest.CaptureFixture[str], typed: Sequence[str], status: int = 2) -> str:
+    """The one line that a command complains with."""
+    assert main(typed) == status
+    captured = capsys.readouterr()
+    assert not captured.out
+    (line,) = captured.err.splitlines()
+    return line
+
+
+def test_mistakes_cost_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert "no such file" in line_of(capsys, ["view", str(tmp_path / "no.mcap")]).lower()
+    assert "none of the configuration" in line_of(capsys, ["view", str(RECORDING), "--robots", "2"])
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        line = line_of(capsys, ["view", str(RECORDING), "--port", port])
+        assert f"--port: got {port}" in line
+        assert "a port that is free" in line
+        assert f"--view: got {port}" in line_of(capsys, ["walk", "--view", port])
+    assert "--port" in line_of(capsys, ["view", "--port", "70000"])
+    monkeypatch.setitem(sys.modules, "viser", None)
+    assert "the package viser" in line_of(capsys, ["view"])
+
+
+def test_a_view_that_fails_is_told_of_and_hurts_nobody(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "config.toml").write_text("[team]\nrobots = 99\n", encoding="utf-8")
+    port = check_port(0)
+    with view_beside(tmp_path, port, Console(width=400)):
+        await_end_of_child()
+    said = capsys.readouterr().out
+    assert url_of(port) in said
+    assert "the view ended before the walk, exit status 2" in said
+    assert "team.robots" in said
+
+
+def test_a_view_leaves_with_its_walk(tmp_path: Path) -> None:
+    bus = BusConfig(endpoint=free_endpoint(), plaintext=True)
+    (tmp_path / "config.toml").write_text(to_toml(replace(Config(), bus=bus)), encoding="utf-8")
+    port, log = check_port(0), tmp_path / "logs" / "view.log"
+    with view_beside(tmp_path, port, Console(quiet=True)):
+        await_text(log, url_of(port))
+    assert check_port(port) == port
+
+
+def await_end_of_child() -> None:
+    """Wait until the only process that this one has started has ended, without reaping it."""
+    os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOWAIT)
+
+
+def await_text(path: Path, text: str) -> None:
+    deadline = monotonic() + WAIT
+    while text not in path.read_text(encoding="utf-8"):
+        assert monotonic() < deadline, path.read_text(encoding="utf-8")
+        sleep(0.02)
