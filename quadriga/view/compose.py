@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.recordings.truth import true_outputs, yaw_of
+from quadriga.recordings.truth import yaw_of
 from quadriga.shared.robot.conventions import N_LEGS, N_OUTPUTS, Array
-from quadriga.shared.wire.messages import Plan, Reference, Status
+from quadriga.shared.wire.messages import Plan
 from quadriga.shared.wire.topics import SAMPLE_MS
-from quadriga.view.picture import Account, Picture, TeamOutputs
+from quadriga.view.picture import Picture
 from quadriga.view.placement import follow_speeds, quat_of
 from quadriga.view.skeleton import rotate
 from quadriga.view.snapshot import Snapshot
@@ -51,8 +51,6 @@ def compose(shape: TeamShape, snapshot: Snapshot) -> Picture:
         true_forces=true,
         paths=_predict_paths(shape, snapshot, trunk, yaw),
         anchors=trunk[:, :3] + rotate(trunk[:, 3:], np.array(shape.config.robot.yoke)),
-        outputs=_outputs(shape, snapshot),
-        accounts=tuple(_account(shape, snapshot, name) for name in shape.robots),
     )
 
 
@@ -79,72 +77,25 @@ def _turn(yaw: float, forces: Array) -> Array:
 
 def _predict_paths(shape: TeamShape, snapshot: Snapshot, trunk: Array, yaw: Array) -> Array:
     """What is left of each plan's way, from where its robot is now. Shape (n, N + 1, 3)."""
-    points = shape.config.planner.N + 1
-    paths = np.repeat(trunk[:, None, :3], points, axis=1)
+    n, samples = shape.count, shape.config.planner.N
+    outputs, rise = np.zeros((n, samples, N_OUTPUTS)), np.zeros((n, samples))
     for i, name in enumerate(shape.robots):
         plan = snapshot.plans.get(name)
         if plan is None:
             continue
-        rows = plan.y[_sample_at(plan, snapshot.tick) :][: points - 1]
-        if not len(rows):
-            continue
-        way = follow_speeds(np.array([*trunk[i, :2], yaw[i]]), rows)
-        count = 1 + len(rows)
-        paths[i, 1:count, :2] = way[:, :2]
-        paths[i, 1:count, 2] += rows[:, 0] - rows[0, 0]
-        paths[i, count:] = paths[i, count - 1]
+        rows = plan.y[sample_at(plan, snapshot.tick) :][:samples]
+        if len(rows):
+            outputs[i, : len(rows)] = rows
+            rise[i, : len(rows)] = rows[:, 0] - rows[0, 0]
+            rise[i, len(rows) :] = rise[i, len(rows) - 1]
+    # What a plan is shorter is zeros: there its robot goes no farther.
+    way = follow_speeds(np.stack([trunk[:, 0], trunk[:, 1], yaw], axis=1), outputs)
+    paths = np.repeat(trunk[:, None, :3], samples + 1, axis=1)
+    paths[:, 1:, :2] = way[..., :2]
+    paths[:, 1:, 2] += rise
     return paths
 
 
-def _sample_at(plan: Plan, tick: int) -> int:
+def sample_at(plan: Plan, tick: int) -> int:
     """Which sample of a plan is in force at a tick; the number of samples, if none is any more."""
     return min(max(tick - plan.tick, 0) // SAMPLE_MS, len(plan.y))
-
-
-def _outputs(shape: TeamShape, snapshot: Snapshot) -> TeamOutputs:
-    n = shape.count
-    measured, planned, true = np.full((3, n, N_OUTPUTS), np.nan)
-    for i, name in enumerate(shape.robots):
-        if (sample := snapshot.measurements.get(name)) is not None:
-            measured[i] = sample.y
-        if (plan := snapshot.plans.get(name)) is not None:
-            k = _sample_at(plan, snapshot.tick)
-            if k < len(plan.y):
-                planned[i] = plan.y[k]
-    if (truth := snapshot.truth) is not None:
-        pose = truth.base_pos, truth.base_quat_wxyz
-        motion = truth.base_vel, truth.base_omega
-        true = true_outputs(pose, motion, shape.terrain, shape.config.robot)
-    return TeamOutputs(measured, planned, true, _asked_outputs(snapshot.reference))
-
-
-def _asked_outputs(reference: Reference | None) -> Array:
-    if reference is None:
-        return np.full(N_OUTPUTS, np.nan)
-    return np.array([reference.height, reference.vx, reference.vy, 0.0, 0.0, reference.wz])
-
-
-def _account(shape: TeamShape, snapshot: Snapshot, name: str) -> Account:
-    status, plan = snapshot.statuses.get(name), snapshot.plans.get(name)
-    mode, reason, estimator = "", "", ""
-    if status is not None:
-        mode, reason, estimator = status.mode, status.reason, status.estimator
-    if plan is None:
-        return Account(mode, reason, planner_ms=_slowest(status), estimator=estimator)
-    step_ms = SAMPLE_MS * shape.config.planner.applied
-    return Account(
-        mode=mode,
-        reason=reason,
-        plan=plan.status,
-        plan_age_ms=max(snapshot.tick - plan.tick, 0),
-        peer_ages_ms={peer: step_ms * (plan.step - step) for peer, step in plan.used.items()},
-        planner_ms=_slowest(status),
-        estimator=estimator,
-    )
-
-
-def _slowest(status: Status | None) -> float | None:
-    """The longest planning step that a status tells of, ms."""
-    if status is None or not status.planner_ms.size:
-        return None
-    return float(status.planner_ms.max())

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.robot.conventions import N_OUTPUTS, Array
-from quadriga.view.picture import Picture
+from quadriga.view.picture import TeamOutputs
 
 SECONDS: Final = 8.0  # that are shown
 _STEP_MS: Final = 50
@@ -18,7 +18,7 @@ _BREAK_MS: Final = 1000  # a longer step, or one back, begins anew
 
 
 class CurveWindow:
-    """A window of samples that moves on with each picture; NaN where nothing is known.
+    """A window of samples that moves on with time; NaN where nothing is known.
 
     Attributes:
         seconds: world time of the samples, shape (SAMPLES,), s; the newest is the last.
@@ -34,24 +34,27 @@ class CurveWindow:
         self._tick = -_BREAK_MS - 1
 
     def follows(self, tick: int) -> bool:
-        """Whether a picture at a tick would go on from the newest sample."""
+        """Whether a sample at a tick would go on from the newest."""
         return 0 <= tick - self._tick <= _BREAK_MS
 
-    def add(self, picture: Picture) -> None:
-        """Add a picture if the newest sample is old enough; what does not follow begins anew."""
-        if not self.follows(picture.tick):
-            self.values[:], self.asked[:] = np.nan, np.nan
-            self.seconds[:] = 1e-3 * (picture.tick + _STEP_MS * np.arange(-SAMPLES + 1, 1))
-        elif picture.tick - self._tick < _STEP_MS:
+    def is_due(self, tick: int) -> bool:
+        """Whether a sample at a tick would be taken."""
+        return not self.follows(tick) or tick - self._tick >= _STEP_MS
+
+    def add(self, tick: int, outputs: TeamOutputs) -> None:
+        """Add a sample if the newest is old enough; one that does not follow begins anew."""
+        if not self.is_due(tick):
             return
-        else:
+        if self.follows(tick):
             for array in (self.seconds, self.values, self.asked):
                 array[:-1] = array[1:]
-        outputs = picture.outputs
-        self.seconds[-1] = 1e-3 * picture.tick
+        else:
+            self.values[:], self.asked[:] = np.nan, np.nan
+            self.seconds[:] = 1e-3 * (tick + _STEP_MS * np.arange(-SAMPLES + 1, 1))
+        self.seconds[-1] = 1e-3 * tick
         self.values[-1] = outputs.measured, outputs.planned, outputs.true
         self.asked[-1] = outputs.asked
-        self._tick = picture.tick
+        self._tick = tick
 
     def of_all(self, output: int) -> tuple[Array, ...]:
         """Time, what each robot measures of an output, and what is asked for; each (SAMPLES,)."""
@@ -75,5 +78,5 @@ def axis_range(curves: Sequence[Array], step: float) -> tuple[float, float]:
 
 
 def ticks_before(tick: int) -> range:
-    """Ticks whose pictures fill a window that ends at `tick`, in ascending order."""
+    """Ticks whose samples fill a window that ends at `tick`, in ascending order."""
     return range(tick - round(1000 * SECONDS), tick + 1, _STEP_MS)

@@ -86,6 +86,11 @@ class Gatherer:
         """World time of the newest state or truth, ms."""
         return self._tick
 
+    @property
+    def has_truth(self) -> bool:
+        """Whether a simulator says where robots are."""
+        return self._truth is not None
+
     def snapshot(self) -> Snapshot:
         """All that is known now."""
         return Snapshot(

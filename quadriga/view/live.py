@@ -31,10 +31,11 @@ from quadriga.view.team_shape import TeamShape, build_team_shape
 from quadriga.view.traffic import Traffic
 from quadriga.view.viser_server import open_server
 
-_KEPT: Final = 512  # messages of a key between two looks: half a second of a thousand a second
+_KEPT: Final = 64  # messages of a key that are kept between two looks
 _EVENTS: Final = 20  # that are remembered
 _QUIET_S: Final = 2.0  # without a message after which the heading says so
 _REPORT_S: Final = 1.0  # between two reports of the traffic
+_UNSEEN_S: Final = 0.15  # between two looks while nobody has the page open
 _POLITE: Final = 10  # added to the nice value: a team on the same machine comes first
 _NEWEST: Final = (STATE, TRUTH, PLAN, STATUS, REFERENCE)  # of which the newest message is enough
 
@@ -51,6 +52,9 @@ class _Source(NamedTuple):
 class _Feed:
     """What a team sends, taken in whenever somebody asks.
 
+    Of a thousand states a second only the newest is fetched from Zenoh, since each that is costs
+    20 µs; so they are not counted.
+
     Attributes:
         gatherer: has the newest of all.
         traffic: counts.
@@ -64,7 +68,12 @@ class _Feed:
         wanted = [(topic, "") for topic in (TRUTH, REFERENCE, EVENT)]
         wanted += [(topic, robot) for robot in shape.robots for topic in per_robot]
         self._sources = [
-            _Source(key.partition("/")[2], topic, robot, bus.keep_newest(key, _KEPT))
+            _Source(
+                key.partition("/")[2],
+                topic,
+                robot,
+                bus.keep_newest(key, 1 if topic is STATE else _KEPT),
+            )
             for topic, robot in wanted
             if (key := topic.key(bus.team, robot))
         ]
@@ -73,7 +82,11 @@ class _Feed:
         """Take in what has come; whether anything has."""
         any_came = False
         for source in self._sources:
-            most = 1 if source.topic in _NEWEST else _KEPT
+            # Where robots are is summed up from their measurements only if nobody else knows.
+            newest_only = source.topic in _NEWEST or (
+                source.topic is MEASUREMENT and self.gatherer.has_truth
+            )
+            most = 1 if newest_only else _KEPT
             fresh = source.newest.take(most)
             tick = -1
             for payload in fresh.payloads:
@@ -87,7 +100,10 @@ class _Feed:
                     self.happenings = [*self.happenings[1 - _EVENTS :], (message.tick, text)]
                 else:
                     self.gatherer.take(message, source.robot)
-            self.traffic.note(source.name, fresh.messages, tick, now)
+            if source.topic is STATE:
+                self.traffic.see(source.name, tick, now)
+            else:
+                self.traffic.note(source.name, fresh.messages, tick, now)
             any_came |= fresh.messages > 0
         return any_came
 
@@ -119,11 +135,15 @@ def view_live(
 def _show(bus: Bus, stage: TeamStage, stopped: Callable[[], bool]) -> None:
     rate, begun = Rate(FRAME_S), monotonic()
     feed, pace = _Feed(bus, stage.shape, begun), _Pace(begun)
+    due = begun
     while not stopped():
         rate.wait()
-        now = monotonic()
+        now, has_audience = monotonic(), stage.has_audience
+        if not has_audience and now < due:
+            continue
+        due = now + _UNSEEN_S
         pace.note(feed.read(now), feed.gatherer.tick, now)
-        if not stage.has_audience:
+        if not has_audience:
             continue
         state = pace.describe(now) or _describe_silence(bus)
         if stage.show(feed.gatherer.snapshot(), state, now):

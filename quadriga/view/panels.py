@@ -13,7 +13,6 @@ from quadriga.charts.colours import LINES, robot_colour
 from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.view import words
 from quadriga.view.curves import KINDS, CurveWindow, axis_range
-from quadriga.view.picture import Picture
 from quadriga.view.team_shape import TeamShape
 from quadriga.view.traffic import KeyTraffic
 from quadriga.view.viser_scene import TeamScene
@@ -75,16 +74,17 @@ class Panels:
         self._drawn = "", 0.0  # whose curves there are, and until when
         self._plots: list[Any] = []
 
-    def show(self, picture: Picture, curves: CurveWindow, state: str) -> None:
-        """Bring words and curves up to date, and do what the boxes that are ticked say."""
+    def show_words(self, heading: str, robots: str) -> None:
+        """Show words, which are HTML."""
+        self._heading.content, self._robots.content = heading, robots
+
+    def heed_boxes(self) -> None:
+        """Do what the boxes say that are ticked, and those that are not."""
         for name, box in self._shown.items():
             for node in self._scene.shown[name]:
                 if node.visible != box.value:
                     node.visible = box.value
         self._scene.follows = self._follow.value
-        self._heading.content = words.format_heading(self._shape, picture, state)
-        self._robots.content = words.format_robots(picture)
-        self._show_curves(curves)
 
     def show_happenings(self, happenings: Sequence[tuple[int, str]]) -> None:
         """List what happened lately, by tick and text, the newest last."""
@@ -97,7 +97,8 @@ class Panels:
                 self._traffic = self._server.gui.add_html("")
         self._traffic.content = words.format_traffic(rows)
 
-    def _show_curves(self, curves: CurveWindow) -> None:
+    def show_curves(self, curves: CurveWindow) -> None:
+        """Show curves, if they have changed or others were chosen."""
         choice, newest = self._choice.value, float(curves.seconds[-1])
         if (choice, newest) == self._drawn:
             return

@@ -71,8 +71,6 @@ class Picture:
         paths: where the trunks go by their plans, shape (n, P, 3); P is always the same, and what
             a path is shorter its last point repeats.
         anchors: the yokes' ball joints, shape (n, 3).
-        outputs: what is planned, measured, true and asked for.
-        accounts: of each robot.
     """
 
     tick: int
@@ -88,8 +86,6 @@ class Picture:
     true_forces: Array
     paths: Array
     anchors: Array
-    outputs: TeamOutputs
-    accounts: tuple[Account, ...]
 
     @property
     def centre(self) -> Array:

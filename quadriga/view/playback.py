@@ -9,10 +9,10 @@ from quadriga.playback.transport import Transport
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import Rate, monotonic
 from quadriga.shared.wire.topics import SAMPLE_MS
-from quadriga.view.compose import compose
 from quadriga.view.controls import Controls
 from quadriga.view.curves import ticks_before
 from quadriga.view.port import url_of
+from quadriga.view.readings import read_outputs
 from quadriga.view.recorded import RecordedRun
 from quadriga.view.stage import FRAME_S, TeamStage
 from quadriga.view.viser_server import open_server
@@ -63,7 +63,7 @@ def _play(
         if not stage.curves.follows(tick):
             for earlier in ticks_before(tick):
                 if earlier >= run.first:
-                    stage.curves.add(compose(run.shape, run.snapshot(earlier)))
+                    stage.curves.add(earlier, read_outputs(run.shape, run.snapshot(earlier)))
         state = f"recorded, {transport.rate:g} ×" + (", paused" if transport.paused else "")
         if stage.show(run.snapshot(tick), state, now):
             controls.show(transport, now)

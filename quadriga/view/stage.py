@@ -7,10 +7,12 @@ from typing import Final
 import viser
 
 from quadriga.pictures.meshes import link_meshes
+from quadriga.view import words
 from quadriga.view.compose import compose
 from quadriga.view.curves import CurveWindow
 from quadriga.view.panels import Panels
-from quadriga.view.picture import Picture
+from quadriga.view.picture import Account, Picture
+from quadriga.view.readings import read_accounts, read_outputs
 from quadriga.view.snapshot import Snapshot
 from quadriga.view.team_shape import TeamShape
 from quadriga.view.viser_scene import TeamScene
@@ -60,19 +62,28 @@ class TeamStage:
             return False
         picture = compose(self.shape, snapshot)
         self._scene.show(picture)
-        self.curves.add(picture)
+        if self.curves.is_due(snapshot.tick):
+            self.curves.add(snapshot.tick, read_outputs(self.shape, snapshot))
         self._drawn = snapshot.tick
-        if not is_due:
-            return False
-        self._panels_due = now + _PANEL_S
-        self._scene.name_robots([_label_of(picture, i) for i in range(self.shape.count)])
-        self.panels.show(picture, self.curves, state)
-        return True
+        if is_due:
+            self._panels_due = now + _PANEL_S
+            self._show_words(picture, snapshot, state)
+        return is_due
+
+    def _show_words(self, picture: Picture, snapshot: Snapshot, state: str) -> None:
+        accounts = read_accounts(self.shape, snapshot)
+        known = picture.known.tolist()
+        self._scene.name_robots(list(map(label_of, self.shape.robots, accounts, known)))
+        self.panels.show_words(
+            words.format_heading(self.shape, picture, snapshot.reference, state),
+            words.format_robots(self.shape.robots, accounts, known),
+        )
+        self.panels.show_curves(self.curves)
+        self.panels.heed_boxes()
 
 
-def _label_of(picture: Picture, index: int) -> str:
+def label_of(name: str, account: Account, known: bool) -> str:
     """What stands over a robot: its name, and what is unusual about it."""
-    name, account = picture.robots[index], picture.accounts[index]
-    if not picture.known[index]:
+    if not known:
         return f"{name}: not heard"
     return name if account.mode in _CALM else f"{name}: {account.reason or account.mode}"

@@ -21,6 +21,7 @@ NEWTON: Final = 0.003  # m of arrow per N
 LEAST: Final = 2.0  # N; a smaller force is not drawn
 _PATH_ABOVE: Final = 0.13  # m over the trunks' origins: inside a trunk nobody would see a path
 _LABEL_ABOVE: Final = 0.2  # m
+_LABEL_OFF: Final = 0.01  # m, by which a name may be off its place
 _UNLOADED: Final = np.array((8, 8, 8), dtype=np.uint8)  # of a foot in the air
 _ARROWS: Final = ("true", "planned")  # styles of the charts
 _YOKE: Final = (217, 166, 33)
@@ -66,9 +67,10 @@ class TeamScene:
             for style, colour in colour_of.items()
         }
         self._labels = [
-            scene.add_label(f"/team/labels/{name}", name, anchor="bottom-center")
+            scene.add_label(f"/labels/{name}", name, anchor="bottom-center")
             for name in shape.robots
         ]
+        self._label_places = np.zeros((shape.count, 3))
         self.shown: dict[str, list[Any]] = {
             **{f"{style} ground forces": [self._arrows[style]] for style in _ARROWS},
             "predicted paths": [self._paths],
@@ -95,8 +97,14 @@ class TeamScene:
                 self._arrows[style].points = arrows_of(picture.feet, forces)
             raised = picture.paths + np.array([0.0, 0.0, _PATH_ABOVE])
             self._paths.points = np.stack([raised[:, :-1], raised[:, 1:]], axis=2).reshape(-1, 2, 3)
-            for label, place in zip(self._labels, picture.trunk[:, :3], strict=True):
-                label.position = place + np.array([0.0, 0.0, _LABEL_ABOVE])
+            self._move_labels(picture.trunk[:, :3] + np.array([-x, -y, _LABEL_ABOVE]))
+
+    def _move_labels(self, places: Array) -> None:
+        """Bring names over robots; what moves with the picture needs not be told each time."""
+        if np.abs(places - self._label_places).max() > _LABEL_OFF:
+            self._label_places = places
+            for label, place in zip(self._labels, places, strict=True):
+                label.position = place
 
     def name_robots(self, texts: list[str]) -> None:
         """What stands over each robot."""

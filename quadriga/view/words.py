@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.charts.colours import LINES, PALETTE, robot_colour
+from quadriga.shared.wire.messages import Reference
 from quadriga.view.picture import Account, Picture
 from quadriga.view.team_shape import TeamShape
 from quadriga.view.traffic import KeyTraffic
@@ -21,8 +22,10 @@ _NUMBER: Final = "padding:0 0 0 0.5em;text-align:right;font-variant-numeric:tabu
 _NONE: Final = "–"
 
 
-def format_heading(shape: TeamShape, picture: Picture, state: str) -> str:
-    """Whose picture it is, of when, and whether it is true."""
+def format_heading(
+    shape: TeamShape, picture: Picture, reference: Reference | None, state: str
+) -> str:
+    """Whose picture it is, of when, whether it is true, and what is asked of the team."""
     team, robot = shape.config.team.name, shape.config.robot.title
     source = "the simulator's truth" if picture.is_truth else "an estimate, by dead reckoning"
     colour = PALETTE["green"] if picture.is_truth else PALETTE["orange"]
@@ -30,26 +33,25 @@ def format_heading(shape: TeamShape, picture: Picture, state: str) -> str:
     lines = (
         f"<b>{escape(team)}</b>, {shape.count} × {escape(robot)} · {escape(state)}",
         f"<b>{picture.tick / 1000:.2f} s</b> · places: {badge}",
-        f"asked: {_format_asked(picture)}",
+        f"asked: {_format_reference(reference)}",
     )
     return _block("<br>".join(lines))
 
 
-def _format_asked(picture: Picture) -> str:
-    z, vx, vy, _, _, wz = picture.outputs.asked.tolist()
-    if np.isnan(vx):
+def _format_reference(reference: Reference | None) -> str:
+    if reference is None:
         return "nothing yet"
-    return f"{vx:.2f} m/s ahead, {vy:.2f} m/s left, {np.degrees(wz):.0f} °/s, {z:.2f} m high"
+    turn = f"{np.degrees(reference.wz):.0f} °/s"
+    ahead, left = f"{reference.vx:.2f} m/s ahead", f"{reference.vy:.2f} m/s left"
+    return f"{ahead}, {left}, {turn}, {reference.height:.2f} m high"
 
 
-def format_robots(picture: Picture) -> str:
+def format_robots(robots: Sequence[str], accounts: Sequence[Account], known: Sequence[bool]) -> str:
     """A row for each robot: mode, plan, ages of the peers' plans in it, planner's time."""
     heads = ("robot", "mode", "plan", "peers' plans", "planner")
     rows = [
-        (f"{_dot(i)}{escape(name)}", *_cells_of(account, known=known))
-        for i, (name, account, known) in enumerate(
-            zip(picture.robots, picture.accounts, picture.known.tolist(), strict=True)
-        )
+        (f"{_dot(i)}{escape(name)}", *_cells_of(account, known=heard))
+        for i, (name, account, heard) in enumerate(zip(robots, accounts, known, strict=True))
     ]
     return _block(_table(heads, rows, numbers=()))
 
@@ -78,7 +80,8 @@ def format_traffic(rows: Iterable[KeyTraffic]) -> str:
         silent = _NONE if row.silent_s is None else f"{row.silent_s:.1f} s"
         pale = row.silent_s is None or row.silent_s > _QUIET_S
         key = f"<span style='opacity:{0.5 if pale else 1}'>{escape(row.key)}</span>"
-        cells.append((key, f"{row.per_s:.0f}", behind, silent))
+        often = _NONE if row.per_s is None else f"{row.per_s:.0f}"
+        cells.append((key, often, behind, silent))
     return _block(_table(heads, cells, numbers=(1, 2, 3)))
 
 

@@ -16,6 +16,7 @@ from quadriga.shared.wire import messages as msg
 from quadriga.shared.wire.codec import encode
 from quadriga.view.compose import compose
 from quadriga.view.picture import Picture
+from quadriga.view.readings import read_accounts, read_outputs
 from quadriga.view.recorded import RecordedRun
 from tests.golden.scenario import RECORDING
 from tests.quadriga.conftest import ESTIMATOR_ERROR, SPEED, WriteRun, outputs, run_config
@@ -42,14 +43,15 @@ def test_trunks_are_where_the_simulator_says(picture: Picture) -> None:
     assert picture.trunk[:, 2] == pytest.approx([outputs(TICK, i)[0] for i in range(2)])
 
 
-def test_outputs_are_those_of_the_instant(picture: Picture) -> None:
+def test_outputs_are_those_of_the_instant(run: RecordedRun) -> None:
+    found = read_outputs(run.shape, run.snapshot(TICK))
     for i in range(2):
         true = outputs(TICK, i)
-        assert picture.outputs.true[i] == pytest.approx(true, abs=1e-6)
-        assert picture.outputs.measured[i] == pytest.approx(true + ESTIMATOR_ERROR)
+        assert found.true[i] == pytest.approx(true, abs=1e-6)
+        assert found.measured[i] == pytest.approx(true + ESTIMATOR_ERROR)
         # The plan in force begins at 3000; its second sample is for 3020.
-        assert picture.outputs.planned[i] == pytest.approx(outputs(TICK + 10, i))
-    assert picture.outputs.asked == pytest.approx([0.26, 0.5, 0.0, 0.0, 0.0, 0.0], abs=0.05)
+        assert found.planned[i] == pytest.approx(outputs(TICK + 10, i))
+    assert found.asked == pytest.approx([0.26, 0.5, 0.0, 0.0, 0.0, 0.0], abs=0.05)
 
 
 def test_paths_go_as_far_as_what_is_left_of_the_plan(picture: Picture) -> None:
@@ -70,8 +72,8 @@ def test_forces_are_in_the_world_frame(picture: Picture, run: RecordedRun) -> No
     assert not picture.contact.all()
 
 
-def test_accounts_tell_mode_and_ages_of_peers_plans(picture: Picture) -> None:
-    first = picture.accounts[0]
+def test_accounts_tell_mode_and_ages_of_peers_plans(run: RecordedRun) -> None:
+    first = read_accounts(run.shape, run.snapshot(TICK))[0]
     assert (first.mode, first.reason, first.estimator) == ("walk", "", "kalman")
     assert (first.plan, first.plan_age_ms, first.planner_ms) == ("solved", 10, 1.0)
     assert first.peer_ages_ms == {"r2": 40}
@@ -81,7 +83,7 @@ def test_before_anything_was_recorded_the_team_stands_at_its_place(run: Recorded
     before = compose(run.shape, run.snapshot(-1))
     assert not before.known.any()
     assert before.trunk == pytest.approx(run.shape.spawn)
-    assert np.isnan(before.outputs.asked).all()
+    assert np.isnan(read_outputs(run.shape, run.snapshot(-1)).asked).all()
     assert before.contact.all()
 
 

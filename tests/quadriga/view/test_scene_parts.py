@@ -16,6 +16,7 @@ from quadriga.view.compose import compose
 from quadriga.view.ground import read_boxes, read_surface
 from quadriga.view.mesh_groups import group_meshes
 from quadriga.view.picture import Account
+from quadriga.view.readings import read_accounts
 from quadriga.view.recorded import RecordedRun
 from quadriga.view.scene_colours import to_linear
 from quadriga.view.team_shape import build_team_shape
@@ -79,12 +80,14 @@ def test_colours_that_are_not_decoded_keep_their_ends() -> None:
 
 def test_words_say_what_is_true_and_escape_what_others_say(known_run: Path) -> None:
     run = RecordedRun(Recording(known_run / "run.mcap"))
-    picture = compose(run.shape, run.snapshot(3000))
-    heading = words.format_heading(run.shape, picture, "live")
+    snapshot = run.snapshot(3000)
+    picture = compose(run.shape, snapshot)
+    heading = words.format_heading(run.shape, picture, snapshot.reference, "live")
     assert "the simulator's truth" in heading
     assert "3.00 s" in heading
     assert "0.50 m/s ahead" in heading
-    table = words.format_robots(picture)
+    accounts = read_accounts(run.shape, snapshot)
+    table = words.format_robots(run.shape.robots, accounts, [True, True])
     assert table.count("<tr>") == 3
     assert "r2 40 ms" in table
     shown = words._cells_of(Account("estop", "<script>"), known=True)[0]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from quadriga.shared.recording.reader import Recording
-from quadriga.view.compose import compose
 from quadriga.view.curves import SAMPLES, CurveWindow, axis_range, ticks_before
+from quadriga.view.readings import read_outputs
 from quadriga.view.recorded import RecordedRun
 from quadriga.view.traffic import KeyTraffic, Traffic
 from tests.quadriga.conftest import ESTIMATOR_ERROR, outputs
@@ -25,13 +25,15 @@ def test_rates_are_of_the_time_since_the_last_report() -> None:
     assert state == KeyTraffic("r1/state", 1000.0, 0, 0.0)
     assert plan == KeyTraffic("r1/plan", 20.0, 30, 0.25)
     assert [row.per_s for row in traffic.report(12.0)] == [0.0, 0.0]
+    traffic.see("r2/state", 720, 12.0)
+    assert traffic.report(12.5)[-1] == KeyTraffic("r2/state", None, 10, 0.5)
 
 
 def test_curves_hold_the_last_seconds(known_run: Path) -> None:
     run = RecordedRun(Recording(known_run / "run.mcap"))
     curves = CurveWindow(2)
     for tick in range(3000, 3501, 10):
-        curves.add(compose(run.shape, run.snapshot(tick)))
+        curves.add(tick, read_outputs(run.shape, run.snapshot(tick)))
     assert curves.seconds[-11:] == pytest.approx(np.arange(3.0, 3.51, 0.05))
     seconds, measured, planned, true, asked = curves.of_robot(1, 3)
     expected = [outputs(tick, 1)[3] for tick in range(3000, 3501, 50)]
@@ -49,7 +51,7 @@ def test_curves_begin_anew_where_the_time_jumps(known_run: Path) -> None:
     curves = CurveWindow(2)
     for tick in (1000, 1050, 3000, 2000):
         assert curves.follows(tick) == (tick == 1050)
-        curves.add(compose(run.shape, run.snapshot(tick)))
+        curves.add(tick, read_outputs(run.shape, run.snapshot(tick)))
     assert np.isfinite(curves.values[:, 0, 0, 0]).sum() == 1
     assert len(ticks_before(2000)) == SAMPLES + 1
 
