@@ -9,12 +9,15 @@ from quadriga.shared.config.sections import Config
 
 
 def add(add_command: AddCommand) -> None:
-    add_command("operate", run, "publish the velocity reference of the configuration")
+    command = add_command("operate", run, "say how fast to walk where: as configured, or by hand")
+    command.add_argument(
+        "--view", metavar="URL", default="", help="of the picture in the page to drive from"
+    )
 
 
-def run(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
+def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Operate the team until the walk is over."""
     from quadriga.team import operator
 
-    operator.run(config)
+    operator.run(config, view=arguments.view)
     return 0

@@ -15,7 +15,7 @@ from typing import Final, Self
 from quadriga.shared.bus.barrier import processes
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.members import LAST, LEADS, RECORDER, ROUTER, SIM, Member, has_lead
+from quadriga.shared.members import LAST, LEADS, OPERATOR, RECORDER, ROUTER, SIM, Member, has_lead
 from quadriga.shared.runtime.clock import monotonic, sleep
 
 _ONE_THREAD: Final = (
@@ -51,7 +51,13 @@ class ProcessSpec:
 
 
 def process_table(
-    config: Config, run_dir: Path, predictor: Path | None, sha256: str, *, armed: bool = False
+    config: Config,
+    run_dir: Path,
+    predictor: Path | None,
+    sha256: str,
+    *,
+    armed: bool = False,
+    view: str = "",
 ) -> tuple[ProcessSpec, ...]:
     """The processes of a walk, in the order in which they are started.
 
@@ -61,6 +67,7 @@ def process_table(
         predictor: the file that agents and planner read; None if they need none.
         sha256: the predictor's, for the recording.
         armed: whether bridges may command their robots.
+        view: URL of a picture of the team, for who drives it; "": none.
     """
     bridged = config.team.plant == BRIDGED
 
@@ -72,6 +79,8 @@ def process_table(
             options += ["--predictor", str(predictor)]
         if role.name == RECORDER:
             options += ["-o", str(run_dir / "run.mcap"), "--predictor-sha256", sha256]
+        if role.name == OPERATOR and view:
+            options += ["--view", view]
         if role.name == SIM and armed:
             options.append("--armed")
         options += ["--config", str(run_dir / "config.toml")]

@@ -63,7 +63,7 @@ def references_of(config: Config) -> Callable[[int], Reference | None]:
     return lambda tick: None if tick % EPOCH_MS else reference_at(config, tick)
 
 
-def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
+def run(config: Config, stopped: Callable[[], bool] | None = None, view: str = "") -> None:
     """Publish the reference, following the team's clock, until the walk ends or it is stopped.
 
     An operator that is started while its team walks goes on where the team's time is.
@@ -71,6 +71,7 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
     Args:
         config: the team's configuration.
         stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
+        view: URL of the picture in the page to drive from; "": none.
 
     Raises:
         BusError: the bus cannot be opened, or the team is not complete in time.
@@ -83,7 +84,7 @@ def run(config: Config, stopped: Callable[[], bool] | None = None) -> None:
             bus.subscribe(topic.key(team))
         controls = Controls(config, bus, drivable=config.reference.driver == BY_HAND)
         port = config.reference.page_port if controls.drivable else None
-        with DriveServer(controls, port, _socket_path(team)) as server:
+        with DriveServer(controls, port, _socket_path(team), view) as server:
             if server.url:
                 print(f"drive from {server.url}", flush=True)
             joined = join(bus, config, stopped)

@@ -23,6 +23,7 @@ from quadriga.team.progress import WalkProgress
 from quadriga.team.registry import team_registered
 from quadriga.team.run_folder import CONFIG, make_run_dir
 from quadriga.team.spectator import view_beside
+from quadriga.view.port import url_of
 from quadriga.warm_up import warm_up
 
 OK: Final = 0
@@ -63,7 +64,8 @@ def walk(
     if find_kind(config.planner.kind).needs_predictor:
         predictor, sha256 = _take_predictor(config, run_dir, console)
     (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
-    rows = process_table(config, run_dir, predictor, sha256, armed=armed)
+    url = "" if view is None else url_of(view)
+    rows = process_table(config, run_dir, predictor, sha256, armed=armed, view=url)
     with (
         stop_flag() as stopped,
         team_registered(config, run_dir),
