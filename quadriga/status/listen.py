@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -29,7 +29,7 @@ from quadriga.status.record import MachineUse, MemberStatus, TeamStatus
 
 _FAST_MS: Final = 10  # a topic with a shorter period costs who hears it a good part of a core
 _ASK_EVERY: Final = 5.0  # s between two questions, each of which costs every process an answer
-_LINK_TIMEOUT: Final = 2.0  # s, in which a link to those that are there has come about
+_LINK_TIMEOUT: Final = 3.0  # s, in which a link to those that are there has come about
 _PAUSE: Final = 0.05  # s between two looks at what has come
 
 
@@ -48,10 +48,13 @@ class TeamListener:
         self._fold, self._end = StatusFold(config), WalkEnd(bus)
         self._refusals = RecentRefusals(bus)
         fast = periods(config)
-        self._takes: list[Callable[[], list[Arrival]]] = [
-            bus.collect(topic.key(bus.team, "*"))
+        keys = {
+            topic.key(bus.team, "*")
             for topic in TABLE
             if every_topic or not 0 < fast[topic.name] < _FAST_MS
+        }
+        self._takes: list[Callable[[], list[Arrival]]] = [
+            bus.collect(key) for key in sorted(keys) if not _is_covered(key, keys)
         ]
         self._view: TeamView | None = None
         self._asked = 0.0
@@ -75,10 +78,12 @@ class TeamListener:
     def look(self) -> TeamStatus:
         """How the team is now, by what was heard since the last look."""
         bus, config = self._bus, self._config
-        if self._view is None or monotonic() - self._asked > _ASK_EVERY:
+        view = self._view
+        if view is None or not view.linked or monotonic() - self._asked > _ASK_EVERY:
             self._asked = monotonic()
-            self._view = view_of(bus, config, ask(bus), describe_process(config, OBSERVER))
-        view, here = self._view, bus.members_at(HERE)
+            view = view_of(bus, config, ask(bus), describe_process(config, OBSERVER))
+            self._view = view
+        here = bus.members_at(HERE)
         health = {of.name: of for of in judge_team(self._team, view, self._refusals.recent())}
         reading = self._fold.look(monotonic_ns())
         members = tuple(
@@ -134,6 +139,16 @@ def listening(
         while not bus.linked and not stopped() and monotonic() < until:
             sleep(_PAUSE)
         yield listener
+
+
+def _is_covered(key: str, keys: Collection[str]) -> bool:
+    """Whether another of these expressions hears the same, as `t/*/event` does `t/sim/event`."""
+    parts = key.split("/")
+    others = (other.split("/") for other in keys if other != key)
+    return any(
+        len(other) == len(parts) and all(o in ("*", p) for o, p in zip(other, parts, strict=True))
+        for other in others
+    )
 
 
 def _is_quadriga(pid: int) -> bool:

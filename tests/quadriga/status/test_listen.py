@@ -19,7 +19,8 @@ from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Clock, Status
+from quadriga.shared.wire.codes import PUSH
+from quadriga.shared.wire.messages import Clock, Event, Status
 from quadriga.status import listen
 from quadriga.status.listen import listening
 from quadriga.team.endpoint import free_endpoint
@@ -55,10 +56,12 @@ def test_a_team_on_the_bus() -> None:
         buses = assemble(stack, of)
         listener = stack.enter_context(listening(of, "status", lambda: False))
         await_listener(buses["sim"], "team/clock")
+        await_listener(buses["sim"], "team/sim/event")
         await_listener(buses["r1"], "team/r1/status")
         assert listener.look().problems == ()  # it has not begun
         for tick in range(1000, 1200, 10):
             buses["sim"].publisher("team/clock")(encode(Clock(tick, 0)))
+        buses["sim"].publisher("team/sim/event")(encode(Event.of(1100, PUSH, "r1", "80 N")))
         buses["r1"].publisher("team/r1/status")(walks(1190))
         buses["r2"].publisher("team/r2/status")(walks(1190, "stand", "led-down"))
         listener.hear(0.3, lambda: False)
@@ -73,6 +76,7 @@ def test_a_team_on_the_bus() -> None:
         assert r1.use.pid == os.getpid()
         topics = {topic.key: topic for topic in status.reading.topics}
         assert (topics["team/clock"].messages, topics["team/clock"].lost) == (20, 0)
+        assert status.reading.events == ("1100 ms: push r1 80 N",)  # once
         buses.pop("operator").close()
         listener.hear(0.3, lambda: False)
         assert "operator: not well: gone" in listener.look().problems
