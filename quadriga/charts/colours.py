@@ -55,6 +55,11 @@ def truth_style(index: int) -> str:
     return f"{robot_style(index)}-true"
 
 
+def broad_style(index: int) -> str:
+    """The style of a curve of the robot at `index` over which another, equal one can be seen."""
+    return f"{robot_style(index)}-broad"
+
+
 def contact_style(index: int) -> str:
     """The style of the bars of contact of the robot at `index`."""
     return f"{robot_style(index)}-contact"
@@ -75,6 +80,7 @@ for _index in range(N_ROBOT_COLOURS):
     _dash = {"linestyle": _DASHES[1]} if _many else {}
     LINES[robot_style(_index)] = {"color": _colour, "linewidth": 1.3, **_dash}
     LINES[truth_style(_index)] = {"color": _colour, "linewidth": _WIDE, "alpha": _VEIL}
+    LINES[broad_style(_index)] = {"color": _colour, "linewidth": 2 * _WIDE}
     BARS[contact_style(_index)] = _colour
 for _index in range(len(_YOKES) * len(_DASHES)):
     LINES[yoke_style(_index)] = {

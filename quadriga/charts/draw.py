@@ -196,7 +196,7 @@ def _draw_curves(axes: Axes, panel: Panel, points: int, tall: float) -> None:
             axes.annotate(
                 name, (1.0, level), (-4.0, 2.0), xycoords=("axes fraction", "data"),
                 textcoords="offset points", ha="right", fontsize=TEXT, color=PALETTE["soft"],
-                bbox={"facecolor": PALETTE["paper"], "edgecolor": "none", "pad": 1.0},
+                bbox={"facecolor": PALETTE["paper"], "edgecolor": "none", "pad": 1.0, "alpha": 0.6},
             )  # fmt: skip
 
 

@@ -52,4 +52,7 @@ def draw(reports: Sequence[FitReport], path: Path) -> None:
     handles, labels = axes[0, 0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
+    figure.suptitle(
+        "Errors of predictors over the horizon, on held-out data", x=0.01, ha="left", weight="bold"
+    )
     save_png(figure, path)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from quadriga.agents.planning.fade import FADED
 from quadriga.agents.time_grid import step_ms
-from quadriga.charts.colours import BARS, robot_style, truth_style
+from quadriga.charts.colours import BARS, broad_style, robot_style
 from quadriga.charts.draw import draw_panels
 from quadriga.charts.panels import Bars, Curve, Mark, Panel, PanelGrid
 from quadriga.recordings.traces import quantile_of, times_of
@@ -133,8 +133,8 @@ def draw_ages(run: Run) -> Figure:
             ]
             if used:
                 time, age = np.array(used, dtype=float).T
-                # Ages are often equal: every other curve is wide, so that none hides another.
-                style = (truth_style if len(curves) % 2 == 0 else robot_style)(index)
+                # Ages are often equal: every other curve is broad, so that none hides another.
+                style = (broad_style if len(curves) % 2 == 0 else robot_style)(index)
                 curves.append(Curve(time / 1000, age, style, "step", gap=2.1e-3 * step))
         for name, style in (("reference", "asked"), ("plan", "planned")):
             ages = [(s.tick, s.ages_ms[name]) for s in traces.statuses[robot] if name in s.ages_ms]

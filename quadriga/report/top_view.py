@@ -18,7 +18,7 @@ from quadriga.shared.robot.conventions import Array
 _INSTANTS: Final = 6  # at which yokes and times are drawn
 _MARGIN: Final = 0.3  # m
 _HIGHEST: Final = 420.0  # points
-_FRAME: Final = (58.0, 14.0, 58.0, 44.0)  # points left, right, above and below the axes
+_FRAME: Final = (58.0, 14.0, 72.0, 44.0)  # points left, right, above and below the axes
 _HEAD: Final = 24.0  # points of the title
 _NEAR: Final = (36.0, 14.0)  # points between the times at two instants, at least
 _STRIDE: Final = 5  # samples between the points of a path
@@ -38,7 +38,8 @@ def draw_top_view(traces: Traces) -> Figure:
     tidy_axes(axes)
     axes.grid(axis="x", color=PALETTE["grid"], linewidth=0.8)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    axes.set_xlabel("x [m], y [m] upwards", fontsize=TEXT, color=PALETTE["soft"])
+    axes.set_xlabel("x [m]", fontsize=TEXT, color=PALETTE["soft"])
+    axes.set_title("y [m]", loc="left", pad=5.0, fontsize=TEXT, fontweight="bold")
     instants = np.unique(np.linspace(0, len(tick) - 1, min(_INSTANTS, len(tick))).astype(int))
     for i, j in yoke_pairs(traces.config.team.robots, traces.config.team.yokes):
         for k in instants:

@@ -37,6 +37,12 @@ def draw_probe(outcome: ProbeOutcome, path: Path) -> None:
             tidy_axes(panel)
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
+    figure.suptitle(
+        "Largest responses to pulses of force, true and predicted, and errors by phase of the gait",
+        x=0.01,
+        ha="left",
+        weight="bold",
+    )
     save_png(figure, path)
 
 
