@@ -9,7 +9,8 @@ import numpy as np
 import viser
 from viser import uplot
 
-from quadriga.charts.colours import LINES, robot_colour
+from quadriga.charts.colours import LINES
+from quadriga.shared.robot.colours import robot_colour
 from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.view import words
 from quadriga.view.curves import KINDS, CurveWindow, axis_range

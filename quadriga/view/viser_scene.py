@@ -7,8 +7,9 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from quadriga.charts.colours import LINES, robot_colour
+from quadriga.charts.colours import LINES
 from quadriga.pictures.link_mesh import LinkMeshes
+from quadriga.shared.robot.colours import robot_colour
 from quadriga.shared.robot.conventions import Array
 from quadriga.view.mesh_groups import MeshGroup, group_meshes
 from quadriga.view.picture import Picture

@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.charts.colours import LINES, PALETTE, robot_colour
+from quadriga.charts.colours import LINES, PALETTE
+from quadriga.shared.robot.colours import robot_colour
 from quadriga.shared.wire.messages import Reference
 from quadriga.view.picture import Account, Picture
 from quadriga.view.team_shape import TeamShape
