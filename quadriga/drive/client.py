@@ -10,7 +10,7 @@ import socket
 from pathlib import Path
 from typing import Any, Final, Self
 
-from quadriga.shared.errors import BusError
+from quadriga.shared.errors import BusError, system_reason
 
 SUFFIX: Final = ".sock"
 _TIMEOUT: Final = 2.0  # s, longest wait for an answer
@@ -34,11 +34,15 @@ class ControlLink:
     Args:
         path: of its socket.
 
+    Attributes:
+        team: its operator's, by the socket's name.
+
     Raises:
         OSError: nobody listens there.
     """
 
     def __init__(self, path: Path) -> None:
+        self.team = path.name.rpartition("-")[0]
         self._socket = socket.socket(socket.AF_UNIX)
         self._socket.settimeout(_TIMEOUT)
         try:
@@ -60,6 +64,17 @@ class ControlLink:
         """
         try:
             self.say(kind, **fields)
+        except OSError as error:
+            raise self._wrong(system_reason(error)) from None
+        return self.answer()
+
+    def answer(self) -> dict[str, Any]:
+        """The next answer.
+
+        Raises:
+            BusError: none comes, or it is none.
+        """
+        try:
             while b"\n" not in self._rest:
                 received = self._socket.recv(_LONGEST)
                 if not received or len(self._rest) > _LONGEST:
