@@ -24,7 +24,7 @@ def check_words(words: Sequence[str], options: Mapping[str, Collection[str]]) ->
     command, *rest = words
     if command not in options:
         hint = did_you_mean(command, options) or "`quadriga --help` lists them"
-        raise ConfigError("quadriga", repr(command), "a command", hint)
+        raise ConfigError("command", repr(command), "one that there is", hint)
     for word in rest:
         if word == "--":
             return

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import AsyncIterable, Awaitable, Callable
 from typing import Final
 
-from quadriga.drive.controls import Controls
+from quadriga.drive.controls import DriveControls
 from quadriga.drive.said import ESTOP, NEWS, WHERE, DriverWord, read_said
 from quadriga.drive.tell import Stopping, tell_news
 from quadriga.shared.errors import MessageError
@@ -29,7 +29,7 @@ class Attendant:
         url: of the page with its token; "" if there is none.
     """
 
-    def __init__(self, controls: Controls) -> None:
+    def __init__(self, controls: DriveControls) -> None:
         self._controls = controls
         self.url = ""
         self._counts: Counter[str] = Counter()

@@ -27,7 +27,7 @@ from quadriga.shared.wire.topics import ESTOP, EVENT, RESET, RESUME, STATUS, STO
 _MOST_EVENTS: Final = 1000  # since the last emergency stop; more can only be a flood
 
 
-class Controls:
+class DriveControls:
     """Who drives, what the team says of itself, and the words that drivers may say to it.
 
     Safe to be used by several threads.

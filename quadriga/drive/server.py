@@ -15,7 +15,7 @@ from threading import Thread
 from typing import Final, Self
 
 from quadriga.drive.attend import Attendant
-from quadriga.drive.controls import Controls
+from quadriga.drive.controls import DriveControls
 from quadriga.drive.said import MOST_BYTES
 from quadriga.shared.errors import BusError, system_reason
 
@@ -39,7 +39,7 @@ class DriveServer:
     """
 
     def __init__(
-        self, controls: Controls, port: int | None, path: Path | None = None, view: str = ""
+        self, controls: DriveControls, port: int | None, path: Path | None = None, view: str = ""
     ) -> None:
         self._attendant, self._view, self._path = Attendant(controls), view, path
         self._loop: asyncio.AbstractEventLoop | None = None

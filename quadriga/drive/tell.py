@@ -6,7 +6,7 @@ import json
 from typing import Any, Final
 
 from quadriga.drive.charge import why_stand
-from quadriga.drive.controls import Controls, now_ms
+from quadriga.drive.controls import DriveControls, now_ms
 from quadriga.drive.said import NEWS
 from quadriga.drive.stop_proof import unconfirmed
 from quadriga.drive.wish import NAMES, limits
@@ -15,7 +15,7 @@ from quadriga.shared.wire.messages import Status
 _PATIENCE_MS: Final = 500  # in which all must have stopped
 
 
-def tell_news(driver: str, controls: Controls) -> str:
+def tell_news(driver: str, controls: DriveControls) -> str:
     """The news for one driver."""
     charge, statuses = controls.charge(), controls.statuses()
     robots = {name: _describe(statuses.get(name)) for name in controls.robots}
@@ -45,7 +45,7 @@ class Stopping:
         controls: through which it was sent.
     """
 
-    def __init__(self, controls: Controls) -> None:
+    def __init__(self, controls: DriveControls) -> None:
         self._controls = controls
         self._begun = now_ms()
         self._missing: list[str] = []

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from quadriga.agents.inbox.reference_slew import most_change
-from quadriga.drive.controls import Controls, now_ms
+from quadriga.drive.controls import DriveControls, now_ms
 from quadriga.drive.steering import GO_ON, STOP, LastWord, steer
 from quadriga.drive.wish import NAMES, Wish, approach, standing
 from quadriga.shared.config.sections import Config
@@ -23,7 +23,7 @@ class DrivenReferences:
         controls: who that is, and what it asks for.
     """
 
-    def __init__(self, config: Config, controls: Controls) -> None:
+    def __init__(self, config: Config, controls: DriveControls) -> None:
         self._controls = controls
         self._last = LastWord()
         self._rest = standing(config)

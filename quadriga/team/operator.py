@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.drive.client import socket_path
-from quadriga.drive.controls import Controls
+from quadriga.drive.controls import DriveControls
 from quadriga.drive.server import DriveServer
 from quadriga.shared import members
 from quadriga.shared.bus.barrier import REJOINS, join
@@ -82,7 +82,7 @@ def run(config: Config, stopped: Callable[[], bool] | None = None, view: str = "
     with Bus.open(config.bus, team, members.OPERATOR, stopped) as bus:
         for topic in (CLOCK, EVENT):
             bus.subscribe(topic.key(team))
-        controls = Controls(config, bus, drivable=config.reference.driver == BY_HAND)
+        controls = DriveControls(config, bus, drivable=config.reference.driver == BY_HAND)
         port = config.reference.page_port if controls.drivable else None
         with DriveServer(controls, port, _socket_path(team), view) as server:
             if server.url:
@@ -107,7 +107,7 @@ def _socket_path(team: str) -> Path | None:
 class _Operator:
     """Sends references, and what drivers say."""
 
-    def __init__(self, config: Config, bus: Bus, controls: Controls) -> None:
+    def __init__(self, config: Config, bus: Bus, controls: DriveControls) -> None:
         # In lock-step none may be lost. In real time one that stands still and hears nothing any
         # more, as a frozen recorder, would hold up the router, and so everybody else.
         realtime = config.world.mode == "realtime"

@@ -54,7 +54,7 @@ def report_folder(run_dir: Path, *, pictures: bool, console: Console) -> dict[st
                 render(run_dir)
     finally:  # with the clip, or without it where drawing it failed or was interrupted
         write_page(run, run_dir / PAGE)
-    console.print(f"run folder: {run_dir}", markup=False, highlight=False)
+    console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
     _check_end(summary)
     return summary
 

@@ -58,7 +58,7 @@ def walk(
     build_scenario(config, build_loads(config))
     trace_of(config)
     run_dir = make_run_dir(out)
-    console.print(f"run folder: {run_dir}", markup=False, highlight=False)
+    console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
     warm_up(config, console)
     predictor, sha256 = None, ""
     if find_kind(config.planner.kind).needs_predictor:

@@ -16,7 +16,7 @@ from quadriga.view import words
 from quadriga.view.curves import KINDS, CurveWindow, axis_range
 from quadriga.view.team_shape import TeamShape
 from quadriga.view.traffic import KeyTraffic
-from quadriga.view.viser_scene import TeamScene
+from quadriga.view.viser_scene import ViewScene
 
 _ALL: Final = "all, measured"
 _LISTED: Final = 8  # of what happened, at a time
@@ -51,7 +51,7 @@ class Panels:
         scene: of which parts can be hidden.
     """
 
-    def __init__(self, server: viser.ViserServer, shape: TeamShape, scene: TeamScene) -> None:
+    def __init__(self, server: viser.ViserServer, shape: TeamShape, scene: ViewScene) -> None:
         self._server, self._shape, self._scene = server, shape, scene
         self._heading = server.gui.add_html("")
         self.controls = server.gui.add_folder(None)  # what a recording is played with

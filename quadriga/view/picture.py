@@ -12,7 +12,7 @@ from quadriga.shared.robot.conventions import Array
 
 
 @dataclass(frozen=True, slots=True)
-class Account:
+class RobotAccount:
     """What is known of a robot's mind.
 
     Attributes:

@@ -9,7 +9,7 @@ from quadriga.shared.robot.conventions import N_OUTPUTS, Array
 from quadriga.shared.wire.messages import Reference, Status
 from quadriga.shared.wire.topics import SAMPLE_MS
 from quadriga.view.compose import sample_at
-from quadriga.view.picture import Account, TeamOutputs
+from quadriga.view.picture import RobotAccount, TeamOutputs
 from quadriga.view.snapshot import Snapshot
 from quadriga.view.team_shape import TeamShape
 
@@ -38,20 +38,20 @@ def _asked_outputs(reference: Reference | None) -> Array:
     return np.array([reference.height, reference.vx, reference.vy, 0.0, 0.0, reference.wz])
 
 
-def read_accounts(shape: TeamShape, snapshot: Snapshot) -> tuple[Account, ...]:
+def read_accounts(shape: TeamShape, snapshot: Snapshot) -> tuple[RobotAccount, ...]:
     """What is known of each robot's mind."""
     return tuple(_account(shape, snapshot, name) for name in shape.robots)
 
 
-def _account(shape: TeamShape, snapshot: Snapshot, name: str) -> Account:
+def _account(shape: TeamShape, snapshot: Snapshot, name: str) -> RobotAccount:
     status, plan = snapshot.statuses.get(name), snapshot.plans.get(name)
     mode, reason, estimator = "", "", ""
     if status is not None:
         mode, reason, estimator = status.mode, status.reason, status.estimator
     if plan is None:
-        return Account(mode, reason, planner_ms=_slowest(status), estimator=estimator)
+        return RobotAccount(mode, reason, planner_ms=_slowest(status), estimator=estimator)
     step_ms = SAMPLE_MS * shape.config.planner.applied
-    return Account(
+    return RobotAccount(
         mode=mode,
         reason=reason,
         plan=plan.status,

@@ -11,11 +11,11 @@ from quadriga.view import words
 from quadriga.view.compose import compose
 from quadriga.view.curves import CurveWindow
 from quadriga.view.panels import Panels
-from quadriga.view.picture import Account, Picture
+from quadriga.view.picture import Picture, RobotAccount
 from quadriga.view.readings import read_accounts, read_outputs
 from quadriga.view.snapshot import Snapshot
 from quadriga.view.team_shape import TeamShape
-from quadriga.view.viser_scene import TeamScene
+from quadriga.view.viser_scene import ViewScene
 
 FRAME_S: Final = 1.0 / 30.0  # between two pictures
 _PANEL_S: Final = 0.25  # between two changes of words and curves
@@ -38,7 +38,7 @@ class TeamStage:
             MeshError: the meshes of the robots are missing.
         """
         self._server, self.shape = server, shape
-        self._scene = TeamScene(server, shape, link_meshes(shape.config.robot.urdf_path()))
+        self._scene = ViewScene(server, shape, link_meshes(shape.config.robot.urdf_path()))
         self.panels = Panels(server, shape, self._scene)
         self.curves = CurveWindow(shape.count)
         self._panels_due = 0.0
@@ -82,7 +82,7 @@ class TeamStage:
         self.panels.heed_boxes()
 
 
-def label_of(name: str, account: Account, known: bool) -> str:
+def label_of(name: str, account: RobotAccount, known: bool) -> str:
     """What stands over a robot: its name, and what is unusual about it."""
     if not known:
         return f"{name}: not heard"

@@ -33,7 +33,7 @@ _LOAD_BOX: Final = (0.2, 0.15, 0.04)  # m
 _CAMERA: Final = ((0.8, 1.25, 0.65), 0.45, 0.8)
 
 
-class TeamScene:
+class ViewScene:
     """All that is drawn of a team.
 
     Attributes:

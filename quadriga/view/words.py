@@ -11,7 +11,7 @@ import numpy as np
 from quadriga.charts.colours import LINES, PALETTE
 from quadriga.shared.robot.colours import robot_colour
 from quadriga.shared.wire.messages import Reference
-from quadriga.view.picture import Account, Picture
+from quadriga.view.picture import Picture, RobotAccount
 from quadriga.view.team_shape import TeamShape
 from quadriga.view.traffic import KeyTraffic
 
@@ -47,7 +47,9 @@ def _format_reference(reference: Reference | None) -> str:
     return f"{ahead}, {left}, {turn}, {reference.height:.2f} m high"
 
 
-def format_robots(robots: Sequence[str], accounts: Sequence[Account], known: Sequence[bool]) -> str:
+def format_robots(
+    robots: Sequence[str], accounts: Sequence[RobotAccount], known: Sequence[bool]
+) -> str:
     """A row for each robot: mode, plan, ages of the peers' plans in it, planner's time."""
     heads = ("robot", "mode", "plan", "peers' plans", "planner")
     rows = [
@@ -57,7 +59,7 @@ def format_robots(robots: Sequence[str], accounts: Sequence[Account], known: Seq
     return _block(_table(heads, rows, numbers=()))
 
 
-def _cells_of(account: Account, *, known: bool) -> tuple[str, str, str, str]:
+def _cells_of(account: RobotAccount, *, known: bool) -> tuple[str, str, str, str]:
     mode = escape(account.mode) or ("no status yet" if known else "not heard yet")
     if account.mode and account.mode not in _CALM:
         mode = f"<b style='color:{PALETTE['bad']}'>{mode}</b>"

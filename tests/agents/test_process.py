@@ -25,7 +25,7 @@ class Line:
 
     def __init__(self, ticks: Iterable[int | None]) -> None:
         self._ticks = iter(ticks)
-        self.now, self.ended = 0.0, False
+        self.name, self.now, self.ended = "r1", 0.0, False
         self.answered: list[int] = []
 
     def get(self, timeout: float) -> Packet | None:

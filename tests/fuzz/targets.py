@@ -113,7 +113,7 @@ class Messages:
 
 def example(kind: type[Message]) -> Message:
     """A message of a type, with some content."""
-    plain = {int: 5, float: 0.1, str: "walk", list: ("r1",), dict: {"r1": 1}}
+    plain = {bool: True, int: 5, float: 0.1, str: "walk", list: ("r1",), dict: {"r1": 1}}
     values: dict[str, Any] = {}
     for item in fields(kind):
         meta = item.metadata

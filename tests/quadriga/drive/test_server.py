@@ -21,7 +21,7 @@ from websockets.sync.connection import Connection
 from websockets.typing import Origin
 
 from quadriga.drive.client import ControlLink
-from quadriga.drive.controls import Controls
+from quadriga.drive.controls import DriveControls
 from quadriga.drive.server import DriveServer
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.load import load
@@ -63,7 +63,7 @@ def serving(
     config: Config, operator: Bus, folder: Path, *, drivable: bool = True
 ) -> Iterator[tuple[DriveServer, Path]]:
     path = folder / "team-1.sock"
-    controls = Controls(config, operator, drivable=drivable)
+    controls = DriveControls(config, operator, drivable=drivable)
     with DriveServer(controls, 0, path, view="http://127.0.0.1:8080") as server:
         yield server, path
     assert not path.exists()
@@ -214,6 +214,6 @@ def test_a_port_that_is_taken_is_one_clear_error(
 ) -> None:
     with serving(config, buses[1], tmp_path) as (server, _):
         port = int(server.url.split(":")[2].partition("/")[0])
-        controls = Controls(config, buses[1], drivable=True)
+        controls = DriveControls(config, buses[1], drivable=True)
         with pytest.raises(BusError, match=r"what drivers reach: got .*in use.*page_port"):
             DriveServer(controls, port)

@@ -15,7 +15,7 @@ from quadriga.view import words
 from quadriga.view.compose import compose
 from quadriga.view.ground import read_boxes, read_surface
 from quadriga.view.mesh_groups import group_meshes
-from quadriga.view.picture import Account
+from quadriga.view.picture import RobotAccount
 from quadriga.view.readings import read_accounts
 from quadriga.view.recorded import RecordedRun
 from quadriga.view.scene_colours import to_linear
@@ -90,10 +90,10 @@ def test_words_say_what_is_true_and_escape_what_others_say(known_run: Path) -> N
     table = words.format_robots(run.shape.robots, accounts, [True, True])
     assert table.count("<tr>") == 3
     assert "r2 40 ms" in table
-    shown = words._cells_of(Account("estop", "<script>"), known=True)[0]
+    shown = words._cells_of(RobotAccount("estop", "<script>"), known=True)[0]
     assert "&lt;script&gt;" in shown
     assert "<script>" not in words.format_happenings([(150, "push <script>")])
-    assert "not heard yet" in words._cells_of(Account(), known=False)[0]
+    assert "not heard yet" in words._cells_of(RobotAccount(), known=False)[0]
 
 
 def test_traffic_names_what_is_silent() -> None:
