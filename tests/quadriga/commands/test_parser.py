@@ -110,8 +110,11 @@ def test_mistakes(
 @pytest.mark.parametrize(
     ("words", "error"),
     [
-        (["wlak"], "quadriga: got 'wlak', expected a command (did you mean 'walk'?)"),
-        (["xyzzy"], "quadriga: got 'xyzzy', expected a command (`quadriga --help` lists them)"),
+        (["wlak"], "command: got 'wlak', expected one that there is (did you mean 'walk'?)"),
+        (
+            ["xyzzy"],
+            "command: got 'xyzzy', expected one that there is (`quadriga --help` lists them)",
+        ),
         (
             ["walk", "--robts", "3"],
             "quadriga walk: got --robts, expected an option that it has (did you mean '--robots'?)",
