@@ -63,7 +63,7 @@ def asks(bus: Bus, page: Page, **least: float) -> None:
 
 
 def is_in(bus: Bus, mode: str, reason: str = "", page: Page | None = None) -> None:
-    """Wait until both robots are in a mode for a reason that begins so; `page` drives meanwhile."""
+    """Wait until the robot is in a mode for a reason that begins so; `page` drives meanwhile."""
 
     def wanted(message: object) -> bool:
         if page is not None:
@@ -71,8 +71,7 @@ def is_in(bus: Bus, mode: str, reason: str = "", page: Page | None = None) -> No
         assert isinstance(message, Status)
         return message.mode == mode and message.reason.startswith(reason)
 
-    for robot in ("r1", "r2"):
-        await_message(bus, STATUS.key("team", robot), Status, wanted)
+    await_message(bus, STATUS.key("team", "r1"), Status, wanted)
 
 
 def url_of(team: Team) -> str:
@@ -84,6 +83,7 @@ def test_a_team_is_driven_stopped_and_released_from_a_page(
     make_team: Make, watcher: Watcher, chromium: Browser, tmp_path: Path
 ) -> None:
     team = make_team(
+        team__robots=1,
         reference__driver="hand",
         world__mode="realtime",
         world__seconds=600.0,

@@ -9,6 +9,7 @@ import pytest
 from quadriga.commands.parser import main
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.codes import (
     ESTOPPED,
     FALL,
@@ -29,12 +30,13 @@ pytestmark = pytest.mark.usefixtures("_compiled")
 Watcher = Callable[..., Bus]
 
 
-@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+@pytest.mark.parametrize(("mode", "robots"), [("lockstep", 1), ("realtime", 2)])
 def test_stopped_released_and_sent_on(
-    make_team: Make, watcher: Watcher, capsys: pytest.CaptureFixture[str], mode: str
+    make_team: Make, watcher: Watcher, capsys: pytest.CaptureFixture[str], mode: str, robots: int
 ) -> None:
-    team = make_team(world__mode=mode, world__seconds=600.0, recorder__enabled=True)
-    file = str(team.folder / "config.toml")
+    keys = {"world__mode": mode, "world__seconds": 600.0, "recorder__enabled": True}
+    team = make_team(team__robots=robots, **keys)
+    file, names = str(team.folder / "config.toml"), robot_names(robots)
 
     def said(command: str, *options: str) -> str:
         assert main([command, *options, "--config", file]) == 0
@@ -42,14 +44,14 @@ def test_stopped_released_and_sent_on(
 
     with team.launch(standing=False) as running:
         await_tick(watcher(team), 1500)
-        assert said("estop", "--reason", "dog").startswith("stopped r1, r2 within")
-        team.await_log("sim", "lies r1")
-        team.await_log("sim", "lies r2")
-        assert "r1: walk\nr2: walk" in said("reset", "--by", "ann")
-        assert "r1: stand stopped:lunch\nr2: stand stopped:lunch" in said(
-            "stop", "--stand", "--reason", "lunch"
-        )
-        assert "r1: walk\nr2: walk" in said("resume")
+        assert said("estop", "--reason", "dog").startswith(f"stopped {', '.join(names)} within")
+        for name in names:
+            team.await_log("sim", f"lies {name}")
+        walk = "".join(f"{name}: walk\n" for name in names)
+        stand = "".join(f"{name}: stand stopped:lunch\n" for name in names)
+        assert said("reset", "--by", "ann") == walk
+        assert said("stop", "--stand", "--reason", "lunch") == stand
+        assert said("resume") == walk
         assert "the walk is over" in said("stop", "--reason", "night")
         running.watch(lambda: False)
     traces = read_traces(team.recording())
