@@ -31,9 +31,10 @@ def run() -> int:
         go_first()
         from quadriga.drive.quick_stop import stop_quickly
 
-        status = stop_quickly(sys.argv[2:])
-        if status is not None:
-            return status
+        done = stop_quickly(sys.argv[2:])
+        if done.status is not None:
+            return done.status
+        sys.argv += done.options
 
     try:
         from quadriga.commands.parser import main as command_line

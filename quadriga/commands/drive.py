@@ -28,9 +28,9 @@ def add(add_command: AddCommand) -> None:
 
 def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     """Say where the page to drive from is, or drive by keys or a gamepad."""
+    from quadriga.drive.driver_words import WHERE
     from quadriga.drive.drivers import drive_by_gamepad, drive_by_keys
     from quadriga.drive.find import open_link
-    from quadriga.drive.said import WHERE
     from quadriga.drive.wish import standing
     from quadriga.shared.runtime.signals import stop_on_signals
 

@@ -9,7 +9,7 @@ from collections.abc import AsyncIterable, Awaitable, Callable
 from typing import Final
 
 from quadriga.drive.controls import DriveControls
-from quadriga.drive.said import ESTOP, NEWS, WHERE, DriverWord, read_said
+from quadriga.drive.driver_words import ESTOP, NEWS, WHERE, DriverWord, read_driver_word
 from quadriga.drive.tell import Stopping, tell_news
 from quadriga.shared.errors import MessageError
 
@@ -51,7 +51,7 @@ class Attendant:
         try:
             async for text in texts:
                 try:
-                    said = read_said(text)
+                    said = read_driver_word(text)
                 except MessageError as error:
                     await send(json.dumps({"kind": "error", "text": str(error)}))
                 else:

@@ -13,7 +13,7 @@ from typing import Any, Final, Self
 from quadriga.shared.errors import BusError, system_reason
 
 SUFFIX: Final = ".sock"
-_TIMEOUT: Final = 2.0  # s, longest wait for an answer
+PATIENCE: Final = 2.0  # s, longest wait for an answer
 _LONGEST: Final = 65_536  # bytes of one
 
 
@@ -33,6 +33,7 @@ class ControlLink:
 
     Args:
         path: of its socket.
+        patience: longest wait for an answer, s.
 
     Attributes:
         team: its operator's, by the socket's name.
@@ -41,10 +42,11 @@ class ControlLink:
         OSError: nobody listens there.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, patience: float = PATIENCE) -> None:
         self.team = path.name.rpartition("-")[0]
         self._socket = socket.socket(socket.AF_UNIX)
-        self._socket.settimeout(_TIMEOUT)
+        self._patience = patience
+        self._socket.settimeout(patience)
         try:
             self._socket.connect(str(path))
         except OSError:
@@ -53,7 +55,7 @@ class ControlLink:
         self._rest = b""
 
     def say(self, kind: str, **fields: Any) -> None:
-        """Say something, see `quadriga.drive.said`."""
+        """Say something, see `quadriga.drive.driver_words`."""
         self._socket.sendall(json.dumps({"kind": kind, **fields}).encode() + b"\n")
 
     def ask(self, kind: str, **fields: Any) -> dict[str, Any]:
@@ -83,7 +85,7 @@ class ControlLink:
             line, _, self._rest = self._rest.partition(b"\n")
             answer = json.loads(line)
         except (TimeoutError, ConnectionError):
-            raise self._wrong(f"no answer within {_TIMEOUT:g} s") from None
+            raise self._wrong(f"no answer within {self._patience:g} s") from None
         except ValueError:
             raise self._wrong("an answer that is no JSON") from None
         if not isinstance(answer, dict):

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from threading import Lock
-from typing import Any, Final
+from typing import Final
 
 from quadriga.drive import charge as charging
-from quadriga.drive import said as words
+from quadriga.drive import driver_words as words
 from quadriga.drive.charge import InCharge
-from quadriga.drive.said import DriverWord
+from quadriga.drive.driver_words import DriverWord
 from quadriga.drive.wish import standing
 from quadriga.shared.bus.zenoh_bus import Arrival, Bus
 from quadriga.shared.config.sections import Config
@@ -22,8 +22,10 @@ from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic_ns
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import EStop, Event, Message, Reset, Resume, SafeStop, Status
+from quadriga.shared.wire.topic import Topic
 from quadriga.shared.wire.topics import ESTOP, EVENT, RESET, RESUME, STATUS, STOP
 
+_MOVES: Final = frozenset((words.GO_ON, words.RESET))  # has robots get up, or walk
 _MOST_EVENTS: Final = 1000  # since the last emergency stop; more can only be a flood
 
 
@@ -83,9 +85,11 @@ class DriveControls:
         return tuple(self._events)
 
     def hear(self, driver: str, said: DriverWord) -> None:
-        """Do what a driver says."""
+        """Do what a driver says; stops of anybody, what moves robots of nobody but who drives."""
         with self._lock:
             self._charge = self._step(driver, said, now_ms())
+            if said.kind in _MOVES and self._charge.driver not in ("", driver):
+                return
         if said.kind == words.ESTOP:
             with self._lock:
                 self._events.clear()
@@ -106,7 +110,7 @@ class DriveControls:
         """Have robots walk that stand and may go on."""
         self.say(RESUME, Resume(*self.time()))
 
-    def say(self, topic: Any, message: Message) -> None:
+    def say(self, topic: Topic, message: Message) -> None:
         """Say a word to the team, before whatever waits to be sent."""
         self._put[topic](encode(message))
 

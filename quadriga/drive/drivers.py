@@ -10,9 +10,9 @@ from typing import Final
 
 from quadriga.drive import gamepad as pads
 from quadriga.drive.client import ControlLink
+from quadriga.drive.driver_words import DRIVE, ESTOP, NEWS, RELEASE, TAKE
 from quadriga.drive.gamepad import EVENT_BYTES, Gamepad
 from quadriga.drive.keys import HELP, KEYS, Keys, press
-from quadriga.drive.said import DRIVE, ESTOP, NEWS, RELEASE, TAKE
 from quadriga.drive.wish import NAMES, Wish
 from quadriga.keyboard import Keyboard
 from quadriga.shared.errors import ConfigError, system_reason

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from contextlib import suppress
 
-from quadriga.drive.client import SUFFIX, ControlLink
+from quadriga.drive.client import PATIENCE, SUFFIX, ControlLink
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.places import make_runtime_dir
 
 
-def open_links(team: str = "") -> list[ControlLink]:
+def open_links(team: str = "", patience: float = PATIENCE) -> list[ControlLink]:
     """Connections to the operators of one team, or of all, by the names of their sockets.
 
     A socket that a crash has left behind is passed over.
+
+    Args:
+        team: its name; "": all.
+        patience: longest wait for an answer, s.
     """
     folder, links = make_runtime_dir(), list[ControlLink]()
     for path in sorted(folder.glob(f"*-*{SUFFIX}")) if folder is not None else ():
         if not team or path.name.rpartition("-")[0] == team:
             with suppress(OSError):
-                links.append(ControlLink(path))
+                links.append(ControlLink(path, patience))
     return links
 
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from quadriga.drive.said import ESTOP, STAND, TAKE
+from quadriga.drive.driver_words import ESTOP, STAND, TAKE
 from quadriga.drive.wish import Wish, limit
 
 _REST, _STEER, _QUIT = "rest", "steer", "quit"
@@ -65,7 +65,7 @@ class Keys(NamedTuple):
     Attributes:
         wish: what is asked for.
         held: whether it counts; else the team stands.
-        word: what is to be said now, of `quadriga.drive.said`; "" nothing.
+        word: what is to be said now, of `quadriga.drive.driver_words`; "" nothing.
         over: whether the driver leaves.
     """
 

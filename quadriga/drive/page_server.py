@@ -21,7 +21,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from quadriga.drive.attend import Attendant
-from quadriga.drive.said import MOST_BYTES
+from quadriga.drive.driver_words import MOST_BYTES
 
 HOST: Final = "127.0.0.1"
 _PAGES: Final = MappingProxyType(

@@ -4,56 +4,76 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import Any, Final
+from contextlib import suppress
+from typing import Any, Final, NamedTuple
 
+from quadriga.drive.client import ControlLink
 from quadriga.shared.errors import QuadrigaError
 
 _REASON: Final = "--reason"
 _STOPPED, _NOT_STOPPED = 0, 2
+_PATIENCE: Final = 0.8  # s; an operator that is well answers within 0.5 s
+_FROZEN: Final = "its operator does not answer"
 
 
-def stop_quickly(options: Sequence[str]) -> int | None:
-    """Stop every team of this user on this machine, through their operators; the exit status.
+class QuickStop(NamedTuple):
+    """What came of it.
 
-    Who is in a hurry does not say which of several.
+    Attributes:
+        status: exit status; None: the stop has to take the long way over the bus.
+        options: which team that way is for, beside what was typed.
+    """
+
+    status: int | None
+    options: tuple[str, ...] = ()
+
+
+def stop_quickly(options: Sequence[str]) -> QuickStop:
+    """Stop every team of this user on this machine, through their operators.
+
+    Who is in a hurry does not say which of several. The long way is left where other options are
+    given, where no team runs here, and for a team whose operator does not answer.
 
     Args:
         options: of `quadriga estop`.
-
-    Returns:
-        None if it is not that easy: other options are given, no team runs here, or an operator
-        does not answer. Then the stop takes the long way over the bus.
     """
     if options and (len(options) != 2 or options[0] != _REASON):
-        return None
+        return QuickStop(None)
     from quadriga.drive.find import open_links
 
-    reason, links = options[1] if options else "operator", open_links()
-    try:
-        for link in links:  # all of them hear it before the first is asked what came of it
+    reason, links = options[1] if options else "operator", open_links(patience=_PATIENCE)
+    for link in links:  # all of them hear it before the first is asked what came of it
+        with suppress(OSError):
             link.say("estop", text=reason)
-        answers = [link.answer() for link in links]
+    answers = [(link.team, _take_answer(link)) for link in links]
+    for team, answer in answers:
+        _tell(team, answer)
+    silent = [team for team, answer in answers if answer is None]
+    if not links or silent:
+        return QuickStop(None, ("--team", silent[0]) if len(silent) == 1 else ())
+    missing = any(answer["missing"] for _, answer in answers if answer is not None)
+    return QuickStop(_NOT_STOPPED if missing else _STOPPED)
+
+
+def _take_answer(link: ControlLink) -> dict[str, Any] | None:
+    """What an operator says came of the stop; None if it says nothing that can be understood."""
+    try:
+        answer = link.answer()
     except (QuadrigaError, OSError):
         return None
     finally:
-        for link in links:
-            link.close()
-    missing = [answer.get("missing") for answer in answers]
-    if not answers or not all(isinstance(names, list) for names in missing):
-        return None
-    for link, answer in zip(links, answers, strict=True):
-        _tell(link.team, answer)
-    return _NOT_STOPPED if any(missing) else _STOPPED
+        link.close()
+    return answer if isinstance(answer.get("missing"), list) else None
 
 
-def _tell(team: str, answer: dict[str, Any]) -> None:
+def _tell(team: str, answer: dict[str, Any] | None) -> None:
     """Say what came of it, on standard error if some have not stopped."""
-    names, ms = ", ".join(map(str, answer["missing"])), answer.get("ms")
-    if names:
-        print(
-            f"quadriga: emergency stop of team {team!r}: no word of {names} after {ms} ms; "
-            "cut the power of a robot that moves",
-            file=sys.stderr,
-        )
+    if answer is not None and not answer["missing"]:
+        what = "every joint is damped, until `quadriga reset`"
+        print(f"team {team!r} stopped within {answer.get('ms')} ms: {what}", flush=True)
         return
-    print(f"team {team!r} stopped within {ms} ms: every joint is damped, until `quadriga reset`")
+    why = f"{_FROZEN}: over the bus now"
+    if answer is not None:
+        names = ", ".join(map(str, answer["missing"]))
+        why = f"no word of {names} after {answer.get('ms')} ms; cut the power of a robot that moves"
+    print(f"quadriga: emergency stop of team {team!r}: {why}", file=sys.stderr, flush=True)

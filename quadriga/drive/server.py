@@ -1,12 +1,13 @@
 """SHELL that hears drivers, by a thread of its own: from a page, and from programs of this machine.
 
-Each driver has a connection of its own, and speaks the words of `quadriga.drive.said`. Programs of
-the same user write them, a line each, to a Unix socket.
+Each driver has a connection of its own, and speaks the words of `quadriga.drive.driver_words`.
+Programs of the same user write them, a line each, to a Unix socket.
 """
 
 from __future__ import annotations
 
 import asyncio
+import sys
 from collections.abc import AsyncIterator
 from concurrent.futures import Future
 from contextlib import AsyncExitStack, suppress
@@ -16,7 +17,7 @@ from typing import Final, Self
 
 from quadriga.drive.attend import Attendant
 from quadriga.drive.controls import DriveControls
-from quadriga.drive.said import MOST_BYTES
+from quadriga.drive.driver_words import MOST_BYTES
 from quadriga.shared.errors import BusError, system_reason
 
 _PATIENCE: Final = 2.0  # s, for the thread to end
@@ -35,7 +36,7 @@ class DriveServer:
         url: of the page with its token; "" without one.
 
     Raises:
-        BusError: the port or the socket cannot be used.
+        BusError: the port cannot be used.
     """
 
     def __init__(
@@ -53,10 +54,13 @@ class DriveServer:
         try:
             asyncio.run(self._serve(port, begun))
         except OSError as error:
-            where = error.filename or f"port {port}"
-            got = f"{where}: {system_reason(error)}"
+            got = f"port {port}: {system_reason(error)}"
             cause = "does another program use it? reference.page_port = 0 takes any that is free"
-            begun.set_exception(BusError("what drivers reach", got, "a place of its own", cause))
+            begun.set_exception(BusError("page to drive from", got, "a port that is free", cause))
+        except Exception as error:
+            if begun.done():
+                raise  # the thread tells it; drivers are heard no more, and the team stands
+            begun.set_exception(error)
 
     async def _serve(self, port: int | None, begun: Future[str]) -> None:
         self._loop, self._over = asyncio.get_running_loop(), asyncio.Event()
@@ -68,17 +72,25 @@ class DriveServer:
                 page = serve_page(self._attendant, port, self._view)
                 self._attendant.url = await stack.enter_async_context(page)
             if self._path is not None:
-                stack.callback(self._path.unlink, missing_ok=True)
-                stack.push_async_exit(await self._listen(self._path))
+                await self._listen(self._path, stack)
             begun.set_result(self._attendant.url)
             await self._over.wait()
 
-    async def _listen(self, path: Path) -> asyncio.Server:
-        """Listen on the Unix socket, which only its user can open."""
-        path.unlink(missing_ok=True)
-        server = await asyncio.start_unix_server(self._attend, path, limit=2 * MOST_BYTES)
+    async def _listen(self, path: Path, stack: AsyncExitStack) -> None:
+        """Listen on the Unix socket, which only its user can open, until `stack` is unwound.
+
+        A team walks without it, too: then a stop goes over the bus.
+        """
+        try:
+            path.unlink(missing_ok=True)
+            server = await asyncio.start_unix_server(self._attend, path, limit=2 * MOST_BYTES)
+        except OSError as error:
+            reason = system_reason(error)
+            print(f"no socket for programs of this machine, {path}: {reason}", file=sys.stderr)
+            return
+        stack.callback(path.unlink, missing_ok=True)
+        stack.push_async_exit(server)
         path.chmod(0o600)
-        return server
 
     async def _attend(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         async def send(text: str) -> None:

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from quadriga.drive.charge import why_stand
 from quadriga.drive.controls import DriveControls, now_ms
-from quadriga.drive.said import NEWS
+from quadriga.drive.driver_words import NEWS
 from quadriga.drive.stop_proof import unconfirmed
 from quadriga.drive.wish import NAMES, limits
 from quadriga.shared.wire.messages import Status

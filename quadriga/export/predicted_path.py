@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from quadriga.recordings.dead_reckoning import follow_speeds
 from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.topics import SAMPLE_MS
 
 
 def predict_path(y: Array, position: Array, yaw: float) -> Array:
@@ -20,12 +20,8 @@ def predict_path(y: Array, position: Array, yaw: float) -> Array:
         Shape (N + 1, 3), m, world. Heights are planned over the ground that the feet feel, so only
         their change is taken over.
     """
-    step = SAMPLE_MS / 1000
-    turned = yaw + step * np.concatenate([[0.0], np.cumsum(y[:-1, 5])])
-    cos, sin = np.cos(turned), np.sin(turned)
     path = np.empty((len(y) + 1, 3))
     path[0] = position
-    path[1:, 0] = position[0] + step * np.cumsum(cos * y[:, 1] - sin * y[:, 2])
-    path[1:, 1] = position[1] + step * np.cumsum(sin * y[:, 1] + cos * y[:, 2])
+    path[1:, :2] = follow_speeds(np.array([position[0], position[1], yaw]), y)[:, :2]
     path[1:, 2] = position[2] + y[:, 0] - y[0, 0]
     return path

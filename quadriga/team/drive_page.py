@@ -7,7 +7,7 @@ from contextlib import suppress
 from rich.console import Console
 
 from quadriga.drive.client import ControlLink, socket_path
-from quadriga.drive.said import WHERE
+from quadriga.drive.driver_words import WHERE
 from quadriga.shared.config.reference import BY_HAND
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError

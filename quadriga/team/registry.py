@@ -11,12 +11,11 @@ from typing import Final
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
-from quadriga.shared.runtime.places import runtime_dir
+from quadriga.shared.runtime.places import is_private, make_runtime_dir, runtime_dir
 from quadriga.shared.runtime.process_use import read_use
 from quadriga.team.running_team import RunningTeam, read_running_team, to_json, unite_teams
 
 _SUFFIX: Final = ".json"
-_OTHERS: Final = 0o077  # permissions of others than the owner
 _LONGEST: Final = 65_536  # bytes that are read of a file
 
 
@@ -44,10 +43,9 @@ def team_registered(config: Config, run_dir: Path | None = None) -> Iterator[Non
 
 def _leave(entry: Path, copy: Path, config: Config, run_dir: Path | None, pid: int) -> None:
     use = read_use(pid)
+    if use is None or make_runtime_dir() is None:
+        return
     with suppress(OSError):
-        entry.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if use is None or not _is_own(entry.parent):
-            return
         folder = "" if run_dir is None else str(run_dir.resolve())
         if run_dir is None:
             _write(copy, to_toml(config))
@@ -62,8 +60,8 @@ def running_teams() -> tuple[RunningTeam, ...]:
 
     Files of processes that have ended are removed; those of other users are not looked at.
     """
-    folder = runtime_dir()
-    if not _is_own(folder):
+    folder = make_runtime_dir()
+    if folder is None:
         return ()
     found = []
     for file in sorted(folder.glob(f"*{_SUFFIX}")):
@@ -80,25 +78,12 @@ def running_teams() -> tuple[RunningTeam, ...]:
     return unite_teams(found)
 
 
-def _is_own(folder: Path) -> bool:
-    """Whether a folder is this user's alone, and no link to another one."""
-    try:
-        about = folder.lstat()
-    except OSError:
-        return False
-    return stat.S_ISDIR(about.st_mode) and _is_private(about)
-
-
-def _is_private(about: os.stat_result) -> bool:
-    return about.st_uid == os.getuid() and not about.st_mode & _OTHERS
-
-
 def _read(file: Path) -> RunningTeam | None:
     """What a file of this user tells; None if it is somebody else's, or tells nothing."""
     try:
         with open(os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as opened:
             about = os.fstat(opened.fileno())
-            if not stat.S_ISREG(about.st_mode) or not _is_private(about):
+            if not stat.S_ISREG(about.st_mode) or not is_private(about):
                 return None
             return read_running_team(opened.read(_LONGEST).decode("utf-8", errors="replace"))
     except OSError:

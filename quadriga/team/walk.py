@@ -64,7 +64,9 @@ def walk(
     if find_kind(config.planner.kind).needs_predictor:
         predictor, sha256 = _take_predictor(config, run_dir, console)
     (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
-    url = "" if view is None else url_of(view)
+    # By another name of this computer, so that the browser draws it in a process of its own: the
+    # page to drive from must not be silent while the scene is drawn.
+    url = "" if view is None else url_of(view, "localhost")
     rows = process_table(config, run_dir, predictor, sha256, armed=armed, view=url)
     with (
         stop_flag() as stopped,

@@ -44,6 +44,6 @@ def taken_error(port: int, reason: str, option: str = "--port") -> ConfigError:
     )
 
 
-def url_of(port: int) -> str:
+def url_of(port: int, host: str = HOST) -> str:
     """What to open in a browser."""
-    return f"http://{HOST}:{port}"
+    return f"http://{host}:{port}"

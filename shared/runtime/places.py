@@ -42,11 +42,15 @@ def make_runtime_dir() -> Path | None:
     folder = runtime_dir()
     with suppress(OSError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        about = folder.lstat()
-        private = about.st_uid == os.getuid() and not about.st_mode & _OF_OTHERS
-        if stat.S_ISDIR(about.st_mode) and private:
+        about = folder.lstat()  # not of what a link points to
+        if stat.S_ISDIR(about.st_mode) and is_private(about):
             return folder
     return None
+
+
+def is_private(about: os.stat_result) -> bool:
+    """Whether a file or folder is this user's, and closed to all others."""
+    return about.st_uid == os.getuid() and not about.st_mode & _OF_OTHERS
 
 
 def cache_file(kind: str, key: str) -> Path:

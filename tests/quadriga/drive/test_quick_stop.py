@@ -59,7 +59,7 @@ def test_all_teams_of_this_machine_are_stopped(
 ) -> None:
     with ExitStack() as stack:
         heard = [stack.enter_context(operator(folder, name, FINE)) for name in ("a", "b-c")]
-        assert stop_quickly(["--reason", "dog"]) == 0
+        assert stop_quickly(["--reason", "dog"]) == (0, ())
     assert heard == [[{"kind": "estop", "text": "dog"}]] * 2
     said = capsys.readouterr().out.splitlines()
     assert said[0].startswith("team 'a' stopped within 7 ms: every joint is damped")
@@ -70,24 +70,27 @@ def test_who_has_not_stopped_is_named_and_the_status_tells(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with operator(folder, "team", {**FINE, "missing": ["r2", "plant"]}) as heard:
-        assert stop_quickly([]) == 2
+        assert stop_quickly([]) == (2, ())
     assert heard == [{"kind": "estop", "text": "operator"}]
     assert "of team 'team': no word of r2, plant after 7 ms" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("answer", [None, {}, [], {"kind": "stopped", "missing": "r1"}])
-def test_an_operator_that_does_not_answer_leaves_it_to_the_long_way(
-    folder: Path, answer: object
+def test_a_team_whose_operator_does_not_answer_is_left_to_the_long_way(
+    folder: Path, answer: object, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with operator(folder, "team", answer):
-        assert stop_quickly([]) is None
+    with operator(folder, "a", FINE) as heard, operator(folder, "b", answer):
+        assert stop_quickly([]) == (None, ("--team", "b"))
+    assert heard == [{"kind": "estop", "text": "operator"}]
+    said = capsys.readouterr()
+    assert said.out.startswith("team 'a' stopped within 7 ms")
+    assert "of team 'b': its operator does not answer: over the bus now" in said.err
 
 
-def test_so_do_other_options_and_no_team_at_all(folder: Path) -> None:
+def test_other_options_and_no_team_at_all_are_left_to_the_long_way(folder: Path) -> None:
     (folder / "left-9.sock").touch()
-    assert stop_quickly([]) is None
-    assert stop_quickly(["--config", "team.toml"]) is None
-    assert stop_quickly(["--armed"]) is None
+    for options in ([], ["--config", "team.toml"], ["--armed"], ["--reason"]):
+        assert stop_quickly(options) == (None, ())
     with pytest.raises(ConfigError, match="no operator on this machine"):
         open_link()
 

@@ -171,6 +171,30 @@ def test_who_is_not_driven_by_hand_cannot_be_taken_but_stopped(
         assert "expected" in link.ask("fly")["text"]
 
 
+def test_who_does_not_drive_may_stop_the_team_and_not_set_it_going(
+    config: Config, buses: tuple[Bus, Bus], tmp_path: Path
+) -> None:
+    sim, operator = buses
+    with (
+        serving(config, operator, tmp_path) as (server, path),
+        ControlLink(path) as other,
+        connect(address(server, "/drive")) as page,
+    ):
+        page.send(json.dumps({"kind": "take"}))
+        drive(page)
+        assert news(page, stands="")
+        other.say("go-on")
+        other.say("reset", text="ann")
+        other.say("stand", text="dog")
+        packet = sim.get(WAIT)
+        assert packet is not None
+        assert packet[0] == STOP.key("team"), "nothing came before it"
+        page.send(json.dumps({"kind": "go-on"}))
+        packet = sim.get(WAIT)
+        assert packet is not None
+        assert packet[0] == RESUME.key("team")
+
+
 @pytest.mark.parametrize("answers", [True, False])
 def test_what_came_of_an_emergency_stop_is_told(
     config: Config, buses: tuple[Bus, Bus], tmp_path: Path, answers: bool
@@ -209,11 +233,20 @@ def test_what_came_of_an_emergency_stop_is_told(
     assert len(heard) == 2
 
 
+def test_a_place_where_no_socket_can_be_leaves_the_page(
+    config: Config, buses: tuple[Bus, Bus], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    controls = DriveControls(config, buses[1], drivable=True)
+    with DriveServer(controls, 0, tmp_path / ("long" * 40) / "team-1.sock") as server:
+        assert urlopen(server.url).status == 200
+    assert "no socket for programs of this machine" in capsys.readouterr().err
+
+
 def test_a_port_that_is_taken_is_one_clear_error(
     config: Config, buses: tuple[Bus, Bus], tmp_path: Path
 ) -> None:
     with serving(config, buses[1], tmp_path) as (server, _):
         port = int(server.url.split(":")[2].partition("/")[0])
         controls = DriveControls(config, buses[1], drivable=True)
-        with pytest.raises(BusError, match=r"what drivers reach: got .*in use.*page_port"):
+        with pytest.raises(BusError, match=r"page to drive from: got .*in use.*page_port"):
             DriveServer(controls, port)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from quadriga.recordings.dead_reckoning import follow_speeds
 from quadriga.shared.wire.messages import Measurement
-from quadriga.view.placement import LONGEST_MS, Placement, follow_speeds, quat_of
+from quadriga.view.placement import LONGEST_MS, Placement, quat_of
 
 
 def measurement(tick: int, vx: float, vy: float = 0.0, wz: float = 0.0) -> Measurement:

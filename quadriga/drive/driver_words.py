@@ -46,7 +46,7 @@ class DriverWord:
     number: int = 0
 
 
-def read_said(payload: str | bytes) -> DriverWord:
+def read_driver_word(payload: str | bytes) -> DriverWord:
     """What a text says.
 
     Raises:

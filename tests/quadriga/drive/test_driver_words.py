@@ -9,7 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.drive.said import DRIVE, ESTOP, KINDS, MOST_BYTES, DriverWord, read_said
+from quadriga.drive.driver_words import (
+    DRIVE,
+    ESTOP,
+    KINDS,
+    MOST_BYTES,
+    DriverWord,
+    read_driver_word,
+)
 from quadriga.drive.wish import NAMES, Wish, limits
 from quadriga.shared.errors import MessageError
 
@@ -21,13 +28,13 @@ def text(**body: Any) -> str:
 
 
 def test_a_wish_within_the_limits_is_what_was_asked_for() -> None:
-    said = read_said(text(kind=DRIVE, held=True, number=7, **WISH))
+    said = read_driver_word(text(kind=DRIVE, held=True, number=7, **WISH))
     assert said == DriverWord(DRIVE, Wish(**WISH), held=True, number=7)
-    assert not read_said(text(kind=DRIVE, held=1, **WISH)).held, "only true is"
+    assert not read_driver_word(text(kind=DRIVE, held=1, **WISH)).held, "only true is"
 
 
 def test_a_wish_beyond_the_limits_is_brought_within_them() -> None:
-    said = read_said(text(kind=DRIVE, held=True, vx=1e300, vy=-1e300, wz=9, height=0))
+    said = read_driver_word(text(kind=DRIVE, held=True, vx=1e300, vy=-1e300, wz=9, height=0))
     assert said.wish == Wish(1.2, -0.5, 1.0, 0.2)
 
 
@@ -57,13 +64,13 @@ def test_a_wish_beyond_the_limits_is_brought_within_them() -> None:
 )
 def test_all_else_is_refused_in_a_line(wrong: str) -> None:
     with pytest.raises(MessageError, match=r"^what a driver says: got .*, expected"):
-        read_said(wrong)
+        read_driver_word(wrong)
 
 
 @given(st.binary(max_size=MOST_BYTES + 9) | st.text(max_size=300))
 def test_noise_is_a_word_or_refused(noise: bytes | str) -> None:
     try:
-        said = read_said(noise)
+        said = read_driver_word(noise)
     except MessageError:
         return
     assert said.kind in KINDS
@@ -72,7 +79,7 @@ def test_noise_is_a_word_or_refused(noise: bytes | str) -> None:
 @given(st.dictionaries(st.sampled_from([*NAMES, "held", "kind"]), st.floats() | st.integers()))
 def test_no_number_leads_beyond_the_limits(body: dict[str, Any]) -> None:
     try:
-        said = read_said(json.dumps({**WISH, **body, "kind": DRIVE}))
+        said = read_driver_word(json.dumps({**WISH, **body, "kind": DRIVE}))
     except MessageError:
         return
     for name, (low, high) in limits().items():
@@ -80,4 +87,4 @@ def test_no_number_leads_beyond_the_limits(body: dict[str, Any]) -> None:
 
 
 def test_nobody_sends_escape_sequences_to_a_terminal() -> None:
-    assert read_said(text(kind=ESTOP, text="\x1b[2Jdog")).text.isprintable()
+    assert read_driver_word(text(kind=ESTOP, text="\x1b[2Jdog")).text.isprintable()
