@@ -117,7 +117,10 @@ const drives = () => news !== null && news.driver === news.you;
 
 setInterval(() => {
   watchStopButton();
-  if (!drives() || limits === null) return;
+  if (!drives() || limits === null) {
+    document.body.classList.remove("driving");
+    return;
+  }
   const asked = wish();
   const rest = { vx: 0, vy: 0, wz: 0, height: Number(element("height").value) };
   drive.say({ kind: "drive", held: asked !== null, ...(asked ?? rest) });
@@ -205,10 +208,18 @@ addEventListener("blur", letGo);
 addEventListener("pagehide", () => drive.say({ kind: "release" }));
 document.addEventListener("visibilitychange", () => document.hidden && letGo());
 
-const view = element("view");
-if (view.dataset.src) {
-  view.src = view.dataset.src;
+// The view starts beside the team, and may do so later than this page.
+async function frameView(view, url) {
+  element("no-view").textContent = "The view starts …";
+  for (let found = false; !found; ) {
+    found = await fetch(url, { mode: "no-cors" }).then(() => true, () => false);
+    if (!found) await new Promise((resume) => setTimeout(resume, 500));
+  }
+  view.src = url;
   view.hidden = false;
   element("no-view").hidden = true;
 }
+
+const view = element("view");
+if (view.dataset.src) frameView(view, view.dataset.src);
 show();
