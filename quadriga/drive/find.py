@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 from quadriga.drive.client import PATIENCE, SUFFIX, ControlLink
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.places import make_runtime_dir
@@ -12,7 +10,7 @@ from quadriga.shared.runtime.places import make_runtime_dir
 def open_links(team: str = "", patience: float = PATIENCE) -> list[ControlLink]:
     """Connections to the operators of one team, or of all, by the names of their sockets.
 
-    A socket that a crash has left behind is passed over.
+    A socket that a crash has left behind is removed.
 
     Args:
         team: its name; "": all.
@@ -21,8 +19,12 @@ def open_links(team: str = "", patience: float = PATIENCE) -> list[ControlLink]:
     folder, links = make_runtime_dir(), list[ControlLink]()
     for path in sorted(folder.glob(f"*-*{SUFFIX}")) if folder is not None else ():
         if not team or path.name.rpartition("-")[0] == team:
-            with suppress(OSError):
+            try:
                 links.append(ControlLink(path, patience))
+            except ConnectionRefusedError:
+                path.unlink(missing_ok=True)
+            except OSError:
+                continue
     return links
 
 

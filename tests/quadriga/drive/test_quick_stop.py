@@ -88,11 +88,14 @@ def test_a_team_whose_operator_does_not_answer_is_left_to_the_long_way(
 
 
 def test_other_options_and_no_team_at_all_are_left_to_the_long_way(folder: Path) -> None:
-    (folder / "left-9.sock").touch()
+    left = folder / "left-9.sock"
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(left))
     for options in ([], ["--config", "team.toml"], ["--armed"], ["--reason"]):
         assert stop_quickly(options) == (None, ())
     with pytest.raises(ConfigError, match="no operator on this machine"):
         open_link()
+    assert not left.exists(), "nobody listens there any more"
 
 
 def test_a_link_to_one_team_must_be_to_one(folder: Path) -> None:
