@@ -97,8 +97,9 @@ class _Shell:
         self._lockstep = not realtime
         self._put = {
             topic: bus.publisher(topic.key(team, agent.robot), droppable=realtime)
-            for topic in (COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, AGENT_EVENT)
+            for topic in (COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS)
         }
+        self._put[AGENT_EVENT] = bus.publisher(AGENT_EVENT.key(team, agent.robot), urgent=realtime)
         self._telemetry = Telemetry(config.estimator.kind, paced=realtime)
         self._intake = Intake(config, inbox)
         self._lead = LeadWatch(bus, config)

@@ -97,11 +97,11 @@ class Rising:
             mode: the agent's before this tick.
             last: tick of its last command, −1: it has given none.
             tick: the present one.
-            reset: the operator's release, if it came.
+            reset: the operator's release, if it came; of what was in force when it was said.
             estop: an emergency stop, if one came: it outranks a release.
         """
         if mode.passive:
-            if reset is None or estop is not None or not self._rises:
+            if reset is None or estop is not None or not self._rises or reset.tick < mode.since:
                 return ""
             return with_detail(RESET, reset.by)[:REASON_MOST]
         away = tick > self._latest_ms if last < 0 else tick - last > self._away_ms

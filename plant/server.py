@@ -83,9 +83,9 @@ class PlantServer:
         self._put_truth = bus.publisher(TRUTH.key(team), droppable=realtime)
         self._put_clock = bus.publisher(CLOCK.key(team), droppable=realtime)
         self._put_status = bus.publisher(STATUS.key(team, name), droppable=True)
-        self._put_event = bus.publisher(EVENT.key(team), droppable=realtime)
-        # All leave by it. In lock-step it comes after all else, in real time it waits for nobody.
-        self._put_stop = bus.publisher(EVENT.key(team), urgent=realtime)
+        # The last one has all leave: in lock-step it comes after all else. In real time events wait
+        # for nobody, and are not what gets lost when somebody is slow.
+        self._put_event = bus.publisher(EVENT.key(team), urgent=realtime)
         self._periods = periods(config)
         self._last_tick = round(config.world.seconds * 1000)
         self._fallen: set[str] = set()
@@ -204,7 +204,7 @@ class PlantServer:
         reset = words.reset
         if reset is not None and reset != self._released:
             self._released = reset
-            if self._estopped >= 0 and not words.estop:
+            if 0 <= self._estopped <= reset.tick and not words.estop:
                 self._estopped = -1
                 self.announce(codes.RESET, robot, f"by {reset.by}: robots may get up")
                 plant.expect_down(self._lowered)
@@ -257,6 +257,5 @@ class PlantServer:
             self.announce(codes.MALFORMED, "", detail)
 
     def _send(self, event: Event) -> None:
-        put = self._put_stop if event.kind == "stop" else self._put_event
-        put(encode(event))
+        self._put_event(encode(event))
         print(format_event(event), file=sys.stderr, flush=True)

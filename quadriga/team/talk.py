@@ -20,6 +20,7 @@ from quadriga.shared.wire.topic import Topic
 from quadriga.shared.wire.topics import EVENT, STATUS, topics_for
 
 SEARCH: Final = 5.0  # s, longest search for the team
+_AGAIN, _OFTEN_FOR = 0.1, 1.0  # s: how often a word is said again at first, and for how long
 _MOST_EVENTS: Final = 10_000  # that are kept; more can only be a flood
 
 
@@ -52,6 +53,7 @@ class TeamTalk:
         self._members = frozenset(row.name for row in rows)
         self._repeat: Callable[[], None] | None = None
         self._told = frozenset[str]()
+        self._again, self._until = 0.0, 0.0  # when it is due again, and until when it may be
         self.bus = Bus.open(config.bus, team, role)
         self._statuses = {STATUS.key(team, name): name for name in self.agents}
         for topic in topics_for(role):
@@ -61,14 +63,16 @@ class TeamTalk:
     def publisher(self, topic: Topic) -> Callable[[Message], None]:
         """A function that says a word at once, whatever waits to be sent.
 
-        It is said again, the same to the byte, to those of the team who turn up later: a recorder
-        that has not found this process yet must not miss what agents have heard.
+        It is said again, the same to the byte, while what comes of it is awaited: a few times, as a
+        link that is new or under load may lose it, and to those of the team who turn up later, as a
+        recorder that has not found this process yet must not miss what agents have heard.
         """
         put = self.bus.publisher(topic.key(self.bus.team), urgent=True)
 
         def say(message: Message) -> None:
             word = encode(message)
             self._repeat, self._told = lambda: put(word), self.bus.members_at(HERE)
+            self._again, self._until = monotonic() + _AGAIN, monotonic() + _OFTEN_FOR
             put(word)
 
         return say
@@ -78,9 +82,10 @@ class TeamTalk:
         first = self.bus.get(timeout)
         for packet in (first, *self.bus.drain()) if first else ():
             self._take(*packet)
-        here = self.bus.members_at(HERE)
-        if self._repeat is not None and (here - self._told) & self._members:
-            self._told |= here
+        here, now = self.bus.members_at(HERE), monotonic()
+        is_due = bool((here - self._told) & self._members) or self._again <= now <= self._until
+        if self._repeat is not None and is_due:
+            self._told, self._again = self._told | here, now + _AGAIN
             self._repeat()
         return self.wanted & here
 

@@ -20,8 +20,10 @@ _COMMON: Final = {
     "scouting/multicast/enabled": False,
     "transport/shared_memory/enabled": False,
     # Messages that may wait for a link in real time before they are dropped. With Zenoh's 2 a
-    # recorder on a busy machine loses one in a thousand.
+    # recorder on a busy machine loses one in a thousand. Words of people and events have a queue of
+    # their own, which is empty nearly always.
     "transport/link/tx/queue/size/data": 16,
+    "transport/link/tx/queue/size/real_time": 16,
     # ms, of a handshake with someone who says nothing, frozen or just leaving. Nobody can leave
     # before it is over, and Zenoh's 10 s are longer than a process is given.
     "transport/unicast/open_timeout": 2000,

@@ -40,7 +40,7 @@ class Line:
     def members_at(self, stage: str) -> frozenset[str]:
         return frozenset({"sim"})
 
-    def publisher(self, key: str, *, droppable: bool) -> Callable[[bytes], None]:
+    def publisher(self, key: str, **_: bool) -> Callable[[bytes], None]:
         return self._note if key.endswith("command") else lambda payload: None
 
     def _note(self, payload: bytes) -> None:

@@ -156,6 +156,8 @@ def test_who_is_damped_gets_up_when_the_operator_releases_it_by_name(walk: str, 
     assert rising.why_now(mode, FROM - 1, FROM, RELEASE, None) == "reset:ann"
     assert not rising.why_now(mode, FROM - 1, FROM, RELEASE, EStop(FROM, 0, "dog"))
     assert not rising.why_now(mode, FROM - 1, FROM, None, None)
+    early = Reset(mode.since - 1, 0, "ann")
+    assert not rising.why_now(mode, FROM - 1, FROM, early, None), "said before the stop"
     for other in (Mode(WALK, 300), Mode(STAND, 0), Mode(STOPPING, 5, "stopped:ann"), RISES):
         assert not rising.why_now(other, FROM - 1, FROM, RELEASE, None)
 

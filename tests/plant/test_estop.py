@@ -89,6 +89,15 @@ def test_a_release_that_comes_twice_ends_no_stop_that_was_pressed_meanwhile() ->
     assert told == [(0, codes.ESTOPPED), (1, codes.RESET), (2, codes.ESTOPPED), (4, codes.RESET)]
 
 
+def test_a_release_that_was_said_before_a_stop_does_not_end_it() -> None:
+    server, listener = served(spawn="standing")
+    say(server, NO_WORDS, Words("dog"), Words(reset=RELEASE), Words(reset=Reset(1, 0, "ann")))
+    for _ in range(4):
+        server.step({"r1": STAND})
+    told = [(e.tick, e.code) for e in listener.events() if e.kind == "fault"]
+    assert told == [(1, codes.ESTOPPED), (3, codes.RESET)]
+
+
 def test_whoever_presses_it_again_gets_an_answer_though_not_with_every_tick() -> None:
     server, listener = served(spawn="standing")
     server.words = lambda: Words("dog")
@@ -106,7 +115,7 @@ def test_a_stopped_robot_sinks_and_that_is_no_fall_but_one_after_its_release_is(
     told = [event.code for event in listener.events() if event.kind == "fault"]
     assert told == [codes.ESTOPPED, codes.LIES]
     assert server.plant.truth().base_pos[0, 2] < 0.15  # type: ignore[union-attr]
-    say(server, Words(reset=RELEASE))
+    say(server, Words(reset=Reset(server.plant.tick, 0, "ann")))
     up = 0.0
     while up < 0.27 and server.plant.tick < 6000:
         assert server.step({"r1": STAND}) is None
