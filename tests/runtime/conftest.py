@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from fcntl import LOCK_EX, flock
 from pathlib import Path
 
 import pytest
@@ -20,11 +21,14 @@ from quadriga.shared.config.write import to_toml
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.wire.topic import Topic
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, ProcessSpec, process_table
 from quadriga.warm_up import warm_up
 
 WAIT = 60.0  # s, more than anything here takes on a busy machine
+# Two workers share the cores: who merely computes lets the other's team run, too.
+ORDINARY = {"runtime.priority": "ordinary"}
 # Less than a team collects by default, which takes minutes; for all tests the same, so that they
 # collect but once.
 DATA = {"identification.seconds": 60.0}
@@ -98,7 +102,8 @@ def make_team(tmp_path: Path) -> Make:
             "bus.clock_timeout": 5.0,  # a machine that runs other tests stalls
             "recorder.enabled": False,
         }
-        given |= {name.replace("__", "."): value for name, value in keys.items()}
+        keys = {"world.mode": "lockstep"} | {n.replace("__", "."): v for n, v in keys.items()}
+        given |= (ORDINARY if keys["world.mode"] == "lockstep" else {}) | keys
         return Team(load(None, given), tmp_path)
 
     return make
@@ -111,14 +116,28 @@ def _compiled() -> None:
 
 
 @pytest.fixture
-def watcher() -> Iterator[Callable[[Team], Bus]]:
-    """A function that puts a bus on a team's network that hears everything."""
+def _alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """One at a time of the tests whose team needs more than one of two cores to keep real time."""
+    with (tmp_path_factory.getbasetemp().parent / "alone.lock").open("w") as file:
+        flock(file, LOCK_EX)
+        yield
+
+
+@pytest.fixture
+def watcher() -> Iterator[Callable[..., Bus]]:
+    """A function that puts a bus on a team's network that hears everything, or some topics.
+
+    In real time what somebody does not take in soon enough is dropped: on a busy machine a test
+    that hears everything may miss an event.
+    """
     buses = []
 
-    def join(team: Team, name: str = "watcher") -> Bus:
-        bus = Bus.open(team.config.bus, team.config.team.name, name)
+    def join(team: Team, *topics: Topic) -> Bus:
+        name = team.config.team.name
+        bus = Bus.open(team.config.bus, name, "watcher")
         buses.append(bus)
-        bus.subscribe(f"{team.config.team.name}/**")
+        for key in [topic.key(name, "*") for topic in topics] or (f"{name}/**",):
+            bus.subscribe(key)
         return bus
 
     yield join

@@ -40,7 +40,7 @@ PATIENT: dict[str, Any] = {
     "bridge.speed_share": 1.5,
 }
 
-pytestmark = pytest.mark.usefixtures("_compiled")
+pytestmark = pytest.mark.usefixtures("_alone", "_compiled")
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from tests.browser import CHROMIUM, WHY_NOT, Browser, Page, browser
 from tests.runtime.conftest import WAIT, Make, Team
 
 pytestmark = [
-    pytest.mark.usefixtures("_compiled"),
+    pytest.mark.usefixtures("_alone", "_compiled"),
     pytest.mark.skipif(CHROMIUM is None, reason=WHY_NOT),
 ]
 Watcher = Callable[..., Bus]

@@ -18,6 +18,7 @@ from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.recording.writer import END
 from quadriga.shared.wire.codes import LEAD_GONE, LINK_LOST
+from quadriga.shared.wire.topics import TRUTH
 from quadriga.team.launch import Launch
 from quadriga.team.run_report import report_folder
 from tests.runtime.conftest import WAIT, Make, Team
@@ -55,7 +56,7 @@ def test_kill_9_of_who_drives_time(
 ) -> None:
     team = make_team(recorder__enabled=True, world__seconds=600.0)
     with team.launch(standing=False) as running:
-        await_tick(watcher(team), 500)
+        await_tick(watcher(team, TRUTH), 500)
         os.kill(running.pids["sim"], signal.SIGKILL)
         ended = statuses(running)
     assert ended == {"sim": -signal.SIGKILL, "r1": 1, "r2": 1, "operator": 1, "recorder": 1}
@@ -74,7 +75,7 @@ def test_kill_9_of_the_router(
     with router(team) as process:
         await_routing(process)
         with team.launch(standing=False) as running:
-            await_tick(watcher(team), 500)
+            await_tick(watcher(team, TRUTH), 500)
             process.kill()
             ended = statuses(running)
     assert ended == dict.fromkeys(("sim", "r1", "r2", "operator", "recorder"), 1)

@@ -17,7 +17,7 @@ ARGUMENTS = (
 )
 
 
-@pytest.mark.usefixtures("_compiled")
+@pytest.mark.usefixtures("_alone", "_compiled")
 def test_a_killed_agent_and_a_dead_knee(tmp_path: Path) -> None:
     rows_file, folder = tmp_path / "rows.json", tmp_path / "out"
     faults = ("agent-killed", "knee-off")

@@ -25,7 +25,7 @@ from quadriga.shared.wire.messages import Command, Measurement, Plan
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.team.operator import reference_at
-from tests.runtime.conftest import DATA
+from tests.runtime.conftest import DATA, ORDINARY
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
@@ -46,6 +46,7 @@ def config_of(kind: str) -> Config:
         "world.seed": 4,
         "bus.endpoint": free_endpoint(),
         **DATA,
+        **ORDINARY,
         **KINDS[kind],
     }
     return load(None, given)

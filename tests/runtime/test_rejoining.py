@@ -19,12 +19,12 @@ from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.codes import FALL, INPUT_LOST, LINK_BACK, LOWERED, RESUMED, STANDS_AGAIN
 from quadriga.shared.wire.messages import Event
-from quadriga.shared.wire.topics import find_topic
+from quadriga.shared.wire.topics import AGENT_EVENT, EVENT, TRUTH, find_topic
 from quadriga.team.launch import Launch, router_row
 from tests.runtime.conftest import WAIT, Make, Team
 from tests.runtime.frozen import await_tick
 
-pytestmark = pytest.mark.usefixtures("_compiled")
+pytestmark = pytest.mark.usefixtures("_alone", "_compiled")
 
 Watcher = Callable[..., Bus]
 News = tuple[str, str]  # robot, code of an event
@@ -66,7 +66,7 @@ def test_an_agent_an_operator_and_a_recorder(
 ) -> None:
     team = make_team(**REAL)
     with team.launch(standing=False) as running:
-        bus = watcher(team)
+        bus = watcher(team, EVENT, AGENT_EVENT, TRUTH)
         await_tick(bus, 1500)
         kill(running, "r2")
         await_news(bus, ("r1", INPUT_LOST), ("r2", LOWERED))
@@ -102,7 +102,7 @@ def test_a_router_and_the_word_to_go_on(make_team: Make, watcher: Watcher) -> No
     rows = (router_row(team.config, team.folder), *team.rows(standing=False))
     with Launch(rows, team.folder / "logs") as running:
         team.await_log("router", "routing at")
-        bus = watcher(team)
+        bus = watcher(team, EVENT, AGENT_EVENT, TRUTH)
         await_tick(bus, 1500)
         kill(running, "router")
         running.restart("router")

@@ -43,7 +43,7 @@ from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.what_if.what_if import Branch, WhatIf, answer_what_if
 from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
-from tests.runtime.conftest import DATA, WAIT
+from tests.runtime.conftest import DATA, ORDINARY, WAIT
 from tests.runtime.frozen import PATIENCE, await_event, await_tick, freeze
 
 pytestmark = pytest.mark.usefixtures("_compiled")
@@ -55,6 +55,7 @@ SWING = 300  # the tick at which the first feet leave the ground
 def walked(folder: Path, disturb: Disturb | None = None, **keys: Any) -> Path:
     """The recording of a walk of two robots with all processes."""
     given = {**DATA, "team.robots": 2, "bus.endpoint": free_endpoint(), "world.seed": 5}
+    given |= ORDINARY if "world__mode" not in keys else {}
     given |= {name.replace("__", "."): value for name, value in keys.items()}
     config = load(None, given)
     predictor = ensure_predictor(config, Console(stderr=True))

@@ -21,7 +21,10 @@ from tests.runtime.conftest import WAIT
 
 Start = Callable[..., subprocess.Popen[str]]
 QUADRIGA = (sys.executable, "-m", "quadriga")
-OPTIONS = ("--robots", "2", "--planner", "none", "--no-render")
+OPTIONS = (
+    *("--robots", "2", "--planner", "none", "--no-render"),
+    *("--set", "runtime.priority=ordinary"),  # as conftest's ORDINARY
+)
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
