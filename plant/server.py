@@ -26,7 +26,7 @@ from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import encode, truncate_text
 from quadriga.shared.wire.event_line import format_event
 from quadriga.shared.wire.messages import Clock, Command, Event, Reset, SafeStop, Status
-from quadriga.shared.wire.topics import CLOCK, EVENT, STATE, STATUS, TRUTH
+from quadriga.shared.wire.topics import CLOCK, EVENT, POSTURE, STATE, STATUS, TRUTH
 
 _TOLD_AFTER: Final = 5.0  # s; a process looks for a router that is gone at least every 4 s
 FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first simulated fall
@@ -80,6 +80,9 @@ class PlantServer:
         self._put_silent = {
             name: bus.publisher(STATE.key(team, name), droppable=True) for name in plant.names
         }
+        self._put_posture = {
+            name: bus.publisher(POSTURE.key(team, name), droppable=True) for name in plant.names
+        }
         self._put_truth = bus.publisher(TRUTH.key(team), droppable=realtime)
         self._put_clock = bus.publisher(CLOCK.key(team), droppable=realtime)
         self._put_status = bus.publisher(STATUS.key(team, name), droppable=True)
@@ -106,11 +109,15 @@ class PlantServer:
             truth = plant.truth()
             if truth is not None:
                 self._put_truth(encode(truth))
+        is_seen = plant.tick % POSTURE.period_ms == 0
         for name, state in plant.states().items():
             # Other plants wait for every state in lock-step: theirs may not be lost.
             droppable = name in self.silent and self.time.alone
             put = self._put_silent if droppable else self._put_state
-            put[name](encode(state))
+            payload = encode(state)
+            put[name](payload)
+            if is_seen:
+                self._put_posture[name](payload)
         self._published = plant.tick
         plant.settle()
 

@@ -8,6 +8,7 @@ from typing import Final
 
 from quadriga.commands import (
     agent,
+    bench_stop,
     bridge,
     campaign,
     certs,
@@ -65,7 +66,8 @@ GROUPS: Final[Mapping[str, tuple[Callable[[AddCommand], None], ...]]] = MappingP
         ),
         "walk recordings again": (replay.add, resim.add, whatif.add),
         "experiments": (
-            campaign.add, experiments.add, fault.add, desk.add, probe.add, tune.add,
+            campaign.add, experiments.add, fault.add, desk.add, bench_stop.add, probe.add,
+            tune.add,
         ),
         "data and predictors": (prepare.add, collect.add, fit.add),
         "processes of a team, one by one": (

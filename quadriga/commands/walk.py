@@ -30,14 +30,17 @@ def add(add_command: AddCommand) -> None:
         help="by hand, from a page whose URL is printed, or by `quadriga drive`: in real time and "
         "for an hour, unless said otherwise",
     )
-    command.add_argument(
+    show = command.add_mutually_exclusive_group()
+    show.add_argument(
         "--view",
         type=int,
         nargs="?",
         const=0,
         metavar="PORT",
-        help="show the walk in the browser, at this port (8090, or any that is free)",
+        help="show the walk in the browser, at this port (8090, or any that is free); so it is "
+        "without the option in a terminal with a display",
     )
+    show.add_argument("--no-view", action="store_true", help="do not show it there")
     add_no_render(command)
 
 
@@ -48,7 +51,7 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     from quadriga.team.endpoint import free_endpoint
     from quadriga.team.run_folder import check_own_config
     from quadriga.team.walk import walk
-    from quadriga.view.port import check_port, free_port
+    from quadriga.view.port import choose_port, is_at_display
 
     check_own_config(arguments.config, arguments.out)
     # Several walks on one machine are the rule; only who names an endpoint wants that one.
@@ -59,16 +62,13 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     if arguments.armed and config.team.plant != BRIDGED:
         plant = config.team.plant
         raise ConfigError("--armed", f"with team.plant {plant!r}", f"team.plant {BRIDGED!r}")
-    port = arguments.view
-    if port is not None:
-        port = check_port(port, "--view") if port else free_port()
     return walk(
         config,
         arguments.out,
         pictures=not arguments.no_render,
         console=Console(),
         armed=arguments.armed,
-        view=port,
+        view=choose_port(arguments.view, wanted=not arguments.no_view and is_at_display()),
     )
 
 

@@ -19,8 +19,8 @@ from quadriga.shared.wire.topics import (
     EVENT,
     MEASUREMENT,
     PLAN,
+    POSTURE,
     REFERENCE,
-    STATE,
     STATUS,
     TRUTH,
 )
@@ -37,7 +37,7 @@ _QUIET_S: Final = 2.0  # without a message after which the heading says so
 _REPORT_S: Final = 1.0  # between two reports of the traffic
 _UNSEEN_S: Final = 0.15  # between two looks while nobody has the page open
 _POLITE: Final = 10  # added to the nice value: a team on the same machine comes first
-_NEWEST: Final = (STATE, TRUTH, PLAN, STATUS, REFERENCE)  # of which the newest message is enough
+_NEWEST: Final = (POSTURE, TRUTH, PLAN, STATUS, REFERENCE)  # of which the newest message is enough
 
 
 class _Source(NamedTuple):
@@ -52,8 +52,8 @@ class _Source(NamedTuple):
 class _Feed:
     """What a team sends, taken in whenever somebody asks.
 
-    Of a thousand states a second only the newest is fetched from Zenoh, since each that is costs
-    20 µs; so they are not counted.
+    Each message that is fetched from Zenoh costs 20 µs, so the thousand states a second of each
+    robot are not listened to: their postures do.
 
     Attributes:
         gatherer: has the newest of all.
@@ -64,16 +64,11 @@ class _Feed:
     def __init__(self, bus: Bus, shape: TeamShape, now: float) -> None:
         self.gatherer, self.traffic = Gatherer(shape), Traffic(now)
         self.happenings: list[tuple[int, str]] = []
-        per_robot = (STATE, MEASUREMENT, PLAN, STATUS, AGENT_EVENT)
+        per_robot = (POSTURE, MEASUREMENT, PLAN, STATUS, AGENT_EVENT)
         wanted = [(topic, "") for topic in (TRUTH, REFERENCE, EVENT)]
         wanted += [(topic, robot) for robot in shape.robots for topic in per_robot]
         self._sources = [
-            _Source(
-                key.partition("/")[2],
-                topic,
-                robot,
-                bus.keep_newest(key, 1 if topic is STATE else _KEPT),
-            )
+            _Source(key.partition("/")[2], topic, robot, bus.keep_newest(key, _KEPT))
             for topic, robot in wanted
             if (key := topic.key(bus.team, robot))
         ]
@@ -100,10 +95,7 @@ class _Feed:
                     self.happenings = [*self.happenings[1 - _EVENTS :], (message.tick, text)]
                 else:
                     self.gatherer.take(message, source.robot)
-            if source.topic is STATE:
-                self.traffic.see(source.name, tick, now)
-            else:
-                self.traffic.note(source.name, fresh.messages, tick, now)
+            self.traffic.note(source.name, fresh.messages, tick, now)
             any_came |= fresh.messages > 0
         return any_came
 
@@ -123,9 +115,9 @@ def view_live(
         ConfigError: the port is in use, or what it takes to draw the robots is missing.
         BusError: the bus cannot be opened.
     """
-    os.nice(_POLITE)
     team = config.team.name
     with open_server(port, f"quadriga · {team}") as server:
+        os.nice(_POLITE)
         stage = TeamStage(server, build_team_shape(config))
         say(f"team {team!r} at {config.bus.endpoint} in the browser: {url_of(server.get_port())}")
         with Bus.open(config.bus, team, f"view-{os.getpid()}", stopped) as bus:

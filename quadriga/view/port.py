@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import socket
+import sys
 from typing import Final
 
 from quadriga.shared.errors import ConfigError, system_reason
@@ -35,6 +37,27 @@ def free_port() -> int:
         return check_port(PORT)
     except ConfigError:
         return check_port(0)
+
+
+def choose_port(asked: int | None, *, wanted: bool) -> int | None:
+    """Where a walk is shown; None: nowhere.
+
+    Args:
+        asked: the port that was asked for; 0: any; None: none was.
+        wanted: whether it is shown then all the same.
+
+    Raises:
+        ConfigError: the port that was asked for cannot be had.
+    """
+    if asked:
+        return check_port(asked, "--view")
+    return free_port() if wanted or asked is not None else None
+
+
+def is_at_display() -> bool:
+    """Whether somebody sits there: standard output is a terminal, of a computer with a display."""
+    shown = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    return shown and sys.stdout.isatty()
 
 
 def taken_error(port: int, reason: str, option: str = "--port") -> ConfigError:

@@ -11,15 +11,14 @@ class KeyTraffic:
 
     Attributes:
         key: without the team.
-        per_s: messages per second of the wall clock, over the last second or so; None of a key of
-            which messages are not counted.
+        per_s: messages per second of the wall clock, over the last second or so.
         behind_ms: world time of its newest message, less than that of the newest of all, ms; None
             if none has come yet.
         silent_s: since the newest came, s; None if none has come yet.
     """
 
     key: str
-    per_s: float | None
+    per_s: float
     behind_ms: int | None
     silent_s: float | None
 
@@ -31,7 +30,6 @@ class _Count:
     messages: int = 0
     tick: int = -1
     came: float = 0.0
-    counted: bool = True
 
 
 class Traffic:
@@ -41,12 +39,6 @@ class Traffic:
         """Begin to count, `now` in seconds of a clock that never goes back."""
         self._counts: dict[str, _Count] = {}
         self._since = now
-
-    def see(self, key: str, tick: int, now: float) -> None:
-        """There are messages of a key, of which the newest is of `tick`; how many is not known."""
-        known = self._counts.setdefault(key, _Count(counted=False))
-        if tick >= 0:
-            known.tick, known.came = max(known.tick, tick), now
 
     def note(self, key: str, count: int, tick: int, now: float) -> None:
         """`count` more messages of a key; `tick` is that of the newest, unless negative."""
@@ -62,7 +54,7 @@ class Traffic:
         rows = tuple(
             KeyTraffic(
                 key=key,
-                per_s=count.messages / seconds if count.counted else None,
+                per_s=count.messages / seconds,
                 behind_ms=newest - count.tick if count.tick >= 0 else None,
                 silent_s=now - count.came if count.tick >= 0 else None,
             )

@@ -83,8 +83,7 @@ def format_traffic(rows: Iterable[KeyTraffic]) -> str:
         silent = _NONE if row.silent_s is None else f"{row.silent_s:.1f} s"
         pale = row.silent_s is None or row.silent_s > _QUIET_S
         key = f"<span style='opacity:{0.5 if pale else 1}'>{escape(row.key)}</span>"
-        often = _NONE if row.per_s is None else f"{row.per_s:.0f}"
-        cells.append((key, often, behind, silent))
+        cells.append((key, f"{row.per_s:.0f}", behind, silent))
     return _block(_table(heads, cells, numbers=(1, 2, 3)))
 
 

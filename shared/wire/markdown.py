@@ -40,7 +40,7 @@ recorded.
 def to_markdown() -> str:
     """The page: the table of topics, then a table for each message; the same of questions."""
     rows = "".join(f"| {' | '.join(_row(topic))} |\n" for topic in TABLE)
-    messages = "".join(_section(topic.type) for topic in TABLE)
+    messages = "".join(map(_section, dict.fromkeys(topic.type for topic in TABLE)))
     questions = "".join(
         f"| `{item.name}` | [{item.type.__name__}](#{item.type.__name__.lower()}) "
         f"| {', '.join(item.askers)} |\n"

@@ -83,6 +83,10 @@ CLOCK: Final = Topic(
     "clock", msg.Clock, (SIM,), (OPERATOR, LAUNCHER, *_SPEAKERS, SIM),
     period_ms=CONFIGURED, recorded=False,
 )  # fmt: skip
+# For who watches: states of some ticks alone. Not recorded either.
+POSTURE: Final = Topic(
+    "posture", msg.State, (SIM,), (), per_robot=True, period_ms=SAMPLE_MS, recorded=False
+)
 # In real time between plants of single robots; clocks of computers, so not of a replay. They tell
 # afterwards how well the team's clock was known, and cost 2 kB/s.
 CLOCK_ASK: Final = Topic(
@@ -97,7 +101,7 @@ REFUSED: Final = Topic("refused", msg.Refusal, (ROUTER,), (), period_ms=0, repea
 
 _OWN: Final = (
     STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, *WORDS, LIVE_FAULT, TRUTH,
-    EVENT, AGENT_EVENT, CLOCK, CLOCK_ASK, CLOCK_ANSWER, REFUSED,
+    EVENT, AGENT_EVENT, CLOCK, POSTURE, CLOCK_ASK, CLOCK_ANSWER, REFUSED,
 )  # fmt: skip
 TABLE: Final = (*_OWN, *plugin_topics(_OWN))
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}

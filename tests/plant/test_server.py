@@ -15,7 +15,7 @@ from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import MAX_TEXT, decode, encode
 from quadriga.shared.wire.messages import Clock, Command, Event, State
-from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, STATE, TRUTH
+from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, POSTURE, STATE, TRUTH
 from quadriga.sim_server.world.world import World
 from tests.sim_server.standing import configured
 
@@ -78,6 +78,18 @@ def test_in_real_time_nothing_waits_for_who_does_not_listen(mode: str) -> None:
     assert {waits for key, waits, _ in listener.packets if key in keys} == {mode == "lockstep"}
 
 
+def test_who_watches_gets_the_states_of_some_ticks_and_holds_up_nobody() -> None:
+    server, listener = served()
+    for _ in range(25):
+        server.publish()
+        server.step({})
+    key = STATE.key("team", "r1")
+    states = [payload for sent, _, payload in listener.packets if sent == key]
+    postures = [p for p in listener.packets if p[0] == POSTURE.key("team", "r1")]
+    assert [payload for _, _, payload in postures] == [states[0], states[10], states[20]]
+    assert not any(waits for _, waits, _ in postures)
+
+
 class BlindPlant(Plant):
     """One robot that stands, or is down at the first tick; nobody knows where it is."""
 
@@ -112,7 +124,8 @@ def test_any_plant_is_served(down: str, last: int) -> None:
     while end is None:
         server.publish()
         end = server.step({})
-    ours = {STATE.key("team", "r1"), EVENT.key("team"), CLOCK.key("team")}
+    of_robot = {topic.key("team", "r1") for topic in (STATE, POSTURE)}
+    ours = of_robot | {EVENT.key("team"), CLOCK.key("team")}
     assert {key for key, _, _ in listener.packets} <= ours
     clock = [decode(p, Clock).tick for key, _, p in listener.packets if key == CLOCK.key("team")]
     assert clock == list(range(0, server.plant.tick, 10))

@@ -60,6 +60,6 @@ def freeze(running: Launch, bus: Bus, robot: str, tick: int, ticks: int) -> None
             now = decode(payload, Truth).tick
     os.kill(pids[robot], signal.SIGCONT)
     answers = (decode(payload, Command) for payload in payloads(bus, COMMAND.key(TEAM, robot)))
-    # The world sends the truth of a tick first: the states of that one may be under way with it.
-    next(answer for answer in answers if answer.tick >= now - 1)
+    # The newest states may not have left the world's process, which stands still.
+    next(answer for answer in answers if answer.tick > now - ticks // 2)
     os.kill(pids["sim"], signal.SIGCONT)

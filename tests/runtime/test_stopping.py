@@ -32,10 +32,8 @@ pytestmark = pytest.mark.usefixtures("_compiled")
 Watcher = Callable[..., Bus]
 
 
-@pytest.mark.parametrize(
-    ("mode", "robots"),
-    [("lockstep", 1), pytest.param("realtime", 2, marks=pytest.mark.usefixtures("_alone"))],
-)
+@pytest.mark.usefixtures("_alone")
+@pytest.mark.parametrize(("mode", "robots"), [("lockstep", 1), ("realtime", 2)])
 def test_stopped_released_and_sent_on(
     make_team: Make, watcher: Watcher, capsys: pytest.CaptureFixture[str], mode: str, robots: int
 ) -> None:

@@ -25,8 +25,6 @@ def test_rates_are_of_the_time_since_the_last_report() -> None:
     assert state == KeyTraffic("r1/state", 1000.0, 0, 0.0)
     assert plan == KeyTraffic("r1/plan", 20.0, 30, 0.25)
     assert [row.per_s for row in traffic.report(12.0)] == [0.0, 0.0]
-    traffic.see("r2/state", 720, 12.0)
-    assert traffic.report(12.5)[-1] == KeyTraffic("r2/state", None, 10, 0.5)
 
 
 def test_curves_hold_the_last_seconds(known_run: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import socket
@@ -22,10 +23,12 @@ from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Message
+from quadriga.shared.wire.topics import POSTURE, STATE
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import QUADRIGA
 from quadriga.team.spectator import view_beside
-from quadriga.view.port import check_port, url_of
+from quadriga.view.port import check_port, choose_port, is_at_display, url_of
 from tests.golden.scenario import RECORDING
 from tests.listening import await_listener
 from tests.quadriga.conftest import packets, run_config
@@ -64,13 +67,24 @@ def test_a_recording_plays_and_pauses() -> None:
         assert "2 × Unitree A1" in heading["updates"]["content"]
         push = page.await_message(labelled("go to"))["props"]["options"]
         assert push[0].startswith("0.30 s push r2")
-        button = page.await_message(labelled("pause"))["uuid"]
-        page.await_message(updates(button, label="play"))  # at the end of 0.6 s
+        # It has played since before the page was there; after 0.6 s it is at its end.
+        playing, at_its_end = labelled("pause"), labelled("play")
+        button = page.await_message(lambda sent: playing(sent) or at_its_end(sent))["uuid"]
+        ends = updates(button, label="play")
+        page.await_message(lambda sent: at_its_end(sent) or ends(sent))
         page.forget()
         page.click(button)
         page.await_message(updates(button, label="pause"))
         page.await_message(named("/team/links/0", "Update"))
         end(process, signal.SIGINT)
+
+
+def traffic(config: Config, before: int) -> Iterator[tuple[str, Message]]:
+    """What a team sends before a tick, its plant for who watches, too."""
+    for key, message in takewhile(lambda packet: packet[1].tick < before, packets(config, 0.3)):
+        yield key, message
+        if key.endswith(f"/{STATE.name}") and message.tick % POSTURE.period_ms == 0:
+            yield key.replace(STATE.name, POSTURE.name), message
 
 
 def test_a_running_team_is_shown_and_hears_nothing(tmp_path: Path) -> None:
@@ -85,15 +99,15 @@ def test_a_running_team_is_shown_and_hears_nothing(tmp_path: Path) -> None:
     ):
         page.await_message(lambda sent: "nobody is heard yet" in str(sent.get("updates")))
         put = {}
-        for key, _ in takewhile(lambda packet: packet[1].tick < 401, packets(config, 0.3)):
-            if key not in put:  # a thousand commands a second are not asked for
-                await_listener(team, key, there=not key.endswith("command"))
+        for key, _ in traffic(config, 401):
+            if key not in put:  # what comes a thousand times a second is not asked for
+                await_listener(team, key, there=not key.endswith(("command", "state")))
                 put[key] = team.publisher(key)
         team.subscribe("team/**")
-        for key, message in takewhile(lambda packet: packet[1].tick < 600, packets(config, 0.3)):
+        for key, message in traffic(config, 600):
             put[key](encode(message))
         page.await_message(lambda sent: "simulator's truth" in str(sent.get("updates")))
-        page.await_message(lambda sent: "r1/state" in str(sent.get("updates")))
+        page.await_message(lambda sent: "r1/posture" in str(sent.get("updates")))
         page.await_message(named("/team/links/0", "Update"))
         assert not team.drain()
         end(process, signal.SIGTERM)
@@ -124,6 +138,26 @@ def test_mistakes_cost_one_line(
     assert "--port" in line_of(capsys, ["view", "--port", "70000"])
     monkeypatch.setitem(sys.modules, "viser", None)
     assert "the package viser" in line_of(capsys, ["view"])
+
+
+def test_a_walk_is_shown_if_asked_for_or_in_a_terminal_with_a_display(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    port = check_port(0)
+    assert choose_port(port, wanted=False) == port
+    assert choose_port(0, wanted=False)
+    assert choose_port(None, wanted=True)
+    assert choose_port(None, wanted=False) is None
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    outside, inside = os.openpty()
+    with os.fdopen(outside, "r"), os.fdopen(inside, "w") as terminal:
+        monkeypatch.setattr(sys, "stdout", terminal)
+        assert not is_at_display()
+        monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
+        assert is_at_display()
+    monkeypatch.setattr(sys, "stdout", io.StringIO())
+    assert not is_at_display()
 
 
 def test_a_view_that_fails_is_told_of_and_hurts_nobody(

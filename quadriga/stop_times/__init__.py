@@ -1,0 +1,1 @@
+"""How long it takes from each way to stop a team until it has stopped."""

@@ -1,0 +1,133 @@
+"""SHELL of the ways to stop a team: each is what a person has at hand, with its own process."""
+
+from __future__ import annotations
+
+import os
+import pty
+import struct
+import subprocess
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+from quadriga.drive.gamepad import STOP_BUTTON
+from quadriga.shared.errors import ProcessError
+from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
+from quadriga.stop_times.page_driver import PageDriver
+from quadriga.team.launch import QUADRIGA
+
+Press = Callable[[], int]  # presses; wall clock at the press, ns
+Way = Callable[[PageDriver, str, Path], AbstractContextManager[Press]]  # of a team, in a folder
+_READY_S: Final = 30.0  # for a program to listen to its keys
+_GRACE_S: Final = 5.0
+_SHOWN: Final = "STOP"  # what it says of its keys or buttons, once it listens to them
+_BUTTON: Final = 0x01  # kind of an event of linux/joystick.h
+
+
+@contextmanager
+def by_page(page: PageDriver, _team: str, _folder: Path) -> Iterator[Press]:
+    """The page's button, from the page that drives."""
+    yield page.press_stop
+
+
+@contextmanager
+def by_silence(page: PageDriver, _team: str, _folder: Path) -> Iterator[Press]:
+    """The page that drives says nothing any more."""
+    yield page.fall_silent
+
+
+@contextmanager
+def by_estop(_page: PageDriver, _team: str, folder: Path) -> Iterator[Press]:
+    """`quadriga estop`, from the start of its process."""
+    running: list[subprocess.Popen[bytes]] = []
+    with (folder / "estop.log").open("ab") as log:
+
+        def press() -> int:
+            at = wall_ns()
+            command = (*QUADRIGA, "estop", "--reason", "bench")
+            running.append(subprocess.Popen(command, stdout=log, stderr=log))
+            return at
+
+        try:
+            yield press
+        finally:
+            for process in running:
+                _end(process)
+
+
+@contextmanager
+def by_keyboard(_page: PageDriver, team: str, folder: Path) -> Iterator[Press]:
+    """The key of `quadriga drive --keyboard`, in a terminal of its own."""
+    terminal, inside = pty.openpty()
+    try:
+        with _driving(("--keyboard",), team, folder / "keyboard.log", inside):
+            yield lambda: _write(terminal, b"k")
+    finally:
+        os.close(terminal)
+        os.close(inside)
+
+
+@contextmanager
+def by_gamepad(_page: PageDriver, team: str, folder: Path) -> Iterator[Press]:
+    """The button of `quadriga drive --gamepad`, of a pad that is a pipe."""
+    pad = folder / "gamepad"
+    os.mkfifo(pad)
+    pipe = os.open(pad, os.O_RDWR)
+    down, up = (struct.pack("<IhBB", 0, value, _BUTTON, STOP_BUTTON) for value in (1, 0))
+    try:
+        with _driving(("--gamepad", str(pad)), team, folder / "gamepad.log"):
+            yield lambda: _write(pipe, down + up)
+    finally:
+        os.close(pipe)
+        pad.unlink()
+
+
+WAYS: Final[Mapping[str, Way]] = MappingProxyType(
+    {
+        "page": by_page,
+        "keyboard": by_keyboard,
+        "estop": by_estop,
+        "gamepad": by_gamepad,
+        "silence": by_silence,
+    }
+)
+STANDS: Final = frozenset(("silence",))  # after which robots stand, instead of being damped
+
+
+def _write(descriptor: int, payload: bytes) -> int:
+    at = wall_ns()
+    os.write(descriptor, payload)
+    return at
+
+
+@contextmanager
+def _driving(
+    options: tuple[str, ...], team: str, path: Path, terminal: int = subprocess.DEVNULL
+) -> Iterator[None]:
+    """`quadriga drive` within the block, once it has shown what it listens to."""
+    command = (*QUADRIGA, "drive", *options, "--set", f"team.name={team}")
+    with path.open("wb") as log:
+        process = subprocess.Popen(
+            command, stdin=terminal, stdout=log, stderr=log, start_new_session=True
+        )
+    try:
+        deadline = monotonic() + _READY_S
+        while _SHOWN not in path.read_text(encoding="utf-8", errors="replace"):
+            if process.poll() is not None or monotonic() > deadline:
+                said = path.read_text(encoding="utf-8", errors="replace").strip()
+                raise ProcessError("quadriga drive", said[-200:] or "nothing said", "to listen")
+            sleep(0.05)
+        yield
+    finally:
+        _end(process)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(_GRACE_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
