@@ -9,7 +9,7 @@ from quadriga.commands.options import recording_path
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.signals import stop_flag
-from quadriga.view.port import PORT
+from quadriga.view.port import HOST, PORT, PageAddress
 
 
 def add(add_command: AddCommand) -> None:
@@ -26,8 +26,16 @@ def add(add_command: AddCommand) -> None:
         type=int,
         default=PORT,
         metavar="PORT",
-        help="of the page, on this machine alone; 0: any that is free (%(default)s)",
+        help="of the page; 0: any that is free (%(default)s)",
     )
+    command.add_argument(
+        "--host",
+        default=HOST,
+        metavar="ADDRESS",
+        help="of the page (%(default)s: this machine alone); whoever reaches another one sees the "
+        "team, and can move what is played",
+    )
+    command.add_argument("--once", action="store_true", help="leave when the team has left")
 
 
 def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
@@ -44,12 +52,13 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     from quadriga.view.live import view_live
     from quadriga.view.playback import view_recording
 
+    address = PageAddress(arguments.port, arguments.host)
     with stop_flag() as stopped:
         if arguments.recording is None:
-            view_live(config, arguments.port, stopped, _tell)
+            view_live(config, address, stopped, _tell, once=arguments.once)
         else:
             refuse_configuration(given)
-            view_recording(arguments.recording, arguments.port, stopped, _tell)
+            view_recording(arguments.recording, address, stopped, _tell)
     return 0
 
 

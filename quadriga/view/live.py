@@ -25,7 +25,7 @@ from quadriga.shared.wire.topics import (
     TRUTH,
 )
 from quadriga.view.gather import Gatherer
-from quadriga.view.port import url_of
+from quadriga.view.port import PageAddress, url_of
 from quadriga.view.stage import FRAME_S, TeamStage
 from quadriga.view.team_shape import TeamShape, build_team_shape
 from quadriga.view.traffic import Traffic
@@ -101,27 +101,48 @@ class _Feed:
 
 
 def view_live(
-    config: Config, port: int, stopped: Callable[[], bool], say: Callable[[str], None]
+    config: Config,
+    address: PageAddress,
+    stopped: Callable[[], bool],
+    say: Callable[[str], None],
+    *,
+    once: bool = False,
 ) -> None:
     """Show a team until this is stopped.
 
     Args:
         config: the team's configuration.
-        port: of the web server.
+        address: of the web server.
         stopped: whether to stop.
         say: tells the user where to look.
+        once: whether to leave when a team that was there has left.
 
     Raises:
         ConfigError: the port is in use, or what it takes to draw the robots is missing.
         BusError: the bus cannot be opened.
     """
     team = config.team.name
-    with open_server(port, f"quadriga · {team}") as server:
+    with open_server(address, f"quadriga · {team}") as server:
         os.nice(_POLITE)
         stage = TeamStage(server, build_team_shape(config))
-        say(f"team {team!r} at {config.bus.endpoint} in the browser: {url_of(server.get_port())}")
+        url = url_of(server.get_port(), address.host)
+        say(f"team {team!r} at {config.bus.endpoint} in the browser: {url}")
         with Bus.open(config.bus, team, f"view-{os.getpid()}", stopped) as bus:
-            _show(bus, stage, stopped)
+            over = _leaves_with(bus) if once else lambda: False
+            _show(bus, stage, lambda: stopped() or over())
+
+
+def _leaves_with(bus: Bus) -> Callable[[], bool]:
+    """A function that tells whether a team that was there has left."""
+    was_there = False
+
+    def has_left() -> bool:
+        nonlocal was_there
+        there = bool(bus.members_at(HERE))
+        was_there |= there
+        return was_there and not there
+
+    return has_left
 
 
 def _show(bus: Bus, stage: TeamStage, stopped: Callable[[], bool]) -> None:

@@ -11,7 +11,7 @@ from quadriga.shared.runtime.clock import Rate, monotonic
 from quadriga.shared.wire.topics import SAMPLE_MS
 from quadriga.view.controls import Controls
 from quadriga.view.curves import ticks_before
-from quadriga.view.port import url_of
+from quadriga.view.port import PageAddress, url_of
 from quadriga.view.readings import read_outputs
 from quadriga.view.recorded import RecordedRun
 from quadriga.view.stage import FRAME_S, TeamStage
@@ -19,13 +19,13 @@ from quadriga.view.viser_server import open_server
 
 
 def view_recording(
-    path: Path, port: int, stopped: Callable[[], bool], say: Callable[[str], None]
+    path: Path, address: PageAddress, stopped: Callable[[], bool], say: Callable[[str], None]
 ) -> None:
     """Show a recording until this is stopped.
 
     Args:
         path: of the recording.
-        port: of the web server.
+        address: of the web server.
         stopped: whether to stop.
         say: tells the user where to look.
 
@@ -34,14 +34,14 @@ def view_recording(
         ConfigError: the port is in use, or what it takes to draw the robots is missing.
     """
     recording = Recording(path)
-    with open_server(port, f"quadriga · {path}") as server:
+    with open_server(address, f"quadriga · {path}") as server:
         run = RecordedRun(recording)
         stage = TeamStage(server, run.shape)
         step_ms = SAMPLE_MS * run.shape.config.planner.applied
         ends = run.first, run.last
         controls = Controls(server, stage.panels.controls, ends, run.marks, step_ms)
         cut = f" ({recording.cut})" if recording.cut else ""
-        say(f"{path}{cut} in the browser: {url_of(server.get_port())}")
+        say(f"{path}{cut} in the browser: {url_of(server.get_port(), address.host)}")
         _play(run, stage, controls, stopped)
 
 

@@ -8,22 +8,39 @@ import sys
 from typing import Final
 
 from quadriga.shared.errors import ConfigError, system_reason
+from quadriga.shared.runtime.record import record
 
 HOST: Final = "127.0.0.1"
 PORT: Final = 8090
 
 
-def check_port(port: int, option: str = "--port") -> int:
+@record
+class PageAddress:
+    """Where a view's page is served.
+
+    Attributes:
+        port: 0: any that is free.
+        host: an address of this computer; the loopback is reached by nobody else.
+    """
+
+    port: int
+    host: str = HOST
+
+
+def check_port(port: int, option: str = "--port", host: str = HOST) -> int:
     """The port, if a server can listen on it now; 0 stands for any that is free.
 
     Raises:
-        ConfigError: it is in use, not permitted, or none.
+        ConfigError: it is in use, not permitted, or none, or this computer has no such address.
     """
     with socket.socket() as probe:
         # A server that has just ended leaves its port in a state in which this permits it.
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            probe.bind((HOST, port))
+            probe.bind((host, port))
+        except socket.gaierror as error:
+            got = f"{host!r} ({error.strerror})"
+            raise ConfigError("--host", got, "an address of this computer") from None
         except (OSError, OverflowError) as error:
             reason = system_reason(error) if isinstance(error, OSError) else str(error)
             raise taken_error(port, reason, option) from None

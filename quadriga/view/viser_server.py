@@ -1,4 +1,4 @@
-"""SHELL: the web server of a view, on this machine alone."""
+"""SHELL: the web server of a view, on this machine alone unless somebody says otherwise."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import contextmanager, redirect_stdout
 
 import viser
 
-from quadriga.view.port import HOST, check_port, taken_error
+from quadriga.view.port import PageAddress, check_port, taken_error
 
 
 class LocalServer(viser.ViserServer):
@@ -19,21 +19,22 @@ class LocalServer(viser.ViserServer):
 
 
 @contextmanager
-def open_server(port: int, title: str) -> Iterator[LocalServer]:
-    """A web server on the loopback address while the context lasts.
+def open_server(address: PageAddress, title: str) -> Iterator[LocalServer]:
+    """A web server while the context lasts.
 
     Args:
-        port: where; 0 takes any that is free.
+        address: where.
         title: what the panel is called.
 
     Raises:
         ConfigError: the port is in use, or not permitted.
     """
-    check_port(port)
+    host, port = address.host, address.port
+    check_port(port, host=host)
     # What it prints about itself would stand between the lines of this project.
     with open(os.devnull, "w", encoding="utf-8") as nowhere:
         with redirect_stdout(nowhere):
-            server = LocalServer(host=HOST, port=port, label=title, verbose=False)
+            server = LocalServer(host=host, port=port, label=title, verbose=False)
         try:
             if port and server.get_port() != port:  # it takes the next one that is free
                 raise taken_error(port, "taken a moment ago")

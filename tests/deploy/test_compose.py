@@ -14,7 +14,7 @@ import yaml
 from quadriga.commands.parser import build_parser
 from quadriga.shared.config.endpoints import host_and_port, is_tls
 from quadriga.shared.config.load import load
-from quadriga.shared.members import DOCTOR, ESTOP, LAST, RESET, RESUME, ROUTER, STOP
+from quadriga.shared.members import DOCTOR, ESTOP, LAST, OBSERVER, RESET, RESUME, ROUTER, STOP
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.security.roll import team_roll
 from quadriga.team.launch import ProcessSpec, process_table
@@ -29,7 +29,8 @@ CONFIG = load(TEAM, {"team.robots": MOST, "planner.kind": "centralised"})
 ROWS = process_table(CONFIG, Path("/run"), Path("/run/predictor.npz"), "sha")
 ONCE = ("certs", "prepare")  # services that do something before the walk
 LATER = ("replay",)
-ON_THE_BUS = sorted(SERVICES.keys() - {*ONCE, *LATER})
+VIEW = "view"  # looks on: nobody waits for it, and it is not of the team
+ON_THE_BUS = sorted(SERVICES.keys() - {*ONCE, *LATER, VIEW})
 
 
 def resolve(text: str, **variables: str) -> str:
@@ -120,7 +121,7 @@ def test_the_team_is_that_of_the_default_walk() -> None:
     assert config.recorder.enabled
 
 
-@pytest.mark.parametrize("service", [*ONCE, *ON_THE_BUS])
+@pytest.mark.parametrize("service", [*ONCE, *ON_THE_BUS, VIEW])
 def test_all_read_the_one_configuration(service: str) -> None:
     mounted = mounts_of(service)[str(arguments_of(service).config)]
     assert (TOP / mounted).resolve() == TEAM
@@ -138,9 +139,10 @@ def test_the_team_meets_at_the_router_with_certificates() -> None:
     assert arguments_of("certs").hosts == [host]
 
 
-@pytest.mark.parametrize("service", ON_THE_BUS)
+@pytest.mark.parametrize("service", [*ON_THE_BUS, VIEW])
 def test_a_service_sees_its_own_certificates_and_cannot_change_them(service: str) -> None:
-    own = {"operator": {"operator", ESTOP, STOP, RESET, RESUME}}.get(service, {service})
+    several = {"operator": {"operator", ESTOP, STOP, RESET, RESUME}, VIEW: {OBSERVER}}
+    own = several.get(service, {service})
     assert secrets_of(service) == own
     entries = [entry for entry in SERVICES[service]["volumes"] if "/secrets/" in entry]
     assert set(entries) == {f"secret-{name}:/secrets/{name}:ro" for name in own}
@@ -149,7 +151,9 @@ def test_a_service_sees_its_own_certificates_and_cannot_change_them(service: str
 def test_certificates_are_made_for_all_and_only_their_maker_has_the_authority() -> None:
     assert CONFIG.bus.certificates == "/secrets"
     assert mounts_of("certs")["/secrets"] == "secret-authority"
-    assert secrets_of("certs") == {name for other in ON_THE_BUS for name in secrets_of(other)}
+    assert secrets_of("certs") == {
+        name for other in (*ON_THE_BUS, VIEW) for name in secrets_of(other)
+    }
     assert secrets_of("certs") <= {who.name for who in team_roll(CONFIG)}
     held = [name for name in SERVICES if "secret-authority" in mounts_of(name).values()]
     assert held == ["certs"]
@@ -189,6 +193,16 @@ def test_healthy_is_who_the_doctor_has_found_well(service: str) -> None:
     assert float(check["start_period"].removesuffix("s")) >= CONFIG.bus.barrier_timeout
 
 
+def test_the_view_is_reached_from_this_computer_alone_and_keeps_nobody_waiting() -> None:
+    view = arguments_of(VIEW)
+    (published,) = SERVICES[VIEW]["ports"]
+    assert resolve(published) == f"127.0.0.1:8090:{view.port}"
+    assert view.host == "0.0.0.0"  # of its container
+    assert view.once, "`docker compose up` would not return after the walk"
+    ports = [name for name, service in SERVICES.items() if "ports" in service]
+    assert ports == [VIEW]
+
+
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
 def test_a_service_has_the_time_to_leave_that_its_process_has(row: ProcessSpec) -> None:
     assert float(SERVICES[row.name]["stop_grace_period"].removesuffix("s")) >= row.grace
@@ -223,7 +237,7 @@ def test_a_service_may_do_no_more_than_it_must(service: str) -> None:
     assert found["read_only"] is True
     assert found["cap_drop"] == ["ALL"]
     assert "no-new-privileges" in found["security_opt"]
-    assert not found.keys() & {"privileged", "pid", "ipc", "ports", "cap_add", "user"}
+    assert not found.keys() & {"privileged", "pid", "ipc", "cap_add", "user"}
 
 
 def test_no_service_pulls_an_image_that_somebody_else_could_have_made() -> None:
@@ -245,9 +259,9 @@ def test_a_service_takes_no_more_of_the_machine_than_its_share(service: str) -> 
 @pytest.mark.parametrize("service", SERVICES)
 def test_a_service_reaches_nobody_but_the_team(service: str) -> None:
     found = SERVICES[service]
-    if service in ON_THE_BUS:
-        assert found["networks"] == ["team"]
+    if service in (*ON_THE_BUS, VIEW):
+        assert found["networks"] == (["team", "page"] if service == VIEW else ["team"])
         assert "network_mode" not in found
     else:
         assert found["network_mode"] == "none"
-    assert COMPOSE["networks"] == {"team": {"internal": True}}
+    assert COMPOSE["networks"] == {"team": {"internal": True}, "page": {}}

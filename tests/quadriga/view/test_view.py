@@ -18,7 +18,7 @@ import pytest
 from rich.console import Console
 
 from quadriga.commands.parser import main
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.runtime.clock import monotonic, sleep
@@ -113,6 +113,19 @@ def test_a_running_team_is_shown_and_hears_nothing(tmp_path: Path) -> None:
         end(process, signal.SIGTERM)
 
 
+def test_a_view_leaves_once_its_team_has(tmp_path: Path) -> None:
+    bus = BusConfig(endpoint=free_endpoint(), plaintext=True)
+    file = tmp_path / "config.toml"
+    file.write_text(to_toml(replace(run_config(), bus=bus)), encoding="utf-8")
+    with viewing("--once", "--config", str(file)) as (process, _):
+        with Bus.open(bus, "team", "sim") as team:
+            await_listener(team, "team/sim/truth", there=True)
+            team.declare(HERE)
+            sleep(1.0)
+            assert process.poll() is None
+        assert process.wait(WAIT) == 0
+
+
 def line_of(capsys: pytest.CaptureFixture[str], typed: Sequence[str], status: int = 2) -> str:
     """The one line that a command complains with."""
     assert main(typed) == status
@@ -136,6 +149,7 @@ def test_mistakes_cost_one_line(
         assert "a port that is free" in line
         assert f"--view: got {port}" in line_of(capsys, ["walk", "--view", port])
     assert "--port" in line_of(capsys, ["view", "--port", "70000"])
+    assert "--host: got 'nowhere.invalid'" in line_of(capsys, ["view", "--host", "nowhere.invalid"])
     monkeypatch.setitem(sys.modules, "viser", None)
     assert "the package viser" in line_of(capsys, ["view"])
 
