@@ -32,13 +32,13 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     from quadriga.shared.recording.reader import Recording
     from quadriga.team.run_report import has_failed, report_file, report_folder
 
-    html = arguments.html
+    html, pictures = arguments.html, not arguments.no_render
     if html is not None and html.suffix.lower() not in (".html", ".htm"):
         raise ConfigError(
             "--html", str(html), "a name that ends in .html", "a recording is never written over"
         )
     if arguments.run.is_file():
-        summary = report_file(arguments.run, html, console=Console())
+        summary = report_file(arguments.run, html, pictures=pictures, console=Console())
         Recording(arguments.run).require_whole()
     elif html is not None:
         raise ConfigError(
@@ -48,5 +48,5 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
             "a run folder's page is its report.html",
         )
     else:
-        summary = report_folder(arguments.run, pictures=not arguments.no_render, console=Console())
+        summary = report_folder(arguments.run, pictures=pictures, console=Console())
     return int(has_failed(summary))

@@ -10,6 +10,10 @@ CLIP: Final = (
     "The end of the walk, at most 5 s of it, as fast as the world was. Arrows are the true forces "
     "of the ground on the feet, each robot's in its colour; the gold rods are yokes."
 )
+SCENE: Final = (
+    "Drag to look from another side, turn the wheel to come nearer. Lines from feet are the true "
+    "forces of the ground, 3 mm for a newton; a foot in the air is black. Fifty pictures a second."
+)
 PATHS: Final = "Dots are the trunks at the times that are written beside them."
 _ESTIMATE: Final = (
     "The agent knows its own estimate alone, and its plans begin there: what is planned follows "

@@ -102,6 +102,25 @@ class Clip:
 
 
 @dataclass(frozen=True, slots=True)
+class MovingScene:
+    """Moments of a walk that the reader looks at from any side.
+
+    Attributes:
+        content: JSON of `quadriga.moving_scene`.
+        caption: words below it.
+    """
+
+    kind: ClassVar = "scene"
+    content: str
+    caption: str
+
+    @property
+    def data(self) -> Markup:
+        """For the template; nothing in it ends the element in which it stands."""
+        return Markup(self.content.replace("<", "\\u003c"))
+
+
+@dataclass(frozen=True, slots=True)
 class Fold:
     """Parts that can be folded away."""
 
@@ -111,7 +130,7 @@ class Fold:
     opened: bool
 
 
-Part = Paragraph | Subtitle | PageTable | Drawing | Clip | Fold
+Part = Paragraph | Subtitle | PageTable | Drawing | Clip | MovingScene | Fold
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +153,7 @@ class Document:
         notes: warnings below the lead.
         sections: in order.
         clock: whether a time is shown in all figures at once.
+        moving: whether a part is a `MovingScene`.
     """
 
     title: str
@@ -142,6 +162,7 @@ class Document:
     verdict: str = ""
     notes: Sequence[str] = ()
     clock: bool = False
+    moving: bool = False
 
     def to_html(self) -> str:
         """The page; it loads nothing from anywhere, and every text in it is escaped."""

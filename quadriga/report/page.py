@@ -16,6 +16,7 @@ from quadriga.report.document import (
     Document,
     Drawing,
     Fold,
+    MovingScene,
     PageTable,
     Paragraph,
     Part,
@@ -44,15 +45,20 @@ _TIMES: Final = (
 _TRAFFIC: Final = ("key", "messages", "rate [Hz]", "from … to [s]", "missing", "invalid")
 
 
-def write_page(run: Run, path: Path) -> Path:
+def write_page(run: Run, path: Path, scene: str = "") -> Path:
     """Write the page of a run, with the clip that lies beside the recording, if any.
+
+    Args:
+        run: what it is about.
+        path: of the page.
+        scene: JSON of `quadriga.moving_scene`; none if empty.
 
     Raises:
         RecordingError: the file cannot be written.
     """
     clip = _read_clip(run.path)
     with name_file_errors(RecordingError, path, "a file that can be written"):
-        path.write_text(build_page(run, clip), encoding="utf-8")
+        path.write_text(build_page(run, clip, scene), encoding="utf-8")
     return path
 
 
@@ -67,31 +73,35 @@ def _read_clip(recording: Path) -> bytes:
     return b""
 
 
-def build_page(run: Run, clip: bytes = b"") -> str:
+def build_page(run: Run, clip: bytes = b"", scene: str = "") -> str:
     """The whole page as HTML; it loads nothing from anywhere.
 
     Args:
         run: what it is about.
         clip: moving pictures of the run, WebP; none if empty.
+        scene: JSON of `quadriga.moving_scene`; none if empty.
     """
     lead, good = about.judge(run)
     return Document(
         title=about.build_title(run),
         lead=lead,
-        sections=list(_build_sections(run, clip)),
+        sections=list(_build_sections(run, clip, scene)),
         verdict="good" if good else "bad",
         notes=about.describe_missing(run),
         clock=True,
+        moving=bool(scene),
     ).to_html()
 
 
-def _build_sections(run: Run, clip: bytes = b"") -> Iterator[Section]:
+def _build_sections(run: Run, clip: bytes, scene: str) -> Iterator[Section]:
     yield Section("run", "The run", _build_run(run))
     summary = PageTable((), list_figures(run.summary), named=True)
     yield Section("summary", "Summary", [summary])
     if clip:
         shown = Clip(clip, "the team walking", captions.CLIP)
         yield Section("clip", "The walk to look at", [shown])
+    if scene:
+        yield Section("scene", "From all sides", [MovingScene(scene, captions.SCENE)])
     troubles = find_troubles(run)
     if troubles:
         yield Section("look", "What to look at", list(_build_troubles(run, troubles)))

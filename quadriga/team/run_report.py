@@ -8,6 +8,7 @@ from typing import Any, Final
 from rich.console import Console
 
 from quadriga.agents.modes import is_commanded
+from quadriga.moving_scene.page_scene import scene_of
 from quadriga.pictures.render import render
 from quadriga.recordings.summary import RECORDING, summarise
 from quadriga.recordings.summary_table import print_summary
@@ -48,23 +49,29 @@ def report_folder(run_dir: Path, *, pictures: bool, console: Console) -> dict[st
     print_summary(summary, console)  # before what takes long
     run = build_run(recording, traces, summary)
     write_figures(run, run_dir)
+    scene = ""
     try:
-        if pictures and run.has_truth:  # nobody else knows where the trunks were
+        if pictures:
             with console.status("rendering"):
-                render(run_dir)
+                scene = scene_of(run)
+                if run.has_truth:  # nobody else knows where the trunks were
+                    render(run_dir)
     finally:  # with the clip, or without it where drawing it failed or was interrupted
-        write_page(run, run_dir / PAGE)
+        write_page(run, run_dir / PAGE, scene)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
     _check_end(summary)
     return summary
 
 
-def report_file(path: Path, page: Path | None, *, console: Console) -> dict[str, Any]:
+def report_file(
+    path: Path, page: Path | None, *, pictures: bool, console: Console
+) -> dict[str, Any]:
     """Write the page of a recording that may have come from elsewhere, show its table.
 
     Args:
         path: the recording.
         page: the file to write; by default beside the recording, with its name.
+        pictures: whether it shows the robots.
         console: where to show the table.
 
     Returns:
@@ -74,7 +81,7 @@ def report_file(path: Path, page: Path | None, *, console: Console) -> dict[str,
         RecordingError: the recording is empty or foreign, or the page cannot be written.
     """
     run = read_run(path)
-    written = write_page(run, page or path.with_suffix(".html"))
+    written = write_page(run, page or path.with_suffix(".html"), scene_of(run) if pictures else "")
     print_summary(dict(run.summary), console)
     for missing in describe_missing(run):
         console.print(printable_line(missing), style="yellow", markup=False, highlight=False)

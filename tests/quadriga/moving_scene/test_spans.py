@@ -1,0 +1,36 @@
+"""Which moments of a walk are shown from all sides."""
+
+from __future__ import annotations
+
+from quadriga.moving_scene.spans import Span, choose_spans
+from quadriga.report.timeline import TimelineEntry
+from quadriga.shared.wire.codes import FALL
+
+
+def entry(tick: int, robot: str, kind: str = FALL) -> TimelineEntry:
+    return TimelineEntry(tick, tick, robot, kind, "")
+
+
+def test_the_second_before_each_fall_and_falls_together_once() -> None:
+    timeline = [
+        entry(400, "r1"),
+        entry(3000, "r2", "push"),
+        entry(4000, "r2"),
+        entry(4200, "r1"),
+        entry(4600, "r3"),
+        entry(9000, "r1"),
+    ]
+    spans = choose_spans(timeline, 0, 4700, 400)
+    assert spans == (
+        Span(0, 700, "r1 falls at 0.40 s"),
+        Span(3000, 4300, "r2, r1 falls at 4.00 s"),
+        Span(3600, 4700, "r3 falls at 4.60 s"),
+    )
+
+
+def test_without_a_fall_some_strides_before_the_last_second() -> None:
+    assert choose_spans([entry(50, "r1", "push")], 0, 20_000, 400) == (
+        Span(17_400, 19_000, "4 strides"),
+    )
+    assert choose_spans([], 100, 900, 400) == (Span(100, 900, "4 strides"),), "all of a short one"
+    assert choose_spans([], 100, 2000, 400) == (Span(100, 1700, "4 strides"),)
