@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -104,6 +105,7 @@ def _stop_in_one_walk(
     console: Console,
 ) -> list[dict[str, Any]]:
     run = folder / f"walk-{number}"
+    shutil.rmtree(run, ignore_errors=True)  # of an earlier call, which was interrupted
     run.mkdir(parents=True)
     (run / CONFIG).write_text(to_toml(config), encoding="utf-8")
     port = free_port()
