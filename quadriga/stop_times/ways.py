@@ -6,6 +6,7 @@ import os
 import pty
 import struct
 import subprocess
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -23,6 +24,11 @@ Way = Callable[[PageDriver, str, Path], AbstractContextManager[Press]]  # of a t
 _READY_S: Final = 30.0  # for a program to listen to its keys
 _GRACE_S: Final = 5.0
 _SHOWN: Final = "STOP"  # what it says of its keys or buttons, once it listens to them
+# Keys come from a terminal that is the program's own, not merely its standard input.
+_IN_TERMINAL: Final = (
+    "import fcntl, os, sys, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+    "os.execv(sys.argv[1], sys.argv[1:])"
+)
 _BUTTON: Final = 0x01  # kind of an event of linux/joystick.h
 
 
@@ -104,13 +110,18 @@ def _write(descriptor: int, payload: bytes) -> int:
 
 @contextmanager
 def _driving(
-    options: tuple[str, ...], team: str, path: Path, terminal: int = subprocess.DEVNULL
+    options: tuple[str, ...], team: str, path: Path, terminal: int | None = None
 ) -> Iterator[None]:
     """`quadriga drive` within the block, once it has shown what it listens to."""
     command = (*QUADRIGA, "drive", *options, "--set", f"team.name={team}")
+    if terminal is not None:
+        command = (sys.executable, "-c", _IN_TERMINAL, *command)
     with path.open("wb") as log:
         process = subprocess.Popen(
-            command, stdin=terminal, stdout=log, stderr=log, start_new_session=True
+            command,
+            stdin=subprocess.DEVNULL if terminal is None else terminal,
+            stdout=log,
+            stderr=log,
         )
     try:
         deadline = monotonic() + _READY_S
