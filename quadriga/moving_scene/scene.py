@@ -1,7 +1,7 @@
 """What a page needs to draw a recorded team from any side, as JSON: shapes once, poses by time.
 
 Numbers are little-endian arrays in base64; `report/scene.js` reads them. Lengths are integers of
-16 bits in a unit of their own, so that a fall of three robots takes some 60 kB.
+16 bits in a unit of their own: 1.6 s of three robots take 78 kB, their shapes 62 kB.
 """
 
 from __future__ import annotations

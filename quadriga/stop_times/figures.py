@@ -22,7 +22,7 @@ _AT_REST: Final = frozenset((codes.ESTOPPED, codes.ROBOT_STOPPED))
 _NOTE: Final = """\
 From the press, or the last thing heard of a driver who falls silent, until every agent commanded
 that all joints be damped and the plant had said that it damps them, whichever was later; after
-silence until all robots stood. Times of the recording; quartiles are linear between tries."""
+silence until all robots stood. Times of the recording; percentiles are linear between tries."""
 
 
 @record

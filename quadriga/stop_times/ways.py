@@ -18,11 +18,11 @@ from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.stop_times.page_driver import PageDriver
 from quadriga.team.launch import QUADRIGA
+from quadriga.team.spectator import end_process
 
 Press = Callable[[], int]  # presses; wall clock at the press, ns
 Way = Callable[[PageDriver, str, Path], AbstractContextManager[Press]]  # of a team, in a folder
 _READY_S: Final = 30.0  # for a program to listen to its keys
-_GRACE_S: Final = 5.0
 _SHOWN: Final = "STOP"  # what it says of its keys or buttons, once it listens to them
 # Keys come from a terminal that is the program's own, not merely its standard input.
 _IN_TERMINAL: Final = (
@@ -60,7 +60,7 @@ def by_estop(_page: PageDriver, _team: str, folder: Path) -> Iterator[Press]:
             yield press
         finally:
             for process in running:
-                _end(process)
+                end_process(process)
 
 
 @contextmanager
@@ -132,13 +132,4 @@ def _driving(
             sleep(0.05)
         yield
     finally:
-        _end(process)
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    process.terminate()
-    try:
-        process.wait(_GRACE_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
+        end_process(process)

@@ -51,12 +51,13 @@ def view_beside(run_dir: Path, port: int | None, console: Console) -> Iterator[N
     finally:
         early = process.poll()
         if early is None:
-            _end(process)
+            end_process(process)
         elif early:
             console.print(_format_failure(early, path), markup=False, highlight=False)
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def end_process(process: subprocess.Popen[bytes]) -> None:
+    """Ask a process beside the team to leave, and kill it if it does not within 5 s."""
     process.terminate()
     try:
         process.wait(_GRACE)
