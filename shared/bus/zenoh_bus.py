@@ -6,13 +6,14 @@ import ctypes
 import json
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 from types import MappingProxyType
 from typing import Any, Final, Self
 
 import zenoh
 
 from quadriga.shared.bus.answers import Answers
+from quadriga.shared.bus.mailbox import Mailbox
 from quadriga.shared.bus.newest import Newest
 from quadriga.shared.bus.presence import Presence
 from quadriga.shared.bus.router_wait import RouterWait
@@ -53,7 +54,7 @@ class Bus:
         self.team, self.name = team, name
         self._session = session
         self._me = str(session.info.zid())
-        self._inbox: SimpleQueue[zenoh.Sample] = SimpleQueue()
+        self._inbox: Mailbox[zenoh.Sample] = Mailbox()
         self._oversized: SimpleQueue[None] = SimpleQueue()  # counts what several threads drop
         self._presence = Presence(self._me)
         self._declared: dict[str, zenoh.LivelinessToken] = {}
@@ -257,15 +258,12 @@ class Bus:
 
     def get(self, timeout: float) -> Packet | None:
         """The oldest packet of the inbox, waiting at most `timeout` seconds for one."""
-        with suppress(Empty):
-            sample = self._inbox.get(timeout=timeout)
-            return str(sample.key_expr), sample.payload.to_bytes()
-        return None
+        sample = self._inbox.take(timeout)
+        return None if sample is None else _packet(sample)
 
     def drain(self) -> list[Packet]:
         """Everything in the inbox, oldest first, without waiting."""
-        samples = [self._inbox.get_nowait() for _ in range(self._inbox.qsize())]
-        return [(str(sample.key_expr), sample.payload.to_bytes()) for sample in samples]
+        return [_packet(sample) for sample in self._inbox.drain()]
 
     def declare(self, stage: str) -> None:
         """Tell everyone that this process has reached `stage`; again has no effect."""
@@ -382,8 +380,12 @@ def start_log() -> None:
     zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]
 
 
+def _packet(sample: zenoh.Sample) -> Packet:
+    return str(sample.key_expr), sample.payload.to_bytes()
+
+
 def _direct(call: Callable[[Any], None]) -> Any:
-    """A Zenoh callback in the receiving thread: a queue's `put` needs no thread of its own."""
+    """A Zenoh callback in the receiving thread: a mailbox needs no thread of its own."""
     return zenoh.handlers.Callback(call, indirect=False)
 
 
