@@ -29,8 +29,10 @@ from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.places import runtime_dir
+from quadriga.stop_times.clock_listener import clock_listener
 from quadriga.stop_times.figures import TOPICS, StopPress, find_stops
 from quadriga.stop_times.page_driver import PageDriver
+from quadriga.stop_times.tick_times import TickTimes
 from quadriga.stop_times.view_watcher import ViewWatcher
 from quadriga.stop_times.ways import STANDS, WAYS
 from quadriga.team.endpoint import free_endpoint
@@ -41,6 +43,7 @@ from quadriga.team.trial_rows import append_row, open_rows
 from quadriga.view.port import free_port
 from quadriga.warm_up import warm_up
 
+_TIMES: Final = "clock.txt"  # of a walk: when its clock was heard
 _BLOCK: Final = 10  # presses in one walk, of which a recording must hold the whole
 _SPEED: Final = 0.3  # m/s forward, while it walks
 _EARLIEST_S, _LATEST_S = 0.5, 1.5  # from the time at which all walk until the press
@@ -114,6 +117,7 @@ def _stop_in_one_walk(
     presses = list[StopPress]()
     with (
         Launch(table, run / "logs") as launch,
+        clock_listener(run / CONFIG, run / _TIMES),
         view_beside(run, port, console),
         ExitStack() as stack,
     ):
@@ -129,7 +133,9 @@ def _stop_in_one_walk(
             _await(page, STAND if way in STANDS else ESTOP)
     names = robot_names(config.team.robots)
     entries = Recording(run / RECORDING).entries(TOPICS)
-    found = find_stops(entries, presses, names, STANDS)
+    with (run / _TIMES).open(encoding="utf-8") as lines:
+        times = TickTimes(lines)
+    found = find_stops(entries, times, presses, names, STANDS)
     return [
         {"way": p.way, "ms": None if ms is None else round(ms, 3), "walk": number}
         for p, ms in zip(presses, found, strict=True)

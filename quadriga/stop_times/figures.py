@@ -1,7 +1,8 @@
-"""When a team had stopped after a press, by its recording; and what many presses come to. Pure."""
+"""When a team had stopped after a press, by recording and clock; what many come to. Pure."""
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
@@ -14,15 +15,17 @@ from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Command, Event, Status
 from quadriga.shared.wire.topics import COMMAND, EVENT, STATUS, topic_of
+from quadriga.stop_times.tick_times import TickTimes
 from quadriga.tables import NOTHING, Table
 
 TOPICS: Final = frozenset((COMMAND.name, EVENT.name, STATUS.name))  # that `find_stops` looks at
 _PLANT: Final = ""
 _AT_REST: Final = frozenset((codes.ESTOPPED, codes.ROBOT_STOPPED))
 _NOTE: Final = """\
-From the press, or the last thing heard of a driver who falls silent, until every agent commanded
-that all joints be damped and the plant had said that it damps them, whichever was later; after
-silence until all robots stood. Times of the recording; percentiles are linear between tries."""
+From the press, or the last thing heard of a driver who falls silent, until the tick at which the
+plant damps all joints by itself and every agent commands that they be damped, whichever is later;
+after silence until all robots stand. A tick's time is when a process that goes before all others
+hears the team's clock, every 10 ms; percentiles are linear between tries."""
 
 
 @record
@@ -31,7 +34,7 @@ class StopPress:
 
     Attributes:
         way: in which it was stopped.
-        at_ns: wall clock at the press.
+        at_ns: of `monotonic_ns`, at the press.
     """
 
     way: str
@@ -40,6 +43,7 @@ class StopPress:
 
 def find_stops(
     entries: Iterable[ChunkEntry],
+    times: TickTimes,
     presses: Sequence[StopPress],
     robots: Sequence[str],
     stands: frozenset[str],
@@ -47,21 +51,22 @@ def find_stops(
     """After each press, ms until the whole team had stopped; None: it did not before the next one.
 
     Args:
-        entries: of the recording, in its order; topics other than `TOPICS` are of no use.
+        entries: of the recording; topics other than `TOPICS` are of no use.
+        times: of the ticks that the messages are of.
         presses: in the order of time.
         robots: of the team.
         stands: ways after which robots stand, instead of being damped.
     """
     found: list[dict[str, int]] = [{} for _ in presses]
-    number = -1
+    begins = [press.at_ns for press in presses]
     for entry in entries:
-        while number + 1 < len(presses) and entry.log_time_ns >= presses[number + 1].at_ns:
-            number += 1
-        if number < 0:
+        at = times.latest(entry.tick)
+        number = -1 if at is None else bisect_right(begins, at) - 1
+        if at is None or number < 0:
             continue
         who = _who_has_stopped(entry, stands=presses[number].way in stands)
         if who is not None:
-            found[number].setdefault(who, entry.log_time_ns)
+            found[number][who] = min(at, found[number].get(who, at))
     results: list[float | None] = []
     for press, stopped in zip(presses, found, strict=True):
         wanted = {*robots} if press.way in stands else {*robots, _PLANT}

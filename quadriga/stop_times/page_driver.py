@@ -16,7 +16,7 @@ from quadriga.drive.driver_words import DRIVE, GO_ON, NEWS, RESET, TAKE
 from quadriga.drive.driver_words import ESTOP as STOP_AT_ONCE
 from quadriga.drive.wish import NAMES, Wish
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.runtime.clock import monotonic, wall_ns
+from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 
 _PERIOD: Final = 0.05  # s, between two of what the page asks for
 _AGAIN: Final = 0.5  # s, between two times that a word is said which does not come true
@@ -78,13 +78,13 @@ class PageDriver:
             self._over.wait(_AGAIN)
 
     def press_stop(self) -> int:
-        """Press the page's stop button; wall clock at the press, ns."""
-        at = wall_ns()
+        """Press the page's stop button; `monotonic_ns` at the press."""
+        at = monotonic_ns()
         self._say(self._stop, STOP_AT_ONCE, text="page")
         return at
 
     def fall_silent(self) -> int:
-        """Ask for nothing any more, as a page that hangs; wall clock of what was said last, ns."""
+        """Ask for nothing any more, as a page that hangs; `monotonic_ns` of what was said last."""
         with self._lock:
             self._silent = True
             return self._spoke_ns
@@ -104,7 +104,7 @@ class PageDriver:
             while not self._over.wait(_PERIOD):
                 with self._lock:
                     if not self._silent:
-                        self._spoke_ns = wall_ns()
+                        self._spoke_ns = monotonic_ns()
                         self._say(self._drive, DRIVE, held=True, **asked)
 
     def _listen(self, link: ClientConnection) -> None:

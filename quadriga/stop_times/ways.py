@@ -15,12 +15,12 @@ from typing import Final
 
 from quadriga.drive.gamepad import STOP_BUTTON
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
+from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
 from quadriga.stop_times.page_driver import PageDriver
 from quadriga.team.launch import QUADRIGA
 from quadriga.team.spectator import end_process
 
-Press = Callable[[], int]  # presses; wall clock at the press, ns
+Press = Callable[[], int]  # presses; `monotonic_ns` at the press
 Way = Callable[[PageDriver, str, Path], AbstractContextManager[Press]]  # of a team, in a folder
 _READY_S: Final = 30.0  # for a program to listen to its keys
 _SHOWN: Final = "STOP"  # what it says of its keys or buttons, once it listens to them
@@ -51,7 +51,7 @@ def by_estop(_page: PageDriver, _team: str, folder: Path) -> Iterator[Press]:
     with (folder / "estop.log").open("ab") as log:
 
         def press() -> int:
-            at = wall_ns()
+            at = monotonic_ns()
             command = (*QUADRIGA, "estop", "--reason", "bench")
             running.append(subprocess.Popen(command, stdout=log, stderr=log))
             return at
@@ -103,7 +103,7 @@ STANDS: Final = frozenset(("silence",))  # after which robots stand, instead of 
 
 
 def _write(descriptor: int, payload: bytes) -> int:
-    at = wall_ns()
+    at = monotonic_ns()
     os.write(descriptor, payload)
     return at
 
