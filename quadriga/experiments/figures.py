@@ -54,14 +54,16 @@ def _no_limits(_variant: str, _measure: str, _world: World) -> Iterable[float]:
 def draw_success(results: Results, limits: Limits = _no_limits) -> Figure | None:
     """For each world a row for each variant: its rate of success. None without any trial."""
     panels = _collect_points(results, ["success"], results.variants)
-    return _draw_rows(panels, "success [%]", results, limits)
+    figure = _draw_rows(panels, "success [%]", results, limits)
+    return _entitle(figure, "Walks that succeeded")
 
 
 def draw_falls(results: Results, limits: Limits = _no_limits) -> Figure | None:
     """For each world a row for each variant: its fall rate less that of the baseline."""
     panels = _collect_points(results, ["fall-difference"], results.others)
     across = f"fall rate less that of {results.baseline} [points]"
-    return _draw_rows(panels, across, results, limits, at=0.0)
+    figure = _draw_rows(panels, across, results, limits, at=0.0)
+    return _entitle(figure, f"Falls against those of {results.baseline}")
 
 
 def draw_ratios(
@@ -76,7 +78,9 @@ def draw_ratios(
     """
     panels = _collect_points(results, [name_ratio(name) for name in names], results.others)
     what = "RMSE, or control cost," if COST in names else "RMSE"
-    return _draw_rows(panels, f"{what} over that of {results.baseline}", results, limits, at=1.0)
+    across = f"{what} over that of {results.baseline}"
+    figure = _draw_rows(panels, across, results, limits, at=1.0)
+    return _entitle(figure, f"Errors against those of {results.baseline}")
 
 
 def draw_sweeps(results: Results, panels: Sequence[SweepPanel]) -> Figure | None:
@@ -95,7 +99,8 @@ def draw_sweeps(results: Results, panels: Sequence[SweepPanel]) -> Figure | None
         return None
     legends = [axis.get_legend_handles_labels() for axis in axes[: len(panels)]]
     handles, labels = max(legends, key=lambda legend: len(legend[1]))
-    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels), frameon=False)
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
+    _entitle(figure, "Success against what is made harder, with 95 % intervals")
     return figure
 
 
@@ -201,6 +206,13 @@ def _draw_rows(
     axes[0].set_ylim(len(rows) - 0.5, -0.5)
     dots = "; dotted: required" if required else ""
     figure.supxlabel(f"{across}, with 95 % intervals{dots}", fontsize="medium")
+    return figure
+
+
+def _entitle(figure: Figure | None, title: str) -> Figure | None:
+    """The figure, if there is one, with its title above."""
+    if figure is not None:
+        figure.suptitle(title, x=0.01, ha="left", weight="bold", fontsize="medium")
     return figure
 
 

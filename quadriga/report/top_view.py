@@ -39,7 +39,9 @@ def draw_top_view(traces: Traces) -> Figure:
     axes.grid(axis="x", color=PALETTE["grid"], linewidth=0.8)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set_xlabel("x [m]", fontsize=TEXT, color=PALETTE["soft"])
-    axes.set_title("y [m]", loc="left", pad=5.0, fontsize=TEXT, fontweight="bold")
+    axes.set_title(
+        "y [m]", loc="left", pad=5.0, fontsize=TEXT, fontweight="bold", color=PALETTE["ink"]
+    )
     instants = np.unique(np.linspace(0, len(tick) - 1, min(_INSTANTS, len(tick))).astype(int))
     for i, j in yoke_pairs(traces.config.team.robots, traces.config.team.yokes):
         for k in instants:
