@@ -53,7 +53,7 @@ from quadriga.agents.schedules import Schedules
 from quadriga.agents.step_io import Inputs as Inputs
 from quadriga.agents.step_io import Outputs as Outputs
 from quadriga.agents.tasks import Tasks
-from quadriga.agents.teammates import Teammates, TeamWatch
+from quadriga.agents.teammates import Teammates, TeamWatch, has_operator
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import neighbours
 from quadriga.shared.robot.conventions import Array, robot_names
@@ -229,7 +229,8 @@ class Agent:
         followed = ramp(references, healing, tick)
         reference, reference_age = reference_at(followed, tick, self._height)
 
-        stops = self._stops_on_arrival(inputs, course, reference_age, team)
+        led = reference_age <= REFERENCE.max_age_ms and has_operator(team, references)
+        stops = self._stops_on_arrival(inputs, course, team, led=led)
         mode = resolve_stops(course, tick, stops) if stops else course
         schedule = self._schedules.at(tick, mode)
         sensed = self._sense(state, inputs, schedule, dt)
@@ -270,15 +271,14 @@ class Agent:
             {"reference": float(reference_age), **planned.ages_ms},
             planned.planner_ns,
         )
-        fed = reference_age <= REFERENCE.max_age_ms and not imu.missing_ms
-        whole = fed and self._is_whole(tick, mode, team, planning)
+        whole = led and not imu.missing_ms and self._is_whole(tick, mode, team, planning)
         healing = self._heal(healing, mode, inputs, whole=whole)
         after = (references, tau, failures, counters, healing, team, None, imu)
         new = AgentState(tick, mode, planning, acted.memory, *after)
         return new, outputs, (sensed, asked, acted)
 
     def _stops_on_arrival(
-        self, inputs: Inputs, course: Mode, reference_age: int, team: Teammates
+        self, inputs: Inputs, course: Mode, team: Teammates, *, led: bool
     ) -> list[Stop]:
         """Stops that what arrived, or did not arrive, asks for."""
         stops, estop = list[Stop](), inputs.estop
@@ -288,7 +288,7 @@ class Agent:
             stops.append(Stop(STOPPING, with_detail(STOPPED, inputs.stop.reason)))
         if course.name != WALK:
             return stops
-        if reference_age > REFERENCE.max_age_ms:
+        if not led:
             stops.append(Stop(STOPPING, REFERENCE_LOST))
         lost = self._watch.find_lost(team, inputs.state.tick, course.since)
         if lost:

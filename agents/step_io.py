@@ -36,7 +36,7 @@ class Inputs:
         reset: the operator's release of an emergency stop, if it came.
         resume: the operator's word to go on, if it came.
         statuses: of the other robots, with their names.
-        events: of the plant, about robots whose commands no longer come, or do again.
+        events: of the plant: commands of a robot, or the operator, no longer come, or do again.
         truth: of the simulator, only for the estimator "truth".
         excitation: force deviation to add, (12,), N, yaw frame; data collection only.
     """

@@ -1,16 +1,18 @@
-"""Which other robots of the team can walk: by what the plant says of them, and they themselves.
+"""Who else is there: which other robots can walk, by the plant and themselves, and the operator.
 
 A robot does not walk while another one of its team does not: it would drag it along. Whether its
 planner takes in anything of the others does not matter.
 
 In real time each robot hears every other's status ten times a second, and at once when its mode
 changes. In lock-step it does not: what it knows would depend on who was faster. There, and sooner
-than by a silence, it knows from the plant which robots' commands no longer come.
+than by a silence, it knows from the plant which robots' commands no longer come. In real time the
+plant also tells that the operator has left: then its references, which speak of the near future,
+count no more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
 from typing import Final
 
@@ -18,12 +20,13 @@ from quadriga.agents.modes import STAND, STOPPING, WALK, Mode, rests
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import BACK, GONE, SILENT
-from quadriga.shared.wire.messages import Event, Status
+from quadriga.shared.wire.codes import BACK, GONE, OPERATOR_BACK, OPERATOR_GONE, SILENT
+from quadriga.shared.wire.messages import Event, Reference, Status
 
 SILENCE_MS: Final = 500  # without a status, after which a robot is lost
 GRACE_MS: Final = 1000  # for which robots that walk again may begin one after the other
-_PLANT_SAYS: Final = frozenset((GONE, SILENT, BACK))
+_OF_ROBOTS: Final = frozenset((GONE, SILENT, BACK))
+_OF_OPERATOR: Final = frozenset((OPERATOR_GONE, OPERATOR_BACK))
 _COMING_TO_REST: Final = (STAND, STOPPING)
 
 
@@ -43,10 +46,12 @@ class Teammates:
     Attributes:
         heard: of each that has spoken.
         lost: of those whose commands no longer come, tick at which the plant has said so.
+        operator_gone: tick at which the plant has said that the operator is gone; −1: it is not.
     """
 
     heard: Mapping[str, Heard] = field(default_factory=dict)
     lost: Mapping[str, int] = field(default_factory=dict)
+    operator_gone: int = -1
 
 
 class TeamWatch:
@@ -68,15 +73,17 @@ class TeamWatch:
         self, known: Teammates, statuses: Iterable[tuple[str, Status]], events: Iterable[Event]
     ) -> Teammates:
         """What is known with what has arrived; the last of several counts."""
-        heard, lost = dict(known.heard), dict(known.lost)
+        heard, lost, gone = dict(known.heard), dict(known.lost), known.operator_gone
         for name, status in statuses:
             heard[name] = Heard(status.tick, status.mode, status.reason)
         for event in events:
-            if event.code == BACK:
+            if event.code in _OF_OPERATOR:
+                gone = event.tick if event.code == OPERATOR_GONE else -1
+            elif event.code == BACK:
                 lost.pop(event.robot, None)
             elif event.robot in self.names:
                 lost[event.robot] = event.tick
-        return Teammates(heard, lost)
+        return Teammates(heard, lost, gone)
 
     def find_lost(self, known: Teammates, tick: int, since: int) -> tuple[str, ...]:
         """Robots because of which one may not walk on.
@@ -117,9 +124,22 @@ class TeamWatch:
         return len(recent) == len(self.names) or tick - since > GRACE_MS
 
 
-def concerns_robot(event: Event) -> bool:
-    """Whether an event of the plant tells of a robot whose commands no longer come, or do again."""
-    return event.code in _PLANT_SAYS and bool(event.robot)
+def concerns_agents(event: Event) -> bool:
+    """Whether an event of the plant tells that a robot's commands, or the operator, come or not."""
+    return event.code in _OF_OPERATOR or (event.code in _OF_ROBOTS and bool(event.robot))
+
+
+def has_operator(known: Teammates, references: Sequence[Reference]) -> bool:
+    """Whether the operator is there, as far as an agent knows.
+
+    That it is again might not be heard; then references of long after tell it.
+
+    Args:
+        known: what is known.
+        references: of the operator, oldest first.
+    """
+    at = known.operator_gone
+    return at < 0 or bool(references and references[-1].tick > at + GRACE_MS)
 
 
 def _is_lost(known: Teammates, name: str) -> bool:

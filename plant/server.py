@@ -51,6 +51,7 @@ class PlantServer:
         faults: gives the faults that somebody has asked for since it was called last.
         commands: the newest command of every robot of the plant.
         silent: robots that are not waited for.
+        operator_gone: whether the operator has left, in real time.
         late_ms: by robot, for how long its motors have not followed its commands, in real time.
     """
 
@@ -62,6 +63,7 @@ class PlantServer:
         self.time = time or TeamTime()
         self.commands = CommandBox(team, plant.names, config.robot)
         self.silent: set[str] = set()
+        self.operator_gone = False
         self.late_ms: dict[str, int] = {}
         self._lost, self._lowered = LostCommands(config), frozenset[str]()
         self.words: Callable[[], Words] = lambda: NO_WORDS

@@ -17,7 +17,7 @@ from quadriga.agents.plausibility import (
     is_within_limits,
     measured_limits,
 )
-from quadriga.agents.teammates import concerns_robot
+from quadriga.agents.teammates import concerns_agents
 from quadriga.agents.time_grid import step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import waits_for_router
@@ -160,7 +160,7 @@ class Inbox:
                 self._released = message
         elif isinstance(message, Event):
             self.ended = self.ended or message.kind == "stop"
-            if concerns_robot(message) and len(self._events) < _HELD:
+            if concerns_agents(message) and len(self._events) < _HELD:
                 self._events.append(message)
         else:
             source = (topic.name, sender)

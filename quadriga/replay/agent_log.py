@@ -10,7 +10,7 @@ from typing import Final
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox, Order, Source, decode_packet, order_of, state_gate
 from quadriga.agents.inbox.intake_log import ANYONE
-from quadriga.agents.teammates import concerns_robot
+from quadriga.agents.teammates import concerns_agents
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.planner_kinds import find_kind
@@ -141,7 +141,7 @@ def _keep_received(log: AgentLog, topic: Topic, sender: str) -> Callable[[ChunkE
 
     def keep(entry: ChunkEntry) -> None:
         message = decode_packet(topic, entry.payload)
-        passes = not isinstance(message, Event) or concerns_robot(message)
+        passes = not isinstance(message, Event) or concerns_agents(message)
         if message is not None and passes:  # what is not valid, the agent dropped
             by_order[order_of(message)].append((entry.key, entry.payload))
 

@@ -32,6 +32,8 @@ FAULT_REFUSED: Final = "fault-refused"
 SILENT: Final = "silent"
 GONE: Final = "gone"
 BACK: Final = "back"
+OPERATOR_GONE: Final = "operator-gone"
+OPERATOR_BACK: Final = "operator-back"
 MALFORMED: Final = "malformed"
 TIME_OVER: Final = "time-over"
 FALLEN: Final = "fallen"
@@ -71,6 +73,8 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         SILENT: EventCode("fault", "a robot did not answer in time: the world waits no longer"),
         GONE: EventCode("fault", "a robot left the bus: the world waits no longer"),
         BACK: EventCode("fault", "a robot answers again: the world waits for it"),
+        OPERATOR_GONE: EventCode("fault", "the operator left the bus: no reference counts"),
+        OPERATOR_BACK: EventCode("fault", "the operator is there again"),
         MALFORMED: EventCode("fault", "commands that are none, or that nobody can mean"),
         ESTOPPED: EventCode("fault", "the emergency stop: simulated joints are damped from now on"),
         LIES: EventCode("fault", "a robot that is stopped has sunk to the ground: no fall"),

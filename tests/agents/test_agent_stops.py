@@ -11,10 +11,12 @@ from quadriga.agents.controller import controller
 from quadriga.agents.controller.whole_body.limited import LIMITED
 from quadriga.agents.controller.whole_body.problem import WholeBodySolution
 from quadriga.agents.imu_bridge import BELIEVED_AFTER_MS
+from quadriga.agents.modes import WHOLE_MS
 from quadriga.agents.telemetry import Telemetry
 from quadriga.shared.robot.conventions import GRAVITY, Array
 from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Command, EStop, State, Status
+from quadriga.shared.wire.codes import OPERATOR_BACK, OPERATOR_GONE
+from quadriga.shared.wire.messages import Command, EStop, Event, State, Status
 from tests.a1 import standing
 from tests.agents.duet import CONFIG, FIRST_PLAN, over_the_bus
 from tests.agents.lone_robot import ALONE, Robot, is_damping, lean, tilted
@@ -214,6 +216,23 @@ def test_a_lost_reference_makes_the_robot_slow_down_and_stand() -> None:
     outputs = robot.run(2200)
     assert (outputs.mode, outputs.reason) == ("stand", "reference-lost")
     assert np.abs(outputs.command.tau).max() > 1.0  # it holds itself up
+
+
+def test_a_robot_whose_operator_has_left_stops_at_once_whatever_it_has_been_asked() -> None:
+    robot = Robot(replace(ALONE, team=replace(ALONE.team, auto_resume=True)))
+    assert robot.run(650).mode == "walk"
+    robot.references = False
+    outputs = robot.step(events=(Event.of(640, OPERATOR_GONE, "", "operator gone"),))
+    assert (outputs.mode, outputs.reason) == ("stopping", "reference-lost")
+    assert outputs.ages_ms["reference"] == 50.0
+    assert robot.run(1301).mode == "stand"
+    robot.references = True
+    robot.run(1500)
+    robot.step(events=(Event.of(1500, OPERATOR_BACK, "", "there again"),))
+    begun = robot.tick
+    while robot.step().mode == "stand":
+        assert robot.tick < begun + WHOLE_MS + 500
+    assert robot.tick > begun + WHOLE_MS
 
 
 def test_a_peer_that_never_answers_makes_the_robot_stop() -> None:

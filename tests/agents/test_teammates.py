@@ -6,10 +6,25 @@ import numpy as np
 import pytest
 
 from quadriga.agents.agent import Agent, Inputs, Outputs
-from quadriga.agents.teammates import GRACE_MS, SILENCE_MS, Teammates, TeamWatch, concerns_robot
+from quadriga.agents.teammates import (
+    GRACE_MS,
+    SILENCE_MS,
+    Teammates,
+    TeamWatch,
+    concerns_agents,
+    has_operator,
+)
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.codes import BACK, GONE, LOWERED, PUSH, SILENT
+from quadriga.shared.wire.codes import (
+    BACK,
+    GONE,
+    LOWERED,
+    OPERATOR_BACK,
+    OPERATOR_GONE,
+    PUSH,
+    SILENT,
+)
 from quadriga.shared.wire.messages import Event, Reference, Status
 from tests.a1 import standing
 
@@ -67,10 +82,24 @@ def test_whom_the_plant_calls_lost_is_until_it_answers_again(code: str) -> None:
     assert WATCH.find_lost(known(gone, back, **walking()), NOW, SINCE) == ()
     later = walking(NOW + GRACE_MS + 1)  # nobody has heard that it is back
     assert WATCH.find_lost(known(gone, **later), NOW + GRACE_MS + 1, SINCE) == ()
-    assert concerns_robot(gone)
-    assert concerns_robot(back)
-    assert not concerns_robot(Event.of(NOW, PUSH, "r2", ""))
-    assert not concerns_robot(Event.of(NOW, LOWERED, "r2", ""))
+    assert concerns_agents(gone)
+    assert concerns_agents(back)
+    assert not concerns_agents(Event.of(NOW, PUSH, "r2", ""))
+    assert not concerns_agents(Event.of(NOW, LOWERED, "r2", ""))
+
+
+def test_there_is_no_operator_from_the_plants_word_until_its_return_is_told_or_seen() -> None:
+    gone = Event.of(NOW, OPERATOR_GONE, "", "gone")
+    back = Event.of(NOW + 5, OPERATOR_BACK, "", "there again")
+    old, new = (Reference(NOW + GRACE_MS + k, 0, 0.2, 0.0, 0.0, 0.26) for k in (0, 1))
+    assert has_operator(known(), ())
+    assert not has_operator(known(gone), ())
+    assert not has_operator(known(gone), (old,)), "said before it left, of the near future"
+    assert has_operator(known(gone), (old, new)), "nobody has heard that it is back"
+    assert has_operator(known(gone, back), (old,))
+    assert WATCH.find_lost(known(gone, **walking()), NOW, SINCE) == ()
+    assert concerns_agents(gone)
+    assert concerns_agents(back)
 
 
 def test_of_itself_nobody_is_told() -> None:

@@ -1,4 +1,4 @@
-"""In real time it is announced, once each, whose agent is gone, is silent, or answers again."""
+"""In real time it is announced, once each, who is gone, is silent, or answers again."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import cast
 
 from quadriga.plant.attendance import note_absences
 from quadriga.plant.server import PlantServer
+from quadriga.plant.team_time import FollowerTime
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.wire import codes
 from quadriga.sim_server.world.world import World
@@ -55,6 +56,26 @@ def test_who_leaves_who_is_silent_and_who_is_back() -> None:
         (420, "r2", codes.BACK),
         (440, "r1", codes.BACK),
     ]
+
+
+def test_an_operator_that_leaves_and_comes_back_is_announced_by_who_drives_time() -> None:
+    config, bus = configured(2, mode="realtime"), Meeting()
+    server = PlantServer(config, World(config), cast("Bus", bus))
+    walk(server, 100)
+    bus.there -= {"operator"}
+    walk(server, 200)
+    bus.there |= {"operator"}
+    walk(server, 300)
+    told = [(event.tick, event.robot, event.code) for event in bus.events()]
+    assert told == [(100, "", codes.OPERATOR_GONE), (200, "", codes.OPERATOR_BACK)]
+
+
+def test_a_follower_announces_no_operator() -> None:
+    config, bus = configured(2, mode="realtime"), Meeting()
+    server = PlantServer(config, World(config), cast("Bus", bus), FollowerTime(config))
+    bus.there -= {"operator"}
+    walk(server, 100)
+    assert bus.events() == []
 
 
 def test_a_robot_whose_commands_always_come_late_is_announced() -> None:
