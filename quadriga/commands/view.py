@@ -35,7 +35,7 @@ def add(add_command: AddCommand) -> None:
         help="of the page (%(default)s: this machine alone); whoever reaches another one sees the "
         "team, and can move what is played",
     )
-    command.add_argument("--once", action="store_true", help="leave when the team has left")
+    command.add_argument("--once", action="store_true", help="live: leave when the team has left")
 
 
 def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
@@ -58,6 +58,8 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
             view_live(config, address, stopped, _tell, once=arguments.once)
         else:
             refuse_configuration(given)
+            if arguments.once:
+                raise ConfigError("--once", "a recording, too", "a team on the bus, which leaves")
             view_recording(arguments.recording, address, stopped, _tell)
     return 0
 

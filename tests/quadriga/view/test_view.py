@@ -140,6 +140,7 @@ def test_mistakes_cost_one_line(
 ) -> None:
     assert "no such file" in line_of(capsys, ["view", str(tmp_path / "no.mcap")]).lower()
     assert "none of the configuration" in line_of(capsys, ["view", str(RECORDING), "--robots", "2"])
+    assert "--once: got a recording, too" in line_of(capsys, ["view", str(RECORDING), "--once"])
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
