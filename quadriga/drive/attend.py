@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import AsyncIterable, Awaitable, Callable
 from typing import Final
 
+from quadriga.drive.client import HEARD
 from quadriga.drive.controls import DriveControls
 from quadriga.drive.driver_words import ESTOP, NEWS, WHERE, DriverWord, read_driver_word
 from quadriga.drive.tell import Stopping, tell_news
@@ -67,7 +68,8 @@ class Attendant:
             await send(tell_news(driver, self._controls))
         elif said.kind == WHERE:
             await send(json.dumps({"kind": WHERE, "url": self.url}))
-        elif said.kind == ESTOP:  # once all have stopped, or it has taken too long
+        elif said.kind == ESTOP:  # at once, and once all have stopped or it has taken too long
+            await send(json.dumps({"kind": HEARD, "number": said.number}))
             stopping = Stopping(self._controls)
             while not stopping.is_over():
                 await asyncio.sleep(_LOOK)

@@ -14,6 +14,7 @@ from quadriga.shared.errors import BusError, system_reason
 
 SUFFIX: Final = ".sock"
 PATIENCE: Final = 2.0  # s, longest wait for an answer
+HEARD: Final = "heard"  # the kind of the first answer to an emergency stop; what came of it follows
 _LONGEST: Final = 65_536  # bytes of one
 
 
@@ -70,12 +71,35 @@ class ControlLink:
             raise self._wrong(system_reason(error)) from None
         return self.answer()
 
-    def answer(self) -> dict[str, Any]:
+    def stop(self, reason: str, patience: float = PATIENCE) -> dict[str, Any]:
+        """Have every joint damped; what came of it.
+
+        Args:
+            reason: told to every agent.
+            patience: longest wait for it once the operator has heard this, s.
+
+        Raises:
+            BusError: no answer comes, or it is none.
+        """
+        self.say("estop", text=reason)
+        return self.await_stop(patience)
+
+    def await_stop(self, patience: float = PATIENCE) -> dict[str, Any]:
+        """What came of an emergency stop, see `stop`."""
+        answer = self.answer()
+        return self.answer(patience) if answer.get("kind") == HEARD else answer
+
+    def answer(self, patience: float | None = None) -> dict[str, Any]:
         """The next answer.
+
+        Args:
+            patience: longest wait for it, s; None: the connection's own.
 
         Raises:
             BusError: none comes, or it is none.
         """
+        patience = self._patience if patience is None else patience
+        self._socket.settimeout(patience)
         try:
             while b"\n" not in self._rest:
                 received = self._socket.recv(_LONGEST)
@@ -85,7 +109,7 @@ class ControlLink:
             line, _, self._rest = self._rest.partition(b"\n")
             answer = json.loads(line)
         except (TimeoutError, ConnectionError):
-            raise self._wrong(f"no answer within {self._patience:g} s") from None
+            raise self._wrong(f"no answer within {patience:g} s") from None
         except ValueError:
             raise self._wrong("an answer that is no JSON") from None
         if not isinstance(answer, dict):

@@ -108,7 +108,7 @@ def _say_word(link: ControlLink, word: str, say: Say) -> None:
     if word != ESTOP:
         link.say(word)
         return
-    say(describe_stop(link.ask(ESTOP, text="driver")))
+    say(describe_stop(link.stop("driver")))
 
 
 def _ask(link: ControlLink, wish: Wish, *, held: bool) -> None:

@@ -26,8 +26,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @contextmanager
-def operator(folder: Path, team: str, answer: object) -> Iterator[list[dict[str, object]]]:
-    """Something that listens as an operator does, and what it has heard."""
+def operator(folder: Path, team: str, *answers: object) -> Iterator[list[dict[str, object]]]:
+    """Something that listens as an operator does, and what it has heard; without answers: hung."""
     heard = list[dict[str, object]]()
     with socket.socket(socket.AF_UNIX) as server:
         server.bind(str(socket_path(folder, team, 7)))
@@ -38,10 +38,11 @@ def operator(folder: Path, team: str, answer: object) -> Iterator[list[dict[str,
             with link, link.makefile("rw", encoding="utf-8") as lines:
                 for line in lines:
                     heard.append(json.loads(line))
-                    if answer is None:
-                        return
-                    lines.write(json.dumps(answer) + "\n")
-                    lines.flush()
+                    for answer in answers:
+                        if answer is None:
+                            return
+                        lines.write(json.dumps(answer) + "\n")
+                        lines.flush()
 
         thread = Thread(target=serve)
         thread.start()
@@ -51,6 +52,7 @@ def operator(folder: Path, team: str, answer: object) -> Iterator[list[dict[str,
             thread.join()
 
 
+HEARD = {"kind": "heard", "number": 0}
 FINE = {"kind": "stopped", "ms": 7, "missing": []}
 
 
@@ -58,7 +60,7 @@ def test_all_teams_of_this_machine_are_stopped(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with ExitStack() as stack:
-        heard = [stack.enter_context(operator(folder, name, FINE)) for name in ("a", "b-c")]
+        heard = [stack.enter_context(operator(folder, name, HEARD, FINE)) for name in ("a", "b-c")]
         assert stop_quickly(["--reason", "dog"]) == (0, ())
     assert heard == [[{"kind": "estop", "text": "dog"}]] * 2
     said = capsys.readouterr().out.splitlines()
@@ -69,17 +71,28 @@ def test_all_teams_of_this_machine_are_stopped(
 def test_who_has_not_stopped_is_named_and_the_status_tells(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with operator(folder, "team", {**FINE, "missing": ["r2", "plant"]}) as heard:
+    with operator(folder, "team", HEARD, {**FINE, "missing": ["r2", "plant"]}) as heard:
         assert stop_quickly([]) == (2, ())
     assert heard == [{"kind": "estop", "text": "operator"}]
     assert "of team 'team': no word of r2, plant after 7 ms" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("answer", [None, {}, [], {"kind": "stopped", "missing": "r1"}])
+@pytest.mark.parametrize(
+    "answers",
+    [
+        [None],
+        [],
+        [HEARD],
+        [HEARD, None],
+        [{}],
+        [[]],
+        [{"kind": "stopped", "missing": "r1"}],
+    ],
+)
 def test_a_team_whose_operator_does_not_answer_is_left_to_the_long_way(
-    folder: Path, answer: object, capsys: pytest.CaptureFixture[str]
+    folder: Path, answers: list[object], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with operator(folder, "a", FINE) as heard, operator(folder, "b", answer):
+    with operator(folder, "a", HEARD, FINE) as heard, operator(folder, "b", *answers):
         assert stop_quickly([]) == (None, ("--team", "b"))
     assert heard == [{"kind": "estop", "text": "operator"}]
     said = capsys.readouterr()

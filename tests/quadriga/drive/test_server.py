@@ -219,9 +219,12 @@ def test_what_came_of_an_emergency_stop_is_told(
     try:
         with serving(config, operator, tmp_path) as (server, path):
             with ControlLink(path) as link:
-                told = link.ask("estop", text="dog", number=3)
+                link.say("estop", text="dog", number=3)
+                assert link.answer() == {"kind": "heard", "number": 3}
+                told = link.answer()
             with connect(address(server, "/stop")) as page:
                 page.send(json.dumps({"kind": "estop", "number": 4}))
+                assert json.loads(page.recv(WAIT)) == {"kind": "heard", "number": 4}
                 also = json.loads(page.recv(WAIT))
     finally:
         over.set()

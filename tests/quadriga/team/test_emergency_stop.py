@@ -95,16 +95,17 @@ def test_what_came_of_it_is_told_and_who_has_not_stopped_is_an_error(
             for key, put in puts.items():
                 put(encode(ANSWERS[key]))
 
-    thread = Thread(target=answer)
+    thread, told = Thread(target=answer), list[str]()
     thread.start()
     try:
         if silent:
             said = "no word of r1 after .* r1: says" if "r1" in silent else "no word of plant after"
             with pytest.raises(BusError, match=said):
-                stop_team(config, "dog")
+                stop_team(config, "dog", told.append)
         else:
             said = r"stopped r1 within \d+ ms: every joint is damped, until `quadriga reset`"
-            assert re.fullmatch(said, stop_team(config, "dog"))
+            stop_team(config, "dog", told.append)
+            assert re.fullmatch(said, "|".join(told))
     finally:
         thread.join()
 
@@ -126,5 +127,5 @@ def test_who_is_not_there_is_named_and_the_others_stop(
     monkeypatch.setattr(emergency_stop, "SEARCH", 0.3)
     match = r"no r1 on the bus after 0.3 s.*\(sim heard it at once"
     with pytest.raises(BusError, match=match):
-        stop_team(config, "dog")
+        stop_team(config, "dog", print)
     assert team[SIM].get(WAIT) is not None

@@ -170,7 +170,7 @@ def said_stop(reason: str, tick: int) -> EStop:
 
         def stop() -> None:
             with suppress(BusError):  # nobody here says that it has stopped
-                stop_team(config, reason)
+                stop_team(config, reason, print)
 
         threads = [Thread(target=tell), Thread(target=stop)]
         for thread in threads:
