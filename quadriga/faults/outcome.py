@@ -159,7 +159,7 @@ def _after(tick: int, later: int | None) -> int | None:
 
 def _count_lost(config: Config, traces: Traces, moment: Moment) -> int:
     own = STATE.key(config.team.name, moment.robot).removesuffix(STATE.name)
-    missing = missing_ticks(config, traces.ticks)
+    missing = missing_ticks(config, traces.ticks, traces.statuses)
     lost = sum(count for key, count in missing.items() if not key.startswith(own))
     states = [traces.ticks.get(STATE.key(config.team.name, name)) for name in traces.robots]
     newest = max((int(found.max()) for found in states if found is not None), default=0)

@@ -6,31 +6,44 @@ is the team's: a robot of which nothing was recorded lacks everything.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 
+from quadriga.agents.modes import RISING, WALK
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, STATE, TRUTH, Topic
 
+_UNKNOWN: Final[Mapping[str, Sequence[Status]]] = MappingProxyType({})
+_ALWAYS: Final = ((0.0, math.inf),)
 
-def missing_ticks(config: Config, ticks: Mapping[str, Ticks]) -> dict[str, int]:
+Span = tuple[float, float]  # ticks from the first up to before the second
+
+
+def missing_ticks(
+    config: Config, ticks: Mapping[str, Ticks], statuses: Mapping[str, Sequence[Status]] = _UNKNOWN
+) -> dict[str, int]:
     """Number of missing ticks by key.
 
     Each topic is expected once a period. A state, a command and truth, of a plant that knows it,
-    are expected from tick 0 on,
-    measurements from their first on, up to the team's last state; of a topic's last period nothing
-    is expected, since the world may have stopped within it. Plans are expected from their first to
-    their last: a robot that has stopped plans no more. A robot without measurements or plans lacks
-    all from the end of the initial stand on.
+    are expected from tick 0 on, measurements from their first on, up to the team's last state; of a
+    topic's last period nothing is expected, since the world may have stopped within it. A robot
+    that gets up measures nothing, and one that does not walk plans nothing: where its statuses say
+    so, nothing is expected until it has begun again. After its last plan none is. A robot without
+    measurements or plans lacks all from the end of the initial stand on.
 
     Args:
         config: the configuration of the run.
         ticks: recorded ticks by key.
+        statuses: of each robot, if they are known.
     """
     team, names = config.team.name, robot_names(config.team.robots)
     period = periods(config)
@@ -50,12 +63,23 @@ def missing_ticks(config: Config, ticks: Mapping[str, Ticks]) -> dict[str, int]:
             key = topic.key(team, name)
             missing[key] = count(key, topic, 0, end)
         key = MEASUREMENT.key(team, name)
-        missing[key] = count(key, MEASUREMENT, _first_tick(config, ticks, key), end)
+        missing[key] = _count_missing_within(
+            _find_spans(statuses.get(name, ()), lambda mode: mode != RISING),
+            _recorded_ticks(ticks, key),
+            config.gait.stand_ms,
+            period[MEASUREMENT.name],
+            end,
+        )
         if find_kind(config.planner.kind).publishes:
             key = PLAN.key(team, name)
             plans = _recorded_ticks(ticks, key)
-            last = min(int(plans.max()), end) if len(plans) else end
-            missing[key] = count(key, PLAN, _first_tick(config, ticks, key), last)
+            missing[key] = _count_missing_within(
+                _find_spans(statuses.get(name, ()), lambda mode: mode == WALK),
+                plans,
+                config.gait.stand_ms,
+                period[PLAN.name],
+                min(int(plans.max()), end) if len(plans) else end,
+            )
     return dict(sorted(missing.items()))
 
 
@@ -72,9 +96,35 @@ def repeated_ticks(ticks: Mapping[str, Ticks]) -> int:
     )
 
 
-def _first_tick(config: Config, ticks: Mapping[str, Ticks], key: str) -> int:
-    recorded = _recorded_ticks(ticks, key)
-    return int(recorded.min()) if len(recorded) else config.gait.stand_ms
+def _find_spans(statuses: Iterable[Status], holds: Callable[[str], bool]) -> tuple[Span, ...]:
+    """When a robot was in a mode of which `holds` is true; always, if it never said its mode."""
+    spans, begun, said = list[Span](), math.inf, False
+    for status in sorted(statuses, key=lambda each: each.tick):
+        if holds(status.mode):
+            begun = min(begun, status.tick) if said else 0.0
+        elif begun < math.inf:
+            spans.append((begun, status.tick))
+            begun = math.inf
+        said = True
+    if begun < math.inf:
+        spans.append((begun, math.inf))
+    return tuple(spans) if said else _ALWAYS
+
+
+def _count_missing_within(
+    spans: Iterable[Span], recorded: Ticks, first: int, period: int, last: int
+) -> int:
+    """Ticks that were not found, in each span from the first that was on.
+
+    If none was found at all, those from `first` on are expected.
+    """
+    missing = 0
+    for begin, end in spans:
+        found = recorded[(recorded >= begin) & (recorded < end)]
+        if len(found) or not len(recorded):
+            begun = int(found.min()) if len(found) else max(first, int(begin))
+            missing += _count_missing(found, begun, period, int(min(end, last)))
+    return missing
 
 
 def _count_missing(recorded: Ticks, first: int, period: int, last: int) -> int:

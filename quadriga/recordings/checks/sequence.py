@@ -61,7 +61,8 @@ class Gaps:
     """No message is missing between the first and the last tick, and no robot's keys are.
 
     In real time an agent answers the newest state and passes over older ones, so there only what
-    others send must be without gaps. A robot that gets up measures and plans nothing.
+    others send must be without gaps. A robot that gets up measures and plans nothing, and one that
+    does not walk plans nothing.
     """
 
     def __init__(self, config: Config, getting_up: GettingUp, *, filtered: bool) -> None:
@@ -133,7 +134,7 @@ class Gaps:
 class Ages:
     """Nothing is older than it may be: between two messages, and as the agents report it.
 
-    A robot that gets up measures and plans nothing.
+    A robot that gets up measures and plans nothing, and one that does not walk plans nothing.
     """
 
     def __init__(self, config: Config, getting_up: GettingUp) -> None:

@@ -79,15 +79,7 @@ def test_who_has_not_stopped_is_named_and_the_status_tells(
 
 @pytest.mark.parametrize(
     "answers",
-    [
-        [None],
-        [],
-        [HEARD],
-        [HEARD, None],
-        [{}],
-        [[]],
-        [{"kind": "stopped", "missing": "r1"}],
-    ],
+    [[None], [], [HEARD], [HEARD, None], [{}], [[]], [{"kind": "stopped", "missing": "r1"}]],
 )
 def test_a_team_whose_operator_does_not_answer_is_left_to_the_long_way(
     folder: Path, answers: list[object], capsys: pytest.CaptureFixture[str]

@@ -14,6 +14,7 @@ from quadriga.commands.parser import main
 from quadriga.recordings.check import check, format_findings
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.recordings.checks.sequence import Order
+from quadriga.recordings.summary import summarise
 from quadriga.shared.config.sections import (
     Config,
     IdentificationConfig,
@@ -324,6 +325,20 @@ def test_real_time_agents_may_pass_over_ticks_but_the_world_may_not(tmp_path: Pa
     gone = at("team/r1/state", lambda _: None)
     findings = by_name(check(write(tmp_path / "b", config, change=gone) / "run.mcap"))
     assert findings["gaps"].objections == 1
+
+
+@pytest.mark.parametrize("says_so", [True, False])
+def test_robots_that_stand_for_a_while_owe_no_plans(tmp_path: Path, says_so: bool) -> None:
+    def change(key: str, message: msg.Message) -> msg.Message | None:
+        rests = 800 <= message.tick < 1000
+        if rests and says_so and isinstance(message, msg.Status):
+            return replace(message, mode="stand", reason="stopped:ann")
+        return None if rests and isinstance(message, msg.Plan) else message
+
+    run = write(tmp_path, SHORT, change=change)
+    findings = by_name(check(run / "run.mcap"))
+    assert findings["gaps"].objections == (0 if says_so else 10)
+    assert summarise(run)["gaps"] == (0 if says_so else 10)
 
 
 def test_what_lies_between_two_parts_of_a_walk_is_told(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 from quadriga.recordings.gaps import missing_ticks, repeated_ticks
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
+from quadriga.shared.wire.messages import Status
 
 
 def configured(**keys: object) -> Config:
@@ -49,6 +50,33 @@ def test_a_robot_of_which_nothing_came_lacks_everything() -> None:
     assert missing["team/r2/state"] == missing["team/r2/command"] == 999
     assert missing["team/r2/measurement"] == 89  # from the end of the initial stand on
     assert missing["team/r1/state"] == 0
+
+
+def says(tick: int, mode: str) -> Status:
+    return Status(tick, 0, mode, "", "", {}, {}, np.zeros(0), np.zeros(0))
+
+
+def test_nothing_is_expected_that_a_robot_says_it_does_not_make() -> None:
+    """It stands up at 100, stands from 300 to 500, and gets up from 700 to 900 ms."""
+    modes = {0: "stand", 100: "walk", 300: "stand", 500: "walk", 700: "rising", 900: "walk"}
+    statuses = {"r1": [says(tick, mode) for tick, mode in modes.items()]}
+    ticks = whole(10)
+    plans, measured = ticks["team/r1/plan"], ticks["team/r1/measurement"]
+    walks = (plans < 300) | ((plans >= 540) & (plans < 700)) | (plans >= 920)
+    ticks["team/r1/plan"] = plans[walks]
+    ticks["team/r1/measurement"] = measured[(measured < 700) | (measured >= 910)]
+    assert sum(missing_ticks(configured(), ticks, statuses).values()) == 0
+    assert missing_ticks(configured(), ticks)["team/r1/plan"] == (~walks).sum()
+    ticks["team/r1/plan"] = np.setdiff1d(ticks["team/r1/plan"], [200, 600])
+    assert missing_ticks(configured(), ticks, statuses)["team/r1/plan"] == 2
+
+
+def test_a_robot_that_only_stands_lacks_no_plans() -> None:
+    ticks = whole(10)
+    del ticks["team/r1/plan"]
+    stands = {"r1": [says(tick, "stand") for tick in range(0, 1000, 100)]}
+    assert missing_ticks(configured(), ticks, stands)["team/r1/plan"] == 0
+    assert missing_ticks(configured(), ticks)["team/r1/plan"] == 22
 
 
 def test_a_tick_that_came_twice_has_a_second_publisher() -> None:
