@@ -306,7 +306,9 @@ class Agent:
         tick, whole_from = inputs.state.tick, None
         if whole:
             whole_from = tick + self._stance_ms - (tick - self._stand_ms) % self._stance_ms
-        word, stop = inputs.resume is not None, inputs.stop is not None
+        word = -1 if inputs.resume is None else inputs.resume.tick
+        # Who did not know the time said 0; nobody can know one that is still to come.
+        stop = -1 if inputs.stop is None else min(inputs.stop.tick or tick, tick)
         return step_healing(healing, mode, tick, whole_from=whole_from, word=word, stop=stop)
 
     def _course(self, state: AgentState, tick: int, blind_ms: float) -> tuple[Mode, Healing]:

@@ -30,11 +30,13 @@ class Healing:
         whole_since: tick from which on it counts that its inputs are whole; −1: they are not.
         word: tick of the operator's word to go on; −1: there is none.
         resumed: tick at which the robot has begun to walk again; −1: never.
+        stopped: tick at which somebody last said that the team is to stop; −1: nobody has.
     """
 
     whole_since: int = -1
     word: int = -1
     resumed: int = -1
+    stopped: int = -1
 
 
 def step_healing(
@@ -43,28 +45,33 @@ def step_healing(
     tick: int,
     *,
     whole_from: int | None,
-    word: bool,
-    stop: bool = False,
+    word: int = -1,
+    stop: int = -1,
 ) -> Healing:
     """What is remembered after a tick.
+
+    Words are said several times, and may come late: one to go on that was said before a stop, or
+    at the same tick, counts no more.
 
     Args:
         healing: before it.
         mode: after it.
         tick: the present one.
         whole_from: if all inputs are there, the begin of the next half cycle; else None.
-        word: whether the operator's word to go on has come.
-        stop: whether somebody has asked the team to stop: an earlier word counts no more.
+        word: tick at which the operator's word to go on was said that has come; −1: none has.
+        stop: likewise of a word to stop.
     """
+    stopped = max(stop, healing.stopped)
     if not rests(mode):
-        idle = healing.whole_since < 0 and healing.word < 0
-        return healing if idle else Healing(resumed=healing.resumed)
+        idle = healing.whole_since < 0 and healing.word < 0 and stopped == healing.stopped
+        return healing if idle else Healing(resumed=healing.resumed, stopped=stopped)
     since = -1
     if whole_from is not None:
         since = healing.whole_since if healing.whole_since >= 0 else whole_from
-    if stop:
-        return replace(healing, whole_since=since, word=-1)
-    return replace(healing, whole_since=since, word=tick if word else healing.word)
+    heeded = -1 if stop >= 0 else healing.word
+    if word > stopped:
+        heeded = tick
+    return replace(healing, whole_since=since, word=heeded, stopped=stopped)
 
 
 def may_resume(healing: Healing, mode: Mode, tick: int, *, auto: bool) -> bool:

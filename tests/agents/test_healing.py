@@ -71,14 +71,14 @@ def test_nothing_else_is_ever_healed(mode: Mode) -> None:
 def test_what_is_whole_for_less_counts_from_the_begin_again() -> None:
     healing = Healing()
     for tick in range(2000, 2900):
-        healing = step_healing(healing, LOST, tick, whole_from=tick, word=False)
+        healing = step_healing(healing, LOST, tick, whole_from=tick)
     assert healing.whole_since == 2000
-    healing = step_healing(healing, LOST, 2900, whole_from=None, word=True)
+    healing = step_healing(healing, LOST, 2900, whole_from=None, word=2899)
     assert healing == Healing(word=2900)
-    healing = step_healing(healing, LOST, 2901, whole_from=3100, word=False)
+    healing = step_healing(healing, LOST, 2901, whole_from=3100)
     assert healing == Healing(whole_since=3100, word=2900)
     walks = step_healing(
-        replace(healing, resumed=3000), Mode(WALK, 3000), 3000, whole_from=None, word=True
+        replace(healing, resumed=3000), Mode(WALK, 3000), 3000, whole_from=None, word=2990
     )
     assert walks == Healing(resumed=3000)
 
@@ -162,6 +162,21 @@ def test_a_word_to_go_on_before_a_stop_counts_no_more() -> None:
     assert modes(robot, 8000) == {STAND: 2002}
     both = {"stop": SafeStop(8000, 0, "dog", False), "resume": Resume(8000, 0)}
     assert modes(robot, 14000, **both) == {STAND: 8000}, "of both in one tick the stop counts"
+
+
+def test_a_word_that_was_said_before_a_stop_and_comes_after_it_counts_no_more() -> None:
+    robot = stood(ALONE)
+    robot.step(stop=SafeStop(1995, 0, "dog", False))
+    assert modes(robot, 8000, resume=Resume(1995, 0)) == {STAND: 2001}
+    assert modes(robot, 12000, resume=Resume(1996, 0)) == {STAND: 8000, WALK: 8100}
+
+
+def test_a_stop_of_who_does_not_know_the_time_outlasts_what_was_said_before_it() -> None:
+    robot = stood(ALONE)
+    robot.step(stop=SafeStop(0, 0, "dog", False))
+    assert modes(robot, 8000, resume=Resume(1999, 0)) == {STAND: 2001}
+    robot.step(stop=SafeStop(1 << 41, 0, "a liar's", False))
+    assert modes(robot, 14000, resume=Resume(8001, 0)) == {STAND: 8001, WALK: 8100}
 
 
 def test_a_stop_is_announced_as_what_it_is() -> None:
