@@ -82,9 +82,8 @@ def _median_and_most(values: Iterable[int | None]) -> str:
 
 def _share_refused(rows: _Rows) -> str:
     forged = sum(row.get("forged", 0) for row in rows)
-    return (
-        f"{100 * sum(row.get('refused', 0) for row in rows) / forged:.4g} %" if forged else NOTHING
-    )
+    refused = sum(min(row.get("forged", 0), row.get("refused", 0)) for row in rows)
+    return f"{100 * refused / forged:.4g} %" if forged else NOTHING
 
 
 def _words(every: _Rows) -> list[str]:

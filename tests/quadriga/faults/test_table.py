@@ -113,11 +113,13 @@ def test_goals_and_the_worst_of_what_came() -> None:
 def test_falls_and_what_got_through_miss_their_goals() -> None:
     fell = row(falls=["r1", "r2"], falls_of_others=1)
     attacked = row(fault="message-forged", forged=220, refused=218, passed=1)
-    lines = {line[0]: line[1:] for line in build_goal_table(Config(), [fell, attacked]).rows}
-    assert lines["robots fall that the fault was not of"] == ("2", "1", "0", "no")
-    assert lines["the robot of the fault falls"] == ("2", "1", "0", "no")
-    assert lines["forgeries get through"] == ("220", "1", "0", "no")
-    assert lines["forgeries that nobody has refused"] == ("220", "2", "0", "no")
+    more = row(fault="message-forged", forged=220, refused=221, passed=0)
+    rows = [fell, attacked, more]
+    lines = {line[0]: line[1:] for line in build_goal_table(Config(), rows).rows}
+    assert lines["robots fall that the fault was not of"] == ("3", "1", "0", "no")
+    assert lines["the robot of the fault falls"] == ("3", "1", "0", "no")
+    assert lines["forgeries get through"] == ("440", "1", "0", "no")
+    assert lines["forgeries that nobody has refused"] == ("440", "2", "0", "no")
 
 
 def test_a_fault_that_nobody_noticed_misses_its_goal() -> None:
