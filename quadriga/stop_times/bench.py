@@ -18,21 +18,18 @@ from quadriga.drive.client import ControlLink, socket_path
 from quadriga.drive.driver_words import WHERE
 from quadriga.drive.wish import standing
 from quadriga.identification.predictors import ensure_predictor
-from quadriga.recordings.summary import RECORDING
 from quadriga.shared.config.reference import BY_HAND
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import BusError, ProcessError
 from quadriga.shared.members import OPERATOR
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.places import runtime_dir
-from quadriga.stop_times.clock_listener import clock_listener
-from quadriga.stop_times.figures import TOPICS, StopPress, find_stops
+from quadriga.stop_times.figures import StopPress, find_stops
 from quadriga.stop_times.page_driver import PageDriver
-from quadriga.stop_times.tick_times import TickTimes
+from quadriga.stop_times.stop_listener import read_heard, stop_listener
 from quadriga.stop_times.view_watcher import ViewWatcher
 from quadriga.stop_times.ways import STANDS, WAYS
 from quadriga.team.endpoint import free_endpoint
@@ -43,8 +40,8 @@ from quadriga.team.trial_rows import append_row, open_rows
 from quadriga.view.port import free_port
 from quadriga.warm_up import warm_up
 
-_TIMES: Final = "clock.txt"  # of a walk: when its clock was heard
-_BLOCK: Final = 10  # presses in one walk, of which a recording must hold the whole
+_HEARD: Final = "heard.txt"  # of a walk: what its agents and plant said of themselves, and when
+_BLOCK: Final = 10  # presses in one walk
 _SPEED: Final = 0.3  # m/s forward, while it walks
 _EARLIEST_S, _LATEST_S = 0.5, 1.5  # from the time at which all walk until the press
 _START_S: Final = 120.0  # for a team to start
@@ -117,7 +114,7 @@ def _stop_in_one_walk(
     presses = list[StopPress]()
     with (
         Launch(table, run / "logs") as launch,
-        clock_listener(run / CONFIG, run / _TIMES),
+        stop_listener(run / CONFIG, run / _HEARD),
         view_beside(run, port, console),
         ExitStack() as stack,
     ):
@@ -132,10 +129,7 @@ def _stop_in_one_walk(
             presses.append(StopPress(way, press[way]()))
             _await(page, STAND if way in STANDS else ESTOP)
     names = robot_names(config.team.robots)
-    entries = Recording(run / RECORDING).entries(TOPICS)
-    with (run / _TIMES).open(encoding="utf-8") as lines:
-        times = TickTimes(lines)
-    found = find_stops(entries, times, presses, names, STANDS)
+    found = find_stops(read_heard(run / _HEARD), presses, names, STANDS)
     return [
         {"way": p.way, "ms": None if ms is None else round(ms, 3), "walk": number}
         for p, ms in zip(presses, found, strict=True)
@@ -143,7 +137,7 @@ def _stop_in_one_walk(
 
 
 def _await(page: PageDriver, mode: str) -> None:
-    """Give the team time to stop; that it has not is what the recording shows."""
+    """Give the team time to stop; that it has not is told by what is heard."""
     deadline = monotonic() + _STOP_S
     while not page.are_all(mode) and monotonic() < deadline:
         sleep(0.02)

@@ -1,4 +1,4 @@
-"""When a team had stopped after a press, by recording and clock; what many come to. Pure."""
+"""When a team had stopped after a press, by what was heard; what many presses come to. Pure."""
 
 from __future__ import annotations
 
@@ -8,24 +8,21 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.modes import STAND
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.agents.modes import ESTOP, STAND
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Command, Event, Status
-from quadriga.shared.wire.topics import COMMAND, EVENT, STATUS, topic_of
-from quadriga.stop_times.tick_times import TickTimes
+from quadriga.shared.wire.messages import Event, Status
+from quadriga.shared.wire.topics import STATUS, topic_of
 from quadriga.tables import NOTHING, Table
 
-TOPICS: Final = frozenset((COMMAND.name, EVENT.name, STATUS.name))  # that `find_stops` looks at
 _PLANT: Final = ""
 _AT_REST: Final = frozenset((codes.ESTOPPED, codes.ROBOT_STOPPED))
 _NOTE: Final = """\
-From the press, or the last thing heard of a driver who falls silent, until the tick at which the
-plant damps all joints by itself and every agent commands that they be damped, whichever is later;
-after silence until all robots stand. A tick's time is when a process that goes before all others
-hears the team's clock, every 10 ms; percentiles are linear between tries."""
+From the press, or the last thing heard of a driver who falls silent, until every agent had said
+that it commands damped joints and the plant that it damps them; after silence until all robots had
+said that they stand. A process that goes before all others hears it; percentiles are linear
+between tries."""
 
 
 @record
@@ -42,8 +39,7 @@ class StopPress:
 
 
 def find_stops(
-    entries: Iterable[ChunkEntry],
-    times: TickTimes,
+    heard: Iterable[tuple[int, str, bytes]],
     presses: Sequence[StopPress],
     robots: Sequence[str],
     stands: frozenset[str],
@@ -51,22 +47,20 @@ def find_stops(
     """After each press, ms until the whole team had stopped; None: it did not before the next one.
 
     Args:
-        entries: of the recording; topics other than `TOPICS` are of no use.
-        times: of the ticks that the messages are of.
+        heard: ns, key and payload of statuses and events, in the order of time.
         presses: in the order of time.
         robots: of the team.
         stands: ways after which robots stand, instead of being damped.
     """
     found: list[dict[str, int]] = [{} for _ in presses]
     begins = [press.at_ns for press in presses]
-    for entry in entries:
-        at = times.latest(entry.tick)
-        number = -1 if at is None else bisect_right(begins, at) - 1
-        if at is None or number < 0:
+    for at_ns, key, payload in heard:
+        number = bisect_right(begins, at_ns) - 1
+        if number < 0:
             continue
-        who = _who_has_stopped(entry, stands=presses[number].way in stands)
+        who = _who_has_stopped(key, payload, stands=presses[number].way in stands)
         if who is not None:
-            found[number][who] = min(at, found[number].get(who, at))
+            found[number].setdefault(who, at_ns)
     results: list[float | None] = []
     for press, stopped in zip(presses, found, strict=True):
         wanted = {*robots} if press.way in stands else {*robots, _PLANT}
@@ -75,18 +69,13 @@ def find_stops(
     return results
 
 
-def _who_has_stopped(entry: ChunkEntry, *, stands: bool) -> str | None:
+def _who_has_stopped(key: str, payload: bytes, *, stands: bool) -> str | None:
     """Robot, or plant, that has stopped as a message says; None: it does not say so."""
-    topic, robot = topic_of(entry.key)
-    if stands:
-        rests = topic is STATUS and decode(entry.payload, Status).mode == STAND
+    topic, robot = topic_of(key)
+    if topic is STATUS:
+        rests = decode(payload, Status).mode == (STAND if stands else ESTOP)
         return robot if rests else None
-    if topic is COMMAND:
-        command = decode(entry.payload, Command)
-        return None if command.kp.any() or command.tau.any() else robot
-    if topic is EVENT and decode(entry.payload, Event).code in _AT_REST:
-        return _PLANT
-    return None
+    return _PLANT if decode(payload, Event).code in _AT_REST else None
 
 
 def sum_up(tries: Mapping[str, Sequence[float | None]]) -> dict[str, dict[str, Any]]:
