@@ -14,6 +14,7 @@ from quadriga.team.run_folder import CONFIG
 from quadriga.team.trial_rows import read_rows
 
 PUBLISHED: Final = Path("docs/results/faults")
+_NOTE: Final = "note.md"  # of a folder of rows, if it has one: with which code they were walked
 _HEAD: Final = """\
 # When something goes wrong
 
@@ -39,6 +40,8 @@ def to_markdown(published: Path = PUBLISHED) -> str:
         parts.append(
             f"## {folder.name}: {config.team.robots} robots, planner {config.planner.kind}"
         )
+        if (folder / _NOTE).is_file():
+            parts.append((folder / _NOTE).read_text(encoding="utf-8").strip())
         tables = (build_goal_table(config, rows), *build_team_fault_tables(rows))
         parts += [table.to_markdown(3).rstrip() for table in tables]
     if not folders:
