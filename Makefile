@@ -89,6 +89,7 @@ docs: $(STAMP)
 	$(BIN)/python -m quadriga.shared.security.markdown
 	$(BIN)/python -m quadriga.desk.page > docs/desk.md
 	$(BIN)/python -m quadriga.faults.page > docs/faults.md
+	$(BIN)/python -m quadriga.stop_times.page
 
 # Every figure and table of results in README and docs, and the clip; two cores walk 30 times a
 # minute. It goes on where it ended. With ARGS the clip is left alone: ARGS=--only-publish walks

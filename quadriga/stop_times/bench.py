@@ -124,8 +124,7 @@ def _stop_in_one_walk(
         stack.enter_context(ViewWatcher(port))
         press = {w: stack.enter_context(WAYS[w](page, config.team.name, run)) for w in {*ways}}
         for way in ways:
-            page.walk()
-            sleep(chance.uniform(_EARLIEST_S, _LATEST_S))
+            _walk_a_while(page, chance)
             presses.append(StopPress(way, press[way]()))
             _await(page, STAND if way in STANDS else ESTOP)
     names = robot_names(config.team.robots)
@@ -134,6 +133,15 @@ def _stop_in_one_walk(
         {"way": p.way, "ms": None if ms is None else round(ms, 3), "walk": number}
         for p, ms in zip(presses, found, strict=True)
     ]
+
+
+def _walk_a_while(page: PageDriver, chance: np.random.Generator) -> None:
+    """Walk until the press; begin again if words of a busy computer came too late to count."""
+    page.walk()
+    sleep(chance.uniform(_EARLIEST_S, _LATEST_S))
+    while not page.drives():
+        page.walk()
+        sleep(chance.uniform(_EARLIEST_S, _LATEST_S))
 
 
 def _await(page: PageDriver, mode: str) -> None:

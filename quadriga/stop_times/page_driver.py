@@ -20,6 +20,7 @@ from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 
 _PERIOD: Final = 0.05  # s, between two of what the page asks for
 _AGAIN: Final = 0.5  # s, between two times that a word is said which does not come true
+_FRESH: Final = 0.25  # s, twice the time between two news and a half more
 _PATIENCE: Final = 60.0  # s, for a team to walk again; it gets up and stands first
 _BY: Final = "bench"
 
@@ -43,6 +44,7 @@ class PageDriver:
             for name in ("drive", "stop")
         )
         self._news: dict[str, Any] = {}
+        self._told = 0.0
         self._lock, self._over, self._spoke_ns = Lock(), Event(), 0
         self._silent = False
         self._threads = [
@@ -62,7 +64,7 @@ class PageDriver:
         with self._lock:
             self._silent = False
         deadline = monotonic() + _PATIENCE
-        while not self.are_all(WALK):
+        while not self.drives():
             if monotonic() > deadline:
                 got = ", ".join(
                     f"{n}: {r['mode']} {r['reason']}" for n, r in self._robots().items()
@@ -76,6 +78,12 @@ class PageDriver:
             elif self.are_all(STAND, WALK):
                 self._say(self._drive, GO_ON)
             self._over.wait(_AGAIN)
+
+    def drives(self) -> bool:
+        """Whether all robots walk and it is in charge, as it was told just now."""
+        news = self._news
+        in_charge = bool(news) and news["driver"] == news["you"] and not news["stands"]
+        return in_charge and monotonic() - self._told < _FRESH and self.are_all(WALK)
 
     def press_stop(self) -> int:
         """Press the page's stop button; `monotonic_ns` at the press."""
@@ -112,7 +120,7 @@ class PageDriver:
             for text in link:
                 told = json.loads(text)
                 if told["kind"] == NEWS:
-                    self._news = told
+                    self._told, self._news = monotonic(), told
 
     def _say(self, link: ClientConnection, kind: str, **fields: Any) -> None:
         link.send(json.dumps({"kind": kind, **fields}))

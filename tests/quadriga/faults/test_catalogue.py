@@ -66,7 +66,7 @@ def test_who_is_paused_goes_on(tmp_path: Path) -> None:
             stage.strike(scene)
         pid = launch.pids[OPERATOR]
         state = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0]
-        assert state in {"R", "S"}  # not T
+        assert state != "T"
         assert not scene.struck  # it leaves by itself
 
 

@@ -10,6 +10,7 @@ from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Event, Message, Status
 from quadriga.shared.wire.topics import EVENT
 from quadriga.stop_times.figures import StopPress, build_stop_table, find_stops, sum_up
+from quadriga.stop_times.page import PAGE, renewed, stop_table
 
 MS = 1_000_000
 ROBOTS = ("r1", "r2")
@@ -76,3 +77,9 @@ def test_figures_are_of_those_tries_that_stopped_the_team() -> None:
     table = build_stop_table(figures)
     assert [row[0] for row in table.rows] == ["page", "silence"]
     assert table.rows[0][1:] == ("102", "101", "51", "100", "101")
+
+
+def test_published_times_are_those_of_the_rows() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    assert renewed(page) == page, "run `make docs`"
+    assert "| page |" in stop_table()
