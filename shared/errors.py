@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
+from typing import Final
+
+_LONGEST: Final = 500  # characters shown of a name, or of what was got
 
 
 class QuadrigaError(Exception):
@@ -20,7 +23,7 @@ class QuadrigaError(Exception):
     def __init__(self, name: str, got: str, expected: str, cause: str = "") -> None:
         self.name, self.got, self.expected, self.cause = name, got, expected, cause
         tail = f" ({cause})" if cause else ""
-        super().__init__(f"{name}: got {got}, expected {expected}{tail}")
+        super().__init__(f"{_cut(name)}: got {_cut(got)}, expected {expected}{tail}")
 
     def __reduce__(self) -> tuple[type[QuadrigaError], tuple[str, str, str, str]]:
         """So that a worker process can hand it on."""
@@ -69,6 +72,11 @@ class CheckError(QuadrigaError):
 
 class ProcessError(QuadrigaError):
     """A process of the team failed, did not start, or has vanished while the team walked."""
+
+
+def _cut(text: str) -> str:
+    """A text that others wrote, as far as a reader will look."""
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}… ({len(text):,} characters)"
 
 
 @contextmanager

@@ -25,3 +25,4 @@ def test_no_input_is_anything_but_read_or_refused(kind: str, tmp_path: Path) -> 
         tally = fuzz(known[kind], inputs, seed=7)
     assert refused <= tally.refused <= inputs
     assert tally.grown_mb < 200.0
+    assert tally.longest < 2500
