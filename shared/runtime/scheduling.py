@@ -55,10 +55,14 @@ def has_priority() -> bool:
     return os.sched_getscheduler(os.getpid()) in (os.SCHED_RR, os.SCHED_FIFO)
 
 
-def go_first() -> None:
-    """Schedule this process before those that walk, if the user may do so: it is to stop them."""
+def go_first(*, alone: bool = False) -> None:
+    """Schedule this process before those that walk, if the user may do so: it is to stop them.
+
+    Args:
+        alone: what it starts from now on is ordinary.
+    """
     with suppress(OSError):
-        _schedule(os.SCHED_RR, _FIRST)
+        _schedule(os.SCHED_RR | os.SCHED_RESET_ON_FORK * alone, _FIRST)
 
 
 def _schedule(policy: int, level: int) -> None:

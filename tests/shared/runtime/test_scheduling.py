@@ -56,3 +56,21 @@ def test_without_the_right_it_runs_all_the_same() -> None:
     found, message = answer("realtime", "deny")
     assert found == ["False", "False", "True"]
     assert message.startswith("no real-time scheduling (Operation not permitted)")
+
+
+_FIRST = """
+import os, subprocess, sys
+from quadriga.shared.runtime.scheduling import go_first
+go_first(alone=sys.argv[1] == "alone")
+print(os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK == os.SCHED_RR)
+ask = "import os; print(os.sched_getscheduler(0) == os.SCHED_RR)"
+subprocess.run([sys.executable, "-c", ask], check=True)
+"""
+
+
+@pytest.mark.skipif(not permitted(), reason="this user may not schedule in real time")
+@pytest.mark.parametrize("alone", [True, False])
+def test_who_goes_first_alone_starts_ordinary_processes(alone: bool) -> None:
+    words = [sys.executable, "-uc", _FIRST, "alone" if alone else "all"]
+    done = subprocess.run(words, check=True, capture_output=True, text=True)
+    assert done.stdout.split() == ["True", str(not alone)]
