@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.report.run import Run
+from quadriga.report.run import ReportedRun
 
 CLIP: Final = (
     "The end of the walk, at most 5 s of it, as fast as the world was. Arrows are the true forces "
@@ -32,12 +32,12 @@ _FORCES: Final = {  # by `planner.interface`
 }
 
 
-def outputs(run: Run) -> str:
+def outputs(run: ReportedRun) -> str:
     """Below an agent's outputs, where the truth stands beside them."""
     return _ESTIMATE + _HEIGHTS if run.has_truth else ""
 
 
-def forces(run: Run) -> str:
+def forces(run: ReportedRun) -> str:
     """Below the forces of feet, where there are planned ones."""
     if not run.has_truth or not any(run.traces.plans.values()):
         return ""

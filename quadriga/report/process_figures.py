@@ -14,7 +14,7 @@ from quadriga.charts.colours import BARS, broad_style, robot_style
 from quadriga.charts.draw import draw_panels
 from quadriga.charts.panels import Bars, Curve, Mark, Panel, PanelGrid
 from quadriga.recordings.traces import quantile_of, times_of
-from quadriga.report.run import Run
+from quadriga.report.run import ReportedRun
 from quadriga.report.trunk_figures import draw_over_run, mark_falls, robot_legend
 from quadriga.shared.members import PLANNER
 from quadriga.shared.planner_kinds import find_kind
@@ -33,7 +33,7 @@ _LEGEND: Final = (
 )  # fmt: skip
 
 
-def draw_timeline(run: Run) -> Figure:
+def draw_timeline(run: ReportedRun) -> Figure:
     """Modes, plans and gaps of every robot, and the events of the world."""
     last = run.end / 1000
     world = [
@@ -78,7 +78,7 @@ def _build_mode_bars(
         begin = k + 1
 
 
-def draw_times(run: Run) -> Figure:
+def draw_times(run: ReportedRun) -> Figure:
     """The longest planner and tick time between two statuses, every robot."""
     planner, tick = [], []
     for index, name in enumerate((*run.traces.robots, PLANNER)):
@@ -104,7 +104,7 @@ def _build_worst(statuses: tuple[Status, ...], values: list[Array], style: str) 
     return Curve(time, worst, style, gap=_SENT_S)
 
 
-def list_times(run: Run) -> list[tuple[str, ...]]:
+def list_times(run: ReportedRun) -> list[tuple[str, ...]]:
     """A row for each process: medians, 99 % quantiles and maxima."""
     rows = []
     for name, statuses in run.traces.statuses.items():
@@ -119,7 +119,7 @@ def list_times(run: Run) -> list[tuple[str, ...]]:
     return rows
 
 
-def draw_ages(run: Run) -> Figure:
+def draw_ages(run: ReportedRun) -> Figure:
     """Age of the reference and of every peer's plan that a plan was made with."""
     traces, step = run.traces, step_ms(run.traces.config)
     panels = []
@@ -150,7 +150,7 @@ def draw_ages(run: Run) -> Figure:
     return draw_over_run(run, panels, [*legend, ("asked", "reference")], title, height=70.0)
 
 
-def draw_time_histograms(run: Run) -> Figure:
+def draw_time_histograms(run: ReportedRun) -> Figure:
     """Distribution of planner solve times and control tick times of every robot."""
     panels = []
     for field, what, unit in (
