@@ -15,6 +15,10 @@ SCENE: Final = (
     "forces of the ground, 3 mm for a newton; a foot in the air is black. Fifty pictures a second."
 )
 PATHS: Final = "Dots are the trunks at the times that are written beside them."
+TIMES: Final = (
+    "By the wall clock. Medians, quantiles and maxima leave out the first solve of each process, "
+    "which the curve has."
+)
 _ESTIMATE: Final = (
     "The agent knows its own estimate alone, and its plans begin there: what is planned follows "
     "the estimate, not the truth."

@@ -240,7 +240,9 @@ def _build_processes(run: ReportedRun) -> Iterator[Section]:
         return
     times = PageTable(_TIMES, process_figures.list_times(run), numbers=True)
     drawing = Drawing(process_figures.draw_times(run), "solve and tick times")
-    yield Section("times", "Solve and tick times", [drawing, times])
+    yield Section(
+        "times", "Solve and tick times", [drawing, times, Paragraph([captions.TIMES], soft=True)]
+    )
     central = find_kind(run.traces.config.planner.kind).central
     what = "the plan in force was" if central else "each peer's plan was when it was planned with"
     drawing = Drawing(process_figures.draw_ages(run), "ages of inputs")

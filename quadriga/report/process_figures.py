@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -13,7 +13,7 @@ from quadriga.agents.time_grid import step_ms
 from quadriga.charts.colours import BARS, broad_style, robot_style
 from quadriga.charts.draw import draw_panels
 from quadriga.charts.panels import Bars, Curve, Mark, Panel, PanelGrid
-from quadriga.recordings.traces import quantile_of, times_of
+from quadriga.recordings.traces import plan_times, quantile_of, times_of
 from quadriga.report.run import ReportedRun
 from quadriga.report.trunk_figures import draw_over_run, mark_falls, robot_legend
 from quadriga.shared.members import PLANNER
@@ -105,18 +105,26 @@ def _build_worst(statuses: tuple[Status, ...], values: list[Array], style: str) 
 
 
 def list_times(run: ReportedRun) -> list[tuple[str, ...]]:
-    """A row for each process: medians, 99 % quantiles and maxima."""
+    """A row for each process: how many there were, medians, 99 % quantiles, maxima.
+
+    The first planner solve of each process is counted, but in no other figure.
+    """
     rows = []
     for name, statuses in run.traces.statuses.items():
         if not statuses:
             continue
         cells = [name]
         for field, digits in (("planner_ms", ".2f"), ("tick_us", ".0f")):
-            values = times_of(statuses, field)
-            cells.append(f"{len(values):,}")
+            values = _read_times(statuses, field)
+            cells.append(f"{len(times_of(statuses, field)):,}")
             cells += [format_number(quantile_of(values, q), digits) for q in (0.5, 0.99, 1.0)]
         rows.append(tuple(cells))
     return rows
+
+
+def _read_times(statuses: Sequence[Status], field: str) -> Array:
+    """Times of planner solves, but for the first of each process, or of control ticks."""
+    return plan_times(statuses) if field == "planner_ms" else times_of(statuses, field)
 
 
 def draw_ages(run: ReportedRun) -> Figure:
@@ -151,14 +159,17 @@ def draw_ages(run: ReportedRun) -> Figure:
 
 
 def draw_time_histograms(run: ReportedRun) -> Figure:
-    """Distribution of planner solve times and control tick times of every robot."""
+    """Distribution of planner solve times and control tick times of every robot.
+
+    Of planner solves the first of each process is left out.
+    """
     panels = []
     for field, what, unit in (
         ("planner_ms", "planner solve", "ms"),
         ("tick_us", "control tick", "µs"),
     ):
         title, across = f"number of {what}s", f"time of a {what} [{unit}]"
-        times = [times_of(run.traces.statuses[robot], field) for robot in run.traces.robots]
+        times = [_read_times(run.traces.statuses[robot], field) for robot in run.traces.robots]
         every = np.concatenate(times)
         if not len(every):
             panels.append(Panel(f"{title}: none recorded", span=1.0, across=across))
