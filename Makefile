@@ -8,7 +8,7 @@ TOOLS := $(VENV)/.tools
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install tools walk prepared test test-containers image-lock lint fuzz fuzz-readers drops starts endurance format docs figures clip acceptance bench bench-planner bench-recorder
+.PHONY: install tools walk prepared test test-containers image-lock lint fuzz fuzz-readers drops starts endurance format docs dist figures clip acceptance bench bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -90,6 +90,11 @@ docs: $(STAMP)
 	$(BIN)/python -m quadriga.desk.page > docs/desk.md
 	$(BIN)/python -m quadriga.faults.page > docs/faults.md
 	$(BIN)/python -m quadriga.stop_times.page
+
+# Wheel and source distribution, in dist/; with ARGS=--walk also installed into an environment of
+# their own, with all they need from the package index, where a team then walks.
+dist: $(STAMP)
+	$(BIN)/python -m tests.deploy.dist $(ARGS)
 
 # Every figure and table of results in README and docs, and the clip; two cores walk 30 times a
 # minute. It goes on where it ended. With ARGS the clip is left alone: ARGS=--only-publish walks

@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
+import io
+
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
+
+
+def quiet_console() -> Console:
+    """A console that shows nothing, and leaves alone what the caller prints meanwhile.
+
+    On a terminal, or in a notebook, a bar would take over the standard output while it is shown.
+    """
+    return Console(file=io.StringIO(), quiet=True, force_terminal=False, force_jupyter=False)
 
 
 def build_progress(

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Generator, Sequence
+import sys
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from queue import SimpleQueue
-from typing import TypeVar
+from threading import Lock
+from types import ModuleType
+from typing import Final, TypeVar
 
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.signals import die_with_parent, interrupts_held
 
 A = TypeVar("A")
 B = TypeVar("B")
+
+_HIDDEN: Final = Lock()  # held by the thread that has hidden the script
 
 
 def run_each(
@@ -39,7 +45,7 @@ def run_each(
             # Not `as_completed`: interrupted while it holds every future's lock, it leaves them
             # locked, and the pool waits for them for ever.
             done: SimpleQueue[Future[B]] = SimpleQueue()
-            with interrupts_held():
+            with interrupts_held(), _script_hidden():
                 futures = {pool.submit(call, argument): argument for argument in arguments}
                 for future in futures:
                     future.add_done_callback(done.put)
@@ -57,3 +63,20 @@ def run_each(
             for worker in multiprocessing.active_children():
                 worker.terminate()
             raise
+
+
+@contextmanager
+def _script_hidden() -> Iterator[None]:
+    """Processes that are started within the block do not run the caller's script anew.
+
+    A process that is spawned imports the main module of its parent, in case what it is to call
+    stands there. Here it never does; and a script without `if __name__ == "__main__"` would walk
+    a team in each of the processes that it merely waits for.
+    """
+    with _HIDDEN:
+        script = sys.modules["__main__"]
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            yield
+        finally:
+            sys.modules["__main__"] = script

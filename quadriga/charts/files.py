@@ -1,9 +1,10 @@
-"""Figures as PNG files, and as SVG for pages: small, and in the colours of the page's style."""
+"""Figures as files, and as SVG for pages: small, and in the colours of the page's style."""
 
 from __future__ import annotations
 
 import io
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree
@@ -17,11 +18,18 @@ from matplotlib.figure import Figure
 from quadriga.charts.colours import PALETTE
 from quadriga.charts.draw import POINTS_PER_INCH, TEXT
 from quadriga.charts.panels import TIME
+from quadriga.shared.errors import ConfigError
 
 _DPI: Final = 110
 _SVG: Final = "{http://www.w3.org/2000/svg}"
 _VARIABLES: Final = {colour: f"var(--{name})" for name, colour in PALETTE.items()}
 _NO_METADATA: Final = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+# By the ending of a file what would differ from day to day, or with what drew it.
+_LEFT_OUT: Final[Mapping[str, tuple[str, ...]]] = {
+    ".png": ("Software",),
+    ".pdf": ("CreationDate", "Creator", "Producer"),
+    ".svg": ("Date", "Creator"),
+}
 _POINT: Final = re.compile(r"-?\d+\.\d+")
 _CURVED: Final = re.compile("[QC]")
 _LETTER: Final = re.compile("[Lz]")
@@ -38,6 +46,34 @@ def save_png(figure: Figure, path: Path) -> None:
     """
     FigureCanvasAgg(figure)
     figure.savefig(path, dpi=_DPI)
+
+
+def check_ending(path: Path, name: str) -> None:
+    """Refuse a file that is neither PNG, nor PDF, nor SVG by its ending.
+
+    Args:
+        path: the file.
+        name: what asked for it, for the error.
+
+    Raises:
+        ConfigError: it has another ending.
+    """
+    if path.suffix.lower() not in _LEFT_OUT:
+        raise ConfigError(name, str(path), "a file that ends in .png, .pdf or .svg")
+
+
+def save_figure(figure: Figure, path: Path, ending: str) -> None:
+    """Write a figure as PNG, PDF or SVG, as `ending` says; equal ones are equal to the byte.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    ending = ending.lower()
+    FigureCanvasAgg(figure)
+    # Equal names within an SVG each time; fonts in a PDF as publishers take them.
+    with mpl.rc_context({"svg.hashsalt": "quadriga", "pdf.fonttype": 42}):
+        form, metadata = ending.removeprefix("."), dict.fromkeys(_LEFT_OUT[ending])
+        figure.savefig(path, format=form, dpi=_DPI, metadata=metadata)
 
 
 def to_svg(figure: Figure, name: str) -> str:

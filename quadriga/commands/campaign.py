@@ -62,6 +62,12 @@ def add(add_command: AddCommand) -> None:
         help="walk nothing: write the report of this folder anew",
     )
     option(
+        "--figure",
+        type=Path,
+        metavar="FILE",
+        help="success, falls and errors as one figure: .png, .pdf or .svg",
+    )
+    option(
         "--record-worst",
         type=int,
         default=0,
@@ -128,6 +134,7 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     """Walk what is missing of a campaign, then report on all of it."""
     from rich.console import Console
 
+    from quadriga.experiments.campaign.figure import check_figure_file, write_figure
     from quadriga.experiments.campaign.walk_trials import walk_campaign
     from quadriga.experiments.campaign.write_report import PAGE, write_report
     from quadriga.tables import print_tables
@@ -141,6 +148,8 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
         raise ConfigError(
             "--scenario", repr(arguments.scenario), "the names of scenarios without an option"
         )
+    if arguments.figure is not None:
+        check_figure_file(arguments.figure)
     if arguments.report is not None:
         _check_only_report(arguments)
         out = arguments.report
@@ -153,6 +162,9 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     tables = [report.build_table(section) for section in ("success", "falls")]
     print_tables(table for table in tables if table is not None)
     print(out / PAGE)
+    if arguments.figure is not None:
+        write_figure(report, arguments.figure)
+        print(arguments.figure)
     return 0
 
 

@@ -139,10 +139,9 @@ def read_config(arguments: argparse.Namespace) -> tuple[Config, Given]:
     elif scenario is None:
         given = layers(arguments.config, overrides)
     else:
-        from quadriga.team.scenarios import LABEL, label, path
+        from quadriga.team.scenarios import scenario_layers
 
-        labelled = {LABEL: label(scenario)} | overrides
-        given = layers(arguments.config, labelled, beneath=path(scenario))
+        given = scenario_layers(scenario, arguments.config, overrides)
     return build(given), given
 
 

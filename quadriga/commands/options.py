@@ -22,9 +22,9 @@ def recording_path(text: str) -> Path:
     path = Path(text)
     if not path.is_dir():
         return path
-    from quadriga.shared.recording.writer import RECORDING
+    from quadriga.recordings.readable import recording_of
 
-    return path / RECORDING
+    return recording_of(path)
 
 
 def add_source(command: argparse.ArgumentParser, what: str) -> None:

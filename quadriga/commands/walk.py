@@ -48,15 +48,13 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     """Walk once; 0 if all walked to the end, 1 if one fell or stopped, 130 if interrupted."""
     from rich.console import Console
 
-    from quadriga.team.endpoint import free_endpoint
+    from quadriga.team.endpoint import with_free_endpoint
     from quadriga.team.run_folder import check_own_config
     from quadriga.team.walk import walk
     from quadriga.view.port import choose_port, is_at_display
 
     check_own_config(arguments.config, arguments.out)
-    # Several walks on one machine are the rule; only who names an endpoint wants that one.
-    if config.bus.mode == "peer" and "endpoint" not in given.get("bus", {}):
-        config = replace(config, bus=replace(config.bus, endpoint=free_endpoint()))
+    config = with_free_endpoint(config, given)
     if arguments.drive:
         config = _driven(config, given)
     if arguments.armed and config.team.plant != BRIDGED:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 
 from quadriga.charts.colours import series_colour
 from quadriga.experiments.measures import MEASURES, Interval, name_ratio
@@ -47,28 +47,56 @@ class _Point:
     estimate: Interval
 
 
+@dataclass(frozen=True, slots=True)
+class FigurePart:
+    """What is drawn: a figure of its own, or one of several below each other.
+
+    Attributes:
+        height: inch.
+        fill: draws it.
+    """
+
+    height: float
+    fill: Callable[[FigureBase], None]
+
+    def draw(self) -> Figure:
+        """A figure of it alone."""
+        figure = Figure(figsize=(_WIDTH, self.height), layout="constrained")
+        self.fill(figure)
+        return figure
+
+
+def draw_together(parts: Sequence[FigurePart]) -> Figure:
+    """One figure of at least one part, the first uppermost."""
+    heights = [part.height for part in parts]
+    figure = Figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
+    places = figure.subfigures(len(parts), 1, squeeze=False, height_ratios=heights)
+    for part, place in zip(parts, places.flat, strict=True):
+        part.fill(place)
+    return figure
+
+
 def _no_limits(_variant: str, _measure: str, _world: World) -> Iterable[float]:
     return ()
 
 
-def draw_success(results: Results, limits: Limits = _no_limits) -> Figure | None:
+def build_success(results: Results, limits: Limits = _no_limits) -> FigurePart | None:
     """For each world a row for each variant: its rate of success. None without any trial."""
     panels = _collect_points(results, ["success"], results.variants)
-    figure = _draw_rows(panels, "success [%]", results, limits)
-    return _entitle(figure, "Walks that succeeded")
+    return _build_rows(panels, "Walks that succeeded", "success [%]", results, limits)
 
 
-def draw_falls(results: Results, limits: Limits = _no_limits) -> Figure | None:
+def build_falls(results: Results, limits: Limits = _no_limits) -> FigurePart | None:
     """For each world a row for each variant: its fall rate less that of the baseline."""
     panels = _collect_points(results, ["fall-difference"], results.others)
     across = f"fall rate less that of {results.baseline} [points]"
-    figure = _draw_rows(panels, across, results, limits, at=0.0)
-    return _entitle(figure, f"Falls against those of {results.baseline}")
+    title = f"Falls against those of {results.baseline}"
+    return _build_rows(panels, title, across, results, limits, at=0.0)
 
 
-def draw_ratios(
+def build_ratios(
     results: Results, names: Sequence[str], limits: Limits = _no_limits
-) -> Figure | None:
+) -> FigurePart | None:
     """For each world rows of errors over those of the baseline, of every other variant.
 
     Args:
@@ -79,46 +107,49 @@ def draw_ratios(
     panels = _collect_points(results, [name_ratio(name) for name in names], results.others)
     what = "RMSE, or control cost," if COST in names else "RMSE"
     across = f"{what} over that of {results.baseline}"
-    figure = _draw_rows(panels, across, results, limits, at=1.0)
-    return _entitle(figure, f"Errors against those of {results.baseline}")
+    title = f"Errors against those of {results.baseline}"
+    return _build_rows(panels, title, across, results, limits, at=1.0)
 
 
-def draw_sweeps(results: Results, panels: Sequence[SweepPanel]) -> Figure | None:
+def build_sweeps(results: Results, panels: Sequence[SweepPanel]) -> FigurePart | None:
     """Success of every variant against what is swept, in each panel. None without any trial."""
-    lines = math.ceil(max(len(panels), 1) / _CURVES_ABREAST)
-    columns = math.ceil(max(len(panels), 1) / lines)
-    figure = Figure(figsize=(_WIDTH, 3.3 * lines), layout="constrained")
+    worlds = [world for panel in panels for _, world in panel.points]
+    if not any(_find_success(results, w, name) for w in worlds for name in results.variants):
+        return None
+    lines = math.ceil(len(panels) / _CURVES_ABREAST)
+    return FigurePart(3.3 * lines, lambda figure: _fill_sweeps(figure, results, panels, lines))
+
+
+def _fill_sweeps(
+    figure: FigureBase, results: Results, panels: Sequence[SweepPanel], lines: int
+) -> None:
+    columns = math.ceil(len(panels) / lines)
     grid = figure.subplots(lines, columns, squeeze=False, sharey=True)
     axes = list(grid.flat)
-    for panel in axes[len(panels) :] if panels else []:
+    for panel in axes[len(panels) :]:
         panel.remove()
-    drawn = [_draw_curves(axis, panel, results) for axis, panel in zip(axes, panels, strict=False)]
+    for axis, panel in zip(axes, panels, strict=False):
+        _draw_curves(axis, panel, results)
     for row in grid:
         row[0].set_ylabel("success [%]")
-    if not any(drawn):
-        return None
     legends = [axis.get_legend_handles_labels() for axis in axes[: len(panels)]]
     handles, labels = max(legends, key=lambda legend: len(legend[1]))
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
     _entitle(figure, "Success against what is made harder, with 95 % intervals")
-    return figure
 
 
-def _draw_curves(axes: Axes, panel: SweepPanel, results: Results) -> bool:
-    """Curves of one panel; whether there is any."""
+def _draw_curves(axes: Axes, panel: SweepPanel, results: Results) -> None:
+    """Curves of one panel."""
     values = [to_number(value) for value, _ in panel.points]
     step = 0.012 * (max(values) - min(values))  # beside each other, so that none hides another
-    drawn = False
     for place, (name, colour) in enumerate(_colours(results).items()):
         aside = step * (place - (len(results.variants) - 1) / 2)
         points = []
         for value, world in panel.points:
-            line = results.find(world, name)
-            interval = None if line is None else MEASURES["success"].of(line)
+            interval = _find_success(results, world, name)
             if interval is not None:
                 points.append((to_number(value) + aside, interval))
         if points:
-            drawn = True
             axes.errorbar(
                 [x for x, _ in points],
                 [e.value for _, e in points],
@@ -134,7 +165,11 @@ def _draw_curves(axes: Axes, panel: SweepPanel, results: Results) -> bool:
     axes.set_xlabel(panel.axis)
     axes.set_ylim(-3.0, 103.0)
     _clean(axes, "both")
-    return drawn
+
+
+def _find_success(results: Results, world: World, variant: str) -> Interval | None:
+    line = results.find(world, variant)
+    return None if line is None else MEASURES["success"].of(line)
 
 
 def _collect_points(
@@ -158,62 +193,76 @@ def _collect_points(
     return points
 
 
-def _draw_rows(
+def _build_rows(
     panels: Mapping[World, Sequence[_Point]],
+    title: str,
     across: str,
     results: Results,
     limits: Limits,
     at: float | None = None,
-) -> Figure | None:
-    """Panels that share their rows; a line at `at`, a dotted one at each limit."""
+) -> FigurePart | None:
+    """Panels that share their rows; a line at `at`, a dotted one at each limit. None of nothing."""
     if not panels:
         return None
     rows = list(dict.fromkeys(point.row for points in panels.values() for point in points))
     lines = math.ceil(len(panels) / _ABREAST)
-    height = 0.4 + lines * (0.6 + 0.24 * max(len(rows), 2))
-    figure = Figure(figsize=(_WIDTH, height), layout="constrained")
-    columns = math.ceil(len(panels) / lines)
-    grid = list(figure.subplots(lines, columns, squeeze=False, sharey=True, sharex=True).flat)
-    axes, empty = grid[: len(panels)], grid[len(panels) :]
-    for panel in empty:
-        panel.remove()
-    for panel in axes[-columns:]:
-        panel.tick_params(labelbottom=True)  # also above an empty place
+
+    def fill(figure: FigureBase) -> None:
+        columns = math.ceil(len(panels) / lines)
+        grid = list(figure.subplots(lines, columns, squeeze=False, sharey=True, sharex=True).flat)
+        axes, empty = grid[: len(panels)], grid[len(panels) :]
+        for panel in empty:
+            panel.remove()
+        for panel in axes[-columns:]:
+            panel.tick_params(labelbottom=True)  # also above an empty place
+        required = False
+        for (world, points), panel in zip(panels.items(), axes, strict=True):
+            if at is not None:
+                panel.axvline(at, color="0.6", linewidth=0.8)
+            required |= _draw_points(panel, points, rows, results, limits, world)
+            panel.set_title(" · ".join(world), loc="left", fontsize="medium")
+            _clean(panel, "x")
+        axes[0].set_yticks(range(len(rows)), rows)
+        axes[0].set_ylim(len(rows) - 0.5, -0.5)
+        dots = "; dotted: required" if required else ""
+        figure.supxlabel(f"{across}, with 95 % intervals{dots}", fontsize="medium")
+        _entitle(figure, title)
+
+    return FigurePart(0.4 + lines * (0.6 + 0.24 * max(len(rows), 2)), fill)
+
+
+def _draw_points(
+    panel: Axes,
+    points: Sequence[_Point],
+    rows: Sequence[str],
+    results: Results,
+    limits: Limits,
+    world: World,
+) -> bool:
+    """Estimates of a world, each in its row, and what is required; whether anything is."""
     colours = _colours(results)
     required = False
-    for (world, points), panel in zip(panels.items(), axes, strict=True):
-        if at is not None:
-            panel.axvline(at, color="0.6", linewidth=0.8)
-        for point in points:
-            place = rows.index(point.row)
-            for limit in limits(point.variant, point.measure, world):
-                required = True
-                panel.plot([limit, limit], [place - 0.45, place + 0.45], color="0.1", ls=":")
-            below, above = _reach(point.estimate)
-            panel.errorbar(
-                [point.estimate.value],
-                [place],
-                xerr=[[below], [above]],
-                color=colours[point.variant],
-                marker="o",
-                markersize=4,
-                linewidth=1.3,
-                capsize=2,
-            )
-        panel.set_title(" · ".join(world), loc="left", fontsize="medium")
-        _clean(panel, "x")
-    axes[0].set_yticks(range(len(rows)), rows)
-    axes[0].set_ylim(len(rows) - 0.5, -0.5)
-    dots = "; dotted: required" if required else ""
-    figure.supxlabel(f"{across}, with 95 % intervals{dots}", fontsize="medium")
-    return figure
+    for point in points:
+        place = rows.index(point.row)
+        for limit in limits(point.variant, point.measure, world):
+            required = True
+            panel.plot([limit, limit], [place - 0.45, place + 0.45], color="0.1", ls=":")
+        below, above = _reach(point.estimate)
+        panel.errorbar(
+            [point.estimate.value],
+            [place],
+            xerr=[[below], [above]],
+            color=colours[point.variant],
+            marker="o",
+            markersize=4,
+            linewidth=1.3,
+            capsize=2,
+        )
+    return required
 
 
-def _entitle(figure: Figure | None, title: str) -> Figure | None:
-    """The figure, if there is one, with its title above."""
-    if figure is not None:
-        figure.suptitle(title, x=0.01, ha="left", weight="bold", fontsize="medium")
-    return figure
+def _entitle(figure: FigureBase, title: str) -> None:
+    figure.suptitle(title, x=0.01, ha="left", weight="bold", fontsize="medium")
 
 
 def _reach(interval: Interval) -> tuple[float, float]:

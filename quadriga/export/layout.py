@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields
 from typing import Any, Final
 
 import numpy as np
@@ -67,6 +67,25 @@ class Layout:
         return any(item.metadata.get("shape", ("",))[0] == _SAMPLES for item in fields(self.kind))
 
 
+def list_owners(config: Config) -> dict[str, tuple[str, ...]]:
+    """Names along the first axis of an array of all robots (`n`) and of all yokes (`k`)."""
+    robots = robot_names(config.team.robots)
+    pairs = yoke_pairs(len(robots), config.team.yokes)
+    return {"n": robots, "k": tuple(f"{robots[i]}-{robots[j]}" for i, j in pairs)}
+
+
+def name_numbers(item: Field[Any], owners: Mapping[str, tuple[str, ...]]) -> list[str]:
+    """Names of the numbers of an array's field: those of one sample, if it is of several.
+
+    Args:
+        item: the field.
+        owners: see `list_owners`.
+    """
+    of = owners.get(item.metadata["shape"][0], ("",))
+    entries = item.metadata["entries"]
+    return [".".join((owner, item.name, entry)).strip(".") for owner in of for entry in entries]
+
+
 def build_layout(
     kind: type[Message], config: Config, entries: Mapping[str, tuple[str, ...]]
 ) -> Layout:
@@ -77,9 +96,7 @@ def build_layout(
         config: the recorded configuration: robots and yokes.
         entries: for each field that is a map, the names that occur in it.
     """
-    robots = robot_names(config.team.robots)
-    pairs = yoke_pairs(len(robots), config.team.yokes)
-    owners = {"n": robots, "k": tuple(f"{robots[i]}-{robots[j]}" for i, j in pairs)}
+    owners = list_owners(config)
     plain, numbers, lists, arrays, maps = [], list[str](), [], [], []
     for item in fields(kind):
         shape, of = item.metadata.get("shape"), item.metadata.get("kind")
@@ -92,15 +109,13 @@ def build_layout(
             lists.append(item.name)
         else:
             arrays.append(item.name)
-            for owner in owners.get(shape[0], ("",)):
-                names = (".".join((owner, item.name, entry)) for entry in item.metadata["entries"])
-                numbers += [name.strip(".") for name in names]
+            numbers += name_numbers(item, owners)
     for name, among in maps:
-        numbers += _entry_names(name, among)
+        numbers += name_entries(name, among)
     return Layout(kind, tuple(plain), tuple(numbers), tuple(lists), tuple(arrays), tuple(maps))
 
 
-def _entry_names(field: str, entries: tuple[str, ...]) -> list[str]:
+def name_entries(field: str, entries: tuple[str, ...]) -> list[str]:
     """Names for the entries of a map, whatever a sender called them: plan.r1 becomes plan_r1."""
     names: list[str] = []
     for entry in entries:

@@ -7,13 +7,13 @@ from contextlib import suppress
 from quadriga.moving_scene.scene import build_scene
 from quadriga.moving_scene.spans import choose_spans
 from quadriga.pictures.meshes import link_meshes
-from quadriga.report.run import Run
+from quadriga.report.run import ReportedRun
 from quadriga.shared.errors import ConfigError, MeshError, RecordingError
 from quadriga.shared.recording.reader import Recording
 from quadriga.view.recorded import RecordedRun
 
 
-def scene_of(run: Run) -> str:
+def scene_of(run: ReportedRun) -> str:
     """The scene as JSON; "" of a recording that tells neither places nor shapes of robots."""
     with suppress(RecordingError, ConfigError, MeshError):
         recorded = RecordedRun(Recording(run.path))

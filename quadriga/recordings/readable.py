@@ -9,6 +9,12 @@ from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.salvage import Salvage
+from quadriga.shared.recording.writer import RECORDING
+
+
+def recording_of(path: Path) -> Path:
+    """The recording that is named by its file or by its run folder."""
+    return path / RECORDING if path.is_dir() else path
 
 
 def open_readable(path: Path) -> tuple[Recording | Salvage, RecordingError | None]:

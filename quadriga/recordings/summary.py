@@ -18,6 +18,7 @@ from quadriga.recordings.traces import (
     Traces,
     estimate_errors,
     mean_of,
+    plan_times,
     quantile_of,
     read_traces,
     stance_height_errors,
@@ -33,7 +34,7 @@ from quadriga.shared.wire.codes import FALL, LOWERED, code_of
 from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import STATE
 
-__all__ = ["RECORDING", "SUMMARY", "steady_from", "summarise", "summary_of"]
+__all__ = ["RECORDING", "SUMMARY", "kept_summary", "steady_from", "summarise", "summary_of"]
 
 SUMMARY: Final = "summary.json"
 _SOURCES: Final = ("clock.leads", "clock.by_ping_pong", "clock.by_system_clock")
@@ -48,7 +49,8 @@ def summarise(run_dir: Path, traces: Traces | None = None) -> dict[str, Any]:
     Lengths in m, speeds in m/s, angles in rad, world time in s. A figure that the recording does
     not hold (no planner, a walk too short for a steady part) is None. Tracking errors, mean speeds
     and estimator errors are over the steady part: from `steady_from`, 1 s after the speed ramp's
-    end, to the end, all robots together.
+    end, to the end, all robots together. Times of planning steps are wall time, without the
+    first of each process; `planner_solves` counts all of them.
 
     Raises:
         RecordingError: there is no recording, or it is empty or foreign.
@@ -57,6 +59,22 @@ def summarise(run_dir: Path, traces: Traces | None = None) -> dict[str, Any]:
     text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
     (run_dir / SUMMARY).write_text(text + "\n", encoding="utf-8")
     return summary
+
+
+def kept_summary(recording: Recording) -> dict[str, Any] | None:
+    """What `summarise` has written of this recording; None if it has not, or of another one."""
+    if recording.path.name != RECORDING:
+        return None
+    path = recording.path.with_name(SUMMARY)
+    try:
+        newer = path.stat().st_mtime_ns >= recording.path.stat().st_mtime_ns
+        found = json.loads(path.read_text(encoding="utf-8")) if newer else None
+    except (OSError, ValueError):
+        return None
+    if not isinstance(found, dict):
+        return None
+    same = found.get("config_sha256") == recording.metadata.get("config_sha256")
+    return found if same else None
 
 
 def summary_of(traces: Traces) -> dict[str, Any]:
@@ -165,9 +183,10 @@ def _agents(traces: Traces) -> dict[str, Any]:
     statuses = traces.statuses
     last = {robot: found[-1] for robot, found in statuses.items() if found}
     every = [status for found in statuses.values() for status in found]
-    planner_ms, tick_us = times_of(every, "planner_ms"), times_of(every, "tick_us")
+    planner_ms = np.concatenate([plan_times(found) for found in statuses.values()])
+    tick_us = times_of(every, "tick_us")
     return {
-        "planner_solves": len(planner_ms),
+        "planner_solves": len(times_of(every, "planner_ms")),
         "planner_ms_median": quantile_of(planner_ms, 0.5),
         "planner_ms_p99": quantile_of(planner_ms, 0.99),
         "tick_us_median": quantile_of(tick_us, 0.5),

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 
+from quadriga.recordings.events import merge_events
 from quadriga.recordings.truth import Ticks, TruthTrace, build_truth_trace, stack, ticks_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
@@ -84,25 +86,27 @@ class Traces:
     notes: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
-def read_traces(recording: Recording, names: Container[str] | None = None) -> Traces:
+def read_traces(
+    recording: Recording, names: Container[str] | None = None, keys: Container[str] | None = None
+) -> Traces:
     """Read a recording once.
 
     Args:
         recording: what to read.
         names: topics to look at, None for all.
+        keys: keys to look at, None for all.
 
     Raises:
         RecordingError: the recording holds no message.
     """
     config = recorded_config(recording)
     robots = robot_names(config.team.robots)
-    counts: Counter[str] = Counter()
-    invalid: Counter[str] = Counter()
+    counts, invalid = Counter[str](), Counter[str]()
     ticks: defaultdict[str, list[int]] = defaultdict(list)
     decoded: defaultdict[tuple[type[Message], str], list[Any]] = defaultdict(list)
     rows: dict[str, Any] = {}
     log_times: tuple[int, int] | None = None
-    for key, tick, log_time, payload in recording.entries(names):
+    for key, tick, log_time, payload in recording.entries(names, keys):
         counts[key] += 1
         row = rows.get(key)
         if row is None:
@@ -135,7 +139,7 @@ def read_traces(recording: Recording, names: Container[str] | None = None) -> Tr
         measurements={robot: _measurements(decoded[Measurement, robot]) for robot in robots},
         plans={robot: tuple(decoded[Plan, robot]) for robot in robots},
         statuses={name: tuple(decoded[Status, name]) for name in (*robots, PLANNER)},
-        events=_events(decoded[Event, ""], [decoded[Event, robot] for robot in robots]),
+        events=merge_events(decoded[Event, ""], [decoded[Event, robot] for robot in robots]),
         plants={
             robot: tuple(decoded[Status, SIM] or decoded[Status, plant_name(robot)])
             for robot in robots
@@ -232,13 +236,6 @@ def _fits(truth: Truth, config: Config) -> bool:
     )
 
 
-def _events(of_world: Sequence[Event], of_agents: Sequence[Sequence[Event]]) -> tuple[Event, ...]:
-    """All events, by time if agents told of some, too."""
-    # Only who drives time announces the end of a walk.
-    told = [event for events in of_agents for event in events if event.kind != "stop"]
-    return tuple(sorted([*of_world, *told], key=lambda event: event.tick) if told else of_world)
-
-
 def _references(messages: Sequence[Reference]) -> tuple[Ticks, Array]:
     latest = {message.tick: message for message in messages}
     ordered = [latest[tick] for tick in sorted(latest)]
@@ -253,6 +250,24 @@ def _measurements(messages: Sequence[Measurement]) -> MeasurementTrace:
 def times_of(statuses: Sequence[Status], field: str) -> Array:
     """All that `planner_ms` or `tick_us` of some statuses hold, shape (K,)."""
     return np.concatenate([np.zeros(0), *(getattr(status, field) for status in statuses)])
+
+
+def plan_times(statuses: Sequence[Status]) -> Array:
+    """Wall times of planning steps but for the first of each process, ms, shape (K,).
+
+    That one meets cold memory, and says nothing about the others.
+
+    Args:
+        statuses: of one agent or of the planner, in order; of several processes one after the
+            other if it was started again.
+    """
+    begins = [0]
+    for place, (before, status) in enumerate(pairwise(statuses), 1):
+        # Counters begin anew with a process, and never fall within it.
+        if any(status.counters.get(name, 0) < count for name, count in before.counters.items()):
+            begins.append(place)
+    processes = [statuses[begin:end] for begin, end in pairwise([*begins, len(statuses)])]
+    return np.concatenate([np.zeros(0), *(times_of(one, "planner_ms")[1:] for one in processes)])
 
 
 def mean_of(values: Array) -> float | None:

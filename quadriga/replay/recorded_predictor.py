@@ -57,10 +57,36 @@ def find_predictor(
     if given is not None:
         predictor = read(given)[0]
         return predictor, not sha256 or predictor_sha256(predictor) == sha256
+    return _find_kept(recording), True
+
+
+def read_recorded(recording: Recording, config: Config) -> Predictor:
+    """The predictor that a recorded team walked with, whoever of it planned.
+
+    Raises:
+        PredictorError: its planner needs none, or it is nowhere.
+    """
+    if not find_kind(config.planner.kind).needs_predictor:
+        raise PredictorError(
+            f"predictor of {recording.path}",
+            f"planner.kind {config.planner.kind!r}",
+            "a planner that predicts",
+            "the team walked without",
+        )
+    return _find_kept(recording)
+
+
+def _find_kept(recording: Recording) -> Predictor:
+    """The predictor beside a recording, or in the cache, that has the recorded digest.
+
+    Raises:
+        PredictorError: it is nowhere.
+    """
+    sha256 = recording.metadata.get("predictor_sha256", "")
     beside = recording.path.parent / PREDICTOR
     for path in (beside, *cache_files("predictor")):
         if sha256 and _read_digest(path) == sha256:
-            return read(path)[0], True
+            return read(path)[0]
     wanted = f"with digest {sha256[:16]}…" if sha256 else "of unknown digest"
     raise PredictorError(
         f"predictor of {recording.path}",

@@ -10,7 +10,7 @@ import numpy as np
 
 from quadriga.agents.planner.cooperation import is_cooperative
 from quadriga.recordings.metadata import recorded_versions
-from quadriga.report.run import Run
+from quadriga.report.run import ReportedRun
 from quadriga.shared.config.reference_trace import ROW_END
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.terrains import TERRAINS
@@ -22,7 +22,7 @@ from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, S
 _DIGITS: Final = 12  # of a digest
 
 
-def build_title(run: Run) -> str:
+def build_title(run: ReportedRun) -> str:
     """The run in one line."""
     config = run.traces.config
     n = config.team.robots
@@ -31,7 +31,7 @@ def build_title(run: Run) -> str:
     return f"{who} on {_describe_ground(config)}, seed {config.world.seed}"
 
 
-def judge(run: Run) -> tuple[str, bool]:
+def judge(run: ReportedRun) -> tuple[str, bool]:
     """How it went in one line, and whether it went well."""
     falls = [entry for entry in run.timeline if entry.kind == FALL]
     if falls or run.summary["fell"]:
@@ -45,7 +45,7 @@ def judge(run: Run) -> tuple[str, bool]:
     return f"{seconds:.1f} s without a fall ({ended or 'no end was recorded'})", True
 
 
-def list_facts(run: Run) -> Iterator[tuple[str, str]]:
+def list_facts(run: ReportedRun) -> Iterator[tuple[str, str]]:
     """Name and text of what identifies the run."""
     traces, config = run.traces, run.traces.config
     if traces.log_times:
@@ -100,7 +100,7 @@ def list_changed_keys(config: Config) -> list[tuple[str, str, str, str]]:
     return changed
 
 
-def describe_missing(run: Run) -> list[str]:
+def describe_missing(run: ReportedRun) -> list[str]:
     """What the recording does not hold, and what the page leaves out for it; empty if whole."""
     traces, missing = run.traces, list[str]()
     names = {key.partition("/")[2].rpartition("/")[2] or key for key in traces.ticks}
@@ -138,7 +138,7 @@ def describe_missing(run: Run) -> list[str]:
     return missing
 
 
-def list_traffic(run: Run) -> list[tuple[str, ...]]:
+def list_traffic(run: ReportedRun) -> list[tuple[str, ...]]:
     """A row for each key: messages, rate, first and last tick, missing and invalid ones."""
     traces = run.traces
     rows: list[tuple[str, ...]] = []

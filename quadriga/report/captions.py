@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.report.run import Run
+from quadriga.report.run import ReportedRun
 
 CLIP: Final = (
     "The end of the walk, at most 5 s of it, as fast as the world was. Arrows are the true forces "
@@ -15,6 +15,10 @@ SCENE: Final = (
     "forces of the ground, 3 mm for a newton; a foot in the air is black. Fifty pictures a second."
 )
 PATHS: Final = "Dots are the trunks at the times that are written beside them."
+TIMES: Final = (
+    "By the wall clock. Medians, quantiles and maxima leave out the first solve of each process, "
+    "which the curve has."
+)
 _ESTIMATE: Final = (
     "The agent knows its own estimate alone, and its plans begin there: what is planned follows "
     "the estimate, not the truth."
@@ -32,12 +36,12 @@ _FORCES: Final = {  # by `planner.interface`
 }
 
 
-def outputs(run: Run) -> str:
+def outputs(run: ReportedRun) -> str:
     """Below an agent's outputs, where the truth stands beside them."""
     return _ESTIMATE + _HEIGHTS if run.has_truth else ""
 
 
-def forces(run: Run) -> str:
+def forces(run: ReportedRun) -> str:
     """Below the forces of feet, where there are planned ones."""
     if not run.has_truth or not any(run.traces.plans.values()):
         return ""

@@ -11,7 +11,7 @@ import numpy as np
 from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.time_grid import step_ms
-from quadriga.report.run import Run
+from quadriga.report.run import ReportedRun
 from quadriga.report.samples import Samples, find_slip
 from quadriga.report.window import (
     BEFORE_MS,
@@ -52,7 +52,7 @@ COLUMNS: Final = (
 )  # fmt: skip
 
 
-def assess_robot(run: Run, index: int, tick: int) -> Condition:
+def assess_robot(run: ReportedRun, index: int, tick: int) -> Condition:
     """The condition of the robot at `index` in the second up to `tick`."""
     robot = run.traces.robots[index]
     down = passive_since(run, robot, tick)
@@ -93,7 +93,7 @@ def _assess_feet(window: Samples) -> Iterator[tuple[str, bool]]:
     yield f"{100 * min(torque, 1.0):.0f} %", torque >= TORQUE
 
 
-def _find_strongest_yoke(run: Run, index: int, tick: int) -> tuple[str, bool]:
+def _find_strongest_yoke(run: ReportedRun, index: int, tick: int) -> tuple[str, bool]:
     """The greatest force in a yoke of the robot, and whether it is more than its weight bears."""
     truth, team = run.traces.truth, run.traces.config.team
     pairs = yoke_pairs(team.robots, team.yokes)
@@ -113,7 +113,7 @@ def _find_strongest_yoke(run: Run, index: int, tick: int) -> tuple[str, bool]:
     return text, abs(force) > YOKE * run.traces.config.robot.weight
 
 
-def _assess_planning(run: Run, index: int, tick: int) -> Iterator[tuple[str, bool]]:
+def _assess_planning(run: ReportedRun, index: int, tick: int) -> Iterator[tuple[str, bool]]:
     config = run.traces.config
     plans = [
         p for p in run.traces.plans[run.traces.robots[index]] if tick - BEFORE_MS < p.tick <= tick
@@ -136,7 +136,7 @@ def _assess_planning(run: Run, index: int, tick: int) -> Iterator[tuple[str, boo
     )
 
 
-def share_at_limit(run: Run, index: int, plan: Plan) -> float:
+def share_at_limit(run: ReportedRun, index: int, plan: Plan) -> float:
     """Share of a plan's applied samples with a force at its friction or deviation limit."""
     planner = run.traces.config.planner
     applied = min(planner.applied, len(plan.u))
@@ -155,7 +155,7 @@ def share_at_limit(run: Run, index: int, plan: Plan) -> float:
     return float((sliding.any(axis=1) | full.any(axis=1)).mean())
 
 
-def _find_oldest_input(run: Run, robot: str, tick: int) -> tuple[str, bool]:
+def _find_oldest_input(run: ReportedRun, robot: str, tick: int) -> tuple[str, bool]:
     """The oldest of what the agent planned with, by its plans and statuses."""
     traces, step = run.traces, step_ms(run.traces.config)
     usual = 0 if find_kind(run.traces.config.planner.kind).central else 1

@@ -8,7 +8,7 @@ from typing import Final
 from quadriga.charts.files import save_png
 from quadriga.report.foot_figures import draw_forces_of_first
 from quadriga.report.process_figures import draw_time_histograms
-from quadriga.report.run import Run
+from quadriga.report.run import ReportedRun
 from quadriga.report.top_view import draw_top_view
 from quadriga.report.trunk_figures import draw_trajectory
 
@@ -18,7 +18,7 @@ TOP_VIEW: Final = "top_view.png"
 TIMES: Final = "times.png"
 
 
-def write_figures(run: Run, folder: Path) -> tuple[Path, ...]:
+def write_figures(run: ReportedRun, folder: Path) -> tuple[Path, ...]:
     """Write the figures of a run and return their paths."""
     figures = {
         TRAJECTORY: draw_trajectory(run, 0),

@@ -15,7 +15,7 @@ from quadriga.charts.panels import Bars, Curve, Panel, PanelGrid
 from quadriga.charts.thinning import find_spells
 from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.recordings.truth import Ticks
-from quadriga.report.run import Run
+from quadriga.report.run import ReportedRun
 from quadriga.report.trunk_figures import first_fall, mark_falls
 from quadriga.shared.robot.conventions import Leg
 from quadriga.shared.wire.topics import SAMPLE_MS
@@ -26,7 +26,7 @@ _STRONG: Final = 200.0  # N, three times what a foot carries: impacts beyond are
 _SHOWN: Final = 10.0  # s of gait; more cannot be told apart
 
 
-def draw_forces(run: Run) -> Figure:
+def draw_forces(run: ReportedRun) -> Figure:
     """Vertical force of every robot's front-right foot, as the paper's Fig. 3."""
     panels = [
         _build_force_panel(run, i, Leg.FR, f"{robot} front right [N]")
@@ -37,7 +37,7 @@ def draw_forces(run: Run) -> Figure:
     return draw_panels(panels, grid, marks=mark_falls(run), legend=_force_legend(run), title=title)
 
 
-def draw_forces_enlarged(run: Run) -> Figure:
+def draw_forces_enlarged(run: ReportedRun) -> Figure:
     """Vertical forces of all feet in four strides."""
     panels = [
         _build_force_panel(run, i, leg, f"{robot} {leg.name} [N]")
@@ -49,7 +49,7 @@ def draw_forces_enlarged(run: Run) -> Figure:
     return draw_panels(panels, grid, marks=mark_falls(run), legend=_force_legend(run), title=title)
 
 
-def draw_forces_of_first(run: Run) -> Figure:
+def draw_forces_of_first(run: ReportedRun) -> Figure:
     """Vertical force of the first robot's front-right foot: the whole run, and four strides."""
     robot = run.traces.robots[0]
     panel = _build_force_panel(run, 0, Leg.FR, f"{robot} front right [N]")
@@ -60,7 +60,7 @@ def draw_forces_of_first(run: Run) -> Figure:
     return draw_panels([panel, part], grid, marks=mark_falls(run), legend=legend, title=title)
 
 
-def draw_gait(run: Run) -> tuple[Figure, float, float]:
+def draw_gait(run: ReportedRun) -> tuple[Figure, float, float]:
     """Scheduled stance and contact of every foot, and from when to when, s."""
     end = min(run.end / 1000, first_fall(run) + 0.5)
     begin = max(run.begin / 1000, end - _SHOWN)
@@ -71,7 +71,7 @@ def draw_gait(run: Run) -> tuple[Figure, float, float]:
     return figure, begin, end
 
 
-def build_gait_panel(run: Run, index: int) -> Panel:
+def build_gait_panel(run: ReportedRun, index: int) -> Panel:
     """One robot's feet: bars of scheduled stance, and in them thin ones of contact."""
     robot = run.traces.robots[index]
     samples = run.samples[robot]
@@ -88,13 +88,13 @@ def build_gait_panel(run: Run, index: int) -> Panel:
     return Panel(robot, rows=rows)
 
 
-def gait_legend(run: Run) -> list[tuple[str, str]]:
+def gait_legend(run: ReportedRun) -> list[tuple[str, str]]:
     """What the bars of the gait mean."""
     contact = "true contact" if run.has_truth else "contact by the foot sensor"
     return [("stance", "scheduled stance"), ("contact", f"{contact}, in the robot's colour")]
 
 
-def four_strides(run: Run) -> tuple[float, float]:
+def four_strides(run: ReportedRun) -> tuple[float, float]:
     """First and last time, s, of four strides before the first fall, in the middle of the run."""
     seconds = 2e-3 * run.traces.config.gait.stance_ms * _STRIDES
     end = min(run.end / 1000, first_fall(run))
@@ -103,13 +103,13 @@ def four_strides(run: Run) -> tuple[float, float]:
     return begin, min(begin + seconds, run.end / 1000)
 
 
-def _force_legend(run: Run) -> list[tuple[str, str]]:
+def _force_legend(run: ReportedRun) -> list[tuple[str, str]]:
     unit = "N" if run.traces.config.feet_measure_newtons else "counts"
     source = "ground reaction (truth)" if run.has_truth else f"by the foot sensor, {unit}"
     return [("true", f"{source}, in the robot's colour"), ("planned", "planned, as applied")]
 
 
-def _build_force_panel(run: Run, index: int, leg: Leg, title: str) -> Panel:
+def _build_force_panel(run: ReportedRun, index: int, leg: Leg, title: str) -> Panel:
     traces, robot = run.traces, run.traces.robots[index]
     begin, forces, _ = join_applied_samples(traces.plans[robot], traces.config.planner.applied)
     style = truth_style(index)

@@ -25,7 +25,7 @@ from quadriga.report.document import (
     Text,
     time_link,
 )
-from quadriga.report.run import Run
+from quadriga.report.run import ReportedRun
 from quadriga.report.timeline import TimelineEntry
 from quadriga.report.top_view import draw_top_view
 from quadriga.report.trouble_figure import draw_trouble
@@ -45,7 +45,7 @@ _TIMES: Final = (
 _TRAFFIC: Final = ("key", "messages", "rate [Hz]", "from … to [s]", "missing", "invalid")
 
 
-def write_page(run: Run, path: Path, scene: str = "") -> Path:
+def write_page(run: ReportedRun, path: Path, scene: str = "") -> Path:
     """Write the page of a run, with the clip that lies beside the recording, if any.
 
     Args:
@@ -73,7 +73,7 @@ def _read_clip(recording: Path) -> bytes:
     return b""
 
 
-def build_page(run: Run, clip: bytes = b"", scene: str = "") -> str:
+def build_page(run: ReportedRun, clip: bytes = b"", scene: str = "") -> str:
     """The whole page as HTML; it loads nothing from anywhere.
 
     Args:
@@ -93,7 +93,7 @@ def build_page(run: Run, clip: bytes = b"", scene: str = "") -> str:
     ).to_html()
 
 
-def _build_sections(run: Run, clip: bytes, scene: str) -> Iterator[Section]:
+def _build_sections(run: ReportedRun, clip: bytes, scene: str) -> Iterator[Section]:
     yield Section("run", "The run", _build_run(run))
     summary = PageTable((), list_figures(run.summary), named=True)
     yield Section("summary", "Summary", [summary])
@@ -113,7 +113,7 @@ def _build_sections(run: Run, clip: bytes, scene: str) -> Iterator[Section]:
     yield Section("traffic", "The recording", [traffic])
 
 
-def _build_run(run: Run) -> list[Part]:
+def _build_run(run: ReportedRun) -> list[Part]:
     facts = PageTable((), list(about.list_facts(run)), named=True)
     changed = about.list_changed_keys(run.traces.config)
     if not changed:
@@ -123,7 +123,7 @@ def _build_run(run: Run) -> list[Part]:
     return [facts, Fold(title, [keys], opened=True)]
 
 
-def _build_troubles(run: Run, troubles: Sequence[Trouble]) -> Iterator[Part]:
+def _build_troubles(run: ReportedRun, troubles: Sequence[Trouble]) -> Iterator[Part]:
     yield Paragraph(
         [
             "For each fall, fault or stop: the second before it, what was out of the ordinary then "
@@ -140,7 +140,7 @@ def _build_troubles(run: Run, troubles: Sequence[Trouble]) -> Iterator[Part]:
         yield Paragraph(links)
 
 
-def _build_trouble(run: Run, trouble: Trouble) -> Iterator[Part]:
+def _build_trouble(run: ReportedRun, trouble: Trouble) -> Iterator[Part]:
     what = "; ".join(f"{e.robot or 'world'} {e.kind}: {e.text}" for e in trouble.entries)
     yield Subtitle([time_link(trouble.tick), f" · {what}"])
     rows: list[list[Text]] = [
@@ -159,7 +159,7 @@ def _build_trouble(run: Run, trouble: Trouble) -> Iterator[Part]:
     yield Fold("What came first", [first], opened=True)
 
 
-def _build_timeline(run: Run) -> list[Part]:
+def _build_timeline(run: ReportedRun) -> list[Part]:
     rows = [_build_row(entry) for entry in run.timeline[:_ENTRIES]]
     listed: list[Part] = [PageTable(("time", "robot", "kind", "what"), rows)]
     more = len(run.timeline) - len(rows)
@@ -179,7 +179,7 @@ def _build_row(entry: TimelineEntry) -> list[Text]:
     return [when, entry.robot, Cell(entry.kind, marked=entry.trouble), entry.text]
 
 
-def _build_trunks(run: Run) -> Iterator[Section]:
+def _build_trunks(run: ReportedRun) -> Iterator[Section]:
     robots = run.traces.robots
     if any(len(run.outputs_of(i)[0]) for i in range(len(robots))):
         yield Section("trajectories", "Trajectories", list(_build_trajectories(run)))
@@ -204,7 +204,7 @@ def _build_trunks(run: Run) -> Iterator[Section]:
         yield Section("yokes", "Yokes", [Drawing(trunk_figures.draw_yokes(run), "yokes")])
 
 
-def _build_trajectories(run: Run) -> Iterator[Part]:
+def _build_trajectories(run: ReportedRun) -> Iterator[Part]:
     for i, robot in enumerate(run.traces.robots):
         figure, caption = trunk_figures.draw_trajectory(run, i), "" if i else captions.outputs(run)
         whole = Drawing(figure, f"trajectories of {robot}", caption)
@@ -217,7 +217,7 @@ def _build_trajectories(run: Run) -> Iterator[Part]:
         yield Paragraph([text], soft=True)
 
 
-def _build_feet(run: Run) -> Iterator[Section]:
+def _build_feet(run: ReportedRun) -> Iterator[Section]:
     sensed = any(len(samples.tick) for samples in run.samples.values())
     if run.has_truth or sensed:
         begin, end = foot_figures.four_strides(run)
@@ -235,12 +235,14 @@ def _build_feet(run: Run) -> Iterator[Section]:
         yield Section("gait", "Gait", parts)
 
 
-def _build_processes(run: Run) -> Iterator[Section]:
+def _build_processes(run: ReportedRun) -> Iterator[Section]:
     if not any(run.traces.statuses.values()) and not any(run.traces.plans.values()):
         return
     times = PageTable(_TIMES, process_figures.list_times(run), numbers=True)
     drawing = Drawing(process_figures.draw_times(run), "solve and tick times")
-    yield Section("times", "Solve and tick times", [drawing, times])
+    yield Section(
+        "times", "Solve and tick times", [drawing, times, Paragraph([captions.TIMES], soft=True)]
+    )
     central = find_kind(run.traces.config.planner.kind).central
     what = "the plan in force was" if central else "each peer's plan was when it was planned with"
     drawing = Drawing(process_figures.draw_ages(run), "ages of inputs")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -13,8 +13,8 @@ from quadriga.agents.time_grid import step_ms
 from quadriga.charts.colours import BARS, broad_style, robot_style
 from quadriga.charts.draw import draw_panels
 from quadriga.charts.panels import Bars, Curve, Mark, Panel, PanelGrid
-from quadriga.recordings.traces import quantile_of, times_of
-from quadriga.report.run import Run
+from quadriga.recordings.traces import plan_times, quantile_of, times_of
+from quadriga.report.run import ReportedRun
 from quadriga.report.trunk_figures import draw_over_run, mark_falls, robot_legend
 from quadriga.shared.members import PLANNER
 from quadriga.shared.planner_kinds import find_kind
@@ -33,7 +33,7 @@ _LEGEND: Final = (
 )  # fmt: skip
 
 
-def draw_timeline(run: Run) -> Figure:
+def draw_timeline(run: ReportedRun) -> Figure:
     """Modes, plans and gaps of every robot, and the events of the world."""
     last = run.end / 1000
     world = [
@@ -78,7 +78,7 @@ def _build_mode_bars(
         begin = k + 1
 
 
-def draw_times(run: Run) -> Figure:
+def draw_times(run: ReportedRun) -> Figure:
     """The longest planner and tick time between two statuses, every robot."""
     planner, tick = [], []
     for index, name in enumerate((*run.traces.robots, PLANNER)):
@@ -104,22 +104,30 @@ def _build_worst(statuses: tuple[Status, ...], values: list[Array], style: str) 
     return Curve(time, worst, style, gap=_SENT_S)
 
 
-def list_times(run: Run) -> list[tuple[str, ...]]:
-    """A row for each process: medians, 99 % quantiles and maxima."""
+def list_times(run: ReportedRun) -> list[tuple[str, ...]]:
+    """A row for each process: how many there were, medians, 99 % quantiles, maxima.
+
+    The first planner solve of each process is counted, but in no other figure.
+    """
     rows = []
     for name, statuses in run.traces.statuses.items():
         if not statuses:
             continue
         cells = [name]
         for field, digits in (("planner_ms", ".2f"), ("tick_us", ".0f")):
-            values = times_of(statuses, field)
-            cells.append(f"{len(values):,}")
+            values = _read_times(statuses, field)
+            cells.append(f"{len(times_of(statuses, field)):,}")
             cells += [format_number(quantile_of(values, q), digits) for q in (0.5, 0.99, 1.0)]
         rows.append(tuple(cells))
     return rows
 
 
-def draw_ages(run: Run) -> Figure:
+def _read_times(statuses: Sequence[Status], field: str) -> Array:
+    """Times of planner solves, but for the first of each process, or of control ticks."""
+    return plan_times(statuses) if field == "planner_ms" else times_of(statuses, field)
+
+
+def draw_ages(run: ReportedRun) -> Figure:
     """Age of the reference and of every peer's plan that a plan was made with."""
     traces, step = run.traces, step_ms(run.traces.config)
     panels = []
@@ -150,15 +158,18 @@ def draw_ages(run: Run) -> Figure:
     return draw_over_run(run, panels, [*legend, ("asked", "reference")], title, height=70.0)
 
 
-def draw_time_histograms(run: Run) -> Figure:
-    """Distribution of planner solve times and control tick times of every robot."""
+def draw_time_histograms(run: ReportedRun) -> Figure:
+    """Distribution of planner solve times and control tick times of every robot.
+
+    Of planner solves the first of each process is left out.
+    """
     panels = []
     for field, what, unit in (
         ("planner_ms", "planner solve", "ms"),
         ("tick_us", "control tick", "µs"),
     ):
         title, across = f"number of {what}s", f"time of a {what} [{unit}]"
-        times = [times_of(run.traces.statuses[robot], field) for robot in run.traces.robots]
+        times = [_read_times(run.traces.statuses[robot], field) for robot in run.traces.robots]
         every = np.concatenate(times)
         if not len(every):
             panels.append(Panel(f"{title}: none recorded", span=1.0, across=across))

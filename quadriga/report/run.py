@@ -24,7 +24,7 @@ _FORGED: Final = 60_000  # ms after the configured end: later ticks are not of t
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class ReportedRun:
     """Everything about one run.
 
     Attributes:
@@ -58,7 +58,7 @@ class Run:
         return own.tick, own.y
 
 
-def read_run(path: Path) -> Run:
+def read_run(path: Path) -> ReportedRun:
     """Read a recording, whole or cut.
 
     Raises:
@@ -70,10 +70,10 @@ def read_run(path: Path) -> Run:
 
 def build_run(
     recording: Recording, traces: Traces, summary: Mapping[str, Any] | None = None
-) -> Run:
+) -> ReportedRun:
     """The run of a recording whose traces are read already."""
     begin, end = _find_span(traces)
-    return Run(
+    return ReportedRun(
         path=recording.path,
         complete=recording.complete,
         traces=traces,

@@ -10,7 +10,7 @@ from quadriga.charts.colours import robot_style
 from quadriga.charts.draw import draw_panels
 from quadriga.charts.panels import DEGREES, Curve, Mark, Panel, PanelGrid
 from quadriga.report.foot_figures import build_gait_panel, gait_legend
-from quadriga.report.run import Run
+from quadriga.report.run import ReportedRun
 from quadriga.report.samples import find_slip
 from quadriga.report.timeline import FAULT, STOP
 from quadriga.report.troubles import Trouble
@@ -23,7 +23,7 @@ _GAP: Final = 0.05  # s without a sample, after which a curve is not joined
 _ROBOTS: Final = 3  # whose feet are shown
 
 
-def draw_trouble(run: Run, trouble: Trouble) -> Figure:
+def draw_trouble(run: ReportedRun, trouble: Trouble) -> Figure:
     """Tilt, slip and torque of all robots, and the feet of those concerned."""
     tilt, slip, torque = [], [], []
     for index, robot in enumerate(run.traces.robots):
@@ -55,7 +55,7 @@ def draw_trouble(run: Run, trouble: Trouble) -> Figure:
     )
 
 
-def _build_marks(run: Run) -> list[Mark]:
+def _build_marks(run: ReportedRun) -> list[Mark]:
     fallen = {entry.robot for entry in run.timeline if entry.kind == FALL}
     return [
         Mark(e.tick / 1000, "fall" if e.kind == FALL else "stopped", f"{e.robot} {e.kind}")

@@ -8,7 +8,7 @@ from typing import Final
 
 from quadriga.charts.thinning import find_spells
 from quadriga.report.conditions import Condition, assess_robot
-from quadriga.report.run import Run
+from quadriga.report.run import ReportedRun
 from quadriga.report.samples import Samples, find_slip
 from quadriga.report.timeline import TimelineEntry
 from quadriga.report.window import (
@@ -60,7 +60,7 @@ class Trouble:
         return tuple(dict.fromkeys(entry.robot for entry in ordered if entry.robot))
 
 
-def find_troubles(run: Run) -> list[Trouble]:
+def find_troubles(run: ReportedRun) -> list[Trouble]:
     """All troubles of a run, those that come together as one."""
     groups: list[list[TimelineEntry]] = []
     for entry in run.timeline:
@@ -72,7 +72,7 @@ def find_troubles(run: Run) -> list[Trouble]:
     return [_build_trouble(run, group) for group in groups]
 
 
-def _build_trouble(run: Run, entries: Sequence[TimelineEntry]) -> Trouble:
+def _build_trouble(run: ReportedRun, entries: Sequence[TimelineEntry]) -> Trouble:
     tick = entries[0].tick
     signs = [
         Sign(entry.tick, entry.robot, _describe(entry, tick))
@@ -113,7 +113,7 @@ def _find_signs(robot: str, window: Samples) -> Iterator[Sign]:
     yield from first(find_spells(window.torque >= TORQUE), "a joint at its torque limit")
 
 
-def _find_planless(run: Run, tick: int) -> Iterator[Sign]:
+def _find_planless(run: ReportedRun, tick: int) -> Iterator[Sign]:
     """Robots that made no plan in the second up to `tick`, although others did."""
     begin = tick - BEFORE_MS
     made = {

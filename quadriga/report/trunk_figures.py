@@ -13,7 +13,7 @@ from quadriga.charts.panels import DEGREES, Curve, Mark, Panel, PanelGrid
 from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.recordings.traces import demanded_outputs, estimate_errors
 from quadriga.recordings.truth import Ticks
-from quadriga.report.run import Run
+from quadriga.report.run import ReportedRun
 from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.shared.wire.codes import FALL
@@ -30,7 +30,7 @@ _LEAST: Final = 200  # points of one curve
 _MOST: Final = 1000
 
 
-def mark_falls(run: Run) -> list[Mark]:
+def mark_falls(run: ReportedRun) -> list[Mark]:
     """Marks of all falls."""
     return [
         Mark(entry.tick / 1000.0, "fall", f"{entry.robot} fell")
@@ -39,18 +39,18 @@ def mark_falls(run: Run) -> list[Mark]:
     ]
 
 
-def first_fall(run: Run) -> float:
+def first_fall(run: ReportedRun) -> float:
     """Time up to which values choose the range of their axes, s; infinite without a fall."""
     return min((mark.time for mark in mark_falls(run)), default=float("inf"))
 
 
-def robot_legend(run: Run) -> list[tuple[str, str]]:
+def robot_legend(run: ReportedRun) -> list[tuple[str, str]]:
     """An entry for each robot."""
     return [(robot_style(index), robot) for index, robot in enumerate(run.traces.robots)]
 
 
 def draw_over_run(
-    run: Run,
+    run: ReportedRun,
     panels: list[Panel],
     legend: Legend,
     title: str,
@@ -63,7 +63,9 @@ def draw_over_run(
     return draw_panels(panels, grid, marks=mark_falls(run), legend=legend, title=title)
 
 
-def draw_trajectory(run: Run, index: int, part: tuple[float, float] | None = None) -> Figure:
+def draw_trajectory(
+    run: ReportedRun, index: int, part: tuple[float, float] | None = None
+) -> Figure:
     """Every output of one robot: asked for, planned, estimated and true.
 
     Args:
@@ -103,7 +105,7 @@ def draw_trajectory(run: Run, index: int, part: tuple[float, float] | None = Non
     return draw_panels(panels, grid, marks=mark_falls(run), legend=legend, title=title)
 
 
-def draw_reference(run: Run) -> Figure:
+def draw_reference(run: ReportedRun) -> Figure:
     """What was asked of the team, and every robot's mean over one gait period."""
     panels = []
     period = 2 * run.traces.config.gait.stance_ms
@@ -123,7 +125,7 @@ def draw_reference(run: Run) -> Figure:
     return draw_over_run(run, panels, legend, title, most=_share_points(run, 10))
 
 
-def draw_estimator_errors(run: Run) -> Figure:
+def draw_estimator_errors(run: ReportedRun) -> Figure:
     """Estimated less true outputs of all robots."""
     errors = [estimate_errors(run.traces, index) for index in range(len(run.traces.robots))]
     panels = []
@@ -143,7 +145,7 @@ def draw_estimator_errors(run: Run) -> Figure:
     return draw_over_run(run, panels, robot_legend(run), title, most=most, height=70.0)
 
 
-def draw_yokes(run: Run) -> Figure:
+def draw_yokes(run: ReportedRun) -> Figure:
     """Stretch and force of every yoke."""
     truth, team, robots = run.traces.truth, run.traces.config.team, run.traces.robots
     panels = []
@@ -175,6 +177,6 @@ def average_over_period(tick: Ticks, values: Array, period_ms: int) -> Array:
     return mean
 
 
-def _share_points(run: Run, curves: int) -> int:
+def _share_points(run: ReportedRun, curves: int) -> int:
     """Points that each of so many curves of each robot may have."""
     return min(_MOST, max(_LEAST, _POINTS // max(1, curves * len(run.traces.robots))))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from quadriga.charts.thinning import find_spells
-from quadriga.report.run import Run
+from quadriga.report.run import ReportedRun
 from quadriga.report.samples import Samples
 from quadriga.shared.wire.topics import SAMPLE_MS
 
@@ -31,7 +31,7 @@ def find_lost_stance(window: Samples, leg: int) -> list[tuple[int, int]]:
     return [(a, b) for a, b in find_spells(lost) if SAMPLE_MS * (b - a) >= _LOST_MS]
 
 
-def passive_since(run: Run, robot: str, tick: int) -> int | None:
+def passive_since(run: ReportedRun, robot: str, tick: int) -> int | None:
     """When a robot fell or went passive, if well before `tick`: its second says nothing then."""
     for entry in run.timeline:
         if entry.robot == robot and entry.passive and entry.tick < tick - TOGETHER_MS:

@@ -4,10 +4,28 @@ from __future__ import annotations
 
 import secrets
 import socket
+from collections.abc import Mapping
 from contextlib import suppress
-from typing import Final
+from dataclasses import replace
+from typing import Any, Final
+
+from quadriga.shared.config.sections import Config
 
 _PORT: Final = 7447  # Zenoh's own
+
+
+def with_free_endpoint(config: Config, given: Mapping[str, Any]) -> Config:
+    """The configuration with an endpoint that nobody else uses, unless one was asked for.
+
+    Several walks on one machine are the rule; only who names an endpoint wants that one.
+
+    Args:
+        config: the team's configuration.
+        given: what of it was given explicitly, by section and key.
+    """
+    if config.bus.mode != "peer" or "endpoint" in given.get("bus", {}):
+        return config
+    return replace(config, bus=replace(config.bus, endpoint=free_endpoint()))
 
 
 def free_endpoint() -> str:

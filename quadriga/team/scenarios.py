@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
+from quadriga.shared.config.load import layers
 from quadriga.shared.errors import ConfigError, did_you_mean, name_file_errors
 from quadriga.shared.runtime.places import scenario_folder
 
@@ -41,6 +43,20 @@ def path(name: str) -> Path:
 def label(name: str) -> str:
     """What a walk of the scenario is labelled with: its name, or that of its file."""
     return Path(name).stem if name.endswith(_SUFFIX) else name
+
+
+def scenario_layers(name: str, file: Path | None, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """What is given explicitly, by section and key: the scenario, a file, then overrides on top.
+
+    Args:
+        name: of the scenario.
+        file: of the configuration that lies over it, if there is one.
+        overrides: values by `section.key`.
+
+    Raises:
+        ConfigError: there is no such scenario, or a file cannot be read.
+    """
+    return layers(file, {LABEL: label(name), **overrides}, beneath=path(name))
 
 
 def description(name: str) -> str:

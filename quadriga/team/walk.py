@@ -31,6 +31,18 @@ FELL: Final = 1
 INTERRUPTED: Final = 130
 
 
+def check_walk(config: Config) -> None:
+    """Refuse what cannot be walked, before anything is written or started.
+
+    Raises:
+        ConfigError: there is no such plant, its world cannot be built, or the trace that it follows
+            cannot be read.
+    """
+    check_plant(config)
+    build_scenario(config, build_loads(config))
+    trace_of(config)
+
+
 def walk(
     config: Config,
     out: Path | None,
@@ -54,9 +66,7 @@ def walk(
         ProcessError: a process failed or left too early, or the walk did not come to its end.
         QuadrigaError: anything a user can put right before the walk begins.
     """
-    check_plant(config)
-    build_scenario(config, build_loads(config))
-    trace_of(config)
+    check_walk(config)
     run_dir = make_run_dir(out)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
     warm_up(config, console)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
 # The libraries must be loaded to be told; what loads them later is not.
 import numpy as np  # noqa: F401
 import scipy.linalg  # noqa: F401
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController, threadpool_limits
 
 
 def use_one_blas_thread() -> None:
@@ -15,3 +19,20 @@ def use_one_blas_thread() -> None:
     tell how many cores the machine has; and agents on one machine would fight for them.
     """
     threadpool_limits(limits=1)
+
+
+@contextmanager
+def blas_threads_kept() -> Iterator[None]:
+    """Whatever happens within the block, BLAS has the caller's number of threads after it."""
+    before = {library.filepath: library.num_threads for library in _libraries()}
+    try:
+        yield
+    finally:
+        for library in _libraries():
+            if library.filepath in before:
+                library.set_num_threads(before[library.filepath])
+
+
+def _libraries() -> list[Any]:
+    """What sums with threads of its own, of all that is loaded now."""
+    return list(ThreadpoolController().lib_controllers)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import stat
-import sys
 import tempfile
 from contextlib import suppress
 from pathlib import Path
@@ -15,8 +14,8 @@ import quadriga
 # The folder that the package `quadriga` is in: the checkout, where it is installed from one.
 SOURCE: Final = Path(quadriga.__file__).parents[1]
 _OF_OTHERS: Final = 0o077  # permissions of others than the owner
-_SCENARIOS: Final = SOURCE / "deploy" / "scenarios"
-_INSTALLED_SCENARIOS: Final = Path(sys.prefix) / "share" / "quadriga" / "scenarios"
+# Files that come with the code: in a checkout links to `deploy`, where they are kept.
+_DEPLOY: Final = SOURCE / "quadriga" / "deploy"
 
 
 def cache_dir() -> Path:
@@ -69,5 +68,10 @@ def cache_files(kind: str) -> list[Path]:
 
 
 def scenario_folder() -> Path:
-    """Where scenarios and traces are kept: beside the source, or where it has been installed."""
-    return _SCENARIOS if _SCENARIOS.is_dir() else _INSTALLED_SCENARIOS
+    """Where scenarios and traces are kept."""
+    return _DEPLOY / "scenarios"
+
+
+def experiment_folder() -> Path:
+    """Where experiments are kept."""
+    return _DEPLOY / "experiments"

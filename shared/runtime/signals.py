@@ -49,9 +49,19 @@ def stop_on_signals() -> StopFlag:
     return flag
 
 
+def _is_main_thread() -> bool:
+    return threading.current_thread() is threading.main_thread()
+
+
 @contextmanager
 def stop_flag() -> Iterator[StopFlag]:
-    """`stop_on_signals` for the time of a `with` block."""
+    """`stop_on_signals` for the time of a `with` block.
+
+    Signals reach the main thread alone: the flag of another one is never set.
+    """
+    if not _is_main_thread():
+        yield StopFlag()
+        return
     before = {number: signal.getsignal(number) for number in _STOPS}
     try:
         yield stop_on_signals()
@@ -157,8 +167,12 @@ def interrupts_held() -> Iterator[None]:
     For workers: Ctrl-C, which the terminal sends to all, is their parent's to handle. A worker
     inherits the blocked signal, so there is no moment, not even among its first imports, at which
     it would be hit. The parent's other threads do not block it; so it is noted here, and raised at
-    the end: in the midst of a start Python may lose an interrupt.
+    the end: in the midst of a start Python may lose an interrupt. Of another thread than the main
+    one, which signals do not reach, nothing is held.
     """
+    if not _is_main_thread():
+        yield
+        return
     noted: list[int] = []
     handlers = {
         number: signal.signal(number, lambda received, _frame: noted.append(received))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from quadriga.workers import run_each
@@ -46,3 +47,29 @@ def test_an_interrupt_at_any_moment_ends_the_calls(tmp_path: Path) -> None:
             env={"PYTHONPATH": str(Path(__file__).parents[2])},
         )
         assert done.stdout == "interrupted\n", done.stderr
+
+
+def test_a_script_without_a_guard_is_not_run_again_by_each_worker(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from quadriga.workers import run_each\nprint('begun')\n"
+        "print(sorted(dict(run_each(abs, [-1, -2], 2)).values()))\n",
+        encoding="utf-8",
+    )
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        capture_output=True,
+        text=True,
+        timeout=60.0,
+        check=False,
+        env={"PYTHONPATH": str(Path(__file__).parents[2])},
+    )
+    assert (done.stdout, done.stderr) == ("begun\n[1, 2]\n", "")
+
+
+def test_several_threads_may_ask_for_workers_at_once() -> None:
+    script = sys.modules["__main__"]
+    with ThreadPoolExecutor(3) as threads:
+        found = list(threads.map(lambda value: dict(run_each(abs, [value], 1)), (-1, -2, -3)))
+    assert found == [{-1: 1}, {-2: 2}, {-3: 3}]
+    assert sys.modules["__main__"] is script

@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from quadriga.experiments.campaign.configs import config_file
+from quadriga.experiments.campaign.figure import build_parts
 from quadriga.experiments.campaign.recordings import build_command, find_recording
 from quadriga.experiments.campaign.report import CampaignReport
-from quadriga.experiments.figures import (
-    SweepPanel,
-    draw_falls,
-    draw_ratios,
-    draw_success,
-    draw_sweeps,
-)
 from quadriga.experiments.plan import Group
-from quadriga.experiments.results import COST, Line, World
+from quadriga.experiments.results import Line
 from quadriga.experiments.seeds import format_seeds
 from quadriga.experiments.summarise import find_worst
-from quadriga.experiments.sweep import order_values, to_number
 from quadriga.experiments.trial.outcome import TrialOutcome
-from quadriga.recordings.traces import ERRORS
 from quadriga.report.document import (
     Cell,
     Document,
@@ -44,13 +33,7 @@ def build_page(report: CampaignReport) -> str:
 
 
 def _build_sections(report: CampaignReport) -> Iterator[Section]:
-    results = report.results
-    base = results.baseline
-    figures = {
-        "success": _draw_success(report),
-        "falls": _draw(draw_falls(results), f"falls against {base}"),
-        "errors": _draw(draw_ratios(results, (COST, *ERRORS)), f"errors against {base}"),
-    }
+    base, figures = report.results.baseline, build_parts(report)
     titles = {
         "success": "Success",
         "falls": f"Falls against {base}",
@@ -63,37 +46,10 @@ def _build_sections(report: CampaignReport) -> Iterator[Section]:
             # Columns of text at the left stay so: swept values are numbers as they were typed.
             shown = PageTable(table.columns, table.rows, named=True, numbers=True)
             notes = [Paragraph([note], soft=True) for note in table.notes]
-            yield Section(anchor, title, [*figures.get(anchor, []), shown, *notes])
+            drawn = [Drawing(part.draw(), name) for name, part in figures.get(anchor, [])]
+            yield Section(anchor, title, [*drawn, shown, *notes])
     yield Section("worst", "Worst seeds", list(_build_worst(report)))
     yield Section("walked", "What was walked", [_build_facts(report)])
-
-
-def _draw(figure: Figure | None, name: str) -> list[Part]:
-    return [] if figure is None else [Drawing(figure, name)]
-
-
-def _draw_success(report: CampaignReport) -> list[Part]:
-    """Success against each swept key that has numbers; else of each variant in each world."""
-    drawn: list[Part] = []
-    for k, sweep in enumerate(report.manifest.sweeps):
-        if panels := _build_panels(report.results.worlds, k, sweep.name):
-            drawn += _draw(draw_sweeps(report.results, panels), f"success against {sweep.name}")
-    return drawn or _draw(draw_success(report.results), "success by variant")
-
-
-def _build_panels(worlds: Sequence[World], k: int, axis: str) -> list[SweepPanel]:
-    """A panel for each scenario and each value of the other keys than the k-th."""
-    values = {world[1 + k] for world in worlds}
-    if len(values) < 2 or any(math.isinf(to_number(value)) for value in values):
-        return []
-    points: dict[World, list[tuple[str, World]]] = {}
-    for world in worlds:
-        others = (*world[: 1 + k], *world[2 + k :])
-        points.setdefault(others, []).append((world[1 + k], world))
-    return [
-        SweepPanel(" · ".join(rest), axis, sorted(same, key=lambda point: order_values(point[:1])))
-        for rest, same in points.items()
-    ]
 
 
 def _build_worst(report: CampaignReport) -> Iterator[Part]:

@@ -32,8 +32,9 @@ _WALKS: Final = (
 _NOTES: Final = {
     "success": "Success: every robot walked to the end; in brackets Wilson's 95 % interval. "
     "Medians: time to fall over the falls; mean vx and cost of transport (∑|τ·q̇|dt / (m g d), "
-    "payload included) over the walks to the end; plan times over the trials' own quantiles, on a "
-    "loaded machine. Radius: of the iteration of the robots' plans, which converges below 1.",
+    "payload included) over the walks to the end; plan times over the trials' own quantiles, "
+    "without the first plan of each process, on a loaded machine. Radius: of the iteration of the "
+    "robots' plans, which converges below 1.",
     "falls": "Pairs: the same world and seed with the baseline. Difference of the fall rates, "
     "negative where the variant falls less, with Newcombe's 95 % interval for paired proportions; "
     "p of McNemar's exact two-sided test, each of a single test, not corrected for their number.",

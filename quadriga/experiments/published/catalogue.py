@@ -9,10 +9,10 @@ from typing import Final
 from quadriga.experiments.published.experiment import Experiment
 from quadriga.experiments.published.experiment_file import read_experiment
 from quadriga.shared.errors import ConfigError, did_you_mean
-from quadriga.shared.runtime.places import SOURCE
+from quadriga.shared.runtime.places import SOURCE, experiment_folder
 
 CHECKOUT: Final = SOURCE
-FOLDER: Final = CHECKOUT / "deploy" / "experiments"
+FOLDER: Final = experiment_folder()
 # In this order on the page: what was promised, then what explains it, then how far it goes.
 _ORDER: Final = (
     "paper", "as-written", "hard", "edge", "distribution", "low-level", "realism", "ideas",
@@ -61,9 +61,6 @@ def load_experiments(given: Sequence[str]) -> tuple[list[Experiment], list[str]]
         asked[name] = None
     if not asked:
         raise ConfigError(
-            "experiments",
-            "none",
-            f"files in {FOLDER}",
-            "they are part of a checkout, not of an installed package",
+            "experiments", "none", f"files in {FOLDER}", "is the project installed as a whole?"
         )
     return [read_experiment(file) for file in files.values()], list(asked)

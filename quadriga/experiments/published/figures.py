@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Final
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from quadriga.experiments.figures import (
+    FigurePart,
     SweepPanel,
-    draw_falls,
-    draw_ratios,
-    draw_success,
-    draw_sweeps,
+    build_falls,
+    build_ratios,
+    build_success,
+    build_sweeps,
 )
 from quadriga.experiments.published.experiment import Experiment
 from quadriga.experiments.results import POOLED, Results, World
@@ -24,17 +24,18 @@ _DPI: Final = 90
 
 def draw_figure(name: str, experiment: Experiment, results: Results, path: Path) -> bool:
     """Write a figure, one of `FIGURES`; False if there is nothing to draw yet."""
-    figure = FIGURES[name](experiment, results)
-    if figure is None:
+    part = FIGURES[name](experiment, results)
+    if part is None:
         return False
+    figure = part.draw()
     FigureCanvasAgg(figure)
     # Without the version of what drew it, which would be the only thing to change now and then.
     figure.savefig(path, format="png", dpi=_DPI, metadata={"Software": None})
     return True
 
 
-def _sweeps(experiment: Experiment, results: Results) -> Figure | None:
-    return draw_sweeps(
+def _sweeps(experiment: Experiment, results: Results) -> FigurePart | None:
+    return build_sweeps(
         results,
         [
             SweepPanel(part.folder, part.axis, [(world[1], world) for world in part.worlds()])
@@ -44,10 +45,10 @@ def _sweeps(experiment: Experiment, results: Results) -> Figure | None:
     )
 
 
-FIGURES: Final[Mapping[str, Callable[[Experiment, Results], Figure | None]]] = {
-    "success": lambda asked, found: draw_success(found, _limits(asked)),
-    "falls": lambda asked, found: draw_falls(found, _limits(asked)),
-    "ratios": lambda asked, found: draw_ratios(found, asked.published.ratios, _limits(asked)),
+FIGURES: Final[Mapping[str, Callable[[Experiment, Results], FigurePart | None]]] = {
+    "success": lambda asked, found: build_success(found, _limits(asked)),
+    "falls": lambda asked, found: build_falls(found, _limits(asked)),
+    "ratios": lambda asked, found: build_ratios(found, asked.published.ratios, _limits(asked)),
     "sweep": _sweeps,
 }
 

@@ -15,6 +15,7 @@ from quadriga.recordings.traces import (
     OVER_STANCE_FEET,
     Traces,
     mean_of,
+    plan_times,
     quantile_of,
     stance_height_errors,
     times_of,
@@ -63,8 +64,9 @@ class Figures:
         cost: mean of ‖y − y_des‖²_Q + ‖u − u_nominal‖²_R over samples of 10 ms and robots, where
             the height is that over the stance feet.
         cost_outputs, cost_forces: its two parts.
-        planner_ms_median, planner_ms_p99: time of one planning step, ms.
-        solves: planning steps timed.
+        planner_ms_median, planner_ms_p99: time of one planning step, without the first of each
+            process, ms.
+        solves: planning steps, those included.
         plans: how many plans had which status.
         distance: length of the way, mean over the robots, m.
         work: of all motors, ∑ |τ q̇| dt over the whole walk, J.
@@ -102,7 +104,7 @@ def compute_figures(walk: Walk) -> Figures:
     outputs = _output_cost(planner.Q, squares)
     forces = mean_of(_force_cost(walk, begin, end, np.tile(planner.R, N_LEGS)))
     every = [status for of_robot in traces.statuses.values() for status in of_robot]
-    planner_ms = times_of(every, "planner_ms")
+    planner_ms = np.concatenate([plan_times(of_robot) for of_robot in traces.statuses.values()])
     return Figures(
         seconds=end / 1000.0,
         fallen=fallen,
@@ -114,7 +116,7 @@ def compute_figures(walk: Walk) -> Figures:
         cost_forces=forces,
         planner_ms_median=quantile_of(planner_ms, 0.5),
         planner_ms_p99=quantile_of(planner_ms, 0.99),
-        solves=len(planner_ms),
+        solves=len(times_of(every, "planner_ms")),
         plans=dict(sorted(walk.plans.items())),
         distance=(way := distance(truth, 2 * config.gait.stance_ms, end if fallen else None)),
         work=walk.work,

@@ -32,7 +32,8 @@ class TrialOutcome:
         cost_of_transport: energy over weight (robots and payload) and distance.
         control_cost: mean of ‖y − y_des‖²_Q + ‖u − u_nominal‖²_R per sample and robot, the height
             over the stance feet.
-        planner_ms_p50, planner_ms_p99, solves: of planning steps, wall time.
+        planner_ms_p50, planner_ms_p99, solves: of planning steps, wall time; the first of each
+            process counts among the solves alone.
         plans: how many plans had which status.
         seconds: world time walked.
         wall_s: wall time it took.

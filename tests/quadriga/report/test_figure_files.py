@@ -14,7 +14,7 @@ from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.report.figure_files import write_figures
 from quadriga.report.foot_figures import draw_forces_of_first
 from quadriga.report.process_figures import draw_time_histograms
-from quadriga.report.run import Run, read_run
+from quadriga.report.run import ReportedRun, read_run
 from quadriga.report.top_view import draw_top_view
 from quadriga.report.trunk_figures import draw_trajectory
 from quadriga.shared.robot.colours import robot_colour
@@ -26,7 +26,7 @@ FILES = ("trajectory.png", "forces.png", "top_view.png", "times.png")
 
 
 @pytest.fixture(scope="session")
-def run(known_run: Path) -> Run:
+def run(known_run: Path) -> ReportedRun:
     return read_run(known_run / "run.mcap")
 
 
@@ -37,7 +37,7 @@ def curve(panel: Axes, style: str) -> Array:
     return np.array(line.get_data(), dtype=float)
 
 
-def test_four_pictures_with_something_on_them(run: Run, tmp_path: Path) -> None:
+def test_four_pictures_with_something_on_them(run: ReportedRun, tmp_path: Path) -> None:
     paths = write_figures(run, tmp_path)
     assert [path.name for path in paths] == list(FILES)
     for path in paths:
@@ -67,7 +67,7 @@ def test_the_applied_samples_of_each_plan_are_joined() -> None:
     np.testing.assert_allclose(y[5], plans[1].y[1])
 
 
-def test_trajectory_shows_truth_plan_and_reference(run: Run) -> None:
+def test_trajectory_shows_truth_plan_and_reference(run: ReportedRun) -> None:
     panels = draw_trajectory(run, 0).axes
     height, speed = panels[0], panels[2]  # z above vx in the left column
     assert (height.get_title("left"), speed.get_title("left")) == ("z [m]", "vx [m/s]")
@@ -82,7 +82,7 @@ def test_trajectory_shows_truth_plan_and_reference(run: Run) -> None:
     assert wanted[time < 0.3] == pytest.approx(0.0)
 
 
-def test_forces_show_the_front_right_leg_of_robot_1(run: Run) -> None:
+def test_forces_show_the_front_right_leg_of_robot_1(run: ReportedRun) -> None:
     whole, part = draw_forces_of_first(run).axes
     time, true = curve(whole, truth_style(0))
     np.testing.assert_allclose(true, run.traces.truth.grf[:, 0, 1, 2])
@@ -96,7 +96,7 @@ def test_forces_show_the_front_right_leg_of_robot_1(run: Run) -> None:
     assert last - first == pytest.approx(8e-3 * run.traces.config.gait.stance_ms)
 
 
-def test_top_view_shows_every_path_and_yoke(run: Run) -> None:
+def test_top_view_shows_every_path_and_yoke(run: ReportedRun) -> None:
     (panel,) = draw_top_view(run.traces).axes
     path = curve(panel, robot_style(1)).T
     np.testing.assert_allclose(path, run.traces.truth.base_pos[::5, 1, :2])
@@ -131,7 +131,7 @@ def test_without_times_the_histograms_say_so(write_run: WriteRun) -> None:
     assert all("none recorded" in axes.get_title("left") for axes in figure.axes)
 
 
-def test_a_histogram_counts_every_tick_of_every_robot(run: Run) -> None:
+def test_a_histogram_counts_every_tick_of_every_robot(run: ReportedRun) -> None:
     ticks = draw_time_histograms(run).axes[1]
     for index, robot in enumerate(run.traces.robots):
         _, counts = curve(ticks, robot_style(index))

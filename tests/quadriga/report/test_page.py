@@ -16,7 +16,7 @@ from quadriga.commands.parser import main
 from quadriga.recordings.traces import MeasurementTrace
 from quadriga.recordings.truth import TruthTrace
 from quadriga.report.page import build_page, write_page
-from quadriga.report.run import Run, read_run
+from quadriga.report.run import ReportedRun, read_run
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.wire import messages as msg
@@ -96,7 +96,7 @@ def test_a_page_is_small_however_many_robots_walk_however_long(write_run: WriteR
     assert "trajectories of r10" in Outline(page).figures
 
 
-def _long(run: Run, samples: int) -> Run:
+def _long(run: ReportedRun, samples: int) -> ReportedRun:
     """The same run with noise, which cannot be thinned out, for truth and measurements."""
     noise, truth = np.random.default_rng(1), run.traces.truth
     tick = 10 * np.arange(samples)

@@ -16,8 +16,9 @@ from tests.quadriga.experiments.published.test_summarise_experiment import of
 def test_no_title_runs_into_another(count: int) -> None:
     worlds = [f"payload-uneven-{k}" for k in range(count)]
     experiment = experiment_of(*worlds)
-    figure = FIGURES["success"](experiment, of(experiment, range(10), upright))
-    assert figure is not None
+    part = FIGURES["success"](experiment, of(experiment, range(10), upright))
+    assert part is not None
+    figure = part.draw()
     figure.draw_without_rendering()
     texts = [text for text in figure.findobj(Text) if isinstance(text, Text)]
     places = {text.get_text(): text.get_window_extent() for text in texts}
