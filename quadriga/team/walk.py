@@ -16,6 +16,7 @@ from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.runtime.signals import stop_flag
 from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
+from quadriga.team.controller_program import check_controller
 from quadriga.team.drive_page import DrivePage
 from quadriga.team.launch import Launch, ProcessSpec, process_table
 from quadriga.team.plants import check_plant
@@ -55,6 +56,7 @@ def walk(
         QuadrigaError: anything a user can put right before the walk begins.
     """
     check_plant(config)
+    check_controller(config)
     build_scenario(config, build_loads(config))
     trace_of(config)
     run_dir = make_run_dir(out)
