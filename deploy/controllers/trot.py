@@ -1,4 +1,4 @@
-"""A trot in fifty lines: stiff joints lead the feet, the IMU keeps the trunk level.
+"""A trot in sixty lines: stiff joints lead the feet, the IMU keeps the trunk level.
 
 quadriga walk --robots 1 --controller 'python deploy/controllers/trot.py'
 """
@@ -39,7 +39,7 @@ def joints(feet):
 def step(state, reference):
     w, x, y, z = state.imu_quat_wxyz
     roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    pitch = np.arcsin(2 * (w * y - z * x))
+    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
     tilt = np.array([roll, pitch, 0.0]) + TILT_RATE_S * np.array([*state.imu_gyro[:2], 0.0])
     v = np.array([reference.vx, reference.vy]) + reference.wz * HIPS[:, 1::-1] * [-1.0, 1.0]
     lift = LIFT if np.abs(v).max() > 0.01 else 0.0
@@ -48,15 +48,14 @@ def step(state, reference):
         feet, stands = pattern(1e-3 * state.tick + ahead, STANCE_S * v, reference.height, lift)
         leaning = np.cross(tilt, feet)
         leaning[stands] *= [0.0, 0.0, -TILT_GAIN]  # push against it; swinging feet give way to it
-        q.append(joints(feet - leaning))
-    load = np.where(stands, MASS * 9.81 / max(stands.sum(), 1), 0.0)[
-        :, None
-    ]  # N, of each standing leg
+        q.append(np.clip(joints(feet - leaning).ravel(), ROBOT.lower, ROBOT.upper))
+    share = MASS * 9.81 / max(stands.sum(), 1)  # N, of the weight, on each standing leg
+    load = np.where(stands, share, 0.0)[:, None]
     x, y, _ = (feet - HIPS).T
-    lever = np.stack([y, -x, LEG.link * np.sin(q[0][:, 1] + q[0][:, 2])], 1)
+    lever = np.stack([y, -x, LEG.link * np.sin(q[0][1::3] + q[0][2::3])], 1)
     v_des = np.clip((q[1] - q[0]) / 1e-3, -20.0, 20.0)
     tau = np.clip((-load * lever).ravel(), -25.0, 25.0)
-    return build_command(state, tau=tau, q_des=q[0].ravel(), v_des=v_des.ravel(), kp=KP, kd=KD)
+    return build_command(state, tau=tau, q_des=q[0], v_des=v_des, kp=KP, kd=KD)
 
 
 if __name__ == "__main__":
