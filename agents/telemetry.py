@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.agent import Outputs
+from quadriga.agents.step_io import Outputs
 from quadriga.shared.runtime.histogram import Histogram
 from quadriga.shared.wire.messages import Status
 

@@ -49,4 +49,4 @@ def _note_operator(server: PlantServer, present: Collection[str]) -> None:
 
 def _announce_loss(server: PlantServer, name: str, code: str, why: str) -> None:
     server.silent.add(name)
-    server.announce(code, name, why)
+    server.announce(code, name, server.explain_silence(name, why))

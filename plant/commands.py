@@ -31,7 +31,7 @@ class CommandBox:
         latest: by robot, in no particular order.
         refused: number of refused messages by reason (`MALFORMED`, `IMPLAUSIBLE`, `CONTRADICTED`,
             `STALE`, `FOREIGN`) and robot, "" for a robot of no or another team.
-        last_error: what was wrong with the latest that no process of this project sends, or "".
+        errors: by robot, what was wrong with the latest that no process of this project sends.
     """
 
     def __init__(self, team: str, names: Iterable[str], robot: RobotSpec) -> None:
@@ -40,20 +40,24 @@ class CommandBox:
         self._limits = command_limits(robot)
         self.latest: dict[str, Command] = {}
         self.refused: Counter[tuple[str, str]] = Counter()
-        self.last_error = ""
+        self.errors: dict[str, str] = {}
+        self._whys: dict[str, str] = {}  # why each robot's latest command was refused
         # The first one read compiles or loads what reads it, which is not for the first tick.
         first = decode(encode(Command(0, 0, *np.zeros((5, N_JOINTS)))), Command)
         describe_excess(first, self._limits)
 
-    @property
-    def invalid(self) -> int:
-        """Number of packets that were no valid command, or one that nobody can mean."""
-        return sum(n for (reason, _), n in self.refused.items() if reason in _INVALID)
+    def invalid_of(self, robot: str) -> int:
+        """Number of a robot's packets that were no valid command, or one that nobody can mean."""
+        return sum(self.refused[reason, robot] for reason in _INVALID)
 
     def tick_of(self, robot: str) -> int:
         """Tick of the robot's newest command, −1 before the first."""
         known = self.latest.get(robot)
         return -1 if known is None else known.tick
+
+    def why_refused(self, robot: str) -> str:
+        """What was wrong with the robot's latest command; "" if it counts, or there is none."""
+        return self._whys.get(robot, "")
 
     def take(self, key: str, payload: bytes, tick: int, oldest: int) -> str:
         """Take in a packet; the robot's name if its command is now newer.
@@ -77,16 +81,21 @@ class CommandBox:
                 return self._refuse(STALE, robot)
             differ = f"command: got two of tick {command.tick} for {robot}, expected one"
             return self._refuse(CONTRADICTED, robot, f"{differ} (does someone else command it?)")
-        if not oldest <= command.tick <= tick or command.tick <= self.tick_of(robot):
+        first = max(oldest, self.tick_of(robot) + 1)
+        if not first <= command.tick <= tick:
+            wanted = f"{first} … {tick}" if first < tick else f"{first}"
+            self._whys[robot] = f"command.tick: got {command.tick}, expected {wanted}"
             return self._refuse(STALE, robot)
         excess = describe_excess(command, self._limits)
         if excess:
             return self._refuse(IMPLAUSIBLE, robot, excess)
         self.latest[robot] = command
+        self._whys.pop(robot, None)
         return robot
 
     def _refuse(self, reason: str, robot: str, error: str = "") -> str:
         """Count a packet; no robot has a newer command by it."""
         self.refused[reason, robot] += 1
-        self.last_error = error or self.last_error
+        if error:
+            self.errors[robot] = self._whys[robot] = error
         return ""

@@ -79,5 +79,6 @@ def _await_plants(server: PlantServer, stopped: Callable[[], bool]) -> End | Non
 
 def _give_up(server: PlantServer, robots: set[str], code: str, why: str) -> None:
     for robot in sorted(robots):
+        said = server.explain_silence(robot, why)
         server.silent.add(robot)
-        server.announce(code, robot, f"{why}: the world goes on without its commands")
+        server.announce(code, robot, f"{said}: the world goes on without its commands")

@@ -94,7 +94,7 @@ class PlantServer:
         self._periods = periods(config)
         self._last_tick = round(config.world.seconds * 1000)
         self._fallen: set[str] = set()
-        self._invalid = 0
+        self._invalid: dict[str, int] = {}  # by robot, as last announced
         self._published = -1  # newest tick whose states are out
         self._realtime = realtime
 
@@ -167,6 +167,11 @@ class PlantServer:
     def announce(self, code: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""
         self._send(Event.of(self.plant.tick, code, robot, truncate_text(detail)))
+
+    def explain_silence(self, robot: str, why: str) -> str:
+        """Why a robot is given up, and what was wrong with its latest command if something was."""
+        refused = self.commands.why_refused(robot)
+        return f"{why}, its last command was refused ({refused})" if refused else why
 
     def publish_status(self, status: Status) -> None:
         """Publish the plant's report on itself."""
@@ -259,11 +264,14 @@ class PlantServer:
 
     def _report_invalid(self, *, at_once: bool = False) -> None:
         """Announce invalid commands, once in a second of world time at most unless `at_once`."""
-        count = self.commands.invalid
-        if count != self._invalid and (at_once or self.plant.tick % 1000 == 0):
-            self._invalid = count
-            detail = f"{count} commands dropped: {self.commands.last_error}"
-            self.announce(codes.MALFORMED, "", detail)
+        if not at_once and self.plant.tick % 1000:
+            return
+        for robot in self.plant.names:
+            count = self.commands.invalid_of(robot)
+            if count != self._invalid.get(robot, 0):
+                self._invalid[robot] = count
+                detail = f"{count} commands dropped: {self.commands.errors[robot]}"
+                self.announce(codes.MALFORMED, robot, detail)
 
     def _send(self, event: Event) -> None:
         self._put_event(encode(event))

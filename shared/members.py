@@ -72,12 +72,14 @@ LAST: Final = ROLES[-1].name
 class Member:
     """One process of a team, which all others wait for before they walk.
 
-    `robot` is the one it is for, "" of a process that is for all.
+    `robot` is the one it is for, "" of a process that is for all; `foreign` tells that it is a
+    controller of one's own, which need not answer who it is.
     """
 
     name: str
     role: Role
     robot: str = ""
+    foreign: bool = False
 
 
 def plant_name(robot: str) -> str:
@@ -91,7 +93,12 @@ def has_lead(names: Collection[str]) -> bool:
 
 
 def team_members(
-    robots: Sequence[str], *, central: bool, recorded: bool, plant_each: bool = False
+    robots: Sequence[str],
+    *,
+    central: bool,
+    recorded: bool,
+    plant_each: bool = False,
+    foreign: bool = False,
 ) -> tuple[Member, ...]:
     """The processes of a team, in the order of the table.
 
@@ -100,6 +107,7 @@ def team_members(
         central: whether one process plans for all.
         recorded: whether the team waits for a recorder.
         plant_each: whether each robot has a plant of its own.
+        foreign: whether the agents are controllers of one's own.
     """
     needed = {ALWAYS: True, CENTRAL: central, RECORDED: recorded}
     members = list[Member]()
@@ -107,7 +115,7 @@ def team_members(
         if not needed[role.needed]:
             continue
         if role.per_robot:
-            members += [Member(robot, role, robot) for robot in robots]
+            members += [Member(robot, role, robot, foreign) for robot in robots]
         elif role.name == SIM and plant_each:
             members += [Member(plant_name(robot), role, robot) for robot in robots]
         else:

@@ -77,6 +77,8 @@ FOLLOW: Final = "quadriga.agents.planning.remote:build_remote"
 _LOCAL: Final = "quadriga.agents.planning.local:LocalPlanning"
 _CENTRAL: Final = "quadriga.agents.planner.team_planner"
 
+NO_PLANNER: Final = "none"  # the kind without plans
+
 BUILT_IN: Final[Mapping[str, PlannerKind]] = {
     kind.name: kind
     for kind in (
@@ -101,7 +103,7 @@ BUILT_IN: Final[Mapping[str, PlannerKind]] = {
             needs_data=True,
         ),
         PlannerKind(
-            "none",
+            NO_PLANNER,
             "nominal forces",
             "quadriga.agents.planning.nominal:build_nominal",
             needs_predictor=False,

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Final
 
-from quadriga.agents.agent import Inputs
 from quadriga.agents.inbox.reference_slew import ReferenceSlew
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.planning.operator_references import AHEAD_MS
@@ -17,6 +16,7 @@ from quadriga.agents.plausibility import (
     is_within_limits,
     measured_limits,
 )
+from quadriga.agents.step_io import Inputs
 from quadriga.agents.teammates import concerns_agents
 from quadriga.agents.time_grid import step_ms
 from quadriga.shared.config.sections import Config

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from quadriga.agents.agent import Inputs
 from quadriga.agents.inbox.inbox import Inbox, Order, Source, order_of
 from quadriga.agents.planning.interface import NOTHING, Expected
+from quadriga.agents.step_io import Inputs
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, SIM
 from quadriga.shared.wire.messages import Consumed, Message

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import tempfile
+from pathlib import Path
+from typing import NoReturn
 
 from quadriga.commands.command import AddCommand, Given
 from quadriga.commands.fitted_predictor import load_predictor
@@ -20,15 +23,30 @@ def add(add_command: AddCommand) -> None:
 
 
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
-    """Run the agent until the walk is over."""
-    from quadriga.agents import process
+    """Run the agent until the walk is over, or become the controller in its place."""
     from quadriga.shared.robot.conventions import robot_names
 
     names = robot_names(config.team.robots)
     if arguments.robot not in names:
         raise ConfigError("--robot", repr(arguments.robot), f"one of {', '.join(names)}")
+    if config.team.controller:
+        _become_controller(arguments, config)
+    from quadriga.agents import process  # compiled code, which a controller does not wait for
+
     predictor = None
     if find_kind(config.planner.kind).agents_predict:
         predictor = load_predictor(config, arguments)
     process.run(config, arguments.robot, predictor)
     return 0
+
+
+def _become_controller(arguments: argparse.Namespace, config: Config) -> NoReturn:
+    """Go on as the controller of one's own that the configuration names."""
+    from quadriga.shared.config.write import to_toml
+    from quadriga.team.controller_program import become_controller, places_of
+
+    file: Path | None = arguments.config
+    if file is None or arguments.overrides or arguments.scenario is not None:
+        file = Path(tempfile.mkdtemp(prefix="quadriga-"), "config.toml")
+        file.write_text(to_toml(config), encoding="utf-8")
+    become_controller(config, places_of(config, arguments.robot, file))

@@ -32,6 +32,7 @@ KEYS: Final = {
     "vy": "reference.vy",
     "wz": "reference.wz",
     "planner": "planner.kind",
+    "controller": "team.controller",
     "interface": "planner.interface",
     "estimator": "estimator.kind",
     "preset": "controller.preset",

@@ -17,6 +17,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.sim_server.world.world import World
 from quadriga.team import scenarios
+from quadriga.team.controller_program import check_controller
 
 _TOGETHER: Final = 8  # seeds that are walked by every variant before the next ones
 _OURS: Final = ("world.seed", "world.mode")  # keys that a campaign sets itself
@@ -83,7 +84,8 @@ def build_plan(
     is swept.
 
     Raises:
-        ConfigError: an unknown scenario or baseline, or a world that cannot be built.
+        ConfigError: an unknown scenario or baseline, a world that cannot be built, or a controller
+            that cannot be started.
     """
     if not names:
         raise ConfigError("scenarios", "none", "at least one name or TOML file")
@@ -118,6 +120,8 @@ def build_plan(
         configs[Group(name, variant.name, tuple(label for label, _ in points))] = config
     _check_names(configs)
     _check_worlds(configs)
+    for config in configs.values():
+        check_controller(config)
     return CampaignPlan(files, variants, sweeps, seeds, baseline, configs)
 
 

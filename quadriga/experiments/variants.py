@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from quadriga.agents.predictor.fits import FITS
 from quadriga.shared.config.load import flatten, parse_assignment, read_toml
+from quadriga.shared.controller_line import KEY as CONTROLLER
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.planner_kinds import BUILT_IN, find_kind, installed_kinds
 
@@ -114,7 +115,8 @@ def combine_with_predictors(
     combined: list[Variant] = []
     for variant in variants:
         kind = variant.keys.get("planner.kind")
-        if not predictors or (kind is not None and not find_kind(kind).needs_predictor):
+        own = not variant.keys.get(CONTROLLER)
+        if not predictors or not own or (kind is not None and not find_kind(kind).needs_predictor):
             combined.append(variant)
             continue
         for name in predictors:

@@ -16,6 +16,8 @@ from quadriga.agents.planning.remote import central_latency
 from quadriga.agents.planning.team import Central, CentralState
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
+from quadriga.shared.controller_line import KEY as CONTROLLER
+from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import PLANNER
 from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.runtime.blas import use_one_blas_thread
@@ -44,7 +46,17 @@ def build_agents(
         config: the team's configuration; they do not look at its world.
         predictor: for agents that plan for themselves, or None.
         clock_ns: read around their planners, for `Outputs.planner_ns` alone.
+
+    Raises:
+        ConfigError: the team's agents are a controller of one's own, a process of its own.
     """
+    if config.team.controller:
+        raise ConfigError(
+            CONTROLLER,
+            repr(config.team.controller),
+            "'': agents that walk in this process",
+            "only `quadriga walk` and campaigns start a controller of one's own",
+        )
     use_one_blas_thread()
     names = robot_names(config.team.robots)
     return {name: Agent(config, name, predictor, clock_ns) for name in names}

@@ -38,7 +38,8 @@ def missing_ticks(
     topic's last period nothing is expected, since the world may have stopped within it. A robot
     that gets up measures nothing, and one that does not walk plans nothing: where its statuses say
     so, nothing is expected until it has begun again. After its last plan none is. A robot without
-    measurements or plans lacks all from the end of the initial stand on.
+    measurements or plans lacks all from the end of the initial stand on; of a controller of one's
+    own no measurements are expected.
 
     Args:
         config: the configuration of the run.
@@ -62,14 +63,15 @@ def missing_ticks(
         for topic in (STATE, COMMAND):
             key = topic.key(team, name)
             missing[key] = count(key, topic, 0, end)
-        key = MEASUREMENT.key(team, name)
-        missing[key] = _count_missing_within(
-            _find_spans(statuses.get(name, ()), lambda mode: mode != RISING),
-            _recorded_ticks(ticks, key),
-            config.gait.stand_ms,
-            period[MEASUREMENT.name],
-            end,
-        )
+        if not config.team.controller:
+            key = MEASUREMENT.key(team, name)
+            missing[key] = _count_missing_within(
+                _find_spans(statuses.get(name, ()), lambda mode: mode != RISING),
+                _recorded_ticks(ticks, key),
+                config.gait.stand_ms,
+                period[MEASUREMENT.name],
+                end,
+            )
         if find_kind(config.planner.kind).publishes:
             key = PLAN.key(team, name)
             plans = _recorded_ticks(ticks, key)

@@ -66,6 +66,8 @@ def _about(s: Survey) -> Iterator[tuple[str, str]]:
             f"seed {c.world.seed}",
         )
         yield "planner", c.planner.kind
+        if c.team.controller:
+            yield "controller", s.metadata.get("controller", c.team.controller)
     yield "falls", ", ".join(e.robot for e in s.events if e.kind == "fall") or "none"
     vanished = s.notes.get(END, {}).get("detail", NOTHING)
     yield "end", next((e.detail for e in reversed(s.events) if e.kind == "stop"), vanished)

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
+from quadriga.shared.controller_line import controller_origin
 from quadriga.shared.planner_kinds import installed_kinds, plugin_origin
 from quadriga.shared.recording.writer import COUNTS
 from quadriga.shared.runtime.installed import package_versions
@@ -21,7 +22,12 @@ _DIGITS: Final = 18  # of a number of messages that can be meant
 
 
 def build_metadata(config: Config, predictor_sha256: str) -> dict[str, str]:
-    """The metadata of a recording made now; `Recording.metadata` hands them back."""
+    """The metadata of a recording made now; `Recording.metadata` hands them back.
+
+    Raises:
+        ConfigError: the file of a controller of one's own cannot be read.
+    """
+    origin = controller_origin(config.team.controller)
     return {
         "team": config.team.name,
         "scenario": config.world.scenario,
@@ -29,6 +35,7 @@ def build_metadata(config: Config, predictor_sha256: str) -> dict[str, str]:
         "config_sha256": config_sha256(config),
         "predictor_sha256": predictor_sha256,
         "versions": json.dumps(installed_versions(config.planner.kind)),
+        **({"controller": origin} if origin else {}),
     }
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from quadriga.recordings.gaps import end_of_world, missing_ticks, repeated_ticks
 from quadriga.recordings.metadata import recorded_versions
+from quadriga.recordings.stops import find_stops
 from quadriga.recordings.traces import (
     ERRORS,
     OVER_STANCE_FEET,
@@ -95,6 +96,7 @@ def summary_of(traces: Traces) -> dict[str, Any]:
         "scenario": config.world.scenario,
         "terrain": config.world.terrain,
         "planner": config.planner.kind,
+        "controller": config.team.controller,
         "estimator": config.estimator.kind,
         "config_sha256": metadata.get("config_sha256", ""),
         "predictor_sha256": metadata.get("predictor_sha256", ""),
@@ -192,7 +194,7 @@ def _agents(traces: Traces) -> dict[str, Any]:
         "tick_us_median": quantile_of(tick_us, 0.5),
         "tick_us_p99": quantile_of(tick_us, 0.99),
         "counters": {robot: dict(status.counters) for robot, status in last.items()},
-        "stop_reasons": {robot: status.reason for robot, status in last.items() if status.reason},
+        "stop_reasons": find_stops(traces),
     }
 
 

@@ -46,7 +46,7 @@ def list_figures(s: Mapping[str, Any]) -> list[tuple[str, str]]:
     shown = [
         ("falls", ", ".join(s["fallen"]) or "none"),
         *_list_motion(s),
-        ("planner", _describe_planner(s)),
+        _describe_planner(s),
         ("control tick", _format_times(s, "tick_us", "µs", ".0f")),
         *_list_lateness(s["realtime"]),
         ("real-time factor", format_number(s["real_time_factor"], ".2f")),
@@ -115,10 +115,13 @@ def _count_all(counters: Mapping[str, Mapping[str, int]]) -> str:
     return ", ".join(f"{name} {count:,}" for name, count in sorted(total.items()))
 
 
-def _describe_planner(s: Mapping[str, Any]) -> str:
+def _describe_planner(s: Mapping[str, Any]) -> tuple[str, str]:
+    """Name and text of who plans, or of the controller of one's own that walks."""
+    if s.get("controller"):
+        return "controller", s["controller"]
     if not s["planner_solves"]:
-        return f"{s['planner']}, no solves"
-    return f"{s['planner']}, {_format_times(s, 'planner_ms', 'ms', '.2f')}"
+        return "planner", f"{s['planner']}, no solves"
+    return "planner", f"{s['planner']}, {_format_times(s, 'planner_ms', 'ms', '.2f')}"
 
 
 def _format_errors(rmse: Mapping[str, float | None]) -> str:

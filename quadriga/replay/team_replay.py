@@ -15,6 +15,7 @@ from quadriga.progress import build_progress
 from quadriga.replay.agent_replay import ReplayJob, replay_agent
 from quadriga.replay.breakpoint import Breakpoint
 from quadriga.replay.outcome import ReplayOutcome
+from quadriga.replay.own_agents import require_own_agents
 from quadriga.replay.problem_saver import ProblemSaver
 from quadriga.shared.errors import ConfigError, QuadrigaError, RecordingError, name_file_errors
 from quadriga.shared.recording.config import recorded_config
@@ -48,11 +49,14 @@ def replay(
         console: where to show progress.
 
     Raises:
-        RecordingError: the recording cannot be read, or lacks what a replay needs.
+        RecordingError: the recording cannot be read, or lacks what a replay needs; or the agents
+            were a controller of a user's own.
         ConfigError: no such robot, or a change that cannot be replayed.
         PredictorError: the predictor is not to be found.
     """
-    config = recorded_config(Recording(path))
+    recording = Recording(path)
+    config = recorded_config(recording)
+    require_own_agents(recording, config)
     jobs = [
         ReplayJob(path, robot, given, predictor, _make_folder(path, out))
         for robot in _choose_robots(robots, robot_names(config.team.robots))
@@ -116,7 +120,10 @@ def replay_to_breakpoint(
     if not isfinite(seconds):
         option = ProblemSaver.option if save_qp else Breakpoint.option
         raise ConfigError(option, f"{seconds}", "a time [s]")
-    _choose_robots((robot,), robot_names(recorded_config(Recording(path)).team.robots))
+    recording = Recording(path)
+    config = recorded_config(recording)
+    require_own_agents(recording, config)
+    _choose_robots((robot,), robot_names(config.team.robots))
     job = ReplayJob(path, robot, given, predictor, _make_folder(path, out))
     try:
         tick = round(1000 * seconds)

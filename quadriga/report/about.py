@@ -80,6 +80,8 @@ def list_facts(run: ReportedRun) -> Iterator[tuple[str, str]]:
     speeds = f"vx {asked.vx:g} m/s, vy {asked.vy:g} m/s, wz {asked.wz:g} rad/s"
     rows = asked.trace.count(ROW_END)
     yield "asked for", f"a trace of {rows} lines" if rows else asked.trace or speeds
+    if config.team.controller:
+        yield "controller", config.team.controller
     whose = ", for the team's cost" if is_cooperative(config) else ""
     yield "planner", f"{config.planner.kind}{whose}, {config.planner.interface}"
     digest = traces.metadata.get("predictor_sha256", "")

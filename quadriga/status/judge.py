@@ -53,7 +53,8 @@ def _of_robot(config: Config, reading: TeamReading, robot: str) -> Iterator[str]
     """What is wrong with a robot of a team that walks, by what its agent told."""
     account = reading.accounts.get(robot)
     if account is None:
-        yield "says nothing of itself"
+        if not config.team.controller:  # which need not
+            yield "says nothing of itself"
         return
     # A team's time may be far slower than the wall clock, and then so are its words.
     patience = max_ages(config)[STATUS.name] / max(reading.pace or 0.0, 1e-3)

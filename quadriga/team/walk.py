@@ -16,6 +16,7 @@ from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.runtime.signals import stop_flag
 from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
+from quadriga.team.controller_program import check_controller
 from quadriga.team.drive_page import DrivePage
 from quadriga.team.launch import Launch, ProcessSpec, process_table
 from quadriga.team.plants import check_plant
@@ -35,10 +36,11 @@ def check_walk(config: Config) -> None:
     """Refuse what cannot be walked, before anything is written or started.
 
     Raises:
-        ConfigError: there is no such plant, its world cannot be built, or the trace that it follows
-            cannot be read.
+        ConfigError: there is no such plant or controller, its world cannot be built, or the trace
+            that it follows cannot be read.
     """
     check_plant(config)
+    check_controller(config)
     build_scenario(config, build_loads(config))
     trace_of(config)
 

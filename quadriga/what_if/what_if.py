@@ -13,6 +13,7 @@ from rich.console import Console
 from quadriga.progress import build_progress
 from quadriga.recordings.truth import ticks_of
 from quadriga.replay.config_changes import change_config, format_changes
+from quadriga.replay.own_agents import require_own_agents
 from quadriga.replay.recorded_predictor import find_predictor
 from quadriga.replay.world_replay import read_computable_config
 from quadriga.shared.config.sections import Config
@@ -79,6 +80,7 @@ def answer_what_if(question: WhatIf, console: Console) -> Branch:
     """
     recording = Recording(question.path)
     config = read_computable_config(recording)
+    require_own_agents(recording, config)
     change, changed = _read_change(question, recording, config)
     truths, events = list(recording.messages(Truth)), list(recording.messages(Event))
     last = int(ticks_of(truths).max()) if truths else 0

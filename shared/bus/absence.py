@@ -17,6 +17,7 @@ from quadriga.shared.wire.about import REFUSED as NOT_GRANTED
 NOT_STARTED: Final = "not-started"
 NO_LINK: Final = "no-link"
 NOT_ANSWERING: Final = "not-answering"
+FOREIGN: Final = "foreign"
 NOT_REACHABLE: Final = "not-reachable"
 UNREADABLE: Final = "unreadable"
 TWO_OF_A_NAME: Final = "two-of-a-name"
@@ -121,6 +122,8 @@ def _explain_silence(member: Member, view: TeamView) -> Diagnosis:
         text = "says what this version cannot read"
         return Diagnosis(UNREADABLE, BAD, text, "another version of quadriga: install the same one")
     if name in view.here:
+        if member.foreign:
+            return Diagnosis(FOREIGN, NOTE, "here, a controller of one's own that answers nothing")
         cause = "frozen or overloaded, or an earlier version of quadriga: see its log, restart it"
         return Diagnosis(NOT_ANSWERING, BAD, "here, but does not answer", cause)
     witnesses = sorted(other for other in view.answers if name in _sees(view.about(other)))

@@ -10,7 +10,7 @@ from typing import Final
 from quadriga.shared.bus.absence import MemberAnswer, TeamView
 from quadriga.shared.bus.agreement import CODE, TeamNorm, disagreements, refuse
 from quadriga.shared.bus.introduction import describe_process
-from quadriga.shared.bus.roster import first_predicting, lead, members
+from quadriga.shared.bus.roster import first_predicting, foreign_members, lead, members
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
@@ -127,6 +127,8 @@ def check_oneself(bus: Bus, config: Config, about: About, say: Callable[[str], N
 def check_others(bus: Bus, config: Config, names: Collection[str], wait: Pause = pause) -> None:
     """Refuse to walk with others that differ, or do not say what they are.
 
+    A controller of one's own need not say it; one that does must not differ.
+
     Args:
         bus: this process's, which drives time or is the plant of a robot.
         config: its configuration.
@@ -137,12 +139,14 @@ def check_others(bus: Bus, config: Config, names: Collection[str], wait: Pause =
         BusError: one differs, or gives no answer; the message names it and in what it differs.
     """
     others, told = sorted({*names} - {bus.name}), ask(bus, wait=wait)
-    deadline = monotonic() + _PATIENCE
-    while (silent := [name for name in others if name not in told]) and monotonic() < deadline:
+    foreign, deadline = foreign_members(config), monotonic() + _PATIENCE
+    while (silent := [n for n in others if n not in {*told, *foreign}]) and monotonic() < deadline:
         _wait_for(_BETWEEN, wait)
         told |= ask(bus, silent, wait)
     view = view_of(bus, config, told, describe_process(config, bus.name))
     for name in others:
+        if name in foreign and name not in told:
+            continue
         about = view.about(name)
         if about is None or view.norm is None:
             raise BusError(

@@ -15,12 +15,18 @@ def processes(config: Config) -> tuple[Member, ...]:
         central=find_kind(config.planner.kind).central,
         recorded=config.recorder.enabled,
         plant_each=config.team.plants == "each",
+        foreign=bool(config.team.controller),
     )
 
 
 def members(config: Config) -> frozenset[str]:
     """Names of all processes of a team."""
     return frozenset(member.name for member in processes(config))
+
+
+def foreign_members(config: Config) -> frozenset[str]:
+    """Names of those that are controllers of one's own."""
+    return frozenset(member.name for member in processes(config) if member.foreign)
 
 
 def lead(config: Config) -> str:

@@ -17,8 +17,9 @@ from quadriga.shared.config.sections import (
     WorldConfig,
 )
 from quadriga.shared.config.terrains import TERRAINS
+from quadriga.shared.controller_line import parse_line
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.planner_kinds import find_kind, read_options
+from quadriga.shared.planner_kinds import NO_PLANNER, find_kind, read_options
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.topics import SAMPLE_MS
 
@@ -45,6 +46,7 @@ def check(config: Config) -> None:
     _check_foot_sensors(config)
     _check_planner(config.planner, config.world)
     _check_plants(config)
+    _check_controller(config)
     _check_pairs(config)
     _check_response(config)
 
@@ -197,6 +199,21 @@ def _check_bridged(config: Config) -> None:
     ):
         if value != wanted:
             raise ConfigError(name, f"{value!r} with team.plant {BRIDGED!r}", repr(wanted), cause)
+
+
+def _check_controller(config: Config) -> None:
+    """A controller of one's own has a command line, and nobody else plans for its robots."""
+    line, kind = config.team.controller, config.planner.kind
+    if not line:
+        return
+    parse_line(line)
+    if kind != NO_PLANNER:
+        raise ConfigError(
+            "planner.kind",
+            f"{kind!r} with team.controller {line!r}",
+            f"{NO_PLANNER!r}, or team.controller = ''",
+            "a controller of one's own takes the place of agents and planners",
+        )
 
 
 def _check_pairs(config: Config) -> None:

@@ -14,7 +14,9 @@ from quadriga.shared.config.presets import PRESETS, preset_keys
 from quadriga.shared.config.reference_trace import ROW_END, inline_trace
 from quadriga.shared.config.renamed import RENAMED, current_value
 from quadriga.shared.config.sections import Config
+from quadriga.shared.controller_line import KEY as CONTROLLER
 from quadriga.shared.errors import ConfigError, did_you_mean, name_file_errors
+from quadriga.shared.planner_kinds import NO_PLANNER
 from quadriga.shared.robot.robots import ROBOTS
 from quadriga.shared.wire.codec import truncate_text
 
@@ -54,11 +56,14 @@ def overlay(given: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, An
 
     A preset that comes with the overrides also replaces what the file says of the keys that
     presets set, so that a file with every key written out can still be walked with another one.
-    The path of a trace gives way to what the file says.
+    The path of a trace gives way to what the file says. A controller of one's own that comes with
+    the overrides replaces what the file says of the kind of planner.
 
     Raises:
         ConfigError: an override names no key, or there is no such trace.
     """
+    if overrides.get(CONTROLLER) and isinstance(given.get("planner"), dict):
+        given["planner"] = {k: v for k, v in given["planner"].items() if k != "kind"}
     for section in PRESETS:
         if f"{section}.preset" in overrides and isinstance(given.get(section), dict):
             replaced = preset_keys(section)
@@ -88,7 +93,7 @@ def build(given: Mapping[str, Any]) -> Config:
             preset = keys.get("preset")
             beneath = presets.get(preset, {}) if isinstance(preset, str) else {}
             given = {**given, section: {**beneath, **keys}}
-    given = _with_robots_values(given)
+    given = _without_planner(_with_robots_values(given))
     known = {item.name: item for item in fields(Config)}
     for section in given.keys() - known.keys():
         raise _unknown_name(section, list(known), "a section")
@@ -112,6 +117,15 @@ def _with_robots_values(given: Mapping[str, Any]) -> Mapping[str, Any]:
         if isinstance(keys, dict):
             filled[section] = {key: value, **keys}
     return filled
+
+
+def _without_planner(given: Mapping[str, Any]) -> Mapping[str, Any]:
+    """`given` with no planner beneath where a controller of one's own takes the agents' place."""
+    team, planner = given.get("team", {}), given.get("planner", {})
+    controlled = isinstance(team, dict) and team.get("controller")
+    if not controlled or not isinstance(planner, dict):
+        return given
+    return {**given, "planner": {"kind": NO_PLANNER, **planner}}
 
 
 def parse_assignment(text: str, option: str = "--set") -> tuple[str, Any]:

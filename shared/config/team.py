@@ -48,6 +48,12 @@ class TeamConfig:
         "one: a single process is the plant of all robots; each: every robot has one of its own",
         choices=("one", "each"),
     )
+    controller: str = key(
+        "",
+        "-",
+        "command line of a program of one's own that is the agent of each robot, see "
+        "docs/tutorials/own_controller.md; empty: the project's own agents",
+    )
 
     @property
     def one_world(self) -> bool:

@@ -58,7 +58,7 @@ def test_a_repeated_command_does_not_count_twice(box: CommandBox) -> None:
     assert box.take(KEY, command(5, 1.0), tick=5, oldest=5) == "r1"
     assert box.take(KEY, command(5, 1.0), tick=5, oldest=5) == ""
     assert box.refused == {(STALE, "r1"): 1}
-    assert (box.invalid, box.last_error) == (0, "")
+    assert (box.invalid_of("r1"), box.errors) == (0, {})
 
 
 def test_two_commands_of_one_tick_are_told(box: CommandBox) -> None:
@@ -68,8 +68,8 @@ def test_two_commands_of_one_tick_are_told(box: CommandBox) -> None:
         assert box.take(KEY, command(5, 1.5), tick=tick, oldest=tick) == ""
     assert box.latest["r1"].tau[0] == 1.0
     assert box.refused == {(CONTRADICTED, "r1"): 2}
-    assert box.invalid == 2
-    assert "two of tick 5 for r1" in box.last_error
+    assert box.invalid_of("r1") == 2
+    assert "two of tick 5 for r1" in box.errors["r1"]
 
 
 def test_real_time_takes_older_ones_but_never_goes_back(box: CommandBox) -> None:
@@ -91,8 +91,8 @@ def test_real_time_takes_older_ones_but_never_goes_back(box: CommandBox) -> None
 )
 def test_what_is_malformed_is_dropped_and_counted(box: CommandBox, payload: bytes) -> None:
     assert box.take(KEY, payload, tick=5, oldest=5) == ""
-    assert box.invalid == 1
-    assert box.last_error.startswith("command")
+    assert box.invalid_of("r1") == 1
+    assert box.errors["r1"].startswith("command")
     assert box.latest == {}
 
 
@@ -117,8 +117,8 @@ def test_what_no_motor_can_be_meant_to_do_is_dropped_and_counted(
 ) -> None:
     assert box.take(KEY, command_of(**wrong), tick=5, oldest=5) == ""
     assert box.refused == {(IMPLAUSIBLE, "r1"): 1}
-    assert box.invalid == 1
-    assert box.last_error.startswith(f"command.{next(iter(wrong))}: got ")
+    assert box.invalid_of("r1") == 1
+    assert box.errors["r1"].startswith(f"command.{next(iter(wrong))}: got ")
     assert box.latest == {}
     assert box.take(KEY, command(5, 1.0), tick=5, oldest=5) == "r1", "the robot's own still counts"
 
@@ -163,3 +163,18 @@ def test_a_robot_of_another_team_or_none_is_foreign(box: CommandBox) -> None:
     for key in ("team/r3/command", "other/r1/command", "team/r1/state"):
         assert box.take(key, command(5), tick=5, oldest=5) == ""
     assert box.refused == {(FOREIGN, ""): 3}
+
+
+def test_why_a_robot_is_silent_is_known_until_it_is_not(box: CommandBox) -> None:
+    assert box.why_refused("r1") == ""
+    box.take(KEY, command(5, float("nan")), tick=5, oldest=5)
+    assert "command.tau: got NaN or infinity" in box.why_refused("r1")
+    for wrong in (4, 6):
+        box.take(KEY, command(wrong), tick=5, oldest=5)
+        assert box.why_refused("r1") == f"command.tick: got {wrong}, expected 5"
+    box.take(KEY, command(3), tick=8, oldest=0)
+    assert box.latest["r1"].tick == 3, "in real time"
+    assert box.why_refused("r1") == ""
+    box.take(KEY, command(9), tick=8, oldest=0)
+    assert box.why_refused("r1") == "command.tick: got 9, expected 4 … 8"
+    assert box.errors.keys() == {"r1"}, "a tick alone is nothing that nobody sends"

@@ -9,14 +9,13 @@ from quadriga.experiments.plan import Group, with_seed
 from quadriga.experiments.predictors import Fitted
 from quadriga.experiments.trial.evaluate import evaluate
 from quadriga.experiments.trial.figures_of_merit import Figures
-from quadriga.experiments.trial.origin import code_and_libraries, is_same_code
+from quadriga.experiments.trial.origin import code_and_libraries, foreign_origin, is_same_code
 from quadriga.experiments.trial.outcome import TrialOutcome, build_outcome
 from quadriga.identification.fit_report import reason
 from quadriga.shared.config.reference_trace import trace_sha256
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import PredictorError, PredictorFileError, ProcessError
-from quadriga.shared.planner_kinds import plugin_origin
 from quadriga.shared.runtime.clock import monotonic
 
 
@@ -24,7 +23,8 @@ from quadriga.shared.runtime.clock import monotonic
 class TrialJob:
     """A trial: its group's configuration, predictor and trace, and the code it is meant for.
 
-    `plugin` is the package that its planner comes with, "" for a built-in one.
+    `plugin` is the package that its planner comes with, or the controller of one's own that walks,
+    see `foreign_origin`; "" for the project's own.
     """
 
     group: Group
@@ -56,10 +56,10 @@ def walk_trial(
         raise ProcessError(
             "a worker's code and libraries", mine, job.versions, "install the same version there"
         )
-    plugin = plugin_origin(job.config.planner.kind)
+    plugin = foreign_origin(job.config)
     if plugin != job.plugin:
         raise ProcessError(
-            "a worker's planner",
+            "a worker's planner or controller",
             plugin or "a built-in one",
             job.plugin or "a built-in one",
             "install the same version there",

@@ -26,9 +26,10 @@ class GroupEntry:
     """A group: its names, seeds, and digests.
 
     `config_sha256` is that of its configuration with seed 0, and of the trace that this names;
-    `plugin` names the package that its planner comes with, its version and the digest of its files
-    (`plugin_origin`), and is empty for a built-in planner; `radius` is that of the iteration of the
-    agents' plans, None where they do not use their peers' or where nobody has noted it.
+    `plugin` names the package that its planner comes with, or the controller of one's own that
+    walks, with the digest of its files (`foreign_origin`), and is empty where all is the project's;
+    `radius` is that of the iteration of the agents' plans, None where they do not use their peers'
+    or where nobody has noted it.
     """
 
     scenario: str
@@ -139,7 +140,7 @@ class Manifest:
             for what, old, new in (
                 ("configuration", known.config_sha256[:12], entry.config_sha256[:12]),
                 ("predictor", known.predictor_sha256[:12], entry.predictor_sha256[:12]),
-                ("planner", known.plugin, entry.plugin),
+                ("planner or controller", known.plugin, entry.plugin),
             ):
                 if old != new:
                     raise ConfigError(

@@ -108,7 +108,7 @@ def _build_facts(report: CampaignReport) -> PageTable:
     ]
     for entry in manifest.groups:
         digest = entry.predictor_sha256[:12] or "none"
-        plugin = f"planner of {entry.plugin}; " if entry.plugin else ""
+        plugin = f"planner or controller {entry.plugin}; " if entry.plugin else ""
         text = f"seeds {format_seeds(entry.seeds)}; predictor {digest}; {plugin}"
         facts.append((_name_group(entry.group), f"{text}{config_file(Path(), entry.group)}"))
     facts.append(("code and libraries", manifest.versions))

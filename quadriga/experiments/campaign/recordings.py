@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Final
 
@@ -14,7 +15,7 @@ from quadriga.experiments.campaign.manifest import Manifest
 from quadriga.experiments.plan import Group, with_seed
 from quadriga.experiments.predictors import Fitted, prepare_predictors
 from quadriga.experiments.trial.figures_of_merit import Figures, compute_figures
-from quadriga.experiments.trial.origin import code_and_libraries
+from quadriga.experiments.trial.origin import code_and_libraries, foreign_origin
 from quadriga.experiments.trial.outcome import TrialOutcome
 from quadriga.experiments.trial.over_bus import walk_over_bus
 from quadriga.recordings.summary import RECORDING
@@ -23,7 +24,6 @@ from quadriga.report.page import PAGE
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, ProcessError
-from quadriga.shared.planner_kinds import plugin_origin
 from quadriga.team.run_report import report_folder
 
 RECORDINGS: Final = "recordings"
@@ -68,10 +68,10 @@ def record_trials(
         if (run_dir / PAGE).is_file():
             continue
         config = with_seed(load(config_file(folder, row.group)), row.seed)
-        plugin = plugin_origin(config.planner.kind)
+        plugin = foreign_origin(config)
         if plugin != plugins[row.group]:
             raise ConfigError(
-                f"planner of {row.group.name}",
+                f"planner or controller of {row.group.name}",
                 plugin,
                 plugins[row.group],
                 "install the version that the trials were walked with",
@@ -95,11 +95,13 @@ def record_trial(config: Config, run_dir: Path, fitted: Fitted) -> Figures:
         ProcessError: a process failed.
     """
     (run_dir / RECORDING).unlink(missing_ok=True)  # of a walk that was interrupted
-    figures = compute_figures(walk_over_bus(config, run_dir, fitted.path, fitted.sha256))
+    walk = walk_over_bus(config, run_dir, fitted.path, fitted.sha256)
     if fitted.path is not None:
         copy_predictor(fitted.path, run_dir)
-    report_folder(run_dir, pictures=False, console=Console(quiet=True))
-    return figures
+    # The end of a walk whose controller failed is no other failure.
+    with suppress(ProcessError) if walk.failed else nullcontext():
+        report_folder(run_dir, pictures=False, console=Console(quiet=True))
+    return compute_figures(walk)
 
 
 def run_dir_of(folder: Path, group: Group, seed: int) -> Path:

@@ -21,13 +21,12 @@ from quadriga.experiments.campaign.recordings import record_trial, run_dir_of
 from quadriga.experiments.plan import CampaignPlan
 from quadriga.experiments.predictors import Fitted, prepare_predictors
 from quadriga.experiments.trial.figures_of_merit import Figures
-from quadriga.experiments.trial.origin import code_and_libraries
+from quadriga.experiments.trial.origin import code_and_libraries, foreign_origin
 from quadriga.experiments.trial.outcome import TrialOutcome, to_columns
 from quadriga.shared.config.reference_trace import trace_sha256
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.planner_kinds import plugin_origin
 from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.warm_up import warm_up
 from quadriga.workers import run_each
@@ -88,7 +87,7 @@ def walk_campaign(
                 fitted[plan.configs[group]],
                 ledger.manifest.versions,
                 traces[group],
-                plugin_origin(plan.configs[group].planner.kind),
+                foreign_origin(plan.configs[group]),
             )
             for group, seed in plan.trials()
             if (group, seed) not in done
@@ -132,7 +131,7 @@ def build_manifest(plan: CampaignPlan, fitted: Mapping[Config, Fitted], typed: s
                 config_digest(config),
                 fitted[config].sha256,
                 tuple(sorted(plan.seeds)),
-                plugin_origin(config.planner.kind),
+                foreign_origin(config),
                 fitted[config].radius,
             )
             for group, config in plan.configs.items()
@@ -149,9 +148,25 @@ def config_digest(config: Config) -> str:
 
 
 def _choose_workers(workers: Workers, out: Path) -> Callable[[Sequence[TrialJob]], Outcomes]:
-    """A function that walks jobs and yields each with its outcome, in the order they are done."""
+    """A function that walks jobs and yields each with its outcome, in the order they are done.
+
+    Controllers of one's own are programs: what they walk is walked over the bus in any case.
+    """
     if workers.bus:
         return lambda todo: _walk_over_bus(todo, out)
+    walk = _choose_own_workers(workers)
+
+    def walk_all(todo: Sequence[TrialJob]) -> Outcomes:
+        own = [job for job in todo if not job.config.team.controller]
+        if own:
+            yield from walk(own)
+        yield from _walk_over_bus([job for job in todo if job.config.team.controller], out)
+
+    return walk_all
+
+
+def _choose_own_workers(workers: Workers) -> Callable[[Sequence[TrialJob]], Outcomes]:
+    """The same for teams of the project's own agents, without the bus."""
     if workers.dask is None:
         return lambda todo: run_each(walk_trial, todo, min(workers.jobs, len(todo)))
     try:

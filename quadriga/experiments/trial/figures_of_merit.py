@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
 from quadriga.agents.gait import nominal_forces
+from quadriga.recordings.stops import find_stops
 from quadriga.recordings.summary import steady_from
 from quadriga.recordings.traces import (
     ERRORS,
@@ -40,12 +41,14 @@ class Walk:
         plans: how many plans had which status, all robots together.
         work: what all motors did or took up, ∑ |τ q̇| dt, J; None of a recording, whose torques and
             rates are those of noisy sensors.
+        failed: robots whose controller of one's own failed, and how; that ended the walk.
     """
 
     traces: Traces
     samples: Mapping[str, tuple[Measurement, ...]]
     plans: Mapping[str, int]
     work: float | None = None
+    failed: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +111,7 @@ def compute_figures(walk: Walk) -> Figures:
     return Figures(
         seconds=end / 1000.0,
         fallen=fallen,
-        stopped=_find_stops(traces, fallen),
+        stopped=_find_stops(walk, fallen),
         mean={name: mean_of(y[..., i]) for i, name in enumerate(OUTPUTS)},
         rmse={name: None if (of := squares[name]) is None else of**0.5 for name in ERRORS},
         cost=None if outputs is None or forces is None else outputs + forces,
@@ -142,9 +145,9 @@ def _find_falls(traces: Traces) -> dict[str, float]:
     return dict(sorted(times.items()))
 
 
-def _find_stops(traces: Traces, fallen: Mapping[str, float]) -> dict[str, str]:
-    last = {robot: of_robot[-1] for robot, of_robot in traces.statuses.items() if of_robot}
-    return {r: s.reason for r, s in last.items() if s.reason and r not in fallen}
+def _find_stops(walk: Walk, fallen: Mapping[str, float]) -> dict[str, str]:
+    stops = find_stops(walk.traces) | dict(walk.failed)
+    return {name: reason for name, reason in stops.items() if name not in fallen}
 
 
 def _output_cost(Q: Sequence[float], squares: Mapping[str, float | None]) -> float | None:

@@ -13,12 +13,26 @@ from typing import Final
 
 from quadriga.agents.predictor.store import versions
 from quadriga.identification.behaviour import behaviour, sources_digest
+from quadriga.shared.config.sections import Config
+from quadriga.shared.controller_line import controller_origin
+from quadriga.shared.planner_kinds import plugin_origin
 from quadriga.shared.runtime.arithmetic import arithmetic_digest
 
 CODE: Final = "code"
 SOURCES: Final = "sources"
 ARITHMETIC: Final = "arithmetic"
 _SAMPLES: Final = "quadriga.experiments.trial.sample_trials"
+
+
+def foreign_origin(config: Config) -> str:
+    """What of a team is not this project's code: a controller of one's own, or a planner's package.
+
+    It names either with a digest of its files, and is empty if there is neither.
+
+    Raises:
+        ConfigError: it cannot be found, or not be read.
+    """
+    return controller_origin(config.team.controller) or plugin_origin(config.planner.kind)
 
 
 @lru_cache(maxsize=1)

@@ -12,13 +12,17 @@ from quadriga.recordings.summary import RECORDING
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.errors import ProcessError, RecordingError
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.wire.codes import with_detail
 from quadriga.shared.wire.messages import Measurement
 from quadriga.shared.wire.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS, TRUTH
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.team.run_folder import CONFIG, make_run_dir
 
+FAILED: Final = "controller-failed"  # begins the reason of a stop
 _NEEDED: Final = {topic.name for topic in (TRUTH, REFERENCE, MEASUREMENT, PLAN, STATUS, EVENT)}
 
 
@@ -32,7 +36,8 @@ def walk_over_bus(config: Config, run_dir: Path, predictor: Path | None, sha256:
         sha256: the predictor's digest, for the recording.
 
     Raises:
-        ProcessError: a process failed or left too early.
+        ProcessError: a process failed or left too early; a controller of one's own before the team
+            walked.
         RecordingError: nothing was recorded.
         ConfigError: the folder holds a recording.
     """
@@ -40,9 +45,33 @@ def walk_over_bus(config: Config, run_dir: Path, predictor: Path | None, sha256:
     config = replace(config, bus=bus, recorder=replace(config.recorder, enabled=True))
     make_run_dir(run_dir)
     (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
+    failed: ProcessError | None = None
     with Launch(process_table(config, run_dir, predictor, sha256), run_dir / "logs") as launch:
-        launch.watch(lambda: False)
-    return read_walk(run_dir / RECORDING)
+        try:
+            launch.watch(lambda: False)
+        except ProcessError as error:
+            if not config.team.controller:
+                raise
+            failed = error
+    return _read_failed(config, run_dir, failed) if failed else read_walk(run_dir / RECORDING)
+
+
+def _read_failed(config: Config, run_dir: Path, failed: ProcessError) -> Walk:
+    """The walk up to where a controller of one's own failed: by that it is judged.
+
+    Raises:
+        ProcessError: it was another process, or nothing had been walked yet.
+    """
+    robot = failed.name.removeprefix("process ")
+    if robot not in robot_names(config.team.robots):
+        raise failed
+    try:
+        walk = read_walk(run_dir / RECORDING)
+    except RecordingError:
+        raise failed from None
+    if walk.traces.truth.tick.max(initial=0) < config.gait.stand_ms:
+        raise failed
+    return replace(walk, failed={robot: with_detail(FAILED, failed.got)})
 
 
 def read_walk(path: Path) -> Walk:

@@ -71,7 +71,8 @@ def _excess(
 class Torques:
     """No commanded torque exceeds what the motor gives, and no gain adds more than damping.
 
-    A robot that gets up is led there by stiff joints, with gains of its bridge's stand.
+    A robot that gets up is led there by stiff joints, with gains of its bridge's stand. A
+    controller of one's own may have any gains that the plant takes.
     """
 
     def __init__(self, config: Config, getting_up: GettingUp) -> None:
@@ -80,6 +81,7 @@ class Torques:
         self._stand = config.bridge.stand_kp, config.bridge.stand_kd
         self._damping = config.controller.damping
         self._limit = config.robot.torque_limit
+        self._any_gains = bool(config.team.controller)
         self._largest = 0.0
 
     def look(self, item: CheckedMessage) -> None:
@@ -97,6 +99,8 @@ class Torques:
                 f"{torque[k]:.6g} N·m of {JOINT_NAMES[k]}",
                 f"{self._limit[k]:g} N·m",
             )
+        if self._any_gains:
+            return
         kp, kd = float(np.abs(command.kp).max()), float(command.kd.max())
         if kp > 0.0 or kd > self._damping or float(command.kd.min()) < 0.0:
             got = f"gains kp up to {kp:.6g}, kd up to {kd:.6g}"

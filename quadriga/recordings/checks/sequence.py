@@ -18,6 +18,7 @@ _MAY_REPEAT: Final = frozenset(topic.name for topic in TABLE if topic.repeats)
 # What is never passed over, not even in real time: agents and planners skip steps, others do not.
 _WHOLE: Final = frozenset(t.name for t in TABLE if not {AGENT, PLANNER} & {*t.senders})
 _EVERYONE_S: Final = (STATE, COMMAND, MEASUREMENT)
+_CONTROLLER_S: Final = (STATE, COMMAND)  # of a controller of one's own
 # Sent by who only hears of the time, if somebody walks at all.
 _UNTIMED: Final = (REFUSED.name, *(word.name for word in WORDS))
 _TAIL_MS: Final = 20  # a world that was stopped may end in the middle of a sample
@@ -116,8 +117,9 @@ class Gaps:
             self.finding.notes.append(f"begins at tick {begin}")
         if self._filtered:
             return
+        of_each = _CONTROLLER_S if team.controller else _EVERYONE_S
         for robot in robot_names(team.robots):
-            for topic in _EVERYONE_S:
+            for topic in of_each:
                 self._check_end(topic.key(team.name, robot), topic.name, end)
 
     def _check_end(self, key: str, topic: str, end: int) -> None:

@@ -50,6 +50,12 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
             "team.plant: got 'mujoko', expected one of mujoco, robots (did you mean 'mujoco'?)",
         ),
         (["walk", "--set", "team.plant=mujoko"], "team.plant: got 'mujoko'"),
+        (["walk", "--controller", "python no.py"], "team.controller: got no file 'no.py'"),
+        (
+            ["walk", "--controller", "wlak", "--planner", "deepc"],
+            "planner.kind: got 'deepc' with team.controller 'wlak', expected 'none'",
+        ),
+        (["agent", "--robot", "r1", "--controller", "wlak"], "team.controller: got 'wlak': No "),
         (["agent", "--robot", "r4"], "--robot: got 'r4', expected one of r1, r2, r3"),
         (
             ["agent", "--robot", "r1", "--connect", "tcp/x:1", "--endpoint", "tcp/y:1"],

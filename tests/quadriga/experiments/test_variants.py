@@ -108,3 +108,11 @@ def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
 @given(st.lists(st.from_regex(r"[a-z]{1,5}(\[[a-z,]{0,5}\])?", fullmatch=True), min_size=1))
 def test_parts_are_split_at_marks_outside_of_brackets_alone(parts: list[str]) -> None:
     assert split_outside_brackets(",".join(parts), ",") == parts
+
+
+def test_a_controller_of_ones_own_has_no_predictor() -> None:
+    mine = "mine:team.controller=python walk.py --fast"
+    variants = parse_variants([f"damped,{mine}"], None)
+    assert dict(variants[1].keys) == {"team.controller": "python walk.py --fast"}
+    found = combine_with_predictors(variants, ("arx",))
+    assert [variant.name for variant in found] == ["damped+arx", "mine"]

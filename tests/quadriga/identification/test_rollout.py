@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.identification.rollout import Rollout
+from quadriga.identification.rollout import Rollout, build_agents
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Message, Reference
@@ -127,3 +128,9 @@ def test_excitation_reaches_the_robot_it_is_meant_for() -> None:
     assert first is not None
     assert second is not None
     assert first.u.sum() == pytest.approx(second.u.sum() - 40.0)  # two of four legs stand
+
+
+def test_a_controller_of_ones_own_does_not_walk_in_this_process() -> None:
+    config = load(None, {"team.robots": 1, "team.controller": "walk"})
+    with pytest.raises(ConfigError, match=r"team\.controller: got 'walk', expected '': agents"):
+        build_agents(config, None)

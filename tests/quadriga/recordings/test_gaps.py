@@ -83,3 +83,10 @@ def test_a_tick_that_came_twice_has_a_second_publisher() -> None:
     ticks = whole(10)
     assert repeated_ticks(ticks) == 0
     assert repeated_ticks(ticks | {"team/r1/command": np.array([1, 2, 2, 2, 3])}) == 2
+
+
+def test_a_controller_of_ones_own_measures_nothing_for_others() -> None:
+    ticks = {key: found for key, found in whole(10).items() if key.endswith(("command", "state"))}
+    ticks["team/sim/truth"] = whole(10)["team/sim/truth"]
+    missing = missing_ticks(configured(team__controller="walk"), ticks)
+    assert missing == {"team/sim/truth": 0, "team/r1/state": 0, "team/r1/command": 0}

@@ -71,3 +71,8 @@ def test_few_losses_or_old_ones_are_not_wrong() -> None:
 def test_who_is_not_well_is_named() -> None:
     members = (*MEMBERS[:3], MemberStatus("operator", False, "not well: gone"))
     assert find_problems(CONFIG, True, READING, members) == ("operator: not well: gone",)
+
+
+def test_a_controller_of_ones_own_need_not_say_how_it_is() -> None:
+    config = load(None, {"team.robots": 2, "team.controller": "walk"})
+    assert find_problems(config, True, replace(READING, accounts={}), MEMBERS) == ()

@@ -142,3 +142,11 @@ def test_the_absent_are_named_together_with_those_of_the_same_reason() -> None:
     text = describe_absent([MEMBERS["sim"], R1, R2, MEMBERS["operator"]], seen)
     nobody = "not on the bus: not started, failed, or another bus.endpoint or team.name"
     assert text == f"sim, r2, operator: {nobody}; r1: still warming up"
+
+
+def test_a_controller_of_ones_own_need_not_answer() -> None:
+    foreign = team_members(("r1", "r2"), central=False, recorded=False, foreign=True)
+    r2 = next(member for member in foreign if member.name == "r2")
+    assert codes(r2, view(SIM, about("r1"), here=NAMES)) == [("foreign", NOTE)]
+    absent = view(SIM, about("r1", sees=("sim",)), here=frozenset({"sim", "r1"}))
+    assert [verdict for _, verdict in codes(r2, absent)] == [BAD], "but it must be there"

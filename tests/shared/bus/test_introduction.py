@@ -201,3 +201,21 @@ def test_without_a_link_it_is_told_whether_somebody_listens(config: Config, join
     with pytest.raises(BusError) as caught:
         meet(join("r1"), soon, never)
     assert f"no link to anyone; nobody listens at {config.bus.endpoint})" in str(caught.value)
+
+
+def test_a_team_starts_with_controllers_that_do_not_say_what_they_are(
+    config: Config, buses: dict[str, Bus]
+) -> None:
+    """One that does say it must have the same version."""
+    team = replace(config.team, controller="walk")
+    config = replace(config, team=team, planner=replace(config.planner, kind="none"))
+    for name in ("sim", "operator"):
+        Introduction(buses[name], config)
+    make_ready(buses, ("r1", "r2", "operator"))
+    assert start_together(buses["sim"], config, never)
+    newer = encode(replace(describe_process(config, "r2"), version="9.0.0"))
+    buses["r2"].answer(ABOUT.key("team", "r2"), lambda: newer)
+    while not ask(buses["sim"], ["r2"]):
+        pass  # it is known there in a moment
+    with pytest.raises(BusError, match=r"version of r2 in team 'team': got 9\.0\.0, expected"):
+        check_others(buses["sim"], config, NAMES)

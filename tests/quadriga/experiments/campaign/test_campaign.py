@@ -90,7 +90,9 @@ def test_a_campaign_survives_ctrl_c_and_kill_and_walks_nothing_twice(
     assert untimed(walk_trial(job)) == done[job.group, 5], "as walked in this process"
     with pytest.raises(ProcessError, match="a worker's code and libraries: got python"):
         walk_trial(replace(job, versions="code 0"))
-    with pytest.raises(ProcessError, match=r"a worker's planner: .*expected mine 0\.1 ab"):
+    with pytest.raises(
+        ProcessError, match=r"a worker's planner or controller: .*expected mine 0\.1 ab"
+    ):
         walk_trial(replace(job, plugin="mine 0.1 ab"))
     table = pq.read_table(out / "trials.parquet").to_pylist()
     assert {(row["variant"], row["seed"]): row["energy_j"] for row in table} == {

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from quadriga.experiments.trial.origin import code_and_libraries, is_same_code
+from quadriga.experiments.trial.origin import code_and_libraries, foreign_origin, is_same_code
+from quadriga.shared.config.load import load
 
 HERE = "python 3.11.7, numpy 2.4, code 1a, sources 2b, arithmetic 3c"
 
@@ -45,3 +48,11 @@ def test_versions_name_code_sources_and_arithmetic() -> None:
     assert names[0] == "python"
     assert names[-3:] == ["code", "sources", "arithmetic"]
     assert len(set(names)) == len(names)
+
+
+def test_a_controller_of_ones_own_is_named_with_its_files(tmp_path: Path) -> None:
+    script = tmp_path / "walk.py"
+    script.touch()
+    assert foreign_origin(load(None)) == ""
+    origin = foreign_origin(load(None, {"team.controller": f"python {script}"}))
+    assert origin.startswith(f"python {script} ")

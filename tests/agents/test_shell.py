@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 
-from quadriga.agents import process
+from quadriga.agents import shell
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
 from quadriga.shared.bus.zenoh_bus import Bus, Packet
@@ -50,10 +50,10 @@ class Line:
 def walk(monkeypatch: pytest.MonkeyPatch, ticks: Iterable[int | None]) -> Line:
     given: dict[str, Any] = {"team.robots": 1, "planner.kind": "none", "world.mode": "realtime"}
     line, config = Line(ticks), load(None, given)
-    monkeypatch.setattr(process, "monotonic", lambda: line.now)
+    monkeypatch.setattr(shell, "monotonic", lambda: line.now)
     arrivals, agent = Inbox(config, "r1", ()), Agent(config, "r1", None)
-    shell = process._Shell(config, agent, arrivals, cast("Bus", line))
-    shell.walk(lambda: line.ended)
+    answering = shell.AgentShell(config, agent, arrivals, cast("Bus", line))
+    answering.walk(lambda: line.ended)
     return line
 
 

@@ -1,0 +1,235 @@
+"""SHELL around whatever answers a robot's states: receive, step, publish."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, Generic, Protocol, TypeVar
+
+from quadriga.agents.healing import change_event
+from quadriga.agents.inbox.inbox import Inbox, Source
+from quadriga.agents.inbox.intake_log import Intake
+from quadriga.agents.modes import Mode
+from quadriga.agents.planning.interface import NOTHING, Expected
+from quadriga.agents.step_io import Inputs, Outputs
+from quadriga.agents.telemetry import Telemetry
+from quadriga.shared.bus.barrier import join
+from quadriga.shared.bus.introduction import Introduction
+from quadriga.shared.bus.lead_watch import LeadWatch
+from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import BusError
+from quadriga.shared.runtime.clock import monotonic, monotonic_ns
+from quadriga.shared.runtime.scheduling import leave_priority, take_priority
+from quadriga.shared.runtime.signals import interruptible
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import State
+from quadriga.shared.wire.topics import (
+    AGENT_EVENT,
+    COMMAND,
+    INPUTS,
+    MEASUREMENT,
+    PLAN,
+    STATE,
+    STATUS,
+)
+
+_PATIENCE: Final = 3.0  # s of states none of which is newer; long before, the joints are damped
+
+
+class RememberedTick(Protocol):
+    """What the shell looks at of all that an agent remembers between ticks."""
+
+    @property
+    def tick(self) -> int:
+        """The newest that has been answered, −1 before the first."""
+        ...
+
+    @property
+    def mode(self) -> Mode:
+        """What the robot is doing."""
+        ...
+
+
+S = TypeVar("S", bound=RememberedTick)
+
+
+class SteppedAgent(Protocol[S]):
+    """Whatever answers a robot's states, tick by tick.
+
+    Attributes:
+        robot: the robot's name.
+    """
+
+    robot: str
+
+    def initial(self) -> S:
+        """What it remembers before the first tick."""
+        ...
+
+    def expected(self, tick: int) -> Expected:
+        """What lock-step waits for before the step of `tick`."""
+        ...
+
+    def step(self, state: S, inputs: Inputs) -> tuple[S, Outputs]:
+        """Advance to the tick of `inputs.state`; that tick must be later than the last one."""
+        ...
+
+
+def answer_states(
+    config: Config,
+    agent: SteppedAgent[S],
+    inbox: Inbox,
+    stopped: Callable[[], bool],
+    rehearse: Callable[[str], None],
+    predictor_sha256: str = "",
+) -> None:
+    """Be a robot's agent on the bus until the walk ends or it is stopped.
+
+    Args:
+        config: the team's configuration.
+        agent: answers the states.
+        inbox: what reaches it.
+        stopped: asked often whether to stop.
+        rehearse: called once all are there, with how this process has joined them: `STARTS` or
+            `REJOINS`. A stop interrupts it.
+        predictor_sha256: digest of the predictor that it plans with; "": none.
+
+    Raises:
+        BusError: the bus cannot be opened, or the team is not complete in time, has something
+            else in common, or walks already in lock-step; or for 3 s no state has come that is
+            newer than those before.
+        ProcessError: who drives time, or the link to the router, has vanished.
+        KeyboardInterrupt: it is stopped before it is ready.
+    """
+    with Bus.open(config.bus, config.team.name, agent.robot, stopped) as bus:
+        for key in inbox.keys:
+            bus.subscribe(key)
+        joined = join(bus, config, stopped, Introduction(bus, config, predictor_sha256))
+        if not joined:
+            return
+        with interruptible(stopped):
+            rehearse(joined)
+        shell = AgentShell(config, agent, inbox, bus)
+        take_priority(config.runtime.priority)
+        bus.declare(READY)
+        try:
+            shell.walk(stopped)
+        finally:
+            leave_priority()
+
+
+class AgentShell(Generic[S]):
+    """The loop around an agent's `step`."""
+
+    def __init__(self, config: Config, agent: SteppedAgent[S], inbox: Inbox, bus: Bus) -> None:
+        team, realtime = config.team.name, config.world.mode == "realtime"
+        self._config, self._agent, self._inbox, self._bus = config, agent, inbox, bus
+        self._lockstep = not realtime
+        self._put = {
+            topic: bus.publisher(topic.key(team, agent.robot), droppable=realtime)
+            for topic in (COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS)
+        }
+        self._put[AGENT_EVENT] = bus.publisher(AGENT_EVENT.key(team, agent.robot), urgent=realtime)
+        self._telemetry = Telemetry(config.estimator.kind, paced=realtime)
+        self._intake = Intake(config, inbox)
+        self._lead = LeadWatch(bus, config)
+        # Since the last answer: how many misfits there were when first noticed, and when.
+        self._misfits: tuple[int, float] | None = None
+        self._given_up: dict[Source, int] = {}  # messages received of a source when given up
+
+    def walk(self, stopped: Callable[[], bool]) -> None:
+        """Answer every state until the walk is over."""
+        memory = self._agent.initial()
+        while not (stopped() or self._inbox.ended):
+            self._receive(0.0 if self._inbox.has_state else POLL)
+            state = self._inbox.pop_state()
+            if state is not None:
+                memory = self._answer(memory, state)
+                self._misfits = None
+                self._lead.hear()
+            else:
+                self._lead.look(memory.tick)
+                self._check_clock(memory.tick)
+
+    def _check_clock(self, tick: int) -> None:
+        """End where states go on coming but none is newer than `tick`: all would be ignored."""
+        count, now = self._inbox.misfits, monotonic()
+        if self._misfits is None:
+            self._misfits = (count, now) if count else None
+            return
+        before, since = self._misfits
+        if count > before and now - since > _PATIENCE:
+            raise BusError(
+                STATE.key(self._config.team.name, self._agent.robot),
+                f"{count} states within {now - since:.0f} s whose ticks do not go on",
+                f"ticks that rise from {tick} on",
+                "has the world's clock been set, or does someone else send states?",
+            )
+
+    def _receive(self, timeout: float) -> bool:
+        """Take in all that has come; False if nothing came within `timeout` seconds."""
+        first = self._bus.get(timeout)
+        if first is None:
+            return False
+        self._inbox.take(*first)
+        for packet in self._bus.drain():
+            self._inbox.take(*packet)
+        return True
+
+    def _answer(self, memory: S, state: State) -> S:
+        begun = monotonic_ns()
+        self._telemetry.note_state(state.tick, begun)
+        expected = self._agent.expected(state.tick)
+        inputs = self._gather_inputs(state, expected)
+        before = memory
+        memory, outputs = self._agent.step(before, inputs)
+        self._put[COMMAND](encode(outputs.command))
+        self._telemetry.note_step(outputs, monotonic_ns() - begun)
+        self._publish_rest(state.tick, outputs)
+        self._publish_intake(before.tick, inputs, expected)
+        event = change_event(before.mode, memory.mode, state.tick, self._agent.robot)
+        if event is not None:
+            self._put[AGENT_EVENT](encode(event))
+        return memory
+
+    def _publish_rest(self, tick: int, outputs: Outputs) -> None:
+        if outputs.measurement is not None:
+            self._put[MEASUREMENT](encode(outputs.measurement))
+        if outputs.plan is not None:
+            self._put[PLAN](encode(outputs.plan))
+        status = self._telemetry.status(tick, outputs, self._inbox.counters)
+        if status is not None:
+            self._put[STATUS](encode(status))
+
+    def _publish_intake(self, last: int, inputs: Inputs, expected: Expected) -> None:
+        """Publish what was taken in, where the rules do not determine it."""
+        record = self._intake.record(last, inputs, expected)
+        if record is not None:
+            self._put[INPUTS](encode(record))
+
+    def _gather_inputs(self, state: State, expected: Expected) -> Inputs:
+        """The inputs of a step; in lock-step once all expected messages have come.
+
+        A source that is silent for the time-out is not waited for again until it sends a message.
+        """
+        if self._lockstep and expected is not NOTHING:
+            deadline = monotonic() + self._config.planner.peer_timeout
+            missing = self._missing_sources(state.tick, expected)
+            while missing:
+                left = deadline - monotonic()
+                if left <= 0.0:
+                    self._given_up |= {source: self._inbox.received[source] for source in missing}
+                    self._inbox.counters["waits_given_up"] += 1
+                    break
+                self._receive(min(left, POLL))
+                missing = self._missing_sources(state.tick, expected)
+        return self._inbox.pop_inputs(state, expected)
+
+    def _missing_sources(self, tick: int, expected: Expected) -> set[Source]:
+        """Sources that have not sent their message yet and are worth waiting for."""
+        received, present = self._inbox.received, self._bus.members_at(HERE)
+        return {
+            source
+            for source in self._inbox.missing_sources(tick, expected)
+            if source[1] in present and self._given_up.get(source) != received[source]
+        }

@@ -1,0 +1,144 @@
+"""A plain function in the place of an agent: when it is asked, and what is made of its answer.
+
+What it remembers between ticks is its own, so that nobody but itself can compute it again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import field, replace
+from typing import Any, Final
+
+import numpy as np
+
+from quadriga.agents.healing import Healing, ramp
+from quadriga.agents.modes import (
+    ESTOP,
+    REFERENCE_LOST,
+    RESET,
+    STAND,
+    STOPPED,
+    STOPPING,
+    WALK,
+    Mode,
+    Stop,
+    resolve_stops,
+    rests,
+    step_mode,
+)
+from quadriga.agents.planning.interface import NOTHING, Expected
+from quadriga.agents.planning.operator_references import reference_at, remember_references
+from quadriga.agents.step_io import Inputs, Outputs
+from quadriga.controller.motor_command import CAUSE
+from quadriga.plant.late import damp_joints
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ProcessError
+from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.codes import with_detail
+from quadriga.shared.wire.messages import Command, Reference, State
+from quadriga.shared.wire.topics import REFERENCE, REFERENCE_EPOCH_MS
+
+Step = Callable[[State, Reference], Command]
+"""From what the robot measures and what is asked of it to its motor command."""
+
+_NO_COUNTS: Final[dict[str, int]] = {}
+
+
+@record
+class ControllerMemory:
+    """What is remembered between ticks of what concerns everybody's robots."""
+
+    tick: int
+    mode: Mode
+    references: tuple[Reference, ...] = ()
+    healing: Healing = field(default_factory=Healing)
+
+
+class SteppedController:
+    """A plain function as an agent: it hears of stops only as a reference of no speed.
+
+    Args:
+        config: the team's configuration.
+        robot: the robot's name.
+        step: the function.
+    """
+
+    def __init__(self, config: Config, robot: str, step: Step) -> None:
+        self.robot = robot
+        self._step: Callable[[State, Reference], Any] = step
+        self._stand_ms, self._height = config.gait.stand_ms, config.reference.height
+
+    def initial(self) -> ControllerMemory:
+        """Before the first tick."""
+        return ControllerMemory(-1, Mode(STAND, 0))
+
+    def expected(self, tick: int) -> Expected:
+        """What lock-step waits for before the step of `tick`: the operator's reference."""
+        return NOTHING if tick % REFERENCE_EPOCH_MS else Expected(reference_tick=tick)
+
+    def step(self, state: ControllerMemory, inputs: Inputs) -> tuple[ControllerMemory, Outputs]:
+        """Advance to the tick of `inputs.state`.
+
+        Raises:
+            ProcessError: the function's answer is no command of finite numbers.
+        """
+        tick = inputs.state.tick
+        references = remember_references(state.references, inputs.references, tick)
+        _, age = reference_at(references, tick, self._height)
+        mode = self._course(state.mode, inputs, led=age <= REFERENCE.max_age_ms)
+        goes_on = rests(state.mode) and mode.name == WALK
+        healing = Healing(resumed=tick) if goes_on else state.healing
+        if mode.passive:
+            command = damp_joints(tick)
+        else:
+            followed, _ = reference_at(ramp(references, healing, tick), tick, self._height)
+            answer = self._step(inputs.state, _slowed(followed, mode, tick))
+            command = self._check(answer, tick)
+        ages = {REFERENCE.name: float(age)}
+        outputs = Outputs(command, None, None, mode.name, mode.reason, _NO_COUNTS, ages, None)
+        return ControllerMemory(tick, mode, references, healing), outputs
+
+    def _course(self, mode: Mode, inputs: Inputs, *, led: bool) -> Mode:
+        """The mode at this tick: what people have said, and whether an operator is there."""
+        tick, stops = inputs.state.tick, list[Stop]()
+        if mode.passive and inputs.reset is not None and inputs.estop is None:
+            mode = Mode(STAND, tick, RESET)
+        elif rests(mode) and mode.name == STAND and inputs.resume is not None:
+            mode = Mode(WALK, tick)
+        else:
+            mode = step_mode(mode, tick, self._stand_ms, half_cycle_ends=True)
+        if inputs.estop is not None:
+            stops.append(Stop(ESTOP, with_detail(ESTOP, inputs.estop.reason)))
+        if inputs.stop is not None:
+            stops.append(Stop(STOPPING, with_detail(STOPPED, inputs.stop.reason)))
+        if mode.name == WALK and not led:
+            stops.append(Stop(STOPPING, REFERENCE_LOST))
+        return resolve_stops(mode, tick, stops)
+
+    def _check(self, answer: Any, tick: int) -> Command:
+        """What the function has answered, if it is a command of this tick.
+
+        Raises:
+            ProcessError: it is not.
+        """
+        name = f"step of {self.robot} at tick {tick}"
+        if not isinstance(answer, Command):
+            got = type(answer).__name__
+            raise ProcessError(name, got, "a Command", "`build_command` makes one")
+        if answer.tick != tick:
+            raise ProcessError(name, f"a command of tick {answer.tick}", f"one of tick {tick}")
+        if not np.isfinite(answer.row).all():
+            wrong = [n for n, cut in Command.CUTS.items() if not np.isfinite(answer.row[cut]).all()]
+            raise ProcessError(
+                f"{name}: command.{wrong[0]}", "NaN or infinity", "finite numbers", CAUSE
+            )
+        return answer
+
+
+def _slowed(reference: Reference, mode: Mode, tick: int) -> Reference:
+    """What is asked of a robot in this mode: the share of the speed that is still followed."""
+    share = mode.speed_factor(tick)
+    if share == 1.0:
+        return reference
+    vx, vy, wz = share * reference.vx, share * reference.vy, share * reference.wz
+    return replace(reference, vx=vx, vy=vy, wz=wz)

@@ -1,0 +1,86 @@
+"""The command line of a controller of one's own: how it is read, filled in and told apart.
+
+Any program that speaks `state` and `command` may be the agent of each robot, see
+docs/tutorials/own_controller.md. The key `team.controller` says how it is started.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from quadriga.shared.errors import ConfigError
+
+KEY: Final = "team.controller"
+# What stands in braces in the command line, and is filled in for each robot; the program finds the
+# same in its environment, under this prefix and in capitals.
+PLACES: Final = ("robot", "team", "config", "endpoint", "mode", "listen")
+ENVIRONMENT: Final = "QUADRIGA_"
+_PLACE: Final = re.compile(r"\{(\w+)\}")
+_DIGITS: Final = 16  # of a digest
+
+
+def parse_line(line: str) -> tuple[str, ...]:
+    """The words of a command line, as a shell would split them.
+
+    Raises:
+        ConfigError: it has none, a quotation is not closed, or braces hold no known place.
+    """
+    try:
+        words = tuple(shlex.split(line))
+    except ValueError as error:
+        raise ConfigError(KEY, repr(line), "a command line", str(error).lower()) from None
+    if not words:
+        raise ConfigError(KEY, repr(line), "a command line, or '' for the project's own agents")
+    for name in _PLACE.findall(line):
+        if name not in PLACES:
+            known = ", ".join(f"{{{place}}}" for place in PLACES)
+            raise ConfigError(KEY, f"{{{name}}} in {line!r}", f"one of {known}")
+    return words
+
+
+def fill_in(words: Sequence[str], places: Mapping[str, str]) -> tuple[str, ...]:
+    """The words with what stands in braces filled in.
+
+    Args:
+        words: of `parse_line`.
+        places: what stands at each of `PLACES`.
+    """
+    return tuple(_PLACE.sub(lambda match: places.get(match[1], match[0]), word) for word in words)
+
+
+def environment_of(places: Mapping[str, str]) -> dict[str, str]:
+    """The variables by which a program finds what stands at each of `PLACES`."""
+    return {f"{ENVIRONMENT}{name.upper()}": value for name, value in places.items()}
+
+
+def controller_origin(line: str) -> str:
+    """A command line with the digest of all files that it names; "" for the project's own agents.
+
+    The digest has 16 hexadecimal digits. Files that the program opens by itself are not part of it.
+
+    Raises:
+        ConfigError: as `parse_line`, or a file cannot be read.
+    """
+    if not line:
+        return ""
+    digest = hashlib.sha256()
+    for path in named_files(parse_line(line)):
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise ConfigError(KEY, f"{path}: {error.strerror}", "a file that can be read") from None
+        digest.update(f"\0{path}\0".encode() + content)
+    return f"{line} {digest.hexdigest()[:_DIGITS]}"
+
+
+def named_files(words: Sequence[str]) -> Iterator[Path]:
+    """The files that words of a command line name, also behind an `=` as in `--weights=FILE`."""
+    for word in words:
+        for text in dict.fromkeys((word, word.rpartition("=")[2])):
+            if text and Path(text).is_file():
+                yield Path(text)

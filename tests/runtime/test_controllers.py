@@ -1,0 +1,88 @@
+"""Controllers of one's own in real teams: they walk, and who fails is named."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from rich.console import Console
+
+from quadriga.recordings.check import check, format_findings
+from quadriga.recordings.summary import summary_of
+from quadriga.recordings.traces import read_traces
+from quadriga.replay.team_replay import replay
+from quadriga.shared.errors import RecordingError
+from quadriga.shared.runtime.places import SOURCE
+from tests.runtime.conftest import Make, Team
+
+TROT = SOURCE / "deploy" / "controllers" / "trot.py"
+BARE = SOURCE / "deploy" / "controllers" / "bare_stand.py"
+FAULTY = SOURCE / "tests" / "runtime" / "faulty_controller.py"
+
+
+def assert_checked(team: Team) -> None:
+    findings = check(team.folder / "run.mcap")
+    assert all(finding.passed for finding in findings), "\n".join(format_findings(findings))
+
+
+def test_a_function_walks_and_is_judged_and_not_recomputed(make_team: Make) -> None:
+    team = make_team(
+        team__robots=1,
+        team__controller=f"python {TROT}",
+        world__seconds=2.0,
+        gait__stand_ms=300,
+        reference__ramp=0.3,
+        recorder__enabled=True,
+    )
+    recording = team.run(standing=False)
+    assert recording.metadata["controller"].startswith(f"python {TROT} ")
+    assert_checked(team)
+    summary = summary_of(read_traces(recording))
+    assert (summary["fell"], summary["stop_reasons"], summary["end_code"]) == (
+        False,
+        {},
+        "time-over",
+    )
+    assert summary["gaps"] == 0
+    assert summary["mean_vx"] > 0.3, "of 0.5 m/s"
+    assert summary["estimator_rmse"]["vx"] is None, "nobody has estimated it"
+    with pytest.raises(RecordingError, match=r"own cannot be recomputed; the world can"):
+        replay(team.folder / "run.mcap", (), {}, None, None, Console(quiet=True))
+
+
+def test_a_program_without_quadriga_is_one_of_the_team(make_team: Make) -> None:
+    assert not re.search(r"^\s*(import|from) quadriga", BARE.read_text(), re.MULTILINE)
+    team = make_team(
+        team__robots=2,
+        team__controller=f"python {BARE}",
+        world__seconds=0.6,
+        recorder__enabled=True,
+    )
+    recording = team.run(standing=False)
+    commands = [entry.tick for entry in recording.entries(("command",))]
+    assert sorted(commands) == sorted([*range(600)] * 2)
+    assert_checked(team)
+
+
+def test_who_fails_is_named_and_the_world_goes_on(make_team: Make) -> None:
+    ways = "r1=nan r2=ticks r3=silent r4=slow"
+    team = make_team(
+        team__robots=4,
+        team__yokes="none",
+        team__controller=f"python {FAULTY} {ways}",
+        world__seconds=0.5,
+        world__command_timeout=0.5,
+        recorder__enabled=True,
+    )
+    recording = team.run(standing=False)
+    said = team.log("sim")
+    refused = "silent for 0.5 s, its last command was refused"
+    assert f"silent r1 {refused} (command.tau: got NaN or infinity, expected finite" in said
+    assert re.search(r"malformed r1 \d+ commands dropped: command\.tau: got NaN", said)
+    assert re.search(rf"silent r2 {refused} \(command\.tick: got 1100, expected 100\)", said)
+    assert "silent r3 silent for 0.5 s: the world goes on without its commands" in said
+    assert not re.search(r"(silent|gone|malformed) r4", said), "it is only slow"
+    stops = summary_of(read_traces(recording))["stop_reasons"]
+    assert {robot: reason.partition(":")[0] for robot, reason in stops.items()} == dict.fromkeys(
+        ("r1", "r2", "r3"), "silent"
+    )
