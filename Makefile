@@ -5,10 +5,11 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 PROBES := runs/probe/3/responses.npz runs/probe/5/responses.npz
 TOOLS := $(VENV)/.tools
+MANUAL := $(VENV)/.manual
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install tools walk prepared test test-containers image-lock lint fuzz fuzz-readers drops starts endurance format docs dist figures clip acceptance bench bench-planner bench-recorder
+.PHONY: install tools walk prepared test test-containers image-lock lint fuzz fuzz-readers drops starts endurance format docs dist pages manual gallery figures clip acceptance bench bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -26,6 +27,11 @@ $(TOOLS): $(STAMP)
 	@touch $@
 
 tools: $(TOOLS)
+
+# What makes the manual: the extra `docs`, 60 MB.
+$(MANUAL): $(STAMP)
+	$(PIP) -c requirements.lock --no-build-isolation --editable '.[docs]'
+	@touch $@
 
 walk: $(STAMP)
 	$(BIN)/quadriga walk $(ARGS)
@@ -49,7 +55,7 @@ lint: $(TOOLS)
 	$(BIN)/lint-imports
 
 # A team in real containers, of Docker or Podman, one of which is killed; some five minutes, and
-# as many more for the first image. BASE, GL and BUILD_OPTIONS: deploy/README.md.
+# as many more for the first image. BASE, GL and BUILD_OPTIONS: docs/containers.md.
 test-containers: $(TOOLS)
 	$(BIN)/python -m tests.containers $(ARGS)
 
@@ -83,22 +89,38 @@ format: $(TOOLS)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-docs: $(STAMP)
+# The manual as HTML in docs/_build: first the pages that are generated, then all of them. A warning,
+# such as that of a link that leads nowhere, is an error.
+docs: pages
+	$(MAKE) manual
+
+pages: $(STAMP)
 	$(BIN)/quadriga config --markdown > docs/configuration.md
 	$(BIN)/python -m quadriga.shared.wire.markdown > docs/messages.md
 	$(BIN)/python -m quadriga.shared.security.markdown
 	$(BIN)/python -m quadriga.desk.page > docs/desk.md
 	$(BIN)/python -m quadriga.faults.page > docs/faults.md
 	$(BIN)/python -m quadriga.stop_times.page
+	$(BIN)/python -m quadriga.commands.markdown > docs/reference/command_line.md
+	$(BIN)/python -m quadriga.experiments.gallery --page > docs/gallery.md
 
 # Wheel and source distribution, in dist/; with ARGS=--walk also installed into an environment of
 # their own, with all they need from the package index, where a team then walks.
 dist: $(STAMP)
 	$(BIN)/python -m tests.deploy.dist $(ARGS)
 
-# Every figure and table of results in README and docs, and the clip; two cores walk 30 times a
-# minute. It goes on where it ended. With ARGS the clip is left alone: ARGS=--only-publish walks
-# nothing, ARGS='hard --seeds 0:2' only looks.
+manual: $(MANUAL)
+	$(BIN)/python -m sphinx --builder html --quiet --fail-on-warning docs docs/_build
+	@echo "the manual: docs/_build/index.html"
+
+# A clip of each scenario, from real walks; about twenty minutes, and more for each team that has not
+# walked here before. ARGS=NAME … draws some of them.
+gallery: $(STAMP)
+	$(BIN)/python -m quadriga.experiments.gallery $(ARGS)
+
+# Every figure and table of results in the docs, and the clip; two cores walk 30 times a minute. It
+# goes on where it ended. With ARGS the clip is left alone: ARGS=--only-publish walks nothing,
+# ARGS='hard --seeds 0:2' only looks.
 figures: $(STAMP) $(if $(ARGS),,$(PROBES))
 	$(BIN)/quadriga experiments $(ARGS)
 	$(if $(ARGS),,$(MAKE) clip)

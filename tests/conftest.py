@@ -25,7 +25,7 @@ def _own_runtime_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
 
 
 # Folders whose tests start processes and take long.
-_LONG: Final = ("docs", "plugins", "runtime", "quadriga/experiments", "deploy")
+_LONG: Final = ("docs", "manual", "plugins", "runtime", "quadriga/experiments", "deploy")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

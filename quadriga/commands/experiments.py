@@ -1,4 +1,4 @@
-"""`quadriga experiments`: what README and docs tell results of, walked and published."""
+"""`quadriga experiments`: what the docs tell results of, walked and published."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LOOKS: Final = "looks"  # the folder of walks that are not published
 
 def add(add_command: AddCommand) -> None:
     command = add_command(
-        "experiments", run, "walk what README and docs tell results of, and publish them"
+        "experiments", run, "walk what the docs tell results of, and publish them"
     )
     command.epilog = (
         "The same command goes on where it ended. Exit status 0 says that results are published, "
@@ -65,7 +65,7 @@ def add(add_command: AddCommand) -> None:
         "--into",
         type=Path,
         metavar="DIR",
-        help="the checkout whose README.md and docs/ are written (this code's)",
+        help="the checkout whose docs/ are written (this code's)",
     )
 
 

@@ -26,7 +26,7 @@ This page is generated: `python -m quadriga.shared.wire.markdown > docs/messages
 
 _QUESTIONS = """\
 
-# Questions
+## Questions
 
 What each process answers when it is asked (a query of Zenoh) on `<team>/<process>/<question>`,
 before the walk and during it; `refusals` only a router with certificates. Nothing of it is

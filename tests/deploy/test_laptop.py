@@ -20,7 +20,8 @@ from quadriga.shared.config.load import load
 
 LAPTOP = Path(__file__).parents[2] / "deploy" / "laptop"
 UNIT = LAPTOP / "quadriga-agent@.service"
-README = (LAPTOP / "README.md").read_text(encoding="utf-8")
+PAGE = LAPTOP.parents[1] / "docs" / "tutorials" / "laptops.md"
+README = PAGE.read_text(encoding="utf-8")
 
 
 def unit() -> configparser.ConfigParser:

@@ -1,4 +1,4 @@
-"""The page of all experiments, and the table that the README shows: text made of results."""
+"""The page of all experiments: text made of results."""
 
 from __future__ import annotations
 
@@ -27,8 +27,6 @@ from quadriga.experiments.tables import (
 )
 from quadriga.tables import NOTHING, Table
 
-BEGIN: Final = "<!-- results:begin -->"
-END: Final = "<!-- results:end -->"
 _MADE: Final = (
     "<!-- Generated, all of it, by `make figures` from deploy/experiments: do not edit. -->"
 )
@@ -41,7 +39,7 @@ In brackets: 95 % intervals. Success rates: Wilson. Differences of fall rates, o
 method 10, with the p of McNemar's exact two-sided test. Ratios: medians over the pairs that both
 walked to the end, with the exact interval by order statistics. Each p and interval is that of a
 single figure, not corrected for their number. Cost of transport, control cost and times of planning
-are medians over walks; times are of the machine that walked, under load. Errors are by the world's
+are medians over walks; times are of the machine that walked, under load. Errors are by the ground
 truth: z is the height over the terrain under the hips, and jumps where a hip passes the edge of a
 block; z over the stance feet is as the robots measure it (a test holds it against the truth), and
 what they are asked to keep. A requirement is held
@@ -75,24 +73,19 @@ class PageEntry:
 
 def build_page(entries: Sequence[PageEntry]) -> str:
     """`docs/results.md`."""
-    parts = [_MADE, "# Results", f"{_READ}\n{POOLED_NOTE}", build_overview(entries, "#")]
+    parts = [_MADE, "# Results", f"{_READ}\n{POOLED_NOTE}", build_overview(entries)]
     for entry in entries:
         parts += _section(entry)
     return "\n\n".join(parts) + "\n"
 
 
-def build_overview(entries: Sequence[PageEntry], link: str) -> str:
-    """A row for each requirement: what was found, where it stands worst, and whether it is met.
-
-    Args:
-        entries: experiments, in order.
-        link: what stands before the anchor of a section.
-    """
+def build_overview(entries: Sequence[PageEntry]) -> str:
+    """A row for each requirement: what was found, where it stands worst, and whether it is met."""
     rows = []
     for entry in entries:
         experiment = entry.experiment
         have, of = count_trials(experiment, entry.results)
-        head = (f"[{experiment.name}]({link}{experiment.name})", _count(have, of))
+        head = (f"[{experiment.name}](#{experiment.name})", _count(have, of))
         verdicts = judge_requirements(experiment, entry.results)
         for k, verdict in enumerate(verdicts):
             rows.append(
@@ -107,12 +100,6 @@ def build_overview(entries: Sequence[PageEntry], link: str) -> str:
             rows.append((*head, "nothing: a comparison", NOTHING, NOTHING))
     columns = ("experiment", "trials", "required", "found, and where it stands worst", "verdict")
     return format_table(Table("", columns, tuple(rows)), left=len(columns))
-
-
-def build_readme_table(entries: Sequence[PageEntry]) -> str:
-    """What stands between the markers of the README: nothing that today is walked otherwise."""
-    current = [entry for entry in entries if not entry.outdated]
-    return f"{BEGIN}\n{build_overview(current, 'docs/results.md#')}\n{END}"
 
 
 def format_table(table: Table, left: int = 1) -> str:
@@ -203,12 +190,3 @@ def _format_findings(verdict: RequirementVerdict) -> str:
     pooled = [one for one in verdict.findings if one.world == POOLED and one.margin is not None]
     shown = dict.fromkeys((*pooled, worst))
     return "; ".join(f"{' · '.join(one.world)}: {format_finding(verdict, one)}" for one in shown)
-
-
-def replace_results(text: str, table: str) -> str | None:
-    """A text with what stands between the markers replaced; None unless both stand there once."""
-    if text.count(BEGIN) != 1 or text.count(END) != 1:
-        return None
-    head, _, rest = text.partition(BEGIN)
-    _, marker, tail = rest.partition(END)
-    return f"{head}{table}{tail}" if marker else None

@@ -11,14 +11,7 @@ from quadriga.experiments.campaign.manifest import FILE
 from quadriga.experiments.plan import Group
 from quadriga.experiments.published.experiment import Experiment, Part
 from quadriga.experiments.published.figures import draw_figure
-from quadriga.experiments.published.page import (
-    BEGIN,
-    END,
-    PageEntry,
-    build_page,
-    build_readme_table,
-    replace_results,
-)
+from quadriga.experiments.published.page import PageEntry, build_page
 from quadriga.experiments.published.published_trials import (
     Campaigns,
     has_more_published,
@@ -27,12 +20,12 @@ from quadriga.experiments.published.published_trials import (
 )
 from quadriga.experiments.published.summarise_experiment import CampaignTrials, summarise_experiment
 from quadriga.experiments.results import Results
-from quadriga.shared.errors import ConfigError, name_file_errors
+from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.atomic import atomic_write, write_text
 
-README: Final = "README.md"
-PAGE: Final = Path("docs/results.md")
-FIGURES: Final = Path("docs/figures")
+DOCS: Final = Path("docs")
+PAGE: Final = DOCS / "results.md"
+FIGURES: Final = DOCS / "figures"
 Say = Callable[[str], None]
 Digests = Mapping[str, Mapping[Group, str]]
 
@@ -50,16 +43,16 @@ def publish(
     Args:
         experiments: all of the page.
         runs: where their campaigns' folders are, if they are.
-        into: the checkout whose README and docs are written.
+        into: the checkout whose docs are written.
         renewed: names of the experiments whose runs win over what is published of them.
         digests: of each experiment's configurations, as they are today, by its name.
         say: takes what a user should know.
 
     Raises:
         ConfigError: a campaign's folder or published results cannot be read, something cannot be
-            written, or the README has no place for results.
+            written, or there are no docs to publish in.
     """
-    readme = read_readme(into)
+    check_docs(into)
     entries = []
     with explain_write_errors(into):
         for experiment in experiments:
@@ -71,25 +64,19 @@ def publish(
             outdated = _is_outdated(published, digests[experiment.name])
             entries.append(PageEntry(experiment, results, figures, outdated))
         write_text(into / PAGE, build_page(entries))
-        write_text(into / README, replace_results(readme, build_readme_table(entries)) or readme)
     return entries
 
 
-def read_readme(into: Path) -> str:
-    """The README, known to have a place for results.
+def check_docs(into: Path) -> None:
+    """See that a folder is a checkout, whose docs can be published in.
 
     Raises:
-        ConfigError: it cannot be read, or has none.
+        ConfigError: it has none.
     """
-    path = into / README
-    remedy = "--into says of which checkout"
-    with name_file_errors(ConfigError, path, "a README to publish in", remedy):
-        text = path.read_text(encoding="utf-8")
-    if replace_results(text, "") is None:
-        raise ConfigError(
-            str(path), "no place for results", f"{BEGIN} and, after it, {END}, each once"
-        )
-    return text
+    folder = into / DOCS
+    if not folder.is_dir():
+        cause = "--into says of which checkout"
+        raise ConfigError(str(folder), "no such folder", "docs to publish in", cause)
 
 
 def _renew(experiment: Experiment, runs: Path, into: Path, say: Say) -> None:

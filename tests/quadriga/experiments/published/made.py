@@ -20,13 +20,10 @@ from tests.quadriga.experiments.rows import row
 DIGEST = "ab" * 32
 Fate = Callable[[Group, int], dict[str, Any]]  # changes of the row of a trial
 
-README = "# Here\n\n<!-- results:begin -->\nold\n<!-- results:end -->\n\nAfter.\n"
-
 
 def checkout(folder: Path) -> Path:
-    """A folder with a README to publish in."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "README.md").write_text(README, encoding="utf-8")
+    """A folder with docs to publish in."""
+    (folder / "docs").mkdir(parents=True, exist_ok=True)
     return folder
 
 

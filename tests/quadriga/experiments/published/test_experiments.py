@@ -80,7 +80,7 @@ def test_a_look_is_shown_and_not_published(capsys: Said, experiment: Path, tmp_p
     assert main([*words, "--jobs", "1", "--seeds", "7"]) == 0, capsys.readouterr().err
     assert "Tiny: Walks" in capsys.readouterr().out
     assert len(finished(runs / "looks" / "tiny")) == 2
-    assert [path.name for path in into.iterdir()] == ["README.md"]
+    assert [path.name for path in into.rglob("*")] == ["docs"]
     assert not (runs / "tiny").exists()
     assert main([*words, "--jobs", "1", "--seeds", "7", "--require"]) == 0, "all is met"
     text = experiment.read_text(encoding="utf-8")
@@ -133,7 +133,7 @@ def test_a_mistake_costs_one_line(capsys: Said, experiment: Path, tmp_path: Path
         (["papers", *where], "experiments: got 'papers'"),
         ([str(broken), *where], "broken.toml"),
         ([str(unknown), *where], "did you mean 'controller.kp_tilt'"),
-        ([name, "--into", str(bare)], "README.md: got No such file"),
+        ([name, "--into", str(bare)], "bare/docs: got no such folder"),
         ([name, *where, "--seeds", "x"], "--seeds: got 'x'"),
         ([name, *where, "--seeds", "0", "--only-publish"], "walks nothing"),
         ([name, *where, "--seeds", "0", "--from-published"], "--from-published: got"),

@@ -12,7 +12,7 @@ from matplotlib import image
 from quadriga.experiments.measures import MEASURES
 from quadriga.experiments.published.catalogue import CHECKOUT, load_experiments
 from quadriga.experiments.published.experiment import Experiment, Requirement
-from quadriga.experiments.published.page import BEGIN, END, build_overview, replace_results
+from quadriga.experiments.published.page import build_overview
 from quadriga.experiments.published.publish import PAGE, publish
 from quadriga.experiments.published.walk_experiment import config_digests
 from quadriga.shared.errors import ConfigError
@@ -37,7 +37,6 @@ def test_the_same_bytes_again_and_from_what_is_published_alone(
     publish_all(experiments, runs, into)
     first = files(into)
     assert set(first) == {
-        "README.md",
         "docs/results.md",
         "docs/figures/small-success.png",
         "docs/figures/small-falls.png",
@@ -84,16 +83,8 @@ def test_the_page_says_what_came_of_it(experiments: list[Experiment], tmp_path: 
         "- trials: **0 of 20**",
     ):
         assert text in page, text
-    readme = (into / "README.md").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
-    assert readme.startswith(f"# Here\n\n{BEGIN}\n| experiment |")
-    assert readme.endswith(f"\n{END}\n\nAfter.\n")
-    assert "old" not in readme
-    assert (
-        "| [small](docs/results.md#small) | 28 of 40 | mine: success ≥ 97 % | steps: 85.7" in readme
-    )
-    assert (
-        "| [later](docs/results.md#later) | 0 of 20 | mine: success ≥ 97 % | – | open |" in readme
-    )
+    assert "| [small](#small) | 28 of 40 | mine: success ≥ 97 % | steps: 85.7" in page
+    assert "| [later](#later) | 0 of 20 | mine: success ≥ 97 % | – | open |" in page
 
 
 def test_all_worlds_together_are_told_beside_the_worst(tmp_path: Path) -> None:
@@ -101,36 +92,28 @@ def test_all_worlds_together_are_told_beside_the_worst(tmp_path: Path) -> None:
     experiment = experiment_of("steps", "ice", requirements=(asked,))
     write_runs(experiment, tmp_path / "runs", range(7), fate)
     (entry,) = publish_all([experiment], tmp_path / "runs", checkout(tmp_path / "here"))
-    text = build_overview([entry], "#").replace("\N{NO-BREAK SPACE}", " ")
+    text = build_overview([entry]).replace("\N{NO-BREAK SPACE}", " ")
     assert "| all worlds: 92.9 [68.5, 98.7] **missed** by 4.1; steps: 85.7 [48.7, 97.4]" in text
     assert "**missed** in 2 of 3 so far" in text
     alone = replace(
         entry, experiment=replace(experiment, requirements=(replace(asked, each=False),))
     )
-    assert "| 92.9 [68.5, 98.7] **missed** by 4.1 |" in build_overview([alone], "#").replace(
+    assert "| 92.9 [68.5, 98.7] **missed** by 4.1 |" in build_overview([alone]).replace(
         "\N{NO-BREAK SPACE}", " "
     )
 
 
-@pytest.mark.parametrize("text", ["", BEGIN, f"{END}\n{BEGIN}", f"{BEGIN}{END}{BEGIN}{END}"])
-def test_a_readme_without_a_place_is_one_error(tmp_path: Path, text: str) -> None:
-    into = checkout(tmp_path / "here")
-    (into / "README.md").write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"README\.md: got no place for results, expected <!-- r"):
-        publish_all([experiment_of("ice")], tmp_path, into)
-    assert list(files(into)) == ["README.md"]
+def test_a_folder_without_docs_is_one_error(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"docs: got no such folder, expected docs to publish in"):
+        publish_all([experiment_of("ice")], tmp_path, tmp_path)
+    assert list(files(tmp_path)) == []
 
 
 def test_what_cannot_be_written_is_one_error(tmp_path: Path) -> None:
     into = checkout(tmp_path / "here")
-    (into / "docs").write_text("a file", encoding="utf-8")
+    (into / "docs" / "figures").write_text("a file", encoding="utf-8")
     with pytest.raises(ConfigError, match="a place that can be written to"):
         publish_all([experiment_of("ice")], tmp_path, into)
-
-
-def test_only_what_stands_between_the_markers_is_replaced() -> None:
-    assert replace_results(f"a{BEGIN}x{END}b", "new") == "anewb"
-    assert replace_results(f"a{BEGIN}xb", "new") is None
 
 
 def test_every_measure_is_told_of_a_line_that_has_it(tmp_path: Path) -> None:
@@ -154,14 +137,12 @@ def test_what_the_project_publishes_is_what_its_files_give(tmp_path: Path) -> No
     """`make figures ARGS=--only-publish` after a change of an experiment, or of how it is told."""
     every, _ = load_experiments([])
     into = tmp_path / "clone"
-    shutil.copytree(CHECKOUT / "docs", into / "docs")
-    shutil.copy(CHECKOUT / "README.md", into / "README.md")
+    shutil.copytree(CHECKOUT / "docs", into / "docs", ignore=shutil.ignore_patterns("_build"))
     today = {one.name: config_digests(one) for one in every}
     names = [one.name for one in every]
     entries = publish(every, tmp_path / "nowhere", into, names, today, print)
-    for name in (Path("README.md"), PAGE):
-        same = (into / name).read_bytes() == (CHECKOUT / name).read_bytes()
-        assert same, f"{name}: make figures ARGS=--only-publish"
+    same = (into / PAGE).read_bytes() == (CHECKOUT / PAGE).read_bytes()
+    assert same, "make figures ARGS=--only-publish"
     for figure in (figure for entry in entries for figure in entry.figures):
         assert (CHECKOUT / "docs" / figure).is_file()
 
@@ -194,16 +175,12 @@ def test_a_refused_variant_is_a_row_and_says_why(tmp_path: Path) -> None:
     assert "| **missed** | **missed**: refused, radius 0.9, not at most 0.5 |" in page
 
 
-def test_what_was_walked_with_earlier_defaults_says_so_and_leaves_the_readme(
-    tmp_path: Path,
-) -> None:
+def test_what_was_walked_with_earlier_defaults_says_so(tmp_path: Path) -> None:
     into, runs = checkout(tmp_path / "here"), tmp_path / "runs"
     experiment = experiment_of("steps")
     write_runs(experiment, runs, range(10), upright)
     for digest, current in ((DIGEST, True), ("cd" * 32, False)):
         publish_all([experiment], runs, into, digest)
-        readme = (into / "README.md").read_text(encoding="utf-8")
-        assert ("results.md#small" in readme) is current
         page = (into / PAGE).read_text(encoding="utf-8")
         assert ("**earlier defaults**" in page) is not current
         assert "20\xa0of\xa020" in page

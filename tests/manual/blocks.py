@@ -1,0 +1,79 @@
+"""The commands and programs that README and manual show: fenced blocks, and what is said of them.
+
+A comment before a block may say `<!-- not run: why -->`; `<!-- short: OPTIONS -->`, which are added
+to each of its commands when it is run; `<!-- short: live -->`, of commands to a team that walks; or
+`<!-- excerpt: FILE -->`, of text that stands in a file of the project.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from quadriga.shared.runtime.places import SOURCE
+
+DOCS: Final = SOURCE / "docs"
+NOT_RUN: Final = "not run"
+SHORT: Final = "short"
+EXCERPT: Final = "excerpt"
+LIVE: Final = "live"
+_OTHERS: Final = ("_build", "results")  # folders of docs without pages of the manual
+# Pages whose blocks are typed one after the other by tests of their own.
+RUN_ELSEWHERE: Final = frozenset(("docs/extending.md",))
+_FENCE: Final = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_SAID: Final = re.compile(r"<!-- (not run|short|excerpt):\s*(.*?)\s*-->\n+\Z")
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A fenced block of a page.
+
+    Attributes:
+        page: the file, from the top of the checkout.
+        line: its first line in the page.
+        language: `sh` or `python`.
+        text: what stands in it.
+        marker: `not run`, `short`, `excerpt`, or "".
+        said: behind the marker's colon.
+    """
+
+    page: str
+    line: int
+    language: str
+    text: str
+    marker: str = ""
+    said: str = ""
+
+    @property
+    def name(self) -> str:
+        """Where it is."""
+        return f"{self.page}:{self.line}"
+
+
+def list_pages() -> list[Path]:
+    """README and all pages of the manual."""
+    pages = (path for path in DOCS.rglob("*.md") if path.relative_to(DOCS).parts[0] not in _OTHERS)
+    return [SOURCE / "README.md", *sorted(pages)]
+
+
+def find_blocks(text: str, page: str) -> list[Block]:
+    """The blocks of a page's text."""
+    found = []
+    for match in _FENCE.finditer(text):
+        before = text[: match.start()]
+        said = _SAID.search(before)
+        marker, words = (said[1], said[2]) if said else ("", "")
+        line = before.count("\n") + 2
+        found.append(Block(page, line, match[1], match[2], marker, words))
+    return found
+
+
+def all_blocks() -> list[Block]:
+    """The blocks of all pages, in their order."""
+    found = []
+    for path in list_pages():
+        text = path.read_text(encoding="utf-8")
+        found += find_blocks(text, path.relative_to(SOURCE).as_posix())
+    return found

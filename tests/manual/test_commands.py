@@ -1,0 +1,80 @@
+"""Every command that README and manual show can be typed: it exists, and has these options."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from quadriga.shared.errors import QuadrigaError
+from quadriga.shared.runtime.places import SOURCE
+from tests.manual.blocks import Block, all_blocks, find_blocks
+from tests.manual.programs import check_command
+from tests.manual.shell import split_commands
+
+BLOCKS = [block for block in all_blocks() if block.language == "sh"]
+
+
+@pytest.fixture(autouse=True)
+def _in_the_checkout(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(SOURCE)
+
+
+def wrong_commands(blocks: list[Block]) -> Iterator[str]:
+    """What is wrong with the commands of blocks, a line each."""
+    for block in blocks:
+        for words in split_commands(block.text):
+            try:
+                check_command(words)
+            except (QuadrigaError, AssertionError, SystemExit) as error:
+                yield f"{block.name}: {' '.join(words)}: {error}"
+
+
+def test_each_command_can_be_typed() -> None:
+    assert len(BLOCKS) > 60
+    assert list(wrong_commands(BLOCKS)) == []
+
+
+@pytest.mark.parametrize(
+    ("line", "error"),
+    [
+        ("quadriga wlak", "got 'wlak'"),
+        ("quadriga walk --robts 3", "--robts"),
+        ("quadriga walk --set world.sed=3", "world.sed"),
+        ("quadriga walk --robots 11", "team.robots: got 11"),
+        (".venv/bin/quadriga walk --scenario gravle-3", "gravle-3"),
+        ("quadriga bridge --armed", ""),  # of which robot?
+        ("quadriga campaign flat --planners 'a:planner.knd=none'", "planner.knd"),
+        ("quadriga campaign flat --seeds x", "--seeds"),
+        ("quadriga config | grpe seed", "grpe"),
+        ("make wlak", "no target wlak"),
+        ("make walk ARGS='--robts 3'", "--robts"),
+        ("python -m quadriga.nothing", ""),
+        ("docker compose exec operator quadriga estp", "estp"),
+    ],
+)
+def test_a_command_that_there_is_not_is_found(line: str, error: str) -> None:
+    found = list(wrong_commands([Block("page.md", 1, "sh", line)]))
+    assert len(found) == 1
+    assert error in found[0]
+
+
+def test_a_block_is_found_with_what_is_said_of_it() -> None:
+    text = "# A\n\n<!-- not run: hours -->\n```sh\nmake bench\n```\n\n```python\nx = 1\n```\n"
+    slow, program = find_blocks(text, "a.md")
+    assert (slow.line, slow.marker, slow.said, slow.text) == (5, "not run", "hours", "make bench\n")
+    assert (program.language, program.marker) == ("python", "")
+
+
+def test_a_line_is_cut_into_its_commands() -> None:
+    text = (
+        "A=1 make \\\n  walk  # ends\n(quadriga walk 2>&1 || true) | grep 'a b' > out\nwait $! &\n"
+    )
+    found = [" ".join(words) for words in split_commands(text)]
+    assert found == ["make walk", "true", "grep a b", "wait $!"]
+
+
+def test_what_is_not_run_says_why() -> None:
+    for block in all_blocks():
+        if block.marker == "not run":
+            assert len(block.said) > 4, block.name
