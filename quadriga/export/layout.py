@@ -18,7 +18,7 @@ _SAMPLES: Final = "N"  # the axis of the horizon: one row per entry
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class MessageLayout:
     """What one kind of message holds, in a recording of one team.
 
     Attributes:
@@ -69,7 +69,7 @@ class Layout:
 
 def build_layout(
     kind: type[Message], config: Config, entries: Mapping[str, tuple[str, ...]]
-) -> Layout:
+) -> MessageLayout:
     """The layout of a kind of message.
 
     Args:
@@ -97,7 +97,9 @@ def build_layout(
                 numbers += [name.strip(".") for name in names]
     for name, among in maps:
         numbers += _entry_names(name, among)
-    return Layout(kind, tuple(plain), tuple(numbers), tuple(lists), tuple(arrays), tuple(maps))
+    return MessageLayout(
+        kind, tuple(plain), tuple(numbers), tuple(lists), tuple(arrays), tuple(maps)
+    )
 
 
 def _entry_names(field: str, entries: tuple[str, ...]) -> list[str]:
