@@ -29,7 +29,7 @@ from scipy import sparse
 
 from benchmarks.as_written import TIGHT, WarmOsqp
 from benchmarks.page import targets
-from benchmarks.planner_contenders import AS_WRITTEN, Case, Contender, Deepc, Local, Team
+from benchmarks.planner_contenders import AS_WRITTEN, Case, Contender, Local, Team, TeamDeepc
 from benchmarks.planner_peer import AVAILABLE, CvxpyDeepc
 from benchmarks.planner_ticks import PlanningTick, record
 from quadriga.agents.planner.checked_predictor import load_checked
@@ -139,7 +139,7 @@ def deepc(robots: int, seconds: float, console: Console) -> list[Row]:
     elif robots == 1:
         console.print("eq. 5 with CVXPY: left out, cvxpy is not installed (pip install cvxpy)")
     last = [walk[-DEEPC_STEPS.get(robots, 1) :] for walk in walks]
-    return measure(config, Deepc(config, episodes), last, extra)
+    return measure(config, TeamDeepc(config, episodes), last, extra)
 
 
 def measure(

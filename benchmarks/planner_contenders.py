@@ -188,7 +188,7 @@ class Team:
         return build_problem(self._config.planner, self._config.robot.weight, self._G_u, pattern)
 
 
-class Deepc:
+class TeamDeepc:
     """Eq. 5: DeePC of the team, with g and σ or without."""
 
     def __init__(self, config: Config, episodes: tuple[Episode, ...]) -> None:

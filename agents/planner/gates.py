@@ -95,13 +95,10 @@ def held_out_error(
 
 def coupling_table(predictor: Predictor) -> Array:
     """Frobenius norms of the blocks G_ij of the scaled predictor, largest phase. Shape (n, n)."""
-    robots = range(predictor.meta.robots)
+    robots, layout = range(predictor.meta.robots), predictor.meta.layout
     norms = [
         [
-            [
-                np.linalg.norm(scaled_blocks(predictor.block(i, j, phase), predictor.meta))
-                for j in robots
-            ]
+            [np.linalg.norm(scaled_blocks(predictor.block(i, j, phase), layout)) for j in robots]
             for i in robots
         ]
         for phase in range(predictor.phases)

@@ -76,7 +76,7 @@ class Adapter:
             y_base: base of the outputs at their ends, shape (samples, 6).
         """
         if known is None:
-            known = begin_correction(self._predictor.meta, self._index, self._forgetting)
+            known = begin_correction(self._predictor.meta.layout, self._index, self._forgetting)
         T_ini, gait = self._config.planner.T_ini, self._config.gait
         stance = np.array([sample.stance for sample in own]) > 0.5
         u, y = np.array([sample.u for sample in own]), np.array([sample.y for sample in own])
@@ -95,4 +95,4 @@ class Adapter:
     def block(self, correction: Correction, phase: int) -> Array:
         """The corrected G_ii. Shape (6 N, 18 T_ini + 12 N)."""
         G_ii = self._predictor.block(self._index, self._index, phase)
-        return G_ii + block_correction(self._predictor.meta, correction)
+        return G_ii + block_correction(self._predictor.meta.layout, correction)

@@ -1,13 +1,14 @@
-"""The part of DeePC (eq. 5) that depends on a team's data alone and not on any weight.
+"""The part of DeePC (eq. 5) that depends on the data alone and not on any weight.
 
 The data enter through their Gram matrix S alone. With a = [u_ini; u] and b = [y_ini; y] its
-Cholesky factor, forces first, gives every g that matters as two orthogonal parts: one that a
+Cholesky factor, inputs first, gives every g that matters as two orthogonal parts: one that a
 determines, with ‖·‖² = aᵀ S_aa⁻¹ a, and one of free coordinates z:
 
     b + [σ; 0] = Φ a + M z,   Φ = S_ba S_aa⁻¹,   M Mᵀ = S_bb − S_ba S_aa⁻¹ S_ab
 
 At the optimum g has no part outside the span of the data's rows. g, σ and S belong to scaled
-deviations (`Episode.scaled_deviations`). `quadriga.agents.planner.deepc_qp` makes the QP of this.
+signals, which of a team are deviations (`Episode.scaled_deviations`).
+`quadriga.agents.planner.deepc_qp` makes the QP of this.
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from quadriga.agents.predictor.episode import Episode
+from quadriga.agents.predictor.episode import Episode, team_layout
 from quadriga.agents.predictor.hankel import gram
+from quadriga.agents.predictor.layout import Layout
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import Array
 
 Index = NDArray[np.int64]
 
@@ -33,28 +35,26 @@ _RANK_TOLERANCE: Final = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Reduction:
-    """What the data determine independently of the weights; scaled deviations, robots first.
+    """What the data determine independently of the weights; scaled signals, agents first.
 
-    Forces stack per robot and time-major first all T_ini samples of the past, then all N of the
+    Inputs stack per agent and time-major first all T_ini samples of the past, then all N of the
     future; outputs likewise.
 
     Attributes:
-        robots, T_ini, N: sizes of the problem; L = T_ini + N.
-        inverse: S_aa⁻¹, shape (12 n L, 12 n L).
-        response: Φ, outputs that the forces explain, shape (6 n L, 12 n L).
-        spread: M, outputs that they leave open, shape (6 n L, rank).
+        layout: sizes of the problem, with L = T_ini + N, and the scales.
+        inverse: S_aa⁻¹, shape (m n L, m n L).
+        response: Φ, outputs that the inputs explain, shape (p n L, m n L).
+        spread: M, outputs that they leave open, shape (p n L, rank).
     """
 
-    robots: int
-    T_ini: int
-    N: int
+    layout: Layout
     inverse: Array
     response: Array
     spread: Array
 
 
 def reduce(episodes: Sequence[Episode], T_ini: int, N: int) -> Reduction:
-    """Split the outputs in the data into a part that the forces explain and the rest.
+    """The reduction of a team's data; see `reduce_signals`.
 
     Args:
         episodes: data of one team; those shorter than T_ini + N are ignored.
@@ -67,9 +67,24 @@ def reduce(episodes: Sequence[Episode], T_ini: int, N: int) -> Reduction:
     robots = {episode.robots for episode in episodes}
     if len(robots) != 1:
         raise PredictorError("episodes", f"teams of {sorted(robots)} robots", "data of one team")
-    n, L = robots.pop(), T_ini + N
-    S = gram([np.concatenate(episode.scaled_deviations(), axis=1) for episode in episodes], L)
-    a, b = _rows(n, T_ini, N)
+    signals = [np.concatenate(episode.scaled_deviations(), axis=1) for episode in episodes]
+    return reduce_signals(signals, team_layout(robots.pop(), T_ini, N))
+
+
+def reduce_signals(signals: Sequence[Array], layout: Layout) -> Reduction:
+    """Split the outputs in the data into a part that the inputs explain and the rest.
+
+    Args:
+        signals: of each episode, scaled: [u of all agents; y of all agents], shape (T, n (m + p));
+            those shorter than T_ini + N are ignored.
+        layout: of the problem; everybody's columns are used.
+
+    Raises:
+        PredictorError: inputs that do not excite every direction.
+    """
+    L = layout.T_ini + layout.N
+    S = gram(signals, L)
+    a, b = input_output_rows(layout)
     S_aa, S_ab = S[np.ix_(a, a)], S[np.ix_(a, b)]
     floor = _RANK_TOLERANCE * float(np.linalg.norm(S_aa))
     try:
@@ -78,10 +93,10 @@ def reduce(episodes: Sequence[Episode], T_ini: int, N: int) -> Reduction:
     except linalg.LinAlgError:
         raise PredictorError(
             "episodes",
-            f"forces of {sum(e.samples for e in episodes)} samples that are not "
+            f"inputs of {sum(len(w) for w in signals)} samples that are not "
             f"persistently exciting of order {L}",
             f"a Hankel matrix of rank {len(a)}",
-            "too little data, or too little noise in the forces",
+            "too little data, or too little noise in the inputs",
         ) from None
     solved = linalg.cho_solve(factor, np.hstack([S_ab, np.eye(len(a))]), check_finite=False)
     response, inverse = solved[:, : len(b)].T, solved[:, len(b) :]
@@ -90,16 +105,15 @@ def reduce(episodes: Sequence[Episode], T_ini: int, N: int) -> Reduction:
     values, vectors = linalg.eigh(0.5 * (left + left.T), check_finite=False)
     significant = values > _RANK_TOLERANCE * np.linalg.norm(S_bb)
     spread = vectors[:, significant] * np.sqrt(values[significant])
-    return Reduction(
-        n, T_ini, N, 0.5 * (inverse + inverse.T), np.ascontiguousarray(response), spread
-    )
+    return Reduction(layout, 0.5 * (inverse + inverse.T), np.ascontiguousarray(response), spread)
 
 
-def _rows(n: int, T_ini: int, N: int) -> tuple[Index, Index]:
-    """Rows of the samples' Gram matrix that hold the forces and the outputs, past before future."""
-    width = n * (N_FORCES + N_OUTPUTS)
-    index = np.arange((T_ini + N) * width).reshape(-1, width)
-    u = index[:, : n * N_FORCES].reshape(-1, n, N_FORCES).transpose(1, 0, 2)
-    y = index[:, n * N_FORCES :].reshape(-1, n, N_OUTPUTS).transpose(1, 0, 2)
+def input_output_rows(layout: Layout) -> tuple[Index, Index]:
+    """Rows of the samples' Gram matrix that hold the inputs and the outputs, past before future."""
+    n, m, p, T_ini = layout.agents, layout.inputs, layout.outputs, layout.T_ini
+    width = n * (m + p)
+    index = np.arange((T_ini + layout.N) * width).reshape(-1, width)
+    u = index[:, : n * m].reshape(-1, n, m).transpose(1, 0, 2)
+    y = index[:, n * m :].reshape(-1, n, p).transpose(1, 0, 2)
     a, b = (np.concatenate([x[:, :T_ini].ravel(), x[:, T_ini:].ravel()]) for x in (u, y))
     return a, b

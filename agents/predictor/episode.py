@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
+from quadriga.agents.predictor.hankel import windows
+from quadriga.agents.predictor.layout import Layout, everyone
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
@@ -77,17 +78,23 @@ class Episode:
             z, shape (n, 18 T_ini + 12 N, C): per robot [u_ini; y_ini; u], time-major;
             y, shape (n, 6 N, C); C = T − T_ini − N + 1 windows.
         """
-        length = T_ini + N
-        du, dy = self.deviations()
-        u, y = (
-            # (C, n, dim, L) → (n, L, dim, C)
-            np.transpose(sliding_window_view(x, length, axis=0), (1, 3, 2, 0))
-            for x in (du, dy)
-        )
-        n, _, _, count = u.shape
-        parts = (u[:, :T_ini], y[:, :T_ini], u[:, T_ini:])
-        z = np.concatenate([part.reshape(n, -1, count) for part in parts], axis=1)
-        return z, y[:, T_ini:].reshape(n, -1, count)
+        return windows(*self.deviations(), T_ini, N)
+
+
+def team_layout(
+    robots: int, T_ini: int, N: int, members: tuple[tuple[int, ...], ...] | None = None
+) -> Layout:
+    """The layout of a predictor of a team: forces and outputs of robots, with their scales.
+
+    Args:
+        robots: in the team.
+        T_ini: estimation horizon.
+        N: control horizon.
+        members: of each robot: whose columns explain its outputs; None: everybody's.
+    """
+    u_scale, y_scale = (U_SCALE,) * N_FORCES, tuple(Y_SCALE.tolist())
+    whose = everyone(robots) if members is None else members
+    return Layout(robots, N_FORCES, N_OUTPUTS, T_ini, N, u_scale, y_scale, whose)
 
 
 def output_base(config: Config, reference: Reference) -> Array:

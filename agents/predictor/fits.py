@@ -8,18 +8,18 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.predictor.arx import roll_out
+from quadriga.agents.predictor.arx import solve_arx
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.least_squares import solve_gamma, solve_pinv
 from quadriga.agents.predictor.periodic import fit_periodic
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.regression import (
-    check_episodes,
-    normal_equations,
-    normal_equations_by_phase,
-    to_physical,
+from quadriga.agents.predictor.regression import to_physical
+from quadriga.agents.predictor.ridge import Penalty, Solutions, solve_causal, solve_ridge
+from quadriga.agents.predictor.team_data import (
+    regressions_by_phase,
+    scaled_signals,
+    team_regression,
 )
-from quadriga.agents.predictor.ridge import Solutions, members_of, solve_causal, solve_ridge
 
 Fit = Callable[[Sequence[Episode], PredictorMeta], Predictor]
 
@@ -39,7 +39,7 @@ def fit_pinv(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, or of another team.
     """
-    solutions = solve_pinv(normal_equations(episodes, meta), meta)
+    solutions = solve_pinv(team_regression(episodes, meta), meta.layout)
     return _one_phase(solutions, _without_penalty(meta, "pinv"))
 
 
@@ -53,7 +53,9 @@ def fit_ridge(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
     """
-    solutions = solve_ridge(normal_equations(episodes, meta), meta, meta.ridge)
+    solutions = solve_ridge(
+        team_regression(episodes, meta), meta.layout, _penalty(meta, meta.ridge)
+    )
     return _one_phase(solutions, replace(meta, kind="ridge", phases=1))
 
 
@@ -63,7 +65,7 @@ def fit_gamma(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, of another team, or forces that do not excite.
     """
-    solutions = solve_gamma(normal_equations(episodes, meta), meta)
+    solutions = solve_gamma(team_regression(episodes, meta), meta.layout)
     return _one_phase(solutions, _without_penalty(meta, "gamma"))
 
 
@@ -73,7 +75,9 @@ def fit_causal(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
     """
-    solutions = solve_causal(normal_equations(episodes, meta), meta, meta.ridge)
+    solutions = solve_causal(
+        team_regression(episodes, meta), meta.layout, _penalty(meta, meta.ridge)
+    )
     return _one_phase(solutions, replace(meta, kind="causal", phases=1))
 
 
@@ -86,14 +90,9 @@ def fit_arx(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
     """
-    check_episodes(episodes, meta)
-    one_step = replace(meta, N=1)
-    solutions = solve_ridge(normal_equations(episodes, one_step), one_step, meta.ridge)
-    x = roll_out(solutions.x, meta)
-    for i in range(meta.robots):
-        strangers = [j for j in range(meta.robots) if j not in members_of(meta, i)]
-        x[i].reshape(meta.robots, meta.width, -1)[strangers] = 0.0
-    return _one_phase(Solutions(x, solutions.condition), replace(meta, kind="arx", phases=1))
+    signals = scaled_signals(episodes, meta)
+    solutions = solve_arx(signals, meta.layout, _penalty(meta, meta.ridge))
+    return _one_phase(solutions, replace(meta, kind="arx", phases=1))
 
 
 def fit_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
@@ -106,16 +105,17 @@ def fit_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
     """
-    pooled = solve_ridge(normal_equations(episodes, meta), meta, meta.ridge).x
+    layout = meta.layout
+    pooled = solve_ridge(team_regression(episodes, meta), layout, _penalty(meta, meta.ridge)).x
     blocks, condition = [], 0.0
-    for regression in normal_equations_by_phase(episodes, meta):
+    for regression in regressions_by_phase(episodes, meta):
         if regression.windows == 0:
-            blocks.append(to_physical(pooled, meta))
+            blocks.append(to_physical(pooled, layout))
             continue
         explained = np.einsum("ab,ibk->aik", regression.zz, pooled, optimize=True)
         left = replace(regression, zy=regression.zy - explained)
-        solutions = solve_ridge(left, meta, meta.phase_ridge)
-        blocks.append(to_physical(pooled + solutions.x, meta))
+        solutions = solve_ridge(left, layout, _penalty(meta, meta.phase_ridge))
+        blocks.append(to_physical(pooled + solutions.x, layout))
         condition = max(condition, solutions.condition)
     return Predictor(replace(meta, kind="phase"), np.stack(blocks), condition)
 
@@ -131,8 +131,12 @@ FITS: Final[Mapping[str, Fit]] = {
 }
 
 
+def _penalty(meta: PredictorMeta, ridge: float) -> Penalty:
+    return Penalty(ridge, meta.block_weight)
+
+
 def _one_phase(solutions: Solutions, meta: PredictorMeta) -> Predictor:
-    return Predictor(meta, to_physical(solutions.x, meta)[None], solutions.condition)
+    return Predictor(meta, to_physical(solutions.x, meta.layout)[None], solutions.condition)
 
 
 def _without_penalty(meta: PredictorMeta, kind: str) -> PredictorMeta:

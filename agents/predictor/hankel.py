@@ -54,6 +54,30 @@ def split(u: Sequence[Array], y: Sequence[Array], T_ini: int, N: int) -> Split:
     return Split(U[: m * T_ini], Y[: p * T_ini], U[m * T_ini :], Y[p * T_ini :])
 
 
+def windows(u: Array, y: Array, T_ini: int, N: int) -> tuple[Array, Array]:
+    """Every window of a signal: a predictor's input and the output it should predict.
+
+    Args:
+        u: inputs, shape (T, n, m).
+        y: outputs, shape (T, n, p).
+        T_ini: samples of the past.
+        N: samples of the horizon.
+
+    Returns:
+        z, shape (n, (m + p) T_ini + m N, C): per agent [u_ini; y_ini; u], time-major;
+        y, shape (n, p N, C); C = T − T_ini − N + 1 windows.
+    """
+    u, y = (
+        # (C, n, dim, L) → (n, L, dim, C)
+        np.transpose(sliding_window_view(x, T_ini + N, axis=0), (1, 3, 2, 0))
+        for x in (u, y)
+    )
+    n, _, _, count = u.shape
+    parts = (u[:, :T_ini], y[:, :T_ini], u[:, T_ini:])
+    z = np.concatenate([part.reshape(n, -1, count) for part in parts], axis=1)
+    return z, y[:, T_ini:].reshape(n, -1, count)
+
+
 def required_samples(m: int, T_ini: int, N: int, n: int) -> int:
     """Least T for a sufficiently rich Hankel matrix, (m+1)(T_ini+N+n)−1; n is the order."""
     return (m + 1) * (T_ini + N + n) - 1

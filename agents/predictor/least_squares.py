@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from scipy import linalg
 
-from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.layout import Layout
 from quadriga.agents.predictor.regression import Index, Regression, past_first
-from quadriga.agents.predictor.ridge import Solutions, condition_number, factorise, members_of
+from quadriga.agents.predictor.ridge import Solutions, condition_number, factorise
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import Array
 
 # Rounding turns eigenvalues of the Gram matrix that should be zero into up to 1e-16 · (number of
 # rows) of the largest. Below 1e-12, which is 1e-6 in singular values of the data, they count as
@@ -21,12 +21,12 @@ RANK_TOLERANCE = 1e-12
 Solve = Callable[[Array, Array], tuple[Array, float]]
 
 
-def solve_pinv(regression: Regression, meta: PredictorMeta) -> Solutions:
+def solve_pinv(regression: Regression, layout: Layout) -> Solutions:
     """Y_f Z† = (Σ y zᵀ)(Σ z zᵀ)†, the solution of least norm where several are best."""
-    return _solve_groups(regression, meta, _solve_least_norm)
+    return _solve_groups(regression, layout, _solve_least_norm)
 
 
-def solve_gamma(regression: Regression, meta: PredictorMeta) -> Solutions:
+def solve_gamma(regression: Regression, layout: Layout) -> Solutions:
     """γ-DDPC: with [Z_p; U_f; Y_f] = L Q, G = [L_31 L_32] [L_11 0; L_21 L_22]⁻¹, γ_3 = 0.
 
     L is the Cholesky factor of the Gram matrix. If the rows of Z_p are not independent (data
@@ -37,7 +37,7 @@ def solve_gamma(regression: Regression, meta: PredictorMeta) -> Solutions:
     """
 
     def solve(A: Array, b: Array) -> tuple[Array, float]:
-        past = len(A) * meta.past // meta.width
+        past = len(A) * layout.past // layout.width
         L_11, pivots, rank, _ = linalg.lapack.dpstrf(
             A[:past, :past], tol=RANK_TOLERANCE * A.diagonal().max(), lower=1
         )
@@ -52,10 +52,10 @@ def solve_gamma(regression: Regression, meta: PredictorMeta) -> Solutions:
             singular = True
         if singular:
             raise PredictorError(
-                "the data's future forces",
+                "the data's future inputs",
                 "combinations of the past and of each other",
-                "forces that excite every direction",
-                "more noise (identification.noise), or more data",
+                "inputs that excite every direction",
+                "more noise in the inputs (identification.noise), or more data",
             )
         L = np.zeros((len(rows), len(rows)))
         L[:rank, :rank] = np.tril(L_11[:rank, :rank])
@@ -65,7 +65,7 @@ def solve_gamma(regression: Regression, meta: PredictorMeta) -> Solutions:
         norm = float(np.linalg.norm(A[np.ix_(rows, rows)], 1))
         return x, condition_number(norm, np.asfortranarray(L))
 
-    return _solve_groups(regression, meta, solve)
+    return _solve_groups(regression, layout, solve)
 
 
 def _solve_least_norm(A: Array, b: Array) -> tuple[Array, float]:
@@ -87,21 +87,21 @@ def _solve_least_norm(A: Array, b: Array) -> tuple[Array, float]:
         )
 
 
-def _solve_groups(regression: Regression, meta: PredictorMeta, solve: Solve) -> Solutions:
-    """Solve once for all robots whose regressions have the same columns."""
-    n, outputs = meta.robots, N_OUTPUTS * meta.N
-    x, condition = np.zeros((n, n * meta.width, outputs)), 0.0
-    for robots, rows in _groups(meta):
-        b = regression.zy[np.ix_(rows, robots)].reshape(len(rows), -1)
+def _solve_groups(regression: Regression, layout: Layout, solve: Solve) -> Solutions:
+    """Solve once for all agents whose regressions have the same columns."""
+    n = layout.agents
+    x, condition = np.zeros((n, n * layout.width, layout.rows)), 0.0
+    for agents, rows in _groups(layout):
+        b = regression.zy[np.ix_(rows, agents)].reshape(len(rows), -1)
         solution, one = solve(regression.zz[np.ix_(rows, rows)], b)
-        x[np.ix_(robots, rows)] = solution.reshape(len(rows), len(robots), -1).transpose(1, 0, 2)
+        x[np.ix_(agents, rows)] = solution.reshape(len(rows), len(agents), -1).transpose(1, 0, 2)
         condition = max(condition, one)
     return Solutions(x, condition)
 
 
-def _groups(meta: PredictorMeta) -> Iterator[tuple[Index, Index]]:
+def _groups(layout: Layout) -> Iterator[tuple[Index, Index]]:
     groups: dict[tuple[int, ...], list[int]] = {}
-    for i in range(meta.robots):
-        groups.setdefault(members_of(meta, i), []).append(i)
-    for members, robots in groups.items():
-        yield np.array(robots), past_first(meta, members)
+    for i, members in enumerate(layout.members):
+        groups.setdefault(members, []).append(i)
+    for members, agents in groups.items():
+        yield np.array(agents), past_first(layout, members)

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from quadriga.agents.predictor.episode import Y_SCALE, Episode
+from quadriga.agents.predictor.episode import Episode
+from quadriga.agents.predictor.layout import Layout
 from quadriga.agents.predictor.measured_response import fit_measured_response, read_pulse_responses
-from quadriga.agents.predictor.periodic_basis import N_WRENCH, phase_angles, wrench_map
+from quadriga.agents.predictor.periodic_basis import phase_angles, wrench_map
 from quadriga.agents.predictor.periodic_data import Walked, scale_episodes
 from quadriga.agents.predictor.periodic_free import fit_free
 from quadriga.agents.predictor.periodic_predictor import PeriodicFactors, PeriodicPredictor
 from quadriga.agents.predictor.periodic_response import solve_lags, spread_over_samples, sum_folds
 from quadriga.agents.predictor.periodic_shrinkage import shrink
 from quadriga.agents.predictor.predictor import PredictorMeta
-from quadriga.agents.predictor.regression import check_episodes
-from quadriga.agents.predictor.ridge import members_of
+from quadriga.agents.predictor.team_data import check_episodes
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.topics import SAMPLE_MS
@@ -41,32 +41,33 @@ def fit_periodic(episodes: Sequence[Episode], meta: PredictorMeta) -> PeriodicPr
     if meta.response:
         h = fit_measured_response(read_pulse_responses(Path(meta.response)), meta)
     else:
-        h = estimate_response(walks, hold, meta)
-    n = meta.robots
-    peers = np.array([[j in members_of(meta, i) for j in range(n)] for i in range(n)])
-    free = fit_free(walks, h, meta.T_ini, peers)
-    factors = PeriodicFactors(h * Y_SCALE, _unscale_free(free, meta), wrench_map(meta.robot))
+        step = float(np.diff(phase_angles(meta, 0, 2))[0] % (2.0 * np.pi))
+        h = estimate_response(walks, hold, meta.layout, step)
+    factors = fit_factors(walks, h, meta.layout, wrench_map(meta.robot))
     phases = max(1, 2 * meta.stance_ms // SAMPLE_MS)
     return PeriodicPredictor(replace(meta, kind="periodic", phases=phases), factors)
 
 
-def estimate_response(walks: Sequence[Walked], hold: int, meta: PredictorMeta) -> Array:
-    """Coefficients of the response to a sample's wrench, scaled. (k, N, n, 6, n, 6).
+def estimate_response(
+    walks: Sequence[Walked], hold: int, layout: Layout, angle_step: float
+) -> Array:
+    """Coefficients of the response to a sample's wrench, scaled. (k, N, n, w, n, p).
 
     Args:
         walks: scaled episodes.
-        hold: for how many samples each draw of the force noise is held.
-        meta: of the predictor.
+        hold: for how many samples each draw of the inputs' noise is held.
+        layout: of the predictor.
+        angle_step: what the phase advances in a sample, rad.
 
     Raises:
         PredictorError: too little data.
     """
-    n = meta.robots
-    folds = sum_folds(walks, meta.N, hold)
+    n = layout.agents
+    folds = sum_folds(walks, layout.N, hold)
     if len(folds) < _LEAST_FOLDS:
         raise PredictorError(
             "data for the periodic predictor",
-            f"{sum(fold.rows for fold in folds)} draws of the force noise",
+            f"{sum(fold.rows for fold in folds)} draws of the inputs' noise",
             "enough to be divided",
             "collect more: identification.seconds",
         )
@@ -76,14 +77,28 @@ def estimate_response(walks: Sequence[Walked], hold: int, meta: PredictorMeta) -
     tested = shrink(estimate, without)
     response = tested.response
     for i in range(n):
-        strangers = [j for j in range(n) if j not in members_of(meta, i)]
-        response[:, :, strangers, :, i] = 0.0
-    steps = phase_angles(meta, 0, 2)
-    return spread_over_samples(response, hold, float(np.diff(steps)[0] % (2.0 * np.pi)))
+        response[:, :, layout.strangers(i), :, i] = 0.0
+    return spread_over_samples(response, hold, angle_step)
 
 
-def _unscale_free(free: Array, meta: PredictorMeta) -> Array:
-    """The map of the past in physical outputs; wrenches keep their scale."""
-    columns = np.concatenate([np.ones(N_WRENCH * meta.T_ini), np.tile(Y_SCALE, meta.T_ini)])
-    physical: Array = free * np.tile(Y_SCALE, meta.N)[:, None] / columns
-    return physical
+def fit_factors(
+    walks: Sequence[Walked], h: Array, layout: Layout, wrench: Array
+) -> PeriodicFactors:
+    """What G is made of: the responses, and by them what follows from the past.
+
+    Args:
+        walks: scaled episodes.
+        h: coefficients of the response to a sample's wrench, scaled, (k, N, n, w, n, p).
+        layout: of the predictor.
+        wrench: from an agent's inputs to what they act by, (w, m).
+
+    Raises:
+        PredictorError: a singular problem.
+    """
+    n, y_scale = layout.agents, np.array(layout.y_scale)
+    peers = np.array([[j in layout.members[i] for j in range(n)] for i in range(n)])
+    free = fit_free(walks, h, layout.T_ini, peers)
+    # Wrenches keep their scale.
+    columns = np.concatenate([np.ones(len(wrench) * layout.T_ini), np.tile(y_scale, layout.T_ini)])
+    physical = free * np.tile(y_scale, layout.N)[:, None] / columns
+    return PeriodicFactors(h * y_scale, physical, wrench)

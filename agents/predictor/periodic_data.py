@@ -1,4 +1,4 @@
-"""Regressions of the periodic predictor on a team's episodes: rows, and sums over folds of them."""
+"""Rows of the periodic predictor's regressions on episodes of a plant with a period."""
 
 from __future__ import annotations
 
@@ -9,17 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.predictor.episode import Y_SCALE, Episode
-from quadriga.agents.predictor.periodic_basis import (
-    N_WRENCH,
-    harmonics,
-    phase_angles,
-    polynomials,
-    wrenches,
-)
+from quadriga.agents.predictor.periodic_basis import harmonics, phase_angles, polynomials, wrenches
 from quadriga.agents.predictor.predictor import PredictorMeta
-from quadriga.shared.robot.conventions import N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import Array
 
-_SAME: Final = 1e-9  # N: forces that differ by less are held
+_SAME: Final = 1e-9  # N of a robot: inputs that differ by less are held
 _COMMANDED: Final = (1, 2, 5)  # vx, vy, wz: outputs whose base moves with the reference
 
 
@@ -27,11 +21,11 @@ class Walked(NamedTuple):
     """One episode as the regressions see it, scaled.
 
     Attributes:
-        w: net wrenches, (T, n, 6).
-        y: outputs, (T, n, 6).
-        base: commanded outputs, (T, n, 3).
-        angle: of the gait's phase at the sample's start, (T,), rad.
-        starts: samples with which a new draw of the force noise begins, in order.
+        w: what the inputs act by, a team's net wrenches, (T, n, w).
+        y: outputs, (T, n, p).
+        base: commanded outputs, (T, n, c); a plant without commands has none, c = 0.
+        angle: of the phase in the period at the sample's start, (T,), rad.
+        starts: samples with which a new draw of the inputs' noise begins, in order.
     """
 
     w: Array
@@ -45,21 +39,22 @@ def scale_episodes(
     episodes: Sequence[Episode], meta: PredictorMeta
 ) -> tuple[tuple[Walked, ...], int]:
     """The episodes scaled, and for how many samples their forces are held."""
-    hold = _held_samples(episodes)
+    hold = held_samples([episode.deviations()[0] for episode in episodes])
     walked = []
     for episode in episodes:
-        dy = episode.deviations()[1] / Y_SCALE
+        du, dy = episode.deviations()
         base = (episode.y_base / Y_SCALE)[..., list(_COMMANDED)]
         angle = phase_angles(meta, episode.first_tick, episode.samples)
-        starts = _draws(episode, hold)
-        walked.append(Walked(wrenches(episode, meta), dy, base, angle, starts))
+        walked.append(
+            Walked(wrenches(episode, meta), dy / Y_SCALE, base, angle, draw_starts(du, hold))
+        )
     return tuple(walked), hold
 
 
 def past_rows(walk: Walked, at: NDArray[np.int64], length: int) -> Array:
     """[w; y] of the `length` samples before each of the samples `at`, oldest first.
 
-    Shape (len(at), n, length · 12): per robot all wrenches, then all outputs.
+    Shape (len(at), n, length · (w + p)): per agent all wrenches, then all outputs.
     """
     places = at[:, None] + np.arange(-length, 0)
     parts = [
@@ -75,7 +70,7 @@ def modulated(x: Array, angle: Array, order: int) -> Array:
 
 
 def forced(walk: Walked, at: NDArray[np.int64], degree: int) -> Array:
-    """Wrenches of all robots at samples `at` times the polynomials there. (len(at), columns)."""
+    """Wrenches of all agents at samples `at` times the polynomials there. (len(at), columns)."""
     w, values = walk.w[at].reshape(len(at), -1), polynomials(walk.angle[at], degree)
     return (values[:, :, None] * w[:, None, :]).reshape(len(at), -1)
 
@@ -100,35 +95,36 @@ def chunks(
             yield walk, at[begin : begin + size]
 
 
-def columns_of(n: int, degree: int) -> int:
-    """Number of columns of `forced`."""
-    return 2 * (degree + 1) * n * N_WRENCH
-
-
 def outputs_of(walk: Walked, at: NDArray[np.int64]) -> Array:
-    """Outputs of all robots at samples `at`. Shape (len(at), 6 n)."""
-    y: Array = walk.y[at].reshape(len(at), walk.y.shape[1] * N_OUTPUTS)
+    """Outputs of all agents at samples `at`. Shape (len(at), p n)."""
+    y: Array = walk.y[at].reshape(len(at), walk.y.shape[1] * walk.y.shape[2])
     return y
 
 
-def _changes(episode: Episode) -> NDArray[np.int64]:
-    """Samples whose force deviations are not those of the sample before."""
-    du = episode.deviations()[0].reshape(episode.samples, -1)
-    changes: NDArray[np.int64] = 1 + np.flatnonzero(np.abs(np.diff(du, axis=0)).max(axis=1) > _SAME)
-    return changes
+def held_samples(inputs: Sequence[Array]) -> int:
+    """For how many samples the inputs are held, everywhere in the data: 1 or more.
 
-
-def _held_samples(episodes: Sequence[Episode]) -> int:
-    """For how many samples the forces are held, everywhere in the data: 1 or more."""
+    Args:
+        inputs: of each episode, shape (T, n, m).
+    """
     held = 0
-    for episode in episodes:
-        held = int(np.gcd.reduce(np.append(np.diff(_changes(episode)), held)))
+    for u in inputs:
+        held = int(np.gcd.reduce(np.append(np.diff(_changes(u)), held)))
     return max(1, held)
 
 
-def _draws(episode: Episode, hold: int) -> NDArray[np.int64]:
+def draw_starts(u: Array, hold: int) -> NDArray[np.int64]:
     """Samples with which a draw of the noise begins; none in an episode without noise."""
-    changes = _changes(episode)
+    changes = _changes(u)
     if not len(changes):
         return changes
-    return np.arange(int(changes[0]) % hold, episode.samples, hold)
+    return np.arange(int(changes[0]) % hold, len(u), hold)
+
+
+def _changes(u: Array) -> NDArray[np.int64]:
+    """Samples whose inputs are not those of the sample before."""
+    flat = u.reshape(len(u), -1)
+    changes: NDArray[np.int64] = 1 + np.flatnonzero(
+        np.abs(np.diff(flat, axis=0)).max(axis=1) > _SAME
+    )
+    return changes

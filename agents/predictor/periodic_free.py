@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from quadriga.agents.predictor.periodic_basis import N_WRENCH
 from quadriga.agents.predictor.periodic_data import (
     Walked,
     chunks,
@@ -26,7 +25,7 @@ from quadriga.agents.predictor.periodic_data import (
     past_rows,
 )
 from quadriga.agents.predictor.ridge import factorise
-from quadriga.shared.robot.conventions import N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import Array
 
 FREE_ORDER: Final = 1  # harmonics of the map
 _HELD_OUT: Final = 0.2  # of the rows, to choose the penalties by
@@ -40,7 +39,7 @@ _ON_PEERS: Final = (np.inf, 1.0, 30.0)  # infinite: left out
 
 @dataclass(frozen=True, slots=True)
 class _Sums:
-    """Σ z zᵀ, (K, K), Σ z yᵀ, (K, N, n, 6), Σ y² over all lags, (n, 6), and the number of rows."""
+    """Σ z zᵀ, (K, K), Σ z yᵀ, (K, N, n, p), Σ y² over all lags, (n, p), and the number of rows."""
 
     zz: Array
     zy: Array
@@ -54,11 +53,11 @@ class _Sums:
 
 
 def fit_free(walks: Sequence[Walked], h: Array, T_ini: int, peers: NDArray[np.bool_]) -> Array:
-    """The map as harmonics. Shape (2 FREE_ORDER + 1, n responding, n, 6 N, 12 T_ini).
+    """The map as harmonics. Shape (2 FREE_ORDER + 1, n responding, n, p N, (w + p) T_ini).
 
     Args:
         walks: scaled episodes.
-        h: coefficients of the response to a sample's wrench, (k, N, n, 6, n, 6).
+        h: coefficients of the response to a sample's wrench, (k, N, n, w, n, p).
         T_ini: samples of the past.
         peers: whose past may matter to whom, (n responding, n).
 
@@ -67,26 +66,26 @@ def fit_free(walks: Sequence[Walked], h: Array, T_ini: int, peers: NDArray[np.bo
     """
     train, rest = _sum_parts(walks, h, T_ini)
     both = train + rest
-    waves, N, n = 2 * FREE_ORDER + 1, h.shape[1], h.shape[2]
-    width = (N_WRENCH + N_OUTPUTS) * T_ini
-    wave, robot, _ = np.indices((waves, n, width)).reshape(3, -1)
-    x = np.zeros((n, N_OUTPUTS, waves * n * width, N))
+    waves, (_, N, n, w, _, p) = 2 * FREE_ORDER + 1, h.shape
+    width = (w + p) * T_ini
+    wave, agent, _ = np.indices((waves, n, width)).reshape(3, -1)
+    x = np.zeros((n, p, waves * n * width, N))
     for i in range(n):
-        columns = np.flatnonzero(peers[i][robot] | (robot == i))
-        candidates = _penalties(robot[columns] == i, wave[columns] > 0)
+        columns = np.flatnonzero(peers[i][agent] | (agent == i))
+        candidates = _penalties(agent[columns] == i, wave[columns] > 0)
         for penalty, outputs in _choose_penalties(train, rest, i, candidates, columns):
             solution = _solve(both, i, penalty, columns, outputs)
             for place, output in enumerate(outputs):
                 x[i, output, columns] = solution[:, :, place]
-    blocks = x.reshape(n, N_OUTPUTS, waves, n, width, N).transpose(2, 0, 3, 5, 1, 4)
-    return blocks.reshape(waves, n, n, N * N_OUTPUTS, width)
+    blocks = x.reshape(n, p, waves, n, width, N).transpose(2, 0, 3, 5, 1, 4)
+    return blocks.reshape(waves, n, n, N * p, width)
 
 
 def forced_outputs(walk: Walked, at: NDArray[np.int64], h: Array) -> Array:
-    """What the wrenches from samples `at` on do to the outputs there. Shape (len(at), N, 6 n)."""
-    count, N, n = h.shape[:3]
-    rows = h.transpose(1, 0, 2, 3, 4, 5).reshape(N, count * n * N_WRENCH, n * N_OUTPUTS)
-    y = np.zeros((len(at), N, n * N_OUTPUTS))
+    """What the wrenches from samples `at` on do to the outputs there. Shape (len(at), N, p n)."""
+    count, N, n, components, _, p = h.shape
+    rows = h.transpose(1, 0, 2, 3, 4, 5).reshape(N, count * n * components, n * p)
+    y = np.zeros((len(at), N, n * p))
     for s in range(N):
         w = forced(walk, at + s, count // 2 - 1)
         later = rows[: N - s].transpose(1, 0, 2).reshape(w.shape[1], -1)
@@ -96,10 +95,10 @@ def forced_outputs(walk: Walked, at: NDArray[np.int64], h: Array) -> Array:
 
 def _sum_parts(walks: Sequence[Walked], h: Array, T_ini: int) -> tuple[_Sums, _Sums]:
     """Sums over the first part of the rows and over the last."""
-    N, n = h.shape[1], h.shape[2]
-    K = (2 * FREE_ORDER + 1) * n * (N_WRENCH + N_OUTPUTS) * T_ini
+    _, N, n, w, _, p = h.shape
+    K = (2 * FREE_ORDER + 1) * n * (w + p) * T_ini
     total = sum(len(at) for _, at in chunks(walks, T_ini, N, _ROWS, starts=False))
-    nothing = np.zeros((K, K)), np.zeros((K, N, n, N_OUTPUTS)), np.zeros((n, N_OUTPUTS))
+    nothing = np.zeros((K, K)), np.zeros((K, N, n, p)), np.zeros((n, p))
     parts = [_Sums(*nothing, 0)] * 2
     seen = 0
     for walk, at in chunks(walks, T_ini, N, _ROWS, starts=False):
@@ -108,18 +107,18 @@ def _sum_parts(walks: Sequence[Walked], h: Array, T_ini: int) -> tuple[_Sums, _S
         z = modulated(past, walk.angle[at], FREE_ORDER)
         y = np.stack([outputs_of(walk, at + lag) for lag in range(N)], axis=1)
         y = (y - forced_outputs(walk, at, h)).reshape(len(at), -1)
-        zy = (z.T @ y).reshape(K, N, n, N_OUTPUTS)
-        yy = (y**2).sum(axis=0).reshape(N, n, N_OUTPUTS).sum(axis=0)
+        zy = (z.T @ y).reshape(K, N, n, p)
+        yy = (y**2).sum(axis=0).reshape(N, n, p).sum(axis=0)
         parts[part] = parts[part] + _Sums(z.T @ z, zy, yy, len(at))
         seen += len(at)
     return parts[0], parts[1]
 
 
 def _penalties(own: NDArray[np.bool_], harmonic: NDArray[np.bool_]) -> list[Array]:
-    """Candidates for the penalties per row on the regressors of one robot's outputs.
+    """Candidates for the penalties per row on the regressors of one agent's outputs.
 
     Args:
-        own: regressors that are the robot's own.
+        own: regressors that are the agent's own.
         harmonic: regressors that change with the gait's phase.
     """
     weights = _ON_PEERS[:1] if own.all() else _ON_PEERS
@@ -132,11 +131,11 @@ def _penalties(own: NDArray[np.bool_], harmonic: NDArray[np.bool_]) -> list[Arra
 def _choose_penalties(
     train: _Sums, rest: _Sums, i: int, candidates: list[Array], columns: NDArray[np.int64]
 ) -> list[tuple[Array, list[int]]]:
-    """Each penalty that is best for some of robot `i`'s outputs, and those outputs.
+    """Each penalty that is best for some of agent `i`'s outputs, and those outputs.
 
     Peers count only where they lower the error by more than chance does.
     """
-    every = list(range(N_OUTPUTS))
+    every = list(range(train.zy.shape[3]))
     if not (train.rows and rest.rows):
         return [(candidates[0], every)]
     zz, zy = rest.zz[np.ix_(columns, columns)], rest.zy[columns, :, i]
@@ -154,7 +153,7 @@ def _choose_penalties(
 def _solve(
     sums: _Sums, i: int, penalty: Array, columns: NDArray[np.int64], outputs: list[int]
 ) -> Array:
-    """Solution for some outputs of robot `i`. Shape (len(columns), N, len(outputs))."""
+    """Solution for some outputs of agent `i`. Shape (len(columns), N, len(outputs))."""
     counted = np.isfinite(penalty)
     some = columns[counted]
     A = sums.zz[np.ix_(some, some)].copy(order="F")

@@ -20,12 +20,17 @@ FACTORS: Final = ("response", "free", "wrench")  # arrays of a periodic predicto
 class PeriodicFactors:
     """What a periodic G is made of, in physical units but for the wrenches' scale.
 
+    Block (t, s) of G_ij at phase θ, which maps the inputs of sample s to the outputs of sample t,
+    is h_{t−s}(θ + s δ) B for t ≥ s and zero before: no input acts backwards. B takes inputs to net
+    wrenches; δ is what the phase advances in a sample.
+
     Attributes:
         response: coefficients of h, what a wrench of a sample does l samples later, as polynomials
-            of the phase, (2d + 2, N, n pushing, 6, n responding, 6).
+            of the phase, (2d + 2, N, n pushing, w, n responding, p).
         free: harmonics of the map from [w_ini; y_ini] to the outputs of the horizon,
-            (2q + 1, n responding, n, 6 N, 12 T_ini).
-        wrench: from the forces of four feet to their net wrench, (6, 12).
+            (2q + 1, n responding, n, p N, (w + p) T_ini).
+        wrench: from the inputs to what they act by, from the forces of four feet to their net
+            wrench, (w, m).
     """
 
     response: Array
@@ -36,13 +41,35 @@ class PeriodicFactors:
         for name in FACTORS:
             getattr(self, name).setflags(write=False)
 
+    def block(self, i: int, j: int, phase: int, phases: int) -> Array:
+        """G_ij of one of `phases` equal parts of the period. Shape (p N, (m + p) T_ini + m N)."""
+        past = self._past_block(i, j, phase, phases)
+        return np.concatenate([past, self.future_block(i, j, phase, phases)], axis=1)
+
+    def future_block(self, i: int, j: int, phase: int, phases: int) -> Array:
+        """The columns of G_ij that multiply the future inputs. Shape (p N, m N)."""
+        response = self.response[:, :, j, :, i]
+        _, N, _, outputs = response.shape
+        angle = 2.0 * np.pi * (phase + np.arange(N)) / phases
+        h = np.tensordot(polynomials(angle, len(response) // 2 - 1), response, axes=1)
+        by_input = np.einsum("slwo,wu->slou", h, self.wrench)
+        block = np.zeros((N, outputs, N, self.wrench.shape[1]))
+        for s in range(N):
+            block[s:, :, s] = by_input[s, : N - s]
+        return block.reshape(N * outputs, -1)
+
+    def _past_block(self, i: int, j: int, phase: int, phases: int) -> Array:
+        """The columns of G_ij that multiply [u_ini; y_ini]. Shape (p N, (m + p) T_ini)."""
+        free, components = self.free[:, i, j], len(self.wrench)
+        T_ini = free.shape[2] // (components + self.response.shape[5])
+        angle = np.array(2.0 * np.pi * phase / phases)
+        past = np.tensordot(harmonics(angle, len(free) // 2), free, axes=1)
+        on_w = past[:, : components * T_ini].reshape(-1, T_ini, components) @ self.wrench
+        return np.concatenate([on_w.reshape(len(past), -1), past[:, components * T_ini :]], axis=1)
+
 
 class PeriodicPredictor(Predictor):
-    """A predictor whose blocks are expanded when they are asked for.
-
-    Block (t, s) of G_ij at phase θ, which maps the forces of sample s to the outputs of sample t,
-    is h_{t−s}(θ + s δ) B for t ≥ s and zero before: no force acts backwards. B takes forces to net
-    wrenches; δ is what the phase advances in a sample.
+    """A predictor whose blocks are expanded when they are asked for, see `PeriodicFactors`.
 
     Args:
         meta: what it was fitted for.
@@ -98,24 +125,8 @@ class PeriodicPredictor(Predictor):
 
     def block(self, i: int, j: int, phase: int = 0) -> Array:
         """See `Predictor.block`."""
-        past = self._past_block(i, j, phase)
-        return np.concatenate([past, self.future_block(i, j, phase)], axis=1)
+        return self.factors.block(i, j, phase, self.phases)
 
     def future_block(self, i: int, j: int, phase: int = 0) -> Array:
         """See `Predictor.future_block`."""
-        N, response = self.meta.N, self.factors.response[:, :, j, :, i]
-        angle = 2.0 * np.pi * (phase + np.arange(N)) / self.phases
-        h = np.tensordot(polynomials(angle, len(response) // 2 - 1), response, axes=1)
-        by_force = np.einsum("slwo,wu->slou", h, self.factors.wrench)
-        block = np.zeros((N, N_OUTPUTS, N, N_FORCES))
-        for s in range(N):
-            block[s:, :, s] = by_force[s, : N - s]
-        return block.reshape(N * N_OUTPUTS, N * N_FORCES)
-
-    def _past_block(self, i: int, j: int, phase: int) -> Array:
-        """The columns of G_ij that multiply [u_ini; y_ini]. Shape (6 N, 18 T_ini)."""
-        T_ini, free = self.meta.T_ini, self.factors.free[:, i, j]
-        angle = np.array(2.0 * np.pi * phase / self.phases)
-        past = np.tensordot(harmonics(angle, len(free) // 2), free, axes=1)
-        on_w = past[:, : N_WRENCH * T_ini].reshape(-1, T_ini, N_WRENCH) @ self.factors.wrench
-        return np.concatenate([on_w.reshape(len(past), -1), past[:, N_WRENCH * T_ini :]], axis=1)
+        return self.factors.future_block(i, j, phase, self.phases)

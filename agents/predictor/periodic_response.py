@@ -19,17 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from quadriga.agents.predictor.periodic_basis import N_WRENCH, harmonics, shift_polynomials
-from quadriga.agents.predictor.periodic_data import (
-    Walked,
-    chunks,
-    columns_of,
-    forced,
-    outputs_of,
-    past_rows,
-)
+from quadriga.agents.predictor.periodic_basis import harmonics, shift_polynomials
+from quadriga.agents.predictor.periodic_data import Walked, chunks, forced, outputs_of, past_rows
 from quadriga.agents.predictor.ridge import factorise
-from quadriga.shared.robot.conventions import N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import Array
 
 DEGREE: Final = 3  # of the polynomials of the phase in a response
 FOLDS: Final = 10
@@ -48,7 +41,7 @@ class Sums:
     Attributes:
         zz: Σ z zᵀ, (K, K).
         zw: Σ z (later draw)ᵀ, for each later draw, (draws, K, kw).
-        zy: Σ z yᵀ for each lag, (N, K, 6 n).
+        zy: Σ z yᵀ for each lag, (N, K, p n).
         rows: how many.
     """
 
@@ -90,25 +83,25 @@ def sum_folds(walks: Sequence[Walked], N: int, hold: int) -> list[Sums]:
 
 
 def solve_lags(sums: Sums, n: int, hold: int) -> Array:
-    """Coefficients of the responses g to a held draw. Shape (2 DEGREE + 2, N, n, 6, n, 6).
+    """Coefficients of the responses g to a held draw. Shape (2 DEGREE + 2, N, n, w, n, p).
 
-    Axes: polynomial, lag, robot that pushes, wrench, robot that responds, output.
+    Axes: polynomial, lag, agent that pushes, wrench, agent that responds, output.
 
     Raises:
         PredictorError: a singular problem.
     """
-    N, K, _ = sums.zy.shape
-    kw = columns_of(n, DEGREE)
+    N, K, outputs = sums.zy.shape
+    kw = sums.zw.shape[2]
     penalised = sums.zz.copy(order="F")
     penalised.flat[:: K + 1] += _RIDGE * sums.rows
     factor = factorise(penalised)
-    g = np.zeros((N, kw, n * N_OUTPUTS))
+    g = np.zeros((N, kw, outputs))
     for lag in range(N):
         rest = sums.zy[lag].copy()
         for draw in range(lag // hold):
             rest -= sums.zw[draw] @ g[lag - hold * (draw + 1)]
         g[lag] = linalg.cho_solve((factor, True), rest, check_finite=False)[K - kw :]
-    return g.reshape(N, 2 * DEGREE + 2, n, N_WRENCH, n, N_OUTPUTS).swapaxes(0, 1)
+    return g.reshape(N, 2 * DEGREE + 2, n, -1, n, outputs // n).swapaxes(0, 1)
 
 
 def spread_over_samples(g: Array, hold: int, angle_step: float) -> Array:
@@ -137,7 +130,6 @@ def spread_over_samples(g: Array, hold: int, angle_step: float) -> Array:
 
 
 def _sum_rows(walk: Walked, at: NDArray[np.int64], N: int, hold: int) -> Sums:
-    n = walk.w.shape[1]
     pulse = forced(walk, at, DEGREE)
     ahead = at[:, None] + np.linspace(0, N, _COMMANDS + 1).astype(int)[1:] - 1
     commands = walk.base[ahead] - walk.base[at - 1][:, None]
@@ -149,7 +141,7 @@ def _sum_rows(walk: Walked, at: NDArray[np.int64], N: int, hold: int) -> Sums:
     ]
     z = np.concatenate(regressors, axis=1)
     later = [forced(walk, at + s, DEGREE) for s in range(hold, N, hold)]
-    kw = columns_of(n, DEGREE)
+    kw = pulse.shape[1]
     zw = np.stack([z.T @ w for w in later]) if later else np.zeros((0, z.shape[1], kw))
     zy = np.stack([z.T @ outputs_of(walk, at + lag) for lag in range(N)])
     return Sums(z.T @ z, zw, zy, len(at))

@@ -8,9 +8,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from quadriga.agents.predictor.episode import team_layout
+from quadriga.agents.predictor.layout import Layout, everyone
 from quadriga.shared.config.later import LATER_KEYS
 from quadriga.shared.config.renamed import with_current_names, with_first_names
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.yokes import neighbours
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 
@@ -94,6 +97,15 @@ class PredictorMeta:
         """
         controller = with_current_names({"controller": body.get("controller", {})})["controller"]
         return cls(**body | {"controller": tuple(sorted(controller.items()))})
+
+    @property
+    def layout(self) -> Layout:
+        """Sizes, scales and members of the predictor, as the numerics take them."""
+        n, members = self.robots, everyone(self.robots)
+        if self.neighbours != "all":
+            yoked = (neighbours(n, self.yokes, i) for i in range(n))
+            members = tuple(tuple(sorted({i, *peers})) for i, peers in enumerate(yoked))
+        return team_layout(n, self.T_ini, self.N, members)
 
     @property
     def width(self) -> int:

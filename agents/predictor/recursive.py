@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.regression import scales
+from quadriga.agents.predictor.layout import Layout, scales
+from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import Array
 
 _LARGEST = 100.0  # of an entry of D; the largest ones of a predictor, as scaled, are about 1
 _NOTHING = 1e-12  # zᵀPz of a regressor that says nothing about anything not known
@@ -54,7 +54,7 @@ class Correction:
 
     Attributes:
         robot: i, whose row it is.
-        D: scaled correction ΔG_ii, shape (6 N, W), W = 18 T_ini + 12 N.
+        D: scaled correction ΔG_ii, shape (p N, W).
         P: covariance over the noise variance, shape (W, W), exactly symmetric.
         updates: windows that were taken in.
         skipped: windows without new information.
@@ -73,15 +73,15 @@ class Correction:
         return replace(self, refused=self.refused + 1)
 
 
-def begin_correction(meta: PredictorMeta, robot: int, how: Forgetting) -> Correction:
+def begin_correction(layout: Layout, robot: int, how: Forgetting) -> Correction:
     """The correction before the first window: zero.
 
     Raises:
         PredictorError: a robot that is not in the team.
     """
-    if not 0 <= robot < meta.robots:
-        raise PredictorError("robot of the correction", f"{robot}", f"0 … {meta.robots - 1}")
-    D, P = np.zeros((N_OUTPUTS * meta.N, meta.width)), how.prior * np.eye(meta.width)
+    if not 0 <= robot < layout.agents:
+        raise PredictorError("robot of the correction", f"{robot}", f"0 … {layout.agents - 1}")
+    D, P = np.zeros((layout.rows, layout.width)), how.prior * np.eye(layout.width)
     return Correction(robot, D, P)
 
 
@@ -101,18 +101,18 @@ def take_in(
     Raises:
         PredictorError: another shape, or numbers that are not finite.
     """
-    meta = predictor.meta
-    if z.shape != (meta.robots, meta.width) or y.shape != (N_OUTPUTS * meta.N,):
+    layout = predictor.meta.layout
+    if z.shape != (layout.agents, layout.width) or y.shape != (layout.rows,):
         raise PredictorError(
             "window",
             f"shapes {z.shape}, {y.shape}",
-            f"{(meta.robots, meta.width)}, {(N_OUTPUTS * meta.N,)}",
+            f"{(layout.agents, layout.width)}, {(layout.rows,)}",
         )
     if not (np.isfinite(z).all() and np.isfinite(y).all()):
         raise PredictorError("window", "NaN or infinity", "finite numbers")
-    blocks = np.stack([predictor.block(state.robot, j, phase) for j in range(meta.robots)])
+    blocks = np.stack([predictor.block(state.robot, j, phase) for j in range(layout.agents)])
     left = y - np.einsum("jab,jb->a", blocks, z)
-    z_scale, y_scale = scales(meta)
+    z_scale, y_scale = scales(layout)
     return update(state, z[state.robot] / z_scale, left / y_scale, how)
 
 
@@ -147,8 +147,8 @@ def update(state: Correction, z: Array, left: Array, how: Forgetting) -> Correct
     return replace(state, D=D, P=P, updates=state.updates + 1)
 
 
-def block_correction(meta: PredictorMeta, state: Correction) -> Array:
+def block_correction(layout: Layout, state: Correction) -> Array:
     """The correction's addition to G_ii, in physical units. Shape (6 N, 18 T_ini + 12 N)."""
-    z_scale, y_scale = scales(meta)
+    z_scale, y_scale = scales(layout)
     added: Array = state.D * y_scale[:, None] / z_scale
     return added

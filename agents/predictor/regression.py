@@ -9,24 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.predictor.cyclic import cyclic_grams
-from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
 from quadriga.agents.predictor.hankel import columns, gram
-from quadriga.agents.predictor.predictor import PredictorMeta
-from quadriga.agents.time_grid import gait_phase
-from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.agents.predictor.layout import Layout, scales
+from quadriga.shared.robot.conventions import Array
 
 Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
 class Regression:
-    """Sums over M windows of scaled deviations, z = [z^1; …; z^n], z^j = [u_ini^j; y_ini^j; u^j].
+    """Sums over M windows of scaled signals, z = [z^1; …; z^n], z^j = [u_ini^j; y_ini^j; u^j].
 
     Attributes:
-        zz: Σ z zᵀ, shape (n W, n W) with W = 18 T_ini + 12 N.
-        zy: Σ z y^iᵀ for every robot i, shape (n W, n, 6 N).
+        zz: Σ z zᵀ, shape (n W, n W).
+        zy: Σ z y^iᵀ for every agent i, shape (n W, n, p N).
         windows: M.
     """
 
@@ -35,119 +31,67 @@ class Regression:
     windows: int
 
 
-def normal_equations(episodes: Sequence[Episode], meta: PredictorMeta) -> Regression:
+def normal_equations(signals: Sequence[Array], layout: Layout) -> Regression:
     """The regression over all windows of all episodes.
 
-    Raises:
-        PredictorError: no data, too little, or of another team.
+    Args:
+        signals: of each episode, scaled: [u of all agents; y of all agents], shape (T, n (m + p)).
+        layout: of the predictor.
     """
-    check_episodes(episodes, meta)
-    L = meta.T_ini + meta.N
-    samples = [np.concatenate(episode.scaled_deviations(), axis=1) for episode in episodes]
-    return _split_by_robot(gram(samples, L), meta, columns(samples, L))
+    L = layout.T_ini + layout.N
+    return _split_by_agent(gram(signals, L), layout, columns(signals, L))
 
 
-def normal_equations_by_phase(
-    episodes: Sequence[Episode], meta: PredictorMeta
+def normal_equations_by_part(
+    signals: Sequence[Array], places: Sequence[int], part_of: NDArray[np.int64], layout: Layout
 ) -> Iterator[Regression]:
-    """The regression over the windows of each phase of the gait in turn.
+    """The regression over the windows that begin in each part of a cycle in turn.
 
-    A window's phase is that of the end of its [u_ini; y_ini], where a plan would begin.
-
-    Raises:
-        PredictorError: no data, too little, or of another team.
+    Args:
+        signals: as in `normal_equations`.
+        places: of each episode's first window in the cycle.
+        part_of: part of every place of the cycle.
+        layout: of the predictor.
     """
-    check_episodes(episodes, meta)
-    L = meta.T_ini + meta.N
-    period = np.lcm(2 * meta.stance_ms, SAMPLE_MS) // SAMPLE_MS
-    starts = np.array([e.first_tick + SAMPLE_MS * (meta.T_ini - 1) for e in episodes])
-    origin = int(starts[0])
-    if ((starts - origin) % SAMPLE_MS).any():
-        raise PredictorError(
-            "episodes: first_tick",
-            f"{sorted({int(s) % SAMPLE_MS for s in starts})} modulo 10 ms",
-            "samples on one grid",
-        )
-    part_of = np.array(
-        [
-            gait_phase(origin + SAMPLE_MS * k, meta.stand_ms, meta.stance_ms, meta.phases)
-            for k in range(period)
-        ]
-    )
-    places = ((starts - origin) // SAMPLE_MS) % period
-    samples = [np.concatenate(episode.scaled_deviations(), axis=1) for episode in episodes]
-    for windows, S in cyclic_grams(samples, places.tolist(), L, part_of):
-        yield _split_by_robot(S, meta, windows)
+    L = layout.T_ini + layout.N
+    for windows, S in cyclic_grams(signals, places, L, part_of):
+        yield _split_by_agent(S, layout, windows)
 
 
-def check_episodes(episodes: Sequence[Episode], meta: PredictorMeta) -> None:
-    """Refuse data that no fit for `meta` can use.
-
-    Raises:
-        PredictorError: no data, too little, or of another team.
-    """
-    if not episodes:
-        raise PredictorError("episodes", "none", "at least one", "did every walk end in a fall?")
-    for episode in episodes:
-        if episode.robots != meta.robots:
-            raise PredictorError(
-                "episode", f"{episode.robots} robots", f"{meta.robots}", "data of another team"
-            )
-        if episode.samples < meta.T_ini + meta.N:
-            raise PredictorError(
-                "episode",
-                f"{episode.samples} samples",
-                f"at least {meta.T_ini + meta.N}",
-                "cut short by a fall",
-            )
-
-
-def to_physical(x: Array, meta: PredictorMeta) -> Array:
-    """Blocks in physical units, (n, n, 6 N, W), from scaled solutions (n, n W, 6 N)."""
-    n = meta.robots
-    blocks = x.reshape(n, n, meta.width, -1).transpose(0, 1, 3, 2)
-    z_scale, y_scale = scales(meta)
+def to_physical(x: Array, layout: Layout) -> Array:
+    """Blocks in physical units, (n, n, p N, W), from scaled solutions (n, n W, p N)."""
+    n = layout.agents
+    blocks = x.reshape(n, n, layout.width, -1).transpose(0, 1, 3, 2)
+    z_scale, y_scale = scales(layout)
     return np.ascontiguousarray(blocks * y_scale[:, None] / z_scale)
 
 
-def scaled_blocks(G: Array, meta: PredictorMeta) -> Array:
-    """Blocks that map scaled deviations to scaled deviations, of the shape of `G`."""
-    z_scale, y_scale = scales(meta)
+def scaled_blocks(G: Array, layout: Layout) -> Array:
+    """Blocks that map scaled signals to scaled signals, of the shape of `G`."""
+    z_scale, y_scale = scales(layout)
     return G * z_scale / y_scale[:, None]
 
 
-def scales(meta: PredictorMeta) -> tuple[Array, Array]:
-    """Scales of one robot's [u_ini; y_ini; u], shape (W,), and y, shape (6 N,)."""
-    z_scale = np.concatenate(
-        [
-            np.full(N_FORCES * meta.T_ini, U_SCALE),
-            np.tile(Y_SCALE, meta.T_ini),
-            np.full(N_FORCES * meta.N, U_SCALE),
-        ]
-    )
-    return z_scale, np.tile(Y_SCALE, meta.N)
+def past_first(layout: Layout, members: Sequence[int]) -> Index:
+    """Rows of `zz` of some agents by time: all [u_ini; y_ini], then each sample's inputs."""
+    rows = np.arange(layout.agents * layout.width).reshape(layout.agents, -1)[list(members)]
+    future = rows[:, layout.past :].reshape(len(members), layout.N, layout.inputs)
+    return np.concatenate([rows[:, : layout.past].ravel(), future.transpose(1, 0, 2).ravel()])
 
 
-def past_first(meta: PredictorMeta, members: Sequence[int]) -> Index:
-    """Rows of `zz` of some robots by time: all [u_ini; y_ini], then each sample's forces."""
-    rows = np.arange(meta.robots * meta.width).reshape(meta.robots, -1)[list(members)]
-    future = rows[:, meta.past :].reshape(len(members), meta.N, N_FORCES)
-    return np.concatenate([rows[:, : meta.past].ravel(), future.transpose(1, 0, 2).ravel()])
-
-
-def robots_first(index: Index, n: int, dim: int) -> Index:
-    """Reorder stacked (time, robot, dim) indices to one row of (time, dim) per robot."""
+def agents_first(index: Index, n: int, dim: int) -> Index:
+    """Reorder stacked (time, agent, dim) indices to one row of (time, dim) per agent."""
     return index.reshape(-1, n, dim).transpose(1, 0, 2).reshape(n, -1)
 
 
-def _split_by_robot(S: Array, meta: PredictorMeta, windows: int) -> Regression:
-    """Cut the Gram matrix of windows of [u of all; y of all] into the robots' parts."""
-    n, m, p = meta.robots, N_FORCES, N_OUTPUTS
-    index = np.arange((meta.T_ini + meta.N) * n * (m + p)).reshape(-1, n * (m + p))
-    past, future = index[: meta.T_ini], index[meta.T_ini :]
+def _split_by_agent(S: Array, layout: Layout, windows: int) -> Regression:
+    """Cut the Gram matrix of windows of [u of all; y of all] into the agents' parts."""
+    n, m, p = layout.agents, layout.inputs, layout.outputs
+    index = np.arange((layout.T_ini + layout.N) * n * (m + p)).reshape(-1, n * (m + p))
+    past, future = index[: layout.T_ini], index[layout.T_ini :]
     parts = ((past[:, : n * m], m), (past[:, n * m :], p), (future[:, : n * m], m))
-    inputs = np.concatenate([robots_first(part, n, dim) for part, dim in parts], axis=1).ravel()
-    outputs = robots_first(future[:, n * m :], n, p).ravel()
+    inputs = np.concatenate([agents_first(part, n, dim) for part, dim in parts], axis=1).ravel()
+    outputs = agents_first(future[:, n * m :], n, p).ravel()
     return Regression(
         S[np.ix_(inputs, inputs)], S[np.ix_(inputs, outputs)].reshape(len(inputs), n, -1), windows
     )

@@ -1,4 +1,4 @@
-"""Solutions of the penalised normal equations (Σ z zᵀ + D_i) x_i = Σ z y^iᵀ of every robot i."""
+"""Solutions of the penalised normal equations (Σ z zᵀ + D_i) x_i = Σ z y^iᵀ of every agent i."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.layout import Layout
 from quadriga.agents.predictor.regression import Regression, past_first
-from quadriga.shared.config.yokes import neighbours
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,37 +18,46 @@ class Solutions:
     """A solver's result.
 
     Attributes:
-        x: scaled solutions, shape (n, n W, 6 N); zero in the rows of robots left out.
-        condition: of the regularised normal equations, in the 1-norm, of one robot or the worst.
+        x: scaled solutions, shape (n, n W, p N); zero in the rows of agents left out.
+        condition: of the regularised normal equations, in the 1-norm, of one agent or the worst.
     """
 
     x: Array
     condition: float
 
 
-def members_of(meta: PredictorMeta, i: int) -> tuple[int, ...]:
-    """Robots whose columns the regression of robot `i` has, in order, `i` among them."""
-    if meta.neighbours == "all":
-        return tuple(range(meta.robots))
-    return tuple(sorted({i, *neighbours(meta.robots, meta.yokes, i)}))
+@dataclass(frozen=True, slots=True)
+class Penalty:
+    """The block-weighted penalty of a ridge regression.
+
+    Attributes:
+        ridge: per window, on scaled columns.
+        weight: w of the peers' blocks; 1: all columns alike.
+    """
+
+    ridge: float
+    weight: float = 1.0
+
+    def of(self, regression: Regression) -> tuple[float, float]:
+        """Penalty on an agent's own columns and on those of its peers."""
+        own = self.ridge * regression.windows
+        return own, own * self.weight**2
 
 
-def solve_ridge(regression: Regression, meta: PredictorMeta, ridge: float) -> Solutions:
-    """Penalty ridge · M on robot i's own columns and w² times as much on its peers'.
+def solve_ridge(regression: Regression, layout: Layout, penalty: Penalty) -> Solutions:
+    """Penalty ridge · M on agent i's own columns and w² times as much on its peers'.
 
     Raises:
         PredictorError: a singular problem.
     """
-    n, W = meta.robots, meta.width
-    light, heavy = penalties(regression, meta, ridge)
-    everyone = all(len(members_of(meta, i)) == n for i in range(n))
-    if everyone:
+    n, W = layout.agents, layout.width
+    light, heavy = penalty.of(regression)
+    if all(len(members) == n for members in layout.members):
         A = _add_penalty(regression.zz, np.where(np.arange(n * W) < W, light, heavy))
         condition = condition_number(_norm(A), factorise(A))
         return Solutions(_solve_each(regression.zz, regression.zy, W, light, heavy), condition)
-    x, condition = np.zeros((n, n * W, N_OUTPUTS * meta.N)), 0.0
-    for i in range(n):
-        members = members_of(meta, i)
+    x, condition = np.zeros((n, n * W, layout.rows)), 0.0
+    for i, members in enumerate(layout.members):
         rows = (np.array(members)[:, None] * W + np.arange(W)).ravel()
         A = _add_penalty(regression.zz[np.ix_(rows, rows)], np.where(rows // W == i, light, heavy))
         norm, factor = _norm(A), factorise(A)
@@ -58,41 +66,34 @@ def solve_ridge(regression: Regression, meta: PredictorMeta, ridge: float) -> So
     return Solutions(x, condition)
 
 
-def solve_causal(regression: Regression, meta: PredictorMeta, ridge: float) -> Solutions:
+def solve_causal(regression: Regression, layout: Layout, penalty: Penalty) -> Solutions:
     """Like `solve_ridge`, but [u_ini; y_ini] and u_0 … u_t alone explain y at sample t.
 
     With columns in the order of time the normal equations of sample t are a leading block of
-    those of the last, and so are their Cholesky factors: one factor serves all N of them. u_k is
-    the mean force over the 10 ms that end with y_k, hence the direct feedthrough.
+    those of the last, and so are their Cholesky factors: one factor serves all N of them. A
+    robot's u_k is the mean force over the 10 ms that end with y_k, hence the direct feedthrough.
 
     Raises:
         PredictorError: a singular problem.
     """
-    n, W = meta.robots, meta.width
-    light, heavy = penalties(regression, meta, ridge)
-    x, condition = np.zeros((n, n * W, N_OUTPUTS * meta.N)), 0.0
-    for i in range(n):
-        members = members_of(meta, i)
-        rows = past_first(meta, members)
+    n, W, p = layout.agents, layout.width, layout.outputs
+    light, heavy = penalty.of(regression)
+    x, condition = np.zeros((n, n * W, layout.rows)), 0.0
+    for i, members in enumerate(layout.members):
+        rows = past_first(layout, members)
         A = _add_penalty(regression.zz[np.ix_(rows, rows)], np.where(rows // W == i, light, heavy))
         norm, factor = _norm(A), factorise(A)
         half = linalg.solve_triangular(
             factor, regression.zy[rows, i], lower=True, check_finite=False
         )
-        for t in range(meta.N):
-            k = len(members) * (meta.past + N_FORCES * (t + 1))
-            at = slice(N_OUTPUTS * t, N_OUTPUTS * (t + 1))
+        for t in range(layout.N):
+            k = len(members) * (layout.past + layout.inputs * (t + 1))
+            at = slice(p * t, p * (t + 1))
             x[i, rows[:k], at] = linalg.solve_triangular(
                 factor[:k, :k], half[:k, at], lower=True, trans=1, check_finite=False
             )
         condition = max(condition, condition_number(norm, factor))
     return Solutions(x, condition)
-
-
-def penalties(regression: Regression, meta: PredictorMeta, ridge: float) -> tuple[float, float]:
-    """Penalty on a robot's own columns and on those of its peers."""
-    own = ridge * regression.windows
-    return own, own * meta.block_weight**2
 
 
 def factorise(A: Array) -> Array:
@@ -107,7 +108,7 @@ def factorise(A: Array) -> Array:
         raise PredictorError(
             "the predictor's regression",
             "a singular problem",
-            "data that excite every direction, or a larger identification.ridge",
+            "data that excite every direction, or a larger ridge (identification.ridge)",
             "too little noise or data",
         ) from None
 

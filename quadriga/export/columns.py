@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from quadriga.export.layout import Layout
+from quadriga.export.layout import MessageLayout
 from quadriga.export.source import ExportedMessage
 
 TIMES: Final = ("tick", "stamp_ns", "log_time_ns")
@@ -22,7 +22,7 @@ class Columns:
 
     Attributes:
         head: integers, texts and numbers that one message has once, with their types.
-        numbers: float64, in the order of `Layout.numbers`.
+        numbers: float64, in the order of `MessageLayout.numbers`.
         lists: lists of float64.
     """
 
@@ -36,7 +36,7 @@ class Columns:
         return (*(name for name, _ in self.head), *self.numbers, *self.lists)
 
 
-def build_columns(layout: Layout, robot: str) -> Columns:
+def build_columns(layout: MessageLayout, robot: str) -> Columns:
     """Columns of the table of a key.
 
     Every name begins with the robot it is about, so that tables can be joined on `tick` without a

@@ -12,7 +12,7 @@ import foxglove.messages as fox
 from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateChannel
 
 from quadriga.export.columns import TickReached
-from quadriga.export.layout import Layout
+from quadriga.export.layout import MessageLayout
 from quadriga.export.planned_forces import PlannedForces
 from quadriga.export.protobuf import ProtobufType, build_type
 from quadriga.export.scene import Scene, stamp_of
@@ -133,7 +133,7 @@ class _Drawing:
         self._forces.log(forces, log_time=time)
 
 
-def _read_plain(message: Message, layout: Layout) -> dict[str, object]:
+def _read_plain(message: Message, layout: MessageLayout) -> dict[str, object]:
     plain: dict[str, object] = {"tick": message.tick}
     plain |= {name: getattr(message, name) for name, _ in layout.plain}
     plain |= {name: getattr(message, name).tolist() for name in layout.lists}

@@ -18,7 +18,7 @@ _SAMPLES: Final = "N"  # the axis of the horizon: one row per entry
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class MessageLayout:
     """What one kind of message holds, in a recording of one team.
 
     Attributes:
@@ -88,7 +88,7 @@ def name_numbers(item: Field[Any], owners: Mapping[str, tuple[str, ...]]) -> lis
 
 def build_layout(
     kind: type[Message], config: Config, entries: Mapping[str, tuple[str, ...]]
-) -> Layout:
+) -> MessageLayout:
     """The layout of a kind of message.
 
     Args:
@@ -112,7 +112,9 @@ def build_layout(
             numbers += name_numbers(item, owners)
     for name, among in maps:
         numbers += name_entries(name, among)
-    return Layout(kind, tuple(plain), tuple(numbers), tuple(lists), tuple(arrays), tuple(maps))
+    return MessageLayout(
+        kind, tuple(plain), tuple(numbers), tuple(lists), tuple(arrays), tuple(maps)
+    )
 
 
 def name_entries(field: str, entries: tuple[str, ...]) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
-from quadriga.export.layout import Layout
+from quadriga.export.layout import MessageLayout
 from quadriga.shared.robot.conventions import Array
 
 _PACKAGE: Final = "quadriga"
@@ -107,7 +107,7 @@ class _Template:
         return body.tobytes()
 
 
-def build_type(layout: Layout) -> ProtobufType:
+def build_type(layout: MessageLayout) -> ProtobufType:
     """The protobuf type of a kind of message."""
     plain = (("tick", int), *layout.plain)
     cut = layout.sampled

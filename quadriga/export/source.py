@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 from typing import Final, NamedTuple
 
-from quadriga.export.layout import Layout, build_layout
+from quadriga.export.layout import MessageLayout, build_layout
 from quadriga.shared.errors import MessageError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
@@ -26,7 +26,7 @@ class ExportedMessage(NamedTuple):
     robot: str
     log_time_ns: int
     message: Message
-    layout: Layout
+    layout: MessageLayout
     numbers: Array  # (rows, len(layout.numbers))
 
 

@@ -16,14 +16,9 @@ from quadriga.agents.predictor.episode import Y_SCALE, Episode
 from quadriga.agents.predictor.fits import FITS, fit, fit_causal, fit_gamma, fit_phase, fit_ridge
 from quadriga.agents.predictor.hankel import mosaic, split
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.regression import (
-    normal_equations,
-    normal_equations_by_phase,
-    robots_first,
-    scaled_blocks,
-    to_physical,
-)
-from quadriga.agents.predictor.ridge import solve_ridge
+from quadriga.agents.predictor.regression import agents_first, scaled_blocks, to_physical
+from quadriga.agents.predictor.ridge import Penalty, solve_ridge
+from quadriga.agents.predictor.team_data import regressions_by_phase, team_regression
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
@@ -99,7 +94,7 @@ def relative_error(predictor: Predictor, episode: Episode) -> float:
 
 def assert_same(first: Predictor, second: Predictor, atol: float) -> None:
     """Equal blocks in scaled units."""
-    ours, theirs = (scaled_blocks(p.G, p.meta) for p in (first, second))
+    ours, theirs = (scaled_blocks(p.G, p.meta.layout) for p in (first, second))
     np.testing.assert_allclose(ours, theirs, atol=atol)
 
 
@@ -134,12 +129,12 @@ def fit_hankel(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
         np.arange(len(Z)), [n * m * meta.T_ini, n * (m + p) * meta.T_ini]
     )
     columns_of = np.concatenate(
-        [robots_first(x, n, d) for x, d in ((past_u, m), (past_y, p), (future_u, m))], axis=1
+        [agents_first(x, n, d) for x, d in ((past_u, m), (past_y, p), (future_u, m))], axis=1
     ).ravel()
-    rows_of = robots_first(np.arange(len(G)), n, p)
+    rows_of = agents_first(np.arange(len(G)), n, p)
     x = G[rows_of[:, None, :], columns_of[:, None]]
     plain = replace(meta, kind="pinv", phases=1, ridge=0.0, block_weight=1.0)
-    return Predictor(plain, to_physical(x, meta)[None], float(np.linalg.cond(Z)) ** 2)
+    return Predictor(plain, to_physical(x, meta.layout)[None], float(np.linalg.cond(Z)) ** 2)
 
 
 @pytest.mark.parametrize("robots", [1, 2, 3])
@@ -162,8 +157,8 @@ def test_of_many_solutions_the_pseudo_inverse_takes_the_least() -> None:
 def test_shared_eliminations_solve_what_each_robot_would_alone(robots: int, weight: float) -> None:
     meta = meta_for(robots, block_weight=weight)
     data = [random_walk(robots, 400, 7, noise=0.3)]
-    regression, W = normal_equations(data, meta), meta.width
-    x = solve_ridge(regression, meta, 1e-3).x
+    regression, W = team_regression(data, meta), meta.width
+    x = solve_ridge(regression, meta.layout, Penalty(1e-3, weight)).x
     for i in range(robots):
         penalty = 1e-3 * regression.windows * np.where(np.arange(robots) == i, 1.0, weight**2)
         direct = np.linalg.solve(
@@ -189,7 +184,7 @@ def test_each_sample_of_the_causal_fit_is_its_own_regression() -> None:
     """Sample t from explicit windows without the forces after it, penalised alike."""
     data = random_walk(2, 400, 8, noise=0.3)
     meta = meta_for(2, ridge=1e-2, block_weight=5.0)
-    blocks = scaled_blocks(fit_causal([data], meta).G, meta)[0]
+    blocks = scaled_blocks(fit_causal([data], meta).G, meta.layout)[0]
     raw, y = data.windows(T_INI, N)
     z_scale = np.r_[np.full(36, 10.0), np.tile(Y_SCALE, T_INI), np.full(48, 10.0)]
     z = raw / z_scale[:, None]
@@ -210,8 +205,8 @@ def test_the_regressions_of_all_phases_add_up_to_the_whole() -> None:
     data = [replace(e, first_tick=310 + 70 * k) for k, e in enumerate(data)]
     for phases in (1, 3, 10, 40):
         meta = meta_for(1, kind="phase", phases=phases)
-        parts = list(normal_equations_by_phase(data[:1] + data[2:], meta))
-        whole = normal_equations(data[:1] + data[2:], meta)
+        parts = list(regressions_by_phase(data[:1] + data[2:], meta))
+        whole = team_regression(data[:1] + data[2:], meta)
         assert len(parts) == phases
         assert sum(part.windows for part in parts) == whole.windows
         np.testing.assert_allclose(sum(part.zz for part in parts), whole.zz, atol=1e-9)
@@ -224,7 +219,7 @@ def test_the_regression_of_a_phase_is_of_the_windows_that_end_their_past_in_it()
     z, _ = data.windows(T_INI, N)
     z = z[0] / np.r_[np.full(36, 10.0), np.tile(Y_SCALE, T_INI), np.full(48, 10.0)][:, None]
     ends = 350 + 10 * (T_INI - 1 + np.arange(z.shape[1]))
-    for phase, part in enumerate(normal_equations_by_phase([data], meta)):
+    for phase, part in enumerate(regressions_by_phase([data], meta)):
         mine = z[:, (ends - 300) % 400 // 100 == phase]
         assert part.windows == mine.shape[1]
         np.testing.assert_allclose(part.zz, mine @ mine.T, atol=1e-9)
@@ -285,12 +280,12 @@ def test_forces_that_do_not_excite_are_refused_where_the_fit_needs_them() -> Non
     data = random_walk(1, 400, 15, noise=0.1)
     dead = data.u.copy()
     dead[:, 0, 5] = 0.0
-    with pytest.raises(PredictorError, match="forces that excite every direction"):
+    with pytest.raises(PredictorError, match="inputs that excite every direction"):
         fit_gamma([replace(data, u=dead)], meta_for(1))
     few = [random_walk(1, 60, 15, noise=0.1)]  # fewer windows than rows
-    with pytest.raises(PredictorError, match="forces that excite every direction"):
+    with pytest.raises(PredictorError, match="inputs that excite every direction"):
         fit_gamma(few, meta_for(1))
-    with pytest.raises(PredictorError, match=r"a larger identification\.ridge"):
+    with pytest.raises(PredictorError, match=r"a larger ridge \(identification\.ridge\)"):
         fit_ridge([replace(data, u=dead)], meta_for(1, ridge=0.0))
 
 
@@ -312,7 +307,7 @@ def test_data_that_no_fit_can_use_are_refused_by_name(kind: str) -> None:
 def test_blocks_scale_back_and_forth() -> None:
     meta = meta_for(2)
     x = np.random.default_rng(0).normal(size=(2, 2 * meta.width, 6 * N))
-    back = scaled_blocks(to_physical(x, meta), meta)
+    back = scaled_blocks(to_physical(x, meta.layout), meta.layout)
     np.testing.assert_allclose(
         back, x.reshape(2, 2, meta.width, 6 * N).transpose(0, 1, 3, 2), rtol=1e-14
     )

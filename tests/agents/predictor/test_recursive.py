@@ -88,7 +88,7 @@ def heavier(team: Any, seed: int, samples: int, share: float) -> Any:
 def corrected(predictor: Predictor, state: Correction) -> Predictor:
     """The predictor with the correction in its blocks."""
     G = predictor.G.copy()
-    G[:, state.robot, state.robot] += block_correction(predictor.meta, state)
+    G[:, state.robot, state.robot] += block_correction(predictor.meta.layout, state)
     return Predictor(predictor.meta, G, predictor.condition)
 
 
@@ -103,7 +103,7 @@ def mean_error(predictor: Predictor, episode: Any, robot: int) -> float:
 def test_a_heavier_robot_is_followed(predictor: Predictor, linear_team: Team) -> None:
     team, how = linear_team(2), Forgetting(factor=0.9995, prior=1e-2, bound=0.1)
     z, y = heavier(team, 21, 1200, 0.6).windows(predictor.meta.T_ini, predictor.meta.N)
-    state = begin_correction(predictor.meta, 0, how)
+    state = begin_correction(predictor.meta.layout, 0, how)
     for k in range(z.shape[2]):
         state = take_in(state, predictor, z[:, :, k], y[0, :, k], 0, how)
     unseen = heavier(team, 22, 200, 0.6)
@@ -117,7 +117,7 @@ def test_a_heavier_robot_is_followed(predictor: Predictor, linear_team: Team) ->
 def test_a_plant_that_did_not_change_is_left_alone(predictor: Predictor, linear_team: Team) -> None:
     how = Forgetting()
     z, y = linear_team(2).episode(600, 23).windows(predictor.meta.T_ini, predictor.meta.N)
-    state = begin_correction(predictor.meta, 1, how)
+    state = begin_correction(predictor.meta.layout, 1, how)
     for k in range(z.shape[2]):
         state = take_in(state, predictor, z[:, :, k], y[1, :, k], 0, how)
     assert np.abs(state.D).max() < 1e-6
@@ -180,14 +180,14 @@ def test_a_window_that_would_spoil_the_correction_is_refused_and_counted(absurd:
 
 def test_windows_that_do_not_fit_are_refused_by_name(predictor: Predictor) -> None:
     meta, how = predictor.meta, Forgetting()
-    state = begin_correction(meta, 0, how)
+    state = begin_correction(meta.layout, 0, how)
     z, y = np.zeros((2, meta.width)), np.zeros(6 * meta.N)
     with pytest.raises(PredictorError, match="window: got NaN"):
         take_in(state, predictor, z * np.nan, y, 0, how)
     with pytest.raises(PredictorError, match="window: got shapes"):
         take_in(state, predictor, z[:1], y, 0, how)
     with pytest.raises(PredictorError, match="robot of the correction"):
-        begin_correction(meta, 2, how)
+        begin_correction(meta.layout, 2, how)
     with pytest.raises(PredictorError, match=r"forgetting\.factor"):
         Forgetting(factor=1.5)
     with pytest.raises(PredictorError, match=r"forgetting\.prior"):
