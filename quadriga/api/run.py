@@ -86,7 +86,7 @@ class Run:
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
-        """What happened, in order of time: pushes, faults, falls, the end.
+        """What happened, in order of time, such as pushes, faults, falls and the end.
 
         Each has a `tick` [ms], a `kind`, a `code`, the `robot` that it is about, or "", and a
         `detail` in words.
@@ -99,7 +99,7 @@ class Run:
 
     @cached_property
     def topics(self) -> Mapping[str, int]:
-        """How many messages there are of each key: `{"r1/state": 10000, …}`.
+        """How many messages there are of each key, without the name of the team in it.
 
         From the recording's index; of one that was cut they are counted.
         """

@@ -60,7 +60,6 @@ class TopicArrays:
         fields: what the messages hold, by name, with units and frames.
         invalid: how many more messages there were that are none of this topic; they are left out.
         arrays: of each field, see `__getitem__`.
-        arrays: of each field, see `__getitem__`.
     """
 
     key: str

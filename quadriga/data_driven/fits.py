@@ -35,14 +35,12 @@ def fit(
 ) -> FittedPredictor:
     """Fit the matrix G that maps past and future inputs to future outputs (eq. 6).
 
-    | kind | what it is |
-    |---|---|
-    | `spc` | subspace predictive control: the pseudo-inverse of eq. 6, of least norm |
-    | `ridge` | least squares with a penalty: less variance where data are noisy or few |
-    | `gamma` | γ-DDPC: LQ factors of the data; equal to `spc` where the outputs' past is noisy |
-    | `causal` | `ridge` in which no input acts backwards in time |
-    | `arx` | a one-step model, rolled out: for data from a feedback loop |
-    | `periodic` | a G of its own for each sample of a period, causal |
+    - `spc`: subspace predictive control, the pseudo-inverse of eq. 6, of least norm;
+    - `ridge`: least squares with a penalty, for less variance where data are noisy or few;
+    - `gamma`: γ-DDPC, LQ factors of the data; equal to `spc` where the outputs' past is noisy;
+    - `causal`: `ridge` in which no input acts backwards in time;
+    - `arx`: a one-step model, rolled out, for data from a feedback loop;
+    - `periodic`: a G of its own for each sample of a period, causal.
 
     Signals are scaled by their root mean square before they are fitted, so that a ridge means the
     same for every plant.
