@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from quadriga.agents.predictor.hankel import columns, excitation, mosaic
+from quadriga.agents.predictor.excitation import excitation
+from quadriga.agents.predictor.hankel import columns, mosaic
 from quadriga.data_driven.signals import as_numbers, root_mean_squares
 from quadriga.data_driven.trajectories import Data
 from quadriga.shared.errors import PredictorError

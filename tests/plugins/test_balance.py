@@ -167,7 +167,7 @@ def test_a_campaign_does_not_go_on_with_other_code_of_it(edited: Place) -> None:
     _, command, *options = documented_commands()[-1]
     done = edited.quadriga(command, *options)
     assert done.returncode != 0
-    assert "trials of planner quadriga-balance 0.1.0 " in done.stderr
+    assert "trials of planner or controller quadriga-balance 0.1.0 " in done.stderr
 
 
 def test_a_replay_with_other_code_of_it_differs_and_says_why(edited: Place) -> None:
