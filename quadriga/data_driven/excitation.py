@@ -68,8 +68,9 @@ def check_excitation(data: Data, order: int) -> None:
 
 
 def _signals(signal: ArrayLike | Sequence[ArrayLike], L: int) -> list[Array]:
-    several = isinstance(signal, list | tuple) and signal and np.ndim(signal[0]) == 2
-    given: Sequence[Any] = signal if several else [signal]  # type: ignore[assignment]
+    given: list[Any] = [signal]
+    if isinstance(signal, list | tuple) and signal and np.ndim(signal[0]) == 2:
+        given = [*signal]
     signals = [as_numbers("signal", one) for one in given]
     if any(x.ndim != 2 or x.shape[1] != signals[0].shape[1] for x in signals):
         shapes = [x.shape for x in signals]
