@@ -16,7 +16,7 @@ from quadriga.shared.recording.writer import RECORDING
 from quadriga.shared.runtime.blas import blas_threads_kept
 from quadriga.team.endpoint import with_free_endpoint
 from quadriga.team.run_folder import make_run_dir
-from quadriga.team.walk import INTERRUPTED, check_walk
+from quadriga.team.walk import INTERRUPTED, Report, check_walk
 from quadriga.team.walk import walk as walk_team
 
 
@@ -30,6 +30,7 @@ def walk(
     out: str | Path | None = None,
     config: str | Path | Config | None = None,
     pictures: bool = False,
+    report: bool = True,
 ) -> Run:
     """Start a team's processes, walk to the end, stop them, and return what was recorded.
 
@@ -51,6 +52,8 @@ def walk(
         out: the run folder, without a recording; None: `runs/<date>-<time>`.
         config: a TOML file, or a configuration of `quadriga.load_config`.
         pictures: whether to render the walk, which takes some seconds.
+        report: whether to draw figures and write the page of the walk, which takes some seconds,
+            too; pictures need it.
 
     Raises:
         ConfigError: a key, a value or a file is wrong, or the folder holds a recording.
@@ -70,7 +73,15 @@ def walk(
     check_walk(in_force)
     folder = make_run_dir(None if out is None else Path(out))
     with blas_threads_kept():
-        status = walk_team(in_force, folder, pictures=pictures, console=quiet_console())
+        status = walk_team(
+            in_force, folder, report=_much(pictures, report), console=quiet_console()
+        )
     if status == INTERRUPTED:
         raise KeyboardInterrupt
     return Run(folder / RECORDING)
+
+
+def _much(pictures: bool, report: bool) -> Report:
+    if not report:
+        return Report.TABLE
+    return Report.PICTURES if pictures else Report.PAGE

@@ -5,13 +5,16 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from quadriga.commands.command import AddCommand, Given
 from quadriga.commands.options import add_no_render
 from quadriga.shared.config.reference import BY_HAND
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ConfigError
+
+if TYPE_CHECKING:
+    from quadriga.team.walk import Report
 
 _DRIVEN_SECONDS: Final = 3600.0
 
@@ -42,6 +45,11 @@ def add(add_command: AddCommand) -> None:
     )
     show.add_argument("--no-view", action="store_true", help="do not show it there")
     add_no_render(command)
+    command.add_argument(
+        "--no-report",
+        action="store_true",
+        help="no figures and no page of the walk; `quadriga report` makes them of its recording",
+    )
 
 
 def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
@@ -63,11 +71,19 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     return walk(
         config,
         arguments.out,
-        pictures=not arguments.no_render,
+        report=_report(arguments),
         console=Console(),
         armed=arguments.armed,
         view=choose_port(arguments.view, wanted=not arguments.no_view and is_at_display()),
     )
+
+
+def _report(arguments: argparse.Namespace) -> Report:
+    from quadriga.team.walk import Report
+
+    if arguments.no_report:
+        return Report.TABLE
+    return Report.PAGE if arguments.no_render else Report.PICTURES
 
 
 def _driven(config: Config, given: Given) -> Config:

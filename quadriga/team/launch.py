@@ -17,6 +17,8 @@ from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import LAST, LEADS, OPERATOR, RECORDER, ROUTER, SIM, Member, has_lead
 from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.team.fork_server import Fork
+from quadriga.team.forked import ForkedProcess, start_forked
 
 _ONE_THREAD: Final = (
     "OMP_NUM_THREADS",
@@ -25,6 +27,7 @@ _ONE_THREAD: Final = (
     "NUMBA_NUM_THREADS",
 )
 QUADRIGA: Final = (sys.executable, "-m", "quadriga")
+_SEVERAL: Final = 2  # processes, from which on it pays to import once for all
 _LAST_WORDS: Final = 12  # lines of a failed process's log that are shown
 _LEAST_DISK: Final = 4096  # bytes, of a file's first block
 _LOOK: Final = 0.02  # s
@@ -104,28 +107,43 @@ class Launch:
     def __init__(self, rows: Sequence[ProcessSpec], logs: Path) -> None:
         """Start one process per row, each in a session of its own, its output in `logs`."""
         self._logs = logs
-        self._running: dict[str, subprocess.Popen[bytes]] = {}
+        self._running: dict[str, subprocess.Popen[bytes] | ForkedProcess] = {}
         self._rows = {row.name: row for row in rows}
         self._overdue = set[str]()
         logs.mkdir(parents=True, exist_ok=True)
         try:
             for row in rows:
-                (logs / f"{row.name}.log").write_bytes(b"")
-                self._start(row)
+                self._log_of(row).write_bytes(b"")
+            self._start_forked([row for row in rows if _is_quadriga(row)])
+            for row in rows:
+                if row.name not in self._running:
+                    self._start(row)
+            self._running = {row.name: self._running[row.name] for row in rows}
         except BaseException:
             self.stop()  # nobody else knows of those that have been started
             raise
 
+    def _start_forked(self, rows: Sequence[ProcessSpec]) -> None:
+        """Start the project's own processes, if they are several, out of one, or none."""
+        if len(rows) < _SEVERAL:
+            return
+        forks = [Fork(_words(row), str(self._log_of(row))) for row in rows]
+        children = start_forked(forks, len(QUADRIGA), _environment())
+        self._running |= {row.name: child for row, child in zip(rows, children, strict=False)}
+
     def _start(self, row: ProcessSpec) -> None:
-        with (self._logs / f"{row.name}.log").open("ab") as log:
+        with self._log_of(row).open("ab") as log:
             self._running[row.name] = subprocess.Popen(
-                [*row.command, "--parent", str(os.getpid())],
+                _words(row),
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
-                env={**os.environ, **dict.fromkeys(_ONE_THREAD, "1")},
+                env=_environment(),
                 start_new_session=True,
             )
+
+    def _log_of(self, row: ProcessSpec) -> Path:
+        return self._logs / f"{row.name}.log"
 
     def restart(self, name: str) -> None:
         """Start a row again whose process has ended, by the same command; its log goes on.
@@ -247,6 +265,19 @@ class Launch:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
+
+
+def _words(row: ProcessSpec) -> tuple[str, ...]:
+    """Its command line; it learns who has started it."""
+    return (*row.command, "--parent", str(os.getpid()))
+
+
+def _is_quadriga(row: ProcessSpec) -> bool:
+    return row.command[: len(QUADRIGA)] == QUADRIGA
+
+
+def _environment() -> dict[str, str]:
+    return {**os.environ, **dict.fromkeys(_ONE_THREAD, "1")}
 
 
 def _is_full(folder: Path) -> bool:

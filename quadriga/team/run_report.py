@@ -33,6 +33,23 @@ _CAUSES: Final = {
 }
 
 
+def sum_up(run_dir: Path, console: Console) -> dict[str, Any]:
+    """Sum up the recording in `run_dir` and show its table, without figures and page.
+
+    Returns:
+        The summary.
+
+    Raises:
+        RecordingError: as `report_folder`.
+        ProcessError: as `report_folder`.
+    """
+    summary = summarise(run_dir, read_traces(Recording(run_dir / RECORDING)))
+    print_summary(summary, console)
+    _say_folder(run_dir, console)
+    _check_end(summary)
+    return summary
+
+
 def report_folder(run_dir: Path, *, pictures: bool, console: Console) -> dict[str, Any]:
     """Sum up the recording in `run_dir`, show its table, draw its figures, write its page.
 
@@ -58,7 +75,7 @@ def report_folder(run_dir: Path, *, pictures: bool, console: Console) -> dict[st
                     render(run_dir)
     finally:  # with the clip, or without it where drawing it failed or was interrupted
         write_page(run, run_dir / PAGE, scene)
-    console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
+    _say_folder(run_dir, console)
     _check_end(summary)
     return summary
 
@@ -87,6 +104,10 @@ def report_file(
         console.print(printable_line(missing), style="yellow", markup=False, highlight=False)
     console.print(f"page: {written}", markup=False, highlight=False)
     return dict(run.summary)
+
+
+def _say_folder(run_dir: Path, console: Console) -> None:
+    console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
 
 
 def has_failed(summary: dict[str, Any]) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from enum import Enum
 from pathlib import Path
 from typing import Final
 
@@ -27,6 +28,15 @@ from quadriga.team.spectator import view_beside
 from quadriga.view.port import url_of
 from quadriga.warm_up import warm_up
 
+
+class Report(Enum):
+    """What is made of a walk's recording once it is over; each has what the one before has."""
+
+    TABLE = "table"
+    PAGE = "page"  # with its figures
+    PICTURES = "pictures"
+
+
 OK: Final = 0
 FELL: Final = 1
 INTERRUPTED: Final = 130
@@ -49,7 +59,7 @@ def walk(
     config: Config,
     out: Path | None,
     *,
-    pictures: bool,
+    report: Report,
     console: Console,
     armed: bool = False,
     view: int | None = None,
@@ -59,7 +69,7 @@ def walk(
     Args:
         config: the team's configuration.
         out: the run folder; by default `runs/<date>-<time>`.
-        pictures: whether to render the walk.
+        report: how much of a report to make of it.
         console: where to show it.
         armed: whether bridges may command their robots.
         view: port of a page that shows the walk; None: none does.
@@ -92,9 +102,12 @@ def walk(
     if not config.recorder.enabled:
         return FELL if fallen else OK
     # Imported late, as the predictor's part is: the processes need not wait for what draws figures.
-    from quadriga.team.run_report import has_failed, report_folder
+    from quadriga.team.run_report import has_failed, report_folder, sum_up
 
-    summary = report_folder(run_dir, pictures=pictures, console=console)
+    if report is Report.TABLE:
+        summary = sum_up(run_dir, console)
+    else:
+        summary = report_folder(run_dir, pictures=report is Report.PICTURES, console=console)
     return FELL if fallen or has_failed(summary) else OK
 
 

@@ -12,7 +12,7 @@ from typing import Final
 
 import pytest
 
-_WALK: Final = ("walk", "--no-render", "--no-view", "--set", "runtime.priority=ordinary")
+_WALK: Final = ("walk", "--no-report", "--no-view", "--set", "runtime.priority=ordinary")
 # The team that `make prepared` collects for.
 _PREPARED: Final = ("--robots", "2", "--set", "identification.seconds=60", "--seconds", "2")
 _ALONE: Final = ("--robots", "1", "--planner", "none", "--seconds", "600")

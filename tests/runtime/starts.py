@@ -64,7 +64,7 @@ def attempt(number: int, chance: random.Random) -> Attempt:
     mark = f"{os.getpid()}-{number}"
     with tempfile.TemporaryDirectory() as scratch:
         command = [sys.executable, "-m", "quadriga", "walk", "--planner", "none", "--robots", "2"]
-        command += ["--seconds", "1", "--mode", mode, "--no-render", "--out", f"{scratch}/run"]
+        command += ["--seconds", "1", "--mode", mode, "--no-report", "--out", f"{scratch}/run"]
         with Path(scratch, "log").open("wb") as log:
             marked = {**os.environ, _MARK: mark}
             walk = subprocess.Popen(

@@ -91,7 +91,7 @@ def robots(config: Config, file: Path, tmp_path: Path) -> Iterator[subprocess.Po
 
 
 def walk(file: Path, out: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    command = [*QUADRIGA, "walk", "--config", str(file), "--out", str(out), "--no-render", *options]
+    command = [*QUADRIGA, "walk", "--config", str(file), "--out", str(out), "--no-report", *options]
     return subprocess.run(command, capture_output=True, text=True, timeout=2 * WAIT, check=False)
 
 
@@ -135,7 +135,7 @@ def test_a_bridge_hears_the_emergency_stop_whatever_its_agent_does(
     config: Config, file: Path, tmp_path: Path
 ) -> None:
     out, log = tmp_path / "run", tmp_path / "robots.log"
-    command = [*QUADRIGA, "walk", "--config", str(file), "--out", str(out), "--no-render"]
+    command = [*QUADRIGA, "walk", "--config", str(file), "--out", str(out), "--no-report"]
     command += ["--armed", "--seconds", "60"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as walking:
         said = out / "logs" / "plant_r1.log"
@@ -191,7 +191,7 @@ def test_a_bridge_that_dies_or_hangs_leaves_a_robot_that_is_damped_and_then_limp
     file: Path, tmp_path: Path, number: signal.Signals
 ) -> None:
     out, log, before = tmp_path / "run", tmp_path / "robots.log", guards()
-    command = [*QUADRIGA, "walk", "--config", str(file), "--out", str(out), "--no-render"]
+    command = [*QUADRIGA, "walk", "--config", str(file), "--out", str(out), "--no-report"]
     command += ["--armed", "--seconds", "60"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as walking:
         said = out / "logs" / "plant_r1.log"

@@ -48,7 +48,7 @@ def walks(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
         str(SECONDS),
         "--seed",
         "3",
-        "--no-render",
+        "--no-report",
         *(f"--set={key}={value}" for key, value in (DATA | ORDINARY).items()),
         "--out",
         str(first),

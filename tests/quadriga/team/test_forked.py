@@ -1,0 +1,147 @@
+"""Processes that share what they import are children like any other."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.team import forked
+from quadriga.team.endpoint import free_endpoint
+from quadriga.team.fork_server import Fork, Order, command_line
+from quadriga.team.forked import ForkedProcess, start_forked
+from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec
+
+WAIT = 20.0  # s
+
+
+def router(folder: Path, name: str) -> Fork:
+    """A process that runs until it is stopped."""
+    words = (*QUADRIGA, "router", "--listen", free_endpoint(), "--parent", str(os.getpid()))
+    return Fork(words, str(folder / f"{name}.log"))
+
+
+def start(*forks: Fork) -> list[ForkedProcess]:
+    return start_forked(forks, len(QUADRIGA), dict(os.environ))
+
+
+def ready(forks: Sequence[Fork]) -> None:
+    """Wait until each has said something."""
+    deadline = monotonic() + WAIT
+    while not all(Path(fork.log).exists() and Path(fork.log).stat().st_size for fork in forks):
+        assert monotonic() < deadline
+        sleep(0.02)
+
+
+@pytest.fixture
+def forks(tmp_path: Path) -> list[Fork]:
+    return [router(tmp_path, name) for name in ("one", "two")]
+
+
+@pytest.fixture
+def routers(forks: list[Fork]) -> Iterator[list[ForkedProcess]]:
+    processes = start(*forks)
+    yield processes
+    for process in processes:
+        process.kill()
+        process.wait(WAIT)
+
+
+def test_each_is_a_child_of_this_process_in_a_session_of_its_own(
+    forks: list[Fork], routers: list[ForkedProcess]
+) -> None:
+    ready(forks)
+    for fork, process in zip(forks, routers, strict=True):
+        folder = Path("/proc", str(process.pid))
+        fields = (folder / "stat").read_text().rpartition(") ")[2].split()
+        assert [int(fields[n]) for n in (1, 3)] == [os.getpid(), process.pid]
+        assert "routing at tcp/" in Path(fork.log).read_text()
+
+
+def test_each_is_shown_with_the_words_of_its_own(
+    forks: list[Fork], routers: list[ForkedProcess]
+) -> None:
+    ready(forks)
+    for fork, process in zip(forks, routers, strict=True):
+        shown = Path("/proc", str(process.pid), "cmdline").read_bytes().decode()
+        assert tuple(shown.rstrip("\0").split("\0")) == fork.words
+
+
+def test_each_ends_as_it_is_told_to(forks: list[Fork], routers: list[ForkedProcess]) -> None:
+    one, two = routers
+    ready(forks)
+    assert [one.poll(), two.poll()] == [None, None]
+    with pytest.raises(subprocess.TimeoutExpired):
+        one.wait(0.01)
+    one.terminate()
+    two.kill()
+    assert [one.wait(WAIT), two.wait(WAIT)] == [0, -signal.SIGKILL]
+    one.terminate()  # gone by now: nobody else is met
+    assert one.poll() == 0
+
+
+def test_a_wrong_command_has_its_own_status_and_says_why(tmp_path: Path) -> None:
+    log = tmp_path / "agent.log"
+    words = (*QUADRIGA, "agent", "--robot", "r7", "--parent", str(os.getpid()))
+    (process,) = start(Fork(words, str(log)))
+    assert process.wait(WAIT) == 2
+    assert "--robot: got 'r7'" in log.read_text()
+
+
+def test_nobody_begins_whose_start_is_not_known(forks: list[Fork]) -> None:
+    """As when who starts them is interrupted between the forks and the word to begin."""
+    go, begin = os.pipe()
+    order = Order(len(QUADRIGA), go, tuple(forks))
+    with subprocess.Popen(
+        command_line(order.forks), stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=(go,)
+    ) as server:
+        said, _ = server.communicate(order.to_json().encode())
+    pids = [int(word) for word in said.decode().strip("[]\n").split(",")]
+    assert all(Path("/proc", str(pid)).exists() for pid in pids)
+    os.close(begin)
+    os.close(go)
+    deadline = monotonic() + WAIT
+    while any(_runs(pid) for pid in pids):
+        assert monotonic() < deadline
+        sleep(0.02)
+    assert [Path(fork.log).read_text() for fork in forks] == ["", ""]
+
+
+def _runs(pid: int) -> bool:
+    try:
+        return ") Z " not in Path("/proc", str(pid), "stat").read_text()
+    except OSError:
+        return False
+
+
+def test_a_team_starts_without_a_fork_server_too(
+    forks: list[Fork], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fails = (sys.executable, "-c", "raise SystemExit(3)")
+    monkeypatch.setattr(forked, "command_line", lambda _: fails)
+    assert start(*forks) == []
+    words = [fork.words[:-2] for fork in forks]
+    rows = [ProcessSpec(name, of, 5.0) for name, of in zip(("one", "two"), words, strict=True)]
+    with Launch(rows, tmp_path) as running:
+        ready(forks)
+        assert running.alive == {"one", "two"}
+        pids = list(running.pids.values())
+    assert not any(map(_runs, pids))
+
+
+def test_the_others_start_beside_them_in_the_order_of_the_table(
+    forks: list[Fork], tmp_path: Path
+) -> None:
+    other = (sys.executable, "-c", "import time; time.sleep(60)")
+    words = (forks[0].words[:-2], other, forks[1].words[:-2])
+    names = ("one", "other", "two")
+    rows = [ProcessSpec(name, of, 5.0) for name, of in zip(names, words, strict=True)]
+    with Launch(rows, tmp_path) as running:
+        ready(forks)
+        assert list(running.pids) == list(names)
