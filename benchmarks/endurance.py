@@ -35,6 +35,7 @@ _EVERY_S: Final = 10.0
 _SETTLED: Final = 0.1  # share of the walk after which memory must not grow any more
 _MOST: Final = 0.05  # share by which it may
 _INTERRUPTED: Final = 130
+_STAND_MS: Final = 9000  # at first: robots that have stood so long know how fast their yaw drifts
 
 Samples = dict[str, list[tuple[float, float]]]  # by process: s since the start, MB
 
@@ -54,6 +55,8 @@ def main() -> int:
             "world.mode": "realtime",
             "world.seconds": 60.0 * given.minutes,
             "planner.kind": given.planner,
+            "gait.stand_ms": _STAND_MS,
+            "team.auto_resume": True,
         }
         return endure(load(None, keys), given.out, Console(highlight=False))
     except QuadrigaError as error:
@@ -79,7 +82,9 @@ def endure(config: Config, out: Path | None, console: Console) -> int:
     lost = summary["gaps"]
     fallen = ", ".join(summary["fallen"]) or "nobody"
     console.print(f"fell: {fallen}; lost messages: {lost}; end: {summary['end']}", markup=False)
-    console.print(f"folder: {folder}", markup=False)
+    parts = (f"{key} {count}" for key, count in summary["gaps_per_topic"].items() if count)
+    console.print(f"lost by topic: {', '.join(parts) or 'none'}", markup=False)
+    console.print(f"walked {summary['distance']:.0f} m; folder: {folder}", markup=False)
     return int(bool(summary["fallen"]) or lost > 0 or max(growth.values(), default=0.0) > _MOST)
 
 

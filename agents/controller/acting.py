@@ -29,6 +29,7 @@ from quadriga.agents.controller.sensed import (
     feet_of,
     trunk_of,
 )
+from quadriga.agents.controller.standing_heading import keep_heading
 from quadriga.agents.controller.swing import MotionReference
 from quadriga.agents.controller.torque_bounds import torque_bounds
 from quadriga.agents.controller.trunk_feedback import (
@@ -132,6 +133,8 @@ def act(
     deviation = accumulate_forces(
         memory, task[TASK.deviation], phase.stance, task[TASK.new_sample] > 0.5, fixed.weight
     )
+    stands = memory[MEMORY.half_cycle] < 0.0 and np.sum(contact) == N_LEGS
+    keep_heading(memory, stands, p_foot, dt)
     push, v_des = _track_reference(memory, trunk, task, fixed.trunk, dt)
     if task[TASK.feedforward] > 0.5:
         push += feedforward(deviation, phase.stance, trunk, p_foot, body)

@@ -43,6 +43,10 @@ class MemoryLayout(NamedTuple):
     load: int
     foot_load: slice
     tilt_error: slice
+    stood_s: int
+    heading_over_feet: int
+    drift_mean: int
+    yaw_drift: int
 
 
 MEMORY: Final = MemoryLayout(
@@ -71,6 +75,10 @@ MEMORY: Final = MemoryLayout(
         load=1,
         foot_load=FOOT_LOAD_SIZE,
         tilt_error=3,
+        stood_s=1,
+        heading_over_feet=1,
+        drift_mean=1,
+        yaw_drift=1,
     )
 )
 MEMORY_SIZE: Final = row_size(MEMORY)
@@ -252,6 +260,26 @@ class Memory:
     def yaw_des(self) -> float:
         """Desired heading, rad."""
         return float(self.flat[MEMORY.yaw_des])
+
+    @property
+    def stood_s(self) -> float:
+        """For how long all feet have stood, as they are meant to, s."""
+        return float(self.flat[MEMORY.stood_s])
+
+    @property
+    def heading_over_feet(self) -> float:
+        """Desired heading less that of the feet, once it has stood for long, rad."""
+        return float(self.flat[MEMORY.heading_over_feet])
+
+    @property
+    def drift_mean(self) -> float:
+        """Mean rate at which the feet have seemed to turn in the present stand, rad/s."""
+        return float(self.flat[MEMORY.drift_mean])
+
+    @property
+    def yaw_drift(self) -> float:
+        """Drift of the IMU's yaw by the last long stand, rad/s; 0 before the first."""
+        return float(self.flat[MEMORY.yaw_drift])
 
     @property
     def mean_force(self) -> Array:

@@ -14,6 +14,7 @@ from quadriga.shared.security.tls import tls_files, tls_settings
 
 NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
 LEASE_MS: Final = 10_000  # of silence after which a link is given up: its process stands still
+RECEIVE_BUFFER: Final = 4 << 20  # bytes, of each link's socket
 _COMMON: Final = {
     "transport/link/tx/lease": LEASE_MS,
     # Nobody is found by multicast, nothing goes through shared memory.
@@ -24,6 +25,11 @@ _COMMON: Final = {
     # their own, which is empty nearly always.
     "transport/link/tx/queue/size/data": 16,
     "transport/link/tx/queue/size/real_time": 16,
+    # Of many small messages Linux counts far more bytes than they have. Its own buffer is full after
+    # some 10 ms of a team that walks; it then throws packets away, and repeats them 0.2 s later, and
+    # with luck: the link to a recorder has stood still for 3 s. Capped by net.core.rmem_max.
+    "transport/link/tcp/so_rcvbuf": RECEIVE_BUFFER,
+    "transport/link/tls/so_rcvbuf": RECEIVE_BUFFER,
     # ms, of a handshake with someone who says nothing, frozen or just leaving. Nobody can leave
     # before it is over, and Zenoh's 10 s are longer than a process is given.
     "transport/unicast/open_timeout": 2000,

@@ -41,7 +41,7 @@ def test_every_number_of_a_row_has_one_name(layout: NamedTuple) -> None:
 
 
 def test_rows_are_as_long_as_their_last_part_says() -> None:
-    assert row_size(MEMORY) == MEMORY_SIZE == MEMORY.tilt_error.stop
+    assert row_size(MEMORY) == MEMORY_SIZE == MEMORY.yaw_drift + 1
     assert row_size(SENSED) == SENSED_SIZE == SENSED.foot_load.stop
 
 
