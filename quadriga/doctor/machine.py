@@ -10,6 +10,7 @@ from quadriga.doctor.packages import check_packages
 from quadriga.shared.bus.absence import CLOCK_LIMIT
 from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
 from quadriga.shared.bus.roster import processes
+from quadriga.shared.bus.zenoh_settings import RECEIVE_BUFFER
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER
 
@@ -20,6 +21,7 @@ MEMORY: Final = "memory"
 DISK: Final = "disk"
 CACHE: Final = "cache"
 CLOCK: Final = "clock"
+BUFFER: Final = "buffer"
 
 _PROCESS_BYTES: Final = 400_000_000  # of memory that a process takes, at most
 _ROBOT_BYTES: Final = 400_000  # recorded of a robot in a second of a walk, at most
@@ -42,6 +44,7 @@ class MachineReadings:
         cache: folder of predictors and compiled code.
         cache_writable: whether something can be written there.
         clock_error: of the wall clock, s; 0: nobody keeps it.
+        receive_buffer: that a socket may ask for, bytes.
         requirements: what this project asks for: `name>=1.0,<2`.
         installed: versions by name of what is asked for.
     """
@@ -54,6 +57,7 @@ class MachineReadings:
     cache: str
     cache_writable: bool | None
     clock_error: float | None
+    receive_buffer: int | None
     requirements: tuple[str, ...] | None
     installed: Mapping[str, str]
 
@@ -105,6 +109,7 @@ def check_machine(readings: MachineReadings, need: MachineNeed) -> tuple[Diagnos
         check_disk(readings.disk, need),
         check_cache(readings.cache_writable, readings.cache),
         check_clock(readings.clock_error, need),
+        check_buffer(readings.receive_buffer, need),
         check_packages(readings.requirements, readings.installed),
     )
 
@@ -174,6 +179,17 @@ def check_cache(writable: bool | None, folder: str) -> Diagnosis:
         return Diagnosis(CACHE, GOOD, f"the cache folder {folder} can be written to")
     text = f"the cache folder {folder} cannot be written to"
     return Diagnosis(CACHE, BAD, text, "set XDG_CACHE_HOME to a folder of this user")
+
+
+def check_buffer(permitted: int | None, need: MachineNeed) -> Diagnosis:
+    """Room for what comes while a process waits for a core; in lock-step the sender waits."""
+    if permitted is None:
+        return _unknown(BUFFER, "the room for what sockets receive")
+    text = f"sockets may have room for {permitted} bytes"
+    if permitted >= RECEIVE_BUFFER:
+        return Diagnosis(BUFFER, GOOD, text)
+    remedy = f"sudo sysctl -w net.core.rmem_max={RECEIVE_BUFFER}, or recordings may have gaps"
+    return Diagnosis(BUFFER, NOTE if need.realtime else GOOD, text, remedy if need.realtime else "")
 
 
 def check_clock(error: float | None, need: MachineNeed) -> Diagnosis:

@@ -20,6 +20,7 @@ from quadriga.team.run_folder import RUNS
 T = TypeVar("T")
 
 _CORES: Final = Path("/sys/devices/system/cpu")
+_RECEIVE_BUFFER: Final = Path("/proc/sys/net/core/rmem_max")
 _CGROUP: Final = Path("/sys/fs/cgroup")
 _UNLIMITED: Final = "max"
 
@@ -38,6 +39,7 @@ def read_machine() -> MachineReadings:
         cache=str(cache_dir()),
         cache_writable=_read(lambda: os.access(_existing(cache_dir()), os.W_OK | os.X_OK)),
         clock_error=_read(lambda: 1e-9 * system_clock_error_ns()),
+        receive_buffer=_read(lambda: int(_RECEIVE_BUFFER.read_text(encoding="ascii"))),
         requirements=requirements,
         installed={name: version for name, version in versions.items() if version},
     )

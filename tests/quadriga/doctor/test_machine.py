@@ -22,6 +22,7 @@ FIT = MachineReadings(
     cache="/home/u/.cache/quadriga",
     cache_writable=True,
     clock_error=0.001,
+    receive_buffer=8 << 20,
     requirements=("numpy>=2.0",),
     installed={"numpy": "2.4.0"},
 )
@@ -38,7 +39,7 @@ def verdicts(need: MachineNeed = WALK, **changes: Any) -> dict[str, str]:
 
 def test_a_fit_computer_is_good_at_everything() -> None:
     assert verdicts() == {}
-    assert len(check_machine(FIT, WALK)) == 8
+    assert len(check_machine(FIT, WALK)) == 9
 
 
 @pytest.mark.parametrize(
@@ -62,12 +63,17 @@ def test_each_lack_is_found_and_judged_by_what_the_walk_needs(
     assert verdicts(LOCKSTEP, **changes) == {code: in_lockstep}
 
 
+def test_little_room_for_what_is_received_matters_in_real_time_alone() -> None:
+    assert verdicts(receive_buffer=212_992) == {"buffer": NOTE}
+    assert verdicts(LOCKSTEP, receive_buffer=212_992) == {}
+
+
 def test_what_cannot_be_read_is_unknown() -> None:
     nothing: dict[str, Any] = dict.fromkeys(f.name for f in fields(FIT))
     nothing |= {"cache": "", "installed": {}}
     found = check_machine(replace(FIT, **nothing), WALK)
     assert {item.verdict for item in found} == {UNKNOWN}
-    assert len({item.text for item in found}) == 8
+    assert len({item.text for item in found}) == 9
 
 
 def test_a_team_at_a_loopback_address_runs_here_as_a_whole() -> None:
