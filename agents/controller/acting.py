@@ -133,9 +133,7 @@ def act(
     deviation = accumulate_forces(
         memory, task[TASK.deviation], phase.stance, task[TASK.new_sample] > 0.5, fixed.weight
     )
-    stands = memory[MEMORY.half_cycle] < 0.0 and np.sum(contact) == N_LEGS
-    keep_heading(memory, stands, p_foot, dt)
-    push, v_des = _track_reference(memory, trunk, task, fixed.trunk, dt)
+    push, v_des = _track_reference(memory, trunk, p_foot, task, fixed.trunk, dt)
     if task[TASK.feedforward] > 0.5:
         push += feedforward(deviation, phase.stance, trunk, p_foot, body)
     if fixed.free_fall:
@@ -192,12 +190,14 @@ def accumulate_forces(
 
 @compiled
 def _track_reference(
-    memory: Array, trunk: TrunkState, task: Array, gains: TrunkGains, dt: float
+    memory: Array, trunk: TrunkState, p_foot: Array, task: Array, gains: TrunkGains, dt: float
 ) -> tuple[Array, Array]:
     """The trunk's acceleration by feedback, (6,), and its desired velocity, (3,), odometry frame.
 
     The integrators in `memory` go on.
     """
+    stands = memory[MEMORY.half_cycle] < 0.0 and np.sum(memory[MEMORY.contact]) == N_LEGS
+    keep_heading(memory, stands, p_foot, dt)
     before = Integrators(
         memory[MEMORY.height_integral],
         memory[MEMORY.speed_integral],

@@ -59,4 +59,5 @@ def keep_heading(memory: Array, stands: bool, p_foot: Array, dt: float) -> None:
 def _heading_of(p_foot: Array) -> float:
     """Direction from between the hind feet to between the front feet, rad; legs FL FR RL RR."""
     forward = p_foot[0] + p_foot[1] - p_foot[2] - p_foot[3]
-    return np.arctan2(forward[1], forward[0])
+    angle: float = np.arctan2(forward[1], forward[0])
+    return angle

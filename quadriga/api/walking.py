@@ -29,8 +29,7 @@ def walk(
     set: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
     config: str | Path | Config | None = None,
-    pictures: bool = False,
-    report: bool = True,
+    report: str = "page",
 ) -> Run:
     """Start a team's processes, walk to the end, stop them, and return what was recorded.
 
@@ -51,9 +50,8 @@ def walk(
         set: values of any keys by `section.key`, see docs/configuration.md; they win.
         out: the run folder, without a recording; None: `runs/<date>-<time>`.
         config: a TOML file, or a configuration of `quadriga.load_config`.
-        pictures: whether to render the walk, which takes some seconds.
-        report: whether to draw figures and write the page of the walk, which takes some seconds,
-            too; pictures need it.
+        report: what to make of the recording: `"table"`, also `"page"` with its figures, or also
+            `"pictures"`; the last two take some seconds.
 
     Raises:
         ConfigError: a key, a value or a file is wrong, or the folder holds a recording.
@@ -64,6 +62,7 @@ def walk(
     """
     named = {"world.seed": seed, "team.robots": robots, "world.seconds": seconds}
     keys = {name: value for name, value in named.items() if value is not None} | dict(set or {})
+    wanted = _read_report(report)
     base = config if isinstance(config, Config) or config is None else Path(config)
     given = read_layers(base, scenario, keys)
     in_force = with_free_endpoint(build(given), given)
@@ -73,15 +72,15 @@ def walk(
     check_walk(in_force)
     folder = make_run_dir(None if out is None else Path(out))
     with blas_threads_kept():
-        status = walk_team(
-            in_force, folder, report=_much(pictures, report), console=quiet_console()
-        )
+        status = walk_team(in_force, folder, report=wanted, console=quiet_console())
     if status == INTERRUPTED:
         raise KeyboardInterrupt
     return Run(folder / RECORDING)
 
 
-def _much(pictures: bool, report: bool) -> Report:
-    if not report:
-        return Report.TABLE
-    return Report.PICTURES if pictures else Report.PAGE
+def _read_report(report: str) -> Report:
+    try:
+        return Report(report)
+    except ValueError:
+        known = ", ".join(repr(kind.value) for kind in Report)
+        raise ConfigError("report", repr(report), f"one of {known}") from None

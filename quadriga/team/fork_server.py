@@ -45,7 +45,7 @@ class Fork:
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class ForkOrder:
     """What this program is to do.
 
     Attributes:
@@ -62,7 +62,7 @@ class Order:
         return json.dumps(asdict(self))
 
     @classmethod
-    def from_json(cls, text: str) -> Order:
+    def from_json(cls, text: str) -> ForkOrder:
         raw = json.loads(text)
         forks = (Fork(tuple(fork["words"]), fork["log"]) for fork in raw["forks"])
         return cls(raw["prefix"], raw["go"], tuple(forks))
@@ -76,7 +76,7 @@ def command_line(forks: tuple[Fork, ...]) -> tuple[str, ...]:
 
 def main() -> None:
     """Read an order, fork, and write the process ids as a line of JSON."""
-    order = Order.from_json(sys.stdin.read())
+    order = ForkOrder.from_json(sys.stdin.read())
     import_module("quadriga.commands.parser")
     for command in dict.fromkeys(fork.words[order.prefix] for fork in order.forks):
         for module in _IMPORTED.get(command, ()):
@@ -89,7 +89,7 @@ def main() -> None:
     print(json.dumps(pids), flush=True)
 
 
-def _fork_all(order: Order, pids: list[int]) -> Fork | None:
+def _fork_all(order: ForkOrder, pids: list[int]) -> Fork | None:
     """What this process is to become if it is a fork; None for the program, which gets `pids`.
 
     Raises:
@@ -108,7 +108,7 @@ def _fork_all(order: Order, pids: list[int]) -> Fork | None:
     return None
 
 
-def _become(fork: Fork, order: Order) -> NoReturn:
+def _become(fork: Fork, order: ForkOrder) -> NoReturn:
     """Be the fork's command once it may begin; end if nobody is left to say so."""
     os.setsid()
     _redirect(fork.log)

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Final
 
-from quadriga.team.fork_server import Fork, Order, command_line
+from quadriga.team.fork_server import Fork, ForkOrder, command_line
 
 _PR_SET_CHILD_SUBREAPER: Final = 36  # linux/prctl.h
 _PR_GET_CHILD_SUBREAPER: Final = 37
@@ -82,7 +82,7 @@ def start_forked(
     go, begin = os.pipe()
     try:
         with _one_at_a_time, _adopting():
-            pids = _fork(Order(prefix, go, tuple(forks)), environment)
+            pids = _fork(ForkOrder(prefix, go, tuple(forks)), environment)
         os.write(begin, b"." * len(pids))
     finally:
         os.close(go)
@@ -90,7 +90,7 @@ def start_forked(
     return [ForkedProcess(pid) for pid in pids]
 
 
-def _fork(order: Order, environment: Mapping[str, str]) -> list[int]:
+def _fork(order: ForkOrder, environment: Mapping[str, str]) -> list[int]:
     server = subprocess.Popen(
         command_line(order.forks),
         stdin=subprocess.PIPE,

@@ -25,9 +25,9 @@ _COMMON: Final = {
     # their own, which is empty nearly always.
     "transport/link/tx/queue/size/data": 16,
     "transport/link/tx/queue/size/real_time": 16,
-    # Of many small messages Linux counts far more bytes than they have. Its own buffer is full after
-    # some 10 ms of a team that walks; it then throws packets away, and repeats them 0.2 s later, and
-    # with luck: the link to a recorder has stood still for 3 s. Capped by net.core.rmem_max.
+    # Linux counts far more bytes of small messages than they have. Its own buffer is full after
+    # 10 ms of a team that walks; then it throws packets away and sends them again 0.2 s later, or
+    # later still: a recorder's link has stood still for 3 s. net.core.rmem_max caps this.
     "transport/link/tcp/so_rcvbuf": RECEIVE_BUFFER,
     "transport/link/tls/so_rcvbuf": RECEIVE_BUFFER,
     # ms, of a handshake with someone who says nothing, frozen or just leaving. Nobody can leave

@@ -68,6 +68,8 @@ def test_a_mistake_leaves_no_folder(
     monkeypatch.chdir(tmp_path)
     with pytest.raises(quadriga.ConfigError, match=message):
         quadriga.walk(set=keys)
+    with pytest.raises(quadriga.ConfigError, match="report: got 'film', expected one of 'table'"):
+        quadriga.walk(report="film")
     with pytest.raises(quadriga.ConfigError, match="did you mean 'hard-blocks'"):
         quadriga.walk("hard-block")
     with pytest.raises(quadriga.ConfigError, match="'flat' beside a Config"):

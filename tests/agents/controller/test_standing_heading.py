@@ -25,7 +25,8 @@ FEET = np.array([[0.18, 0.14, 0.0], [0.18, -0.14, 0.0], [-0.18, 0.14, 0.0], [-0.
 def turned(yaw: float) -> Array:
     """The feet of a robot that stands still, in an odometry frame that has drifted."""
     c, s = np.cos(yaw), np.sin(yaw)
-    return FEET @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    feet: Array = FEET @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    return feet
 
 
 def stand(memory: Array, seconds: float, rate: float, noise: float = 0.0) -> float:
@@ -85,7 +86,7 @@ def true_yaw(rollout: Rollout) -> float:
 
 
 def test_a_robot_stands_on_although_its_imu_turns() -> None:
-    """It walked, its operator left; before the feet told, the trunk turned by as much as the IMU."""
+    """It walked, and its operator left. A heading by the IMU would turn the trunk as far."""
     given = {"team.robots": 1, "planner.kind": "none", "world.seed": 53}
     config = load(None, given | {"sensors.yaw_drift": 0.05})
     references = references_of(config)

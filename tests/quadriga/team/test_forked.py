@@ -14,7 +14,7 @@ import pytest
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.team import forked
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.fork_server import Fork, Order, command_line
+from quadriga.team.fork_server import Fork, ForkOrder, command_line
 from quadriga.team.forked import ForkedProcess, start_forked
 from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec
 
@@ -97,7 +97,7 @@ def test_a_wrong_command_has_its_own_status_and_says_why(tmp_path: Path) -> None
 def test_nobody_begins_whose_start_is_not_known(forks: list[Fork]) -> None:
     """As when who starts them is interrupted between the forks and the word to begin."""
     go, begin = os.pipe()
-    order = Order(len(QUADRIGA), go, tuple(forks))
+    order = ForkOrder(len(QUADRIGA), go, tuple(forks))
     with subprocess.Popen(
         command_line(order.forks), stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=(go,)
     ) as server:
