@@ -17,7 +17,7 @@ from quadriga.shared.runtime.clock import sleep
 
 _STOPS: Final = (signal.SIGINT, signal.SIGTERM)
 _IMPORTS: Final = "<frozen importlib"  # how the files begin whose functions import
-_AGAIN: Final = 0.02  # s, after which an interrupt in the midst of an import is tried again
+_AGAIN: Final = 0.02  # s, after which an interrupt that came at a bad moment is tried again
 _PR_SET_PDEATHSIG: Final = 1  # linux/prctl.h
 _PATIENCE: Final = 90.0  # s; a bridge may take 72 to lay its robot down and leave
 
@@ -102,8 +102,18 @@ def interrupt_on_sigterm() -> None:
 
     Both are let through from now on; one that was held back raises here. One that comes while a
     module is imported raises once that is over: what is half set up would show a traceback of its
-    own, or swallow it.
+    own, or swallow it. One that Python loses, since it came while a library called back, raises
+    again.
     """
+    shown = sys.unraisablehook
+
+    def show_or_repeat(lost: sys.UnraisableHookArgs) -> None:
+        if issubclass(lost.exc_type, KeyboardInterrupt):
+            signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+        else:
+            shown(lost)
+
+    sys.unraisablehook = show_or_repeat
     signal.signal(signal.SIGALRM, lambda _number, _frame: signal.raise_signal(signal.SIGINT))
     for number in _STOPS:  # SIGINT too: a script's background job is started with it ignored
         signal.signal(number, _interrupt)

@@ -162,15 +162,31 @@ except BaseException as error:
     raise ImportError("half set up") from error
 ready = True
 """
+CALLS_BACK = """
+import ctypes, os, signal
+
+@ctypes.CFUNCTYPE(None)
+def called():
+    os.kill(os.getpid(), signal.SIGTERM)
+    for _ in range(1000):
+        pass
+
+called()
+ready = True
+"""
 PROGRAM = """
 import sys
-sys.path.insert(0, sys.argv[1])
+folder, how = sys.argv[1:]
+sys.path.insert(0, folder)
 from quadriga.commands import version
 
 def run(*_):
-    import library
-    assert library.ready
-    print("imported", flush=True)
+    if how == "import":
+        import library
+        assert library.ready
+    else:
+        exec(open(folder + "/library.py").read(), {})
+    print("gone on", flush=True)
     while True:
         pass
 
@@ -182,15 +198,18 @@ sys.exit(main())
 """
 
 
-def test_an_interrupt_in_the_midst_of_an_import_is_one_line(tmp_path: Path) -> None:
-    """As a library in C does, this one makes an error of its own of it."""
-    (tmp_path / "library.py").write_text(LIBRARY, encoding="utf-8")
+@pytest.mark.parametrize(
+    ("library", "how"), [(LIBRARY, "import"), (CALLS_BACK, "run")], ids=["import", "callback"]
+)
+def test_an_interrupt_at_a_bad_moment_is_one_line(tmp_path: Path, library: str, how: str) -> None:
+    """As a library in C does, this one makes an error of its own of it, or Python loses it."""
+    (tmp_path / "library.py").write_text(library, encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(tmp_path)],
+        [sys.executable, "-c", PROGRAM, str(tmp_path), how],
         capture_output=True,
         text=True,
         timeout=60.0,
         check=False,
     )
     assert (done.returncode, done.stderr) == (130, "quadriga: interrupted\n")
-    assert done.stdout == "imported\n"
+    assert done.stdout == "gone on\n"
