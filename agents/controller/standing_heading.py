@@ -6,6 +6,7 @@ until its legs reach no further, and robots that walk together turn away from ea
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -19,6 +20,9 @@ SETTLED_S: Final = 2.0  # of standing, from which on the feet tell; until then t
 FOLLOW_S: Final = 1.0  # time constant: encoders' noise stays out of the heading
 _FOLLOWS_S: Final = SETTLED_S + 3.0 * FOLLOW_S  # of standing, from which on the drift is averaged
 DRIFT_KNOWN_S: Final = _FOLLOWS_S + 2.0  # of standing, from which on the mean is believed
+# rad/s. The yaw of an IMU does not drift faster: feet that seem to turn so fast do turn, as those
+# of a robot that somebody turns round.
+DRIFT_MOST: Final = math.radians(1.0)
 
 
 @compiled
@@ -26,7 +30,7 @@ def keep_heading(memory: Array, stands: bool, p_foot: Array, dt: float) -> None:
     """Have the desired heading turn as the odometry frame does, which drifts with the IMU's yaw.
 
     While the robot stands, that is how its feet seem to turn; in a walk it is as fast as they
-    turned in its last long stand.
+    turned in its last long stand, what an IMU cannot drift left out.
 
     Args:
         memory: `Memory.flat`, whose `yaw_des` and memory of the stand are filled.
@@ -48,7 +52,7 @@ def keep_heading(memory: Array, stands: bool, p_foot: Array, dt: float) -> None:
     error = wrap_angle(_heading_of(p_foot) + memory[MEMORY.heading_over_feet] - yaw_des)
     rate = error / FOLLOW_S
     memory[MEMORY.yaw_des] = wrap_angle(yaw_des + dt * rate)
-    if stood > _FOLLOWS_S:
+    if stood > _FOLLOWS_S and abs(rate) <= DRIFT_MOST:
         share = min(1.0, dt / (stood - _FOLLOWS_S))
         memory[MEMORY.drift_mean] += share * (rate - memory[MEMORY.drift_mean])
     if stood > DRIFT_KNOWN_S:

@@ -37,12 +37,17 @@ class Moment(NamedTuple):
 
 
 def describe_outcome(
-    config: Config, traces: Traces, recording: Recording, moment: Moment, told: Sequence[Event] = ()
+    config: Config,
+    traces: Traces,
+    recording: Recording,
+    moment: Moment,
+    told: Sequence[Event] = (),
+    missed: Sequence[int] = (),
 ) -> dict[str, Any]:
     """The row of a trial.
 
     `detect_ms` is the time from the fault until an agent no longer walks, or the world announces
-    that a robot is silent or gone, or the recorder misses the world; None if nobody ever noticed.
+    that a robot is silent or gone, or any process misses the world; None if nobody ever noticed.
     `stand_ms` is the time until all others stand, or are damped; None if they walked on.
     `recover_ms` is the time until all robots walk again for good: 0 if none stopped, None if one
     has not walked again, or if the recording lacks the end of the walk. `lowered` are robots that
@@ -57,6 +62,7 @@ def describe_outcome(
         recording: it.
         moment: of the fault.
         told: what the world itself has logged: a recording may lack the end.
+        missed: when the others have missed the world, as they have logged it, ns since 1970.
     """
     tick = moment.tick
     if moment.wall_ns:  # by the recorder's clock, which may be what the fault is about
@@ -75,7 +81,7 @@ def describe_outcome(
         "falls": fallen,
         "falls_of_others": sum(name in fallen for name in others),
         "lowered": sorted({e.robot for e in events if e.code == codes.LOWERED}),
-        "detect_ms": _first_notice(traces, events, moment, tick),
+        "detect_ms": _first_notice(traces, events, moment, tick, missed),
         "stand_ms": _after(tick, _all_stand(traces.statuses, others, tick)),
         "recover_ms": None if recorded_end is None else _after(tick, _all_walk(traces, tick)),
         "lost_messages": _count_lost(config, traces, moment),
@@ -99,7 +105,9 @@ def tick_at(recording: Recording, wall_ns: int) -> int:
     return newest
 
 
-def _first_notice(traces: Traces, events: Iterable[Event], moment: Moment, tick: int) -> int | None:
+def _first_notice(
+    traces: Traces, events: Iterable[Event], moment: Moment, tick: int, missed: Sequence[int]
+) -> int | None:
     noticed = [
         status.tick - tick
         for statuses in traces.statuses.values()
@@ -111,9 +119,13 @@ def _first_notice(traces: Traces, events: Iterable[Event], moment: Moment, tick:
         for event in events
         if event.kind == "fault" and event.code not in _ANNOUNCED and event.tick >= tick
     ]
-    missed_ns = int(traces.notes.get(END, {}).get("missed_ns", "0"))
-    if missed_ns and moment.wall_ns:
-        noticed.append(round(1e-6 * (missed_ns - moment.wall_ns)))
+    if moment.wall_ns:
+        by_recorder = int(traces.notes.get(END, {}).get("missed_ns", "0"))
+        noticed += [
+            round(1e-6 * (ns - moment.wall_ns))
+            for ns in (by_recorder, *missed)
+            if ns >= moment.wall_ns
+        ]
     return min(noticed, default=None)
 
 

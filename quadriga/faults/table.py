@@ -19,8 +19,8 @@ _COLUMNS: Final = (
 _NOTE: Final = """\
 "void": tries without a result; "fell": other robots than the one of the fault, and that one. Of
 times, and of messages lost, the median and the largest of all other tries. "noticed": from the
-fault until an agent no longer walked, the world said that a robot is silent or gone, or the
-recorder missed the world; "stood": until all others stood or were damped; "again": until all robots
+fault until an agent no longer walked, the world said that a robot is silent or gone, or the first
+process missed the world; "stood": until all others stood or were damped; "again": until all robots
 walked for good, 0 if none had stopped. "lost": what the recording lacks, the faulty robot's own
 aside; in real time also commands of ticks that an agent did not answer. "refused": share of what
 was forged."""

@@ -112,8 +112,7 @@ class Session:
     @property
     def loss_ns(self) -> int:
         """When what has vanished was missed first, ns since 1970; 0: all is there."""
-        since = self._losses.since
-        return 0 if since is None else wall_ns() - round(1e9 * (monotonic() - since))
+        return self._losses.missed_ns
 
     def _take(self, timeout: float) -> bool:
         """Write all that has arrived; False if nothing came within `timeout` seconds."""

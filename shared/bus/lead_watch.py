@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from datetime import UTC, datetime
 from typing import Final, NamedTuple
 
 from quadriga.shared.bus.barrier import lead
@@ -12,9 +14,10 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import waits_for_router
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import has_lead
-from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.runtime.clock import monotonic, wall_ns
 from quadriga.shared.wire.codes import LEAD_GONE, LINK_LOST
 
+_MISSED: Final = re.compile(r", missed since (\S+Z),")
 LAST_WORDS: Final = 1.0  # s wall, in which what was sent before may still arrive
 
 
@@ -42,18 +45,36 @@ def find_loss(bus: Bus, config: Config) -> Loss | None:
     return None
 
 
-def loss_error(loss: Loss, tick: int) -> ProcessError:
+def loss_error(loss: Loss, tick: int, missed_ns: int = 0) -> ProcessError:
     """The error of a process that ends because of a loss.
 
     Args:
         loss: what has vanished.
         tick: the team's time as far as this process knows it, ms.
+        missed_ns: when it was missed first, ns since 1970; 0: that is not known.
     """
     cause = "killed, failed, or cut off: see what it says itself"
     if loss.code == LINK_LOST:
         cause = "the router was killed, the network is gone, or a certificate has expired"
     got = f"none any more after {tick / 1000:.3f} s of the walk"
+    if missed_ns:
+        moment = datetime.fromtimestamp(1e-9 * missed_ns, UTC)
+        got += f", missed since {moment.isoformat(timespec='milliseconds')[:-6]}Z"
     return ProcessError(loss.what, got, "it to be there until the walk's announced end", cause)
+
+
+def missed_ns_of(line: str) -> int:
+    """When something was missed first, of a line that shows a `loss_error`; 0 of any other line.
+
+    Returns:
+        ns since 1970, to the ms.
+    """
+    found = _MISSED.search(line)
+    return (
+        0
+        if found is None
+        else 1_000_000 * round(1e3 * datetime.fromisoformat(found[1]).timestamp())
+    )
 
 
 class LossWatch:
@@ -91,6 +112,11 @@ class LossWatch:
             self._patience = self._of_link
         return loss if now - self.since >= self._patience else None
 
+    @property
+    def missed_ns(self) -> int:
+        """When the loss was seen first, ns since 1970; 0: there is none."""
+        return 0 if self.since is None else wall_ns() - round(1e9 * (monotonic() - self.since))
+
     def clear(self) -> None:
         """All is there again."""
         self.since, self._patience = None, self._grace
@@ -123,7 +149,7 @@ class LeadWatch:
         """
         loss = self._watch.look()
         if loss is not None:
-            raise loss_error(loss, max(tick, 0))
+            raise loss_error(loss, max(tick, 0), self._watch.missed_ns)
 
     def hear(self) -> None:
         """Something has arrived: the team walks, and who was gone is back."""

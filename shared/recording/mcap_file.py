@@ -33,6 +33,8 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
+from quadriga.shared.recording.packed_records import PackedRecords
+
 _MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
 _MESSAGE_FIELDS: Final = 22  # bytes of a message record's content before the payload
 _FOOTER: Final = struct.Struct("<BQQQ")  # opcode, length, summary, offsets; a checksum follows
@@ -58,8 +60,8 @@ class McapFile:
         self._entries: defaultdict[int, list[int]] = defaultdict(list)  # log time, offset, …
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        self._chunks: list[bytes] = []  # the records of their indexes
-        self._index_size = 0  # bytes in them
+        self._chunks = PackedRecords()  # their indexes
+        self._index_size = 0  # bytes of schemas and channels in the summary
         self._times: list[int] = []  # earliest and latest log time
         self._metadata: list[MetadataIndex] = []
         self._counts: defaultdict[int, int] = defaultdict(int)  # messages by channel
@@ -69,7 +71,8 @@ class McapFile:
     @property
     def size(self) -> int:
         """Bytes written, waiting (the open chunk before compression) and of the index to come."""
-        return self._written + self._size + self._waiting + self._index_size
+        index = self._index_size + self._chunks.size
+        return self._written + self._size + self._waiting + index
 
     def metadata(self, name: str, values: dict[str, str]) -> None:
         """Write a metadata record, ahead of the open chunk."""
@@ -174,7 +177,6 @@ class McapFile:
             uncompressed_size=len(content),
         )
         self._chunks.append(_bytes(index))
-        self._index_size += len(self._chunks[-1])
         self._times = [min([first, *self._times[:1]]), max([last, *self._times[1:]])]
         self._parts, self._size, self._waiting = [self._known], len(self._known), 0
         self._entries.clear()
@@ -184,7 +186,7 @@ class McapFile:
             attachment_count=0,
             channel_count=len(self._channels),
             channel_message_counts=dict(self._counts),
-            chunk_count=len(self._chunks),
+            chunk_count=self._chunks.count,
             message_count=sum(self._counts.values()),
             message_end_time=self._times[1] if self._times else 0,
             message_start_time=self._times[0] if self._times else 0,

@@ -9,13 +9,13 @@ from dataclasses import replace
 import pytest
 
 from quadriga.shared.bus import lead_watch
-from quadriga.shared.bus.lead_watch import LeadWatch, find_loss
+from quadriga.shared.bus.lead_watch import LeadWatch, Loss, find_loss, loss_error, missed_ns_of
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import SIM
-from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.wire.codes import LEAD_GONE, LINK_LOST
 from quadriga.team.endpoint import free_endpoint
 
@@ -62,10 +62,13 @@ def test_who_drives_time_is_missed_after_its_last_words() -> None:
         watch = LeadWatch(r1, config)
         watch.look(1)
         assert find_loss(r1, config) is None
+        left_ns = wall_ns()
         sim.close()
         wait_until(lambda: not r1.members_at(HERE))
         assert find_loss(r1, config) == (LEAD_GONE, "process sim of team 'team', seen by r1")
         said, after = complaint(watch, 1234)
+        ended_ns = wall_ns()
+    assert left_ns - 1_000_000 <= missed_ns_of(said) <= ended_ns - round(0.2e9)
     assert said.startswith(
         "process sim of team 'team', seen by r1: got none any more after 1.234 s of the walk"
     )
@@ -140,3 +143,11 @@ def test_who_is_back_in_time_is_not_missed() -> None:
         sim.withdraw()
         wait_until(lambda: not r1.members_at(HERE))
         assert complaint(watch, 3)[1] >= 0.2
+
+
+def test_a_line_tells_since_when_something_is_missed() -> None:
+    loss, missed_ns = Loss(LEAD_GONE, "process sim"), 1_796_000_000_123_000_000
+    said = str(loss_error(loss, 2500, missed_ns))
+    assert "after 2.500 s of the walk, missed since 2026-11-30T00:53:20.123Z, expected" in said
+    assert missed_ns_of(f"quadriga: {said}") == missed_ns
+    assert missed_ns_of(str(loss_error(loss, 2500))) == 0
