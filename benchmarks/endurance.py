@@ -46,6 +46,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--robots", type=int, default=2)
     parser.add_argument("--planner", default="distributed")
+    parser.add_argument("--seed", type=int, default=0, help="of the world")
     parser.add_argument("--out", type=Path, metavar="DIR", help="run folder (runs/<date>-<time>)")
     given = parser.parse_args()
     interrupt_on_sigterm()
@@ -53,6 +54,7 @@ def main() -> int:
         keys = {
             "team.robots": given.robots,
             "world.mode": "realtime",
+            "world.seed": given.seed,
             "world.seconds": 60.0 * given.minutes,
             "planner.kind": given.planner,
             "gait.stand_ms": _STAND_MS,
