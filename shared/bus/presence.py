@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+
+from quadriga.shared.runtime.clock import monotonic
 
 
 class Presence:
@@ -30,6 +32,27 @@ class Presence:
     def at(self, stage: str) -> frozenset[str]:
         """Names of those that are at `stage` now."""
         return frozenset(self._names(stage))
+
+    def await_all(
+        self,
+        stage: str,
+        names: frozenset[str],
+        timeout: float,
+        stopped: Callable[[], bool],
+        pause: Callable[[], None],
+    ) -> frozenset[str] | None:
+        """Who of `names` is still not at `stage` after `timeout` seconds; None: `stopped()` first.
+
+        Between two looks `pause()` is called.
+        """
+        deadline = monotonic() + timeout
+        while absent := names - self.at(stage):
+            if stopped():
+                return None
+            if monotonic() > deadline:
+                return absent
+            pause()
+        return frozenset()
 
     def duplicates(self, stage: str, own: Iterable[str]) -> frozenset[str]:
         """Names that two processes carry at `stage`; `own` is this one's, if it is there."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from queue import SimpleQueue
 from types import MappingProxyType
 from typing import Any, Final, Self
@@ -19,6 +19,7 @@ from quadriga.shared.bus.presence import Presence
 from quadriga.shared.bus.router_wait import RouterWait
 from quadriga.shared.bus.trust import check_trust
 from quadriga.shared.bus.zenoh_settings import member_settings, opening_error, router_settings
+from quadriga.shared.bus.zenoh_threads import one_thread_receives
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import ROUTER
@@ -308,19 +309,15 @@ class Bus:
             BusError: some were still absent after `timeout` seconds; the message names them.
         """
         wanted = frozenset(names) - {self.name}
-        deadline = monotonic() + timeout
-        while absent := wanted - self.members_at(stage):
-            if stopped():
-                return False
-            if monotonic() > deadline:
-                raise BusError(
-                    f"barrier of team {self.team!r}, seen by {self.name}",
-                    f"no {', '.join(sorted(absent))} at stage {stage!r} after {timeout:g} s",
-                    f"{', '.join(sorted(wanted))}",
-                    explain(absent) if explain else self._likely_cause(),
-                )
-            pause()
-        return True
+        absent = self._presence.await_all(stage, wanted, timeout, stopped, pause)
+        if absent:
+            raise BusError(
+                f"barrier of team {self.team!r}, seen by {self.name}",
+                f"no {', '.join(sorted(absent))} at stage {stage!r} after {timeout:g} s",
+                f"{', '.join(sorted(wanted))}",
+                explain(absent) if explain else self._likely_cause(),
+            )
+        return absent is not None
 
     def close(self) -> None:
         """Leave the network once the others have received what this process published.
@@ -394,6 +391,7 @@ def _open(settings: dict[str, Any], name: str) -> zenoh.Session:
     try:
         for at, value in settings.items():
             config.insert_json5(at, json.dumps(value))
-        return zenoh.open(config)
+        with nullcontext() if name == ROUTER else one_thread_receives():
+            return zenoh.open(config)
     except zenoh.ZError as error:
         raise opening_error(settings, at, name, str(error)) from None

@@ -1,0 +1,55 @@
+"""A member of a team receives in one thread, a router in as many as Zenoh has."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.config.load import load
+from quadriga.team.endpoint import free_endpoint
+
+PROGRAM = """
+import os, sys
+from pathlib import Path
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.config.load import load
+
+endpoint, who = sys.argv[1:]
+config = load(None, {"bus.endpoint": endpoint}).bus
+opened = Bus.route(endpoint, "team") if who == "router" else Bus.open(config, "team", who)
+with opened:
+    opened.declare(HERE)
+    opened.wait_for(HERE, {"r1"}, 20.0, lambda: False)
+    # Those that receive begin with the first link; Zenoh names them rx-0, rx-1, …
+    names = [(task / "comm").read_text() for task in Path("/proc/self/task").iterdir()]
+    print(sum(name.startswith("rx-") for name in names), os.environ.get("ZENOH_RUNTIME"))
+"""
+
+
+@pytest.mark.skipif(
+    not Path("/proc/self/task").exists(), reason="it looks at threads as Linux does"
+)
+@pytest.mark.parametrize(
+    ("who", "given", "threads"),
+    [("sim", None, 1), ("router", None, 2), ("sim", "(rx: (worker_threads: 3))", 3)],
+)
+def test_how_many_threads_receive(who: str, given: str | None, threads: int) -> None:
+    endpoint = free_endpoint()
+    environment = {name: text for name, text in os.environ.items() if name != "ZENOH_RUNTIME"}
+    if given is not None:
+        environment["ZENOH_RUNTIME"] = given
+    command = [sys.executable, "-c", PROGRAM, endpoint, who]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
+    config = load(None, {"bus.endpoint": endpoint}).bus
+    if who == "router":
+        config = replace(config, mode="client")
+    with Bus.open(config, "team", "r1", lambda: False) as other:
+        other.declare(HERE)
+        said, _ = process.communicate(timeout=60.0)
+    assert said == f"{threads} {given}\n"
