@@ -30,7 +30,7 @@ def keep_heading(memory: Array, stands: bool, p_foot: Array, dt: float) -> None:
     """Have the desired heading turn as the odometry frame does, which drifts with the IMU's yaw.
 
     While the robot stands, that is how its feet seem to turn; in a walk it is as fast as they
-    turned in its last long stand, what an IMU cannot drift left out.
+    turned in its last long stand, but for turns that are too fast for a drift.
 
     Args:
         memory: `Memory.flat`, whose `yaw_des` and memory of the stand are filled.

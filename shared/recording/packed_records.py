@@ -10,14 +10,19 @@ _PACKED_FROM: Final = 1 << 16  # bytes; of chunk indexes, which pack to 40 %
 
 
 class PackedRecords:
-    """Bytes in the order in which they were added; all but the newest are compressed."""
+    """Bytes in the order in which they were added; all but the newest are compressed.
+
+    Attributes:
+        count: how many records were added.
+        size: bytes in all of them, unpacked.
+    """
 
     def __init__(self) -> None:
         self._packed: list[bytes] = []
         self._newest: list[bytes] = []
         self._waiting = 0  # bytes of the newest
         self.count = 0
-        self.size = 0  # bytes of all records, unpacked
+        self.size = 0
 
     def append(self, record: bytes) -> None:
         """Add a record."""

@@ -45,11 +45,13 @@ def test_how_many_threads_receive(who: str, given: str | None, threads: int) -> 
     if given is not None:
         environment["ZENOH_RUNTIME"] = given
     command = [sys.executable, "-c", PROGRAM, endpoint, who]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
     config = load(None, {"bus.endpoint": endpoint}).bus
     if who == "router":
         config = replace(config, mode="client")
-    with Bus.open(config, "team", "r1", lambda: False) as other:
+    with (
+        subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process,
+        Bus.open(config, "team", "r1", lambda: False) as other,
+    ):
         other.declare(HERE)
         said, _ = process.communicate(timeout=60.0)
     assert said == f"{threads} {given}\n"

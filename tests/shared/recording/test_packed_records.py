@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import tracemalloc
 
 from hypothesis import given
@@ -25,8 +26,8 @@ def test_the_indexes_of_hours_take_little_memory() -> None:
     tracemalloc.start()
     for number in range(72_000):  # an hour of chunks of 50 ms
         place = 40_000 * number
-        words = [place, 10**18 + number * 50_000_000, *(place + 1_500 * n for n in range(25))]
-        kept.append(b"".join(word.to_bytes(8, "little") for word in words))
+        words = [place, 10**18 + number * 50_000_000, *range(place, place + 37_500, 1_500)]
+        kept.append(struct.pack("<27Q", *words))
     used, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert kept.size > 15_000_000
