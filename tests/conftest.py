@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from fcntl import LOCK_EX, flock
 from pathlib import Path
 from typing import Final
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+from quadriga.shared.runtime.scheduling import VARIABLE
 
 # The same examples each time, so that a change is judged by itself and not by chance; and no
 # verdict on speed, which on a busy machine is not the code's. HYPOTHESIS_PROFILE=search draws anew.
@@ -22,6 +26,23 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 def _own_runtime_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Teams of other tests, and of this machine's user, are not found."""
     os.environ["XDG_RUNTIME_DIR"] = str(tmp_path_factory.mktemp("runtime"))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _ordinary() -> None:
+    """Two workers share the cores: who merely computes lets the other's team run, too."""
+    os.environ[VARIABLE] = "ordinary"
+
+
+@pytest.fixture
+def _alone(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[None]:
+    """One at a time of the tests whose team has to keep real time; it precedes all else."""
+    with (tmp_path_factory.getbasetemp().parent / "alone.lock").open("w") as file:
+        flock(file, LOCK_EX)
+        monkeypatch.delenv(VARIABLE)
+        yield
 
 
 # Folders whose tests start processes and take long.

@@ -23,7 +23,7 @@ from quadriga.shared.members import RECORDER, has_lead
 from quadriga.shared.recording.admission import LARGEST, Admission
 from quadriga.shared.recording.writer import END
 from quadriga.shared.runtime.clock import sleep
-from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.scheduling import precede_ordinary, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.topics import EVENT
 
@@ -96,8 +96,7 @@ def run(
                 session = Session(bus, parts, keys, config, stopped, say)
                 me = None if selection.at_once else Introduction(bus, config, predictor_sha256)
                 role = _join(bus, config, stopped, me)
-                if config.world.mode == "lockstep":  # else the others leave it nothing
-                    take_priority(config.runtime.priority)
+                _schedule(config)
                 if role == MEMBER:
                     bus.declare(READY)
                 if role:
@@ -131,6 +130,14 @@ def _open_parts(
         selection.limits,
         admission=Admission(keys.own.__contains__),
     )
+
+
+def _schedule(config: Config) -> None:
+    """Go before ordinary processes, but not before the motors' ones when those are in a hurry."""
+    if config.world.mode == "lockstep":  # the others, who hurry always, would leave it nothing
+        take_priority(config.runtime.priority)
+    else:
+        precede_ordinary(config.runtime.priority)
 
 
 def _subscribe(bus: Bus, keys: KeyFilter) -> None:

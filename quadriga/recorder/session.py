@@ -55,7 +55,7 @@ class Session:
         self._bus, self._parts, self._keys, self._stopped = bus, parts, keys, stopped
         self._say = say
         self._flushed = self._begun = monotonic()
-        self._ended = self._seen = self._announced = False
+        self._ended = self._seen = self._announced = self._drops = False
         self._losses = LossWatch(lambda: find_loss(bus, config), config, grace=0.0)
 
     def record(self, *, late: bool, seen: bool) -> None:
@@ -104,6 +104,8 @@ class Session:
             if not some and (self.find_unannounced() is None or monotonic() > begun + LAST_WORDS):
                 break
         self._parts.admission.refused[OVERSIZED] += self._bus.oversized
+        if self._bus.dropped:
+            self._say(f"{self._bus.dropped:,} messages were dropped before they were recorded")
 
     def find_unannounced(self) -> Loss | None:
         """What has vanished without an announced end of the walk; None if nothing has."""
@@ -140,6 +142,9 @@ class Session:
             return
         self._parts.flush()
         self._flushed = monotonic()
+        if self._bus.dropped and not self._drops:
+            self._drops = True
+            self._say("this computer is too busy to record all: messages are dropped from now on")
         gone = self._losses.look() is not None
         self._ended = self._seen and gone
         self._seen = self._seen or self._losses.since is None

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import deque
 from contextlib import suppress
 from threading import Lock
-from typing import Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 from quadriga.shared.runtime.clock import monotonic
 
+INBOX: Final = 1 << 16  # packets that wait for a process at most, some seconds of ten robots
 Item = TypeVar("Item")
 
 
@@ -19,10 +20,18 @@ class Mailbox(Generic[Item]):
     timeout, when a signal's handler or a busy computer takes up the time that was left. It then
     computes a negative rest, which it takes for no limit. To put into and
     take from a `queue.Queue` costs ten times as much.
+
+    Args:
+        most: how many items wait at most: one more drops the oldest, so that who is too slow for
+            its senders does not fill the memory; 0: no limit.
+
+    Attributes:
+        dropped: how many items were dropped so.
     """
 
-    def __init__(self) -> None:
-        self._items: deque[Item] = deque()
+    def __init__(self, most: int = 0) -> None:
+        self.dropped = 0
+        self._items: deque[Item] = deque(maxlen=most or None)
         self._empty = Lock()  # released by `put`; whoever waits for an item acquires it
         self._empty.acquire()
 
@@ -31,6 +40,8 @@ class Mailbox(Generic[Item]):
 
     def put(self, item: Item) -> None:
         """Add an item, from any thread."""
+        if len(self._items) == self._items.maxlen:
+            self.dropped += 1
         self._items.append(item)
         if self._empty.locked():
             with suppress(RuntimeError):  # another thread has released it since

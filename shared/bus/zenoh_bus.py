@@ -13,7 +13,7 @@ from typing import Any, Final, Self
 import zenoh
 
 from quadriga.shared.bus.answers import Answers
-from quadriga.shared.bus.mailbox import Mailbox
+from quadriga.shared.bus.mailbox import INBOX, Mailbox
 from quadriga.shared.bus.newest import Newest
 from quadriga.shared.bus.presence import Presence
 from quadriga.shared.bus.router_wait import RouterWait
@@ -55,7 +55,7 @@ class Bus:
         self.team, self.name = team, name
         self._session = session
         self._me = str(session.info.zid())
-        self._inbox: Mailbox[zenoh.Sample] = Mailbox()
+        self._inbox: Mailbox[zenoh.Sample] = Mailbox(INBOX)
         self._oversized: SimpleQueue[None] = SimpleQueue()  # counts what several threads drop
         self._presence = Presence(self._me)
         self._declared: dict[str, zenoh.LivelinessToken] = {}
@@ -201,6 +201,11 @@ class Bus:
         """Payloads that were dropped because of their size so far."""
         return self._oversized.qsize()
 
+    @property
+    def dropped(self) -> int:
+        """Packets that were dropped so far because this process did not take them in."""
+        return self._inbox.dropped
+
     def collect(self, key: str) -> Callable[[], list[Arrival]]:
         """Keep what others publish on `key` apart from the inbox, each with when it arrived.
 
@@ -212,8 +217,7 @@ class Bus:
         kept: SimpleQueue[Arrival] = SimpleQueue()
 
         def keep(sample: zenoh.Sample) -> None:
-            now = monotonic_ns()
-            kept.put((now, str(sample.key_expr), sample.payload.to_bytes()))
+            kept.put((monotonic_ns(), str(sample.key_expr), sample.payload.to_bytes()))
 
         self._hear(key, _direct(keep))
         return lambda: [kept.get_nowait() for _ in range(kept.qsize())]
@@ -363,8 +367,7 @@ class Bus:
         return all(reply.ok is not None for reply in asked)
 
     def _hear(self, key: str, handler: Any) -> Any:
-        remote = zenoh.Locality.REMOTE
-        heard = self._session.declare_subscriber(key, handler, allowed_origin=remote)
+        heard = self._session.declare_subscriber(key, handler, allowed_origin=zenoh.Locality.REMOTE)
         self._declarations.append(heard)
         return heard
 

@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Final
 
 REALTIME: Final = "realtime"
+VARIABLE: Final = "QUADRIGA_PRIORITY"  # of the environment: what holds instead of the configuration
 _PRIORITY: Final = 1  # of 99: before every ordinary process, after everything else of the system
 _FIRST: Final = 2  # likewise, before those that walk
+_NICE: Final = -15  # of -20 to 19: an ordinary process gets a thirtieth beside it
 
 
 def take_priority(priority: str) -> bool:
@@ -18,17 +20,18 @@ def take_priority(priority: str) -> bool:
 
     So a thread that wakes up does not push out one at work, which costs both their caches, and
     no other program delays a command. The system keeps a share (5 % on Linux) for ordinary
-    processes. In real time the recorder stays one of them; in lock-step, where agents and world
-    wait for nothing but each other, it would starve, and is scheduled like them.
+    processes. In real time the recorder stays one of them, see `precede_ordinary`; in lock-step,
+    where agents and world wait for nothing but each other, it would starve, and is scheduled like
+    them.
 
     Args:
-        priority: `runtime.priority`.
+        priority: `runtime.priority`, unless the environment has `VARIABLE`.
 
     Returns:
         Whether it is so now: a user without the right (CAP_SYS_NICE, or an rtprio limit) is not
         refused, the process merely runs as an ordinary one.
     """
-    if priority != REALTIME:
+    if not _is_realtime(priority):
         return False
     try:
         _schedule(os.SCHED_RR, _PRIORITY)
@@ -39,6 +42,21 @@ def take_priority(priority: str) -> bool:
         )
         return False
     return True
+
+
+def precede_ordinary(priority: str) -> None:
+    """Give all threads of this process more of the processors than other ordinary ones get.
+
+    For who must neither hold up those that walk nor starve because others compute: the recorder
+    in real time. A user without the right (CAP_SYS_NICE) is not refused.
+
+    Args:
+        priority: as of `take_priority`; only `REALTIME` has an effect.
+    """
+    if _is_realtime(priority):
+        for thread in _threads():
+            with suppress(OSError):
+                os.setpriority(os.PRIO_PROCESS, thread, _NICE)
 
 
 def leave_priority() -> None:
@@ -65,10 +83,18 @@ def go_first(*, alone: bool = False) -> None:
         _schedule(os.SCHED_RR | os.SCHED_RESET_ON_FORK * alone, _FIRST)
 
 
+def _is_realtime(priority: str) -> bool:
+    return os.environ.get(VARIABLE, priority) == REALTIME
+
+
 def _schedule(policy: int, level: int) -> None:
-    for thread in Path("/proc/self/task").iterdir():
+    for thread in _threads():
         with suppress(ProcessLookupError):  # it has ended meanwhile
-            os.sched_setscheduler(int(thread.name), policy, os.sched_param(level))
+            os.sched_setscheduler(thread, policy, os.sched_param(level))
+
+
+def _threads() -> list[int]:
+    return [int(thread.name) for thread in Path("/proc/self/task").iterdir()]
 
 
 def count_cores() -> int:

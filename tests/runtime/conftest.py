@@ -6,7 +6,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from fcntl import LOCK_EX, flock
 from pathlib import Path
 
 import pytest
@@ -26,9 +25,8 @@ from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, ProcessSpec, process_table
 from quadriga.warm_up import warm_up
 
+BEGUN = "0 ms: start "  # in the log of a plant that drives time: all are there, and walk
 WAIT = 60.0  # s, more than anything here takes on a busy machine
-# Two workers share the cores: who merely computes lets the other's team run, too.
-ORDINARY = {"runtime.priority": "ordinary"}
 # Less than a team collects by default, which takes minutes; for all tests the same, so that they
 # collect but once.
 DATA = {"identification.seconds": 60.0}
@@ -90,8 +88,11 @@ Make = Callable[..., Team]
 
 
 @pytest.fixture
-def make_team(tmp_path: Path) -> Make:
-    """A function that makes a team of a test's own; keyword `section__key` sets a key."""
+def make_team(tmp_path: Path, request: pytest.FixtureRequest) -> Make:
+    """A function that makes a team of a test's own; keyword `section__key` sets a key.
+
+    Real time is kept by one test's team at a time.
+    """
 
     def make(**keys: object) -> Team:
         given = {
@@ -103,8 +104,9 @@ def make_team(tmp_path: Path) -> Make:
             "recorder.enabled": False,
         }
         keys = {"world.mode": "lockstep"} | {n.replace("__", "."): v for n, v in keys.items()}
-        given |= (ORDINARY if keys["world.mode"] == "lockstep" else {}) | keys
-        return Team(load(None, given), tmp_path)
+        if keys["world.mode"] == "realtime":
+            request.getfixturevalue("_alone")
+        return Team(load(None, given | keys), tmp_path)
 
     return make
 
@@ -113,14 +115,6 @@ def make_team(tmp_path: Path) -> Make:
 def _compiled() -> None:
     """Agents that walk are compiled once, before several processes would all do it."""
     warm_up(Config(), Console(stderr=True))
-
-
-@pytest.fixture
-def _alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """One at a time of the tests whose team needs more than one of two cores to keep real time."""
-    with (tmp_path_factory.getbasetemp().parent / "alone.lock").open("w") as file:
-        flock(file, LOCK_EX)
-        yield
 
 
 @pytest.fixture

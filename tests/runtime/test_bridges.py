@@ -123,10 +123,13 @@ def test_a_robot_stands_up_walks_and_lies_down_through_its_own_protocol(
 
 
 def replay_all(out: Path) -> str:
-    """What differs when all agents are replayed."""
+    """What differs when all agents are replayed, up to an input that the recorder lost."""
     command = [*QUADRIGA, "replay", str(out), "--all"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT, check=False)
-    return "" if done.returncode == 0 else done.stdout + done.stderr
+    said = done.stdout + done.stderr
+    whole = "equal to the byte" in said and "differ" not in said
+    lost = done.returncode == 2 and "input missing from the recording" in said
+    return "" if whole and (done.returncode == 0 or lost) else said
 
 
 @pytest.mark.usefixtures("robots")

@@ -25,6 +25,12 @@ pytestmark = [
 Watcher = Callable[..., Bus]
 # On a busy machine a page may have been silent for too long: then it takes the controls again.
 STAYS_IN_CHARGE = "news && !news.driver && drive.say({kind: 'take'})"
+CLICK_IF_TAKEN = """
+news.driver === 'page 1' && (document.getElementById('take').click(), true)
+"""
+TOLD_WHO = """
+news.driver === 'page 1' && document.body.innerText.includes('page 1 has the controls')
+"""
 # A gamepad that the test holds: its buttons and axes are `window.stick`.
 GAMEPAD = """
 window.stick = {connected: true, axes: [0, 0, 0, 0],
@@ -74,6 +80,18 @@ def is_in(bus: Bus, mode: str, reason: str = "", page: Page | None = None) -> No
     await_message(bus, STATUS.key("team", "r1"), Status, wanted)
 
 
+def wants_controls(second: Page, page: Page) -> None:
+    """Ask for the controls on another page while `page` has them, and be told who has."""
+    deadline = monotonic() + WAIT
+    while not second.evaluate(CLICK_IF_TAKEN):
+        assert monotonic() < deadline, second.text()
+        page.evaluate(STAYS_IN_CHARGE)
+    while not second.evaluate(TOLD_WHO):
+        assert monotonic() < deadline, second.text()
+        assert second.evaluate("news.driver") != "page 2"
+        page.evaluate(STAYS_IN_CHARGE)
+
+
 def url_of(team: Team) -> str:
     team.await_log("operator", "drive from http://")
     return team.log("operator").partition("drive from ")[2].split()[0]
@@ -118,10 +136,8 @@ def drive(team: Team, running: Launch, bus: Bus, chromium: Browser, folder: Path
             page.call("Page.bringToFront")
             page.click("#take")
             asks(bus, page, vx=0.3, wz=0.3)
-            second.await_true("document.body.innerText.includes('page 1 has the controls')")
-            second.evaluate("document.getElementById('take').click()")
+            wants_controls(second, page)
             asks(bus, page, vx=0.3, wz=0.3)
-            assert second.evaluate("news.driver") == "page 1"
             assert not second.complaints
         page.evaluate("stick.buttons[5].pressed = false; stick.axes[1] = stick.axes[2] = 0")
         is_in(bus, "stand")

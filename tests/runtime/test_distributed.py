@@ -23,7 +23,7 @@ from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Plan
 from quadriga.team.launch import Launch, process_table
 from tests.a1 import nominal_forces
-from tests.runtime.conftest import DATA, ORDINARY
+from tests.runtime.conftest import DATA
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
@@ -34,7 +34,7 @@ STEP_MS = 40
 @pytest.fixture(scope="module")
 def walks(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Run folders of one scenario walked as a user would, and by the same processes once more."""
-    config = load(None, {"team.robots": ROBOTS, **DATA, **ORDINARY})
+    config = load(None, {"team.robots": ROBOTS, **DATA})
     ensure_predictor(config, Console(stderr=True))
     first, second = (tmp_path_factory.mktemp("walk") / "run" for _ in range(2))
     command = [
@@ -49,7 +49,7 @@ def walks(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
         "--seed",
         "3",
         "--no-report",
-        *(f"--set={key}={value}" for key, value in (DATA | ORDINARY).items()),
+        *(f"--set={key}={value}" for key, value in DATA.items()),
         "--out",
         str(first),
     ]

@@ -25,7 +25,7 @@ from quadriga.shared.wire.about import ABOUT, About
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import QUADRIGA, Launch
-from tests.runtime.conftest import WAIT, Make, Team
+from tests.runtime.conftest import BEGUN, WAIT, Make, Team
 
 WAITS = """
 import sys
@@ -147,7 +147,7 @@ def test_a_team_that_waits_for_one_and_a_doctor_that_is_none_of_it(
 def test_a_doctor_beside_a_walk_finds_all_well_and_leaves_it_alone(make_team: Make) -> None:
     team = make_team(world__seconds=600.0)
     with team.launch() as running:
-        team.await_log("sim", "start")
+        team.await_log("sim", BEGUN)
         _, report = doctor(team.config, of=team)
         assert running.alive == {"sim", "r1", "r2", "operator"}
         running.watch(lambda: True)
@@ -171,7 +171,7 @@ def test_a_process_with_another_configuration_does_not_walk(make_team: Make) -> 
     mu = f"controller.mu {team.config.controller.mu}"
     assert "process operator: got exit status 2" in str(caught.value)
     assert f"got controller.mu 0.31, expected {mu} as sim has it" in str(caught.value)
-    assert "start" not in team.log("sim")
+    assert BEGUN not in team.log("sim")
 
 
 def test_nobody_at_all(config: Config) -> None:

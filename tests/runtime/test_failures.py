@@ -18,7 +18,7 @@ from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import EStop, Event, Status
 from quadriga.shared.wire.topics import EVENT
 from quadriga.team import launch
-from tests.runtime.conftest import WAIT, Make, run_alone
+from tests.runtime.conftest import BEGUN, WAIT, Make, run_alone
 from tests.runtime.frozen import PATIENCE, TEAM, await_tick, freeze
 
 FOREVER = 600.0  # s of world time
@@ -34,7 +34,7 @@ def test_a_frozen_robot_is_named_and_the_world_goes_on_until_it_returns(
 ) -> None:
     team = make_team(world__seconds=FOREVER, world__command_timeout=PATIENCE)
     with team.launch() as running:
-        team.await_log("sim", "start")
+        team.await_log("sim", BEGUN)
         freeze(running, watcher(team), "r2", tick=100, ticks=100)
         team.await_log("sim", f"silent r2 silent for {PATIENCE:g} s: the world goes on")
         team.await_log("sim", "back r2 answers again")
@@ -45,7 +45,7 @@ def test_who_is_frozen_to_the_end_is_named_and_nobody_else(make_team: Make) -> N
     team = make_team(world__seconds=1.0, world__command_timeout=0.5)
     rows = [replace(row, grace=1.0 if row.name == "r2" else row.grace) for row in team.rows()]
     with launch.Launch(rows, team.folder / "logs") as running:
-        team.await_log("sim", "start")
+        team.await_log("sim", BEGUN)
         os.kill(running.pids["r2"], signal.SIGSTOP)
         with pytest.raises(ProcessError, match="process r2: got no end after the walk"):
             running.watch(never)
@@ -87,7 +87,7 @@ def test_kill_9_of_one_stops_the_walk_and_names_it(make_team: Make, name: str) -
     team = make_team(world__seconds=FOREVER)
     with team.launch() as running:
         pids = running.pids
-        team.await_log("sim", "start")
+        team.await_log("sim", BEGUN)
         os.kill(pids[name], signal.SIGKILL)
         if name == "r2":  # the world notices by itself, if the launcher does not stop it before
             team.await_log("sim", "gone r2 gone")
@@ -102,7 +102,7 @@ def test_a_stopped_sim_server_ends_the_walk_for_all(
 ) -> None:
     team = make_team(world__seconds=FOREVER)
     with team.launch() as running:
-        team.await_log("sim", "start")
+        team.await_log("sim", BEGUN)
         os.kill(running.pids["sim"], number)
         running.watch(never)  # all leave by themselves, with exit status 0
     assert team.log("sim").splitlines()[-1].endswith("signal  signal")
@@ -116,7 +116,7 @@ def test_a_stopped_agent_leaves_cleanly_and_the_walk_stops(
     monkeypatch.setattr(launch, "_EARLY", 0.3)
     team = make_team(team__robots=1, world__seconds=FOREVER)
     with team.launch(standing=False) as running:
-        team.await_log("sim", "start")
+        team.await_log("sim", BEGUN)
         os.kill(running.pids["r1"], number)
         with pytest.raises(ProcessError, match="process r1: got an end while the team walked"):
             running.watch(never)
@@ -129,7 +129,7 @@ def test_a_stopped_agent_leaves_cleanly_and_the_walk_stops(
 def test_an_emergency_stop_damps_every_robot(make_team: Make, watcher: Watcher) -> None:
     team = make_team(world__seconds=FOREVER)
     with team.launch(standing=False) as running:
-        team.await_log("sim", "start")
+        team.await_log("sim", BEGUN)
         bus = watcher(team)
         stop = launch.ProcessSpec(
             "estop",
@@ -166,7 +166,7 @@ def test_the_world_obeys_an_emergency_stop_whatever_the_agents_do(
     team = make_team(world__seconds=FOREVER, world__mode=mode)
     file = str(team.folder / "config.toml")
     with team.launch() as running:
-        team.await_log("sim", "start")
+        team.await_log("sim", BEGUN)
         command = (*launch.QUADRIGA, "estop", "--reason", "smoke", "--config", file)
         status, errors = run_alone(launch.ProcessSpec("estop", command, 5.0))
         assert status == 2, "no agent says that it has stopped"
@@ -186,7 +186,7 @@ def test_an_emergency_stop_waits_for_nobody(make_team: Make, watcher: Watcher) -
     file = team.folder / "larger.toml"
     file.write_text(to_toml(larger), encoding="utf-8")
     with team.launch() as running:
-        team.await_log("sim", "start")
+        team.await_log("sim", BEGUN)
         bus = watcher(team)
         stop = subprocess.Popen(
             [*launch.QUADRIGA, "estop", "--config", str(file)], stderr=subprocess.PIPE, text=True

@@ -21,7 +21,7 @@ from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import M, decode, encode
 from quadriga.shared.wire.messages import Command, Event, Reference, State, Status, Truth
 from quadriga.shared.wire.topics import ESTOP, EVENT, STATUS, TABLE, TRUTH
-from tests.runtime.conftest import WAIT, Make, Team, run_alone
+from tests.runtime.conftest import BEGUN, WAIT, Make, Team, run_alone
 
 
 def test_every_tick_is_answered_and_recorded_and_everyone_leaves(make_team: Make) -> None:
@@ -142,7 +142,7 @@ def test_a_second_team_does_not_disturb_the_first(make_team: Make) -> None:
     intruders.mkdir()
     second = Team(team.config, intruders)
     with team.launch() as running:
-        team.await_log("sim", "start")
+        team.await_log("sim", BEGUN)
         rows = [row for row in second.rows(standing=False) if row.name in ("sim", "r1")]
         with ThreadPoolExecutor() as side_by_side:
             (sim_status, sim_said), (agent_status, agent_said) = side_by_side.map(run_alone, rows)

@@ -25,7 +25,7 @@ from quadriga.shared.wire.messages import Command, Measurement, Plan
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.team.operator import reference_at
-from tests.runtime.conftest import DATA, ORDINARY
+from tests.runtime.conftest import DATA
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
@@ -46,7 +46,6 @@ def config_of(kind: str) -> Config:
         "world.seed": 4,
         "bus.endpoint": free_endpoint(),
         **DATA,
-        **ORDINARY,
         **KINDS[kind],
     }
     return load(None, given)

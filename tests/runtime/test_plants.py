@@ -32,7 +32,7 @@ from quadriga.shared.wire.messages import (
 )
 from quadriga.shared.wire.topics import CLOCK
 from quadriga.team import launch
-from tests.runtime.conftest import WAIT, Make, Team
+from tests.runtime.conftest import BEGUN, WAIT, Make, Team
 
 FOREVER = 600.0  # s of world time
 Watcher = Callable[..., Bus]
@@ -138,8 +138,9 @@ def test_a_fall_in_one_world_ends_the_walk_of_all(make_team: Make) -> None:
     assert [e.kind for e in events].count("start") == 1
 
 
-@pytest.mark.parametrize("mode", [LOCKSTEP, REALTIME], ids=lambda mode: mode["world__mode"])
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    ("mode", "number"), [(LOCKSTEP, signal.SIGTERM), (REALTIME, signal.SIGKILL)]
+)
 def test_a_plant_that_dies_stops_the_team_and_is_named(
     puppets: Make, watcher: Watcher, mode: dict[str, str], number: signal.Signals
 ) -> None:
@@ -173,7 +174,7 @@ def test_the_others_leave_when_who_drives_time_dies(
 def test_a_frozen_plant_stops_the_team_and_is_named(make_team: Make) -> None:
     team = make_team(world__seconds=FOREVER, world__command_timeout=0.5, **EACH)
     with team.launch() as running:
-        team.await_log("plant_r1", "start")
+        team.await_log("plant_r1", BEGUN)
         os.kill(running.pids["plant_r2"], signal.SIGSTOP)
         team.await_log("plant_r1", "plant-gone  plant_r2 silent for 1 s")
         os.kill(running.pids["plant_r2"], signal.SIGCONT)
@@ -205,7 +206,7 @@ def test_a_robot_that_leaves_is_led_down_by_its_own_plant_and_the_walk_goes_on(
 ) -> None:
     team = make_team(world__seconds=4.0, **EACH)
     with team.launch() as running:
-        team.await_log("plant_r1", "start")
+        team.await_log("plant_r1", BEGUN)
         os.kill(running.pids["r2"], signal.SIGKILL)
         team.await_log("plant_r2", "gone r2 gone: the world goes on")
         team.await_log("plant_r2", "lowered r2 no command: its joints are led down")
@@ -220,7 +221,7 @@ def test_a_walk_that_is_told_to_stop_leaves_no_plant_behind(make_team: Make) -> 
     with subprocess.Popen(walk, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
         log = team.folder / "out" / "logs" / "plant_r1.log"
         deadline = monotonic() + WAIT
-        while not (log.exists() and "start" in log.read_text(encoding="utf-8")):
+        while not (log.exists() and BEGUN in log.read_text(encoding="utf-8")):
             assert monotonic() < deadline
             sleep(0.05)
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()

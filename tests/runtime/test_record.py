@@ -12,7 +12,7 @@ from pathlib import Path
 from quadriga.recordings.survey import survey
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.wire.messages import Event
-from tests.runtime.conftest import WAIT, Make, Team
+from tests.runtime.conftest import BEGUN, WAIT, Make, Team
 
 
 def beside(team: Team, name: str, room: int = -1) -> subprocess.Popen[str]:
@@ -41,7 +41,7 @@ def test_recorders_die_beside_a_team_that_walks_on(make_team: Make) -> None:
     others = []
     try:
         with team.launch() as running:
-            team.await_log("sim", "start")
+            team.await_log("sim", BEGUN)
             others = [
                 beside(team, "full.mcap", 60_000),
                 beside(team, "killed.mcap"),

@@ -43,7 +43,7 @@ from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.what_if.what_if import Branch, WhatIf, answer_what_if
 from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
-from tests.runtime.conftest import DATA, ORDINARY, WAIT
+from tests.runtime.conftest import DATA, WAIT
 from tests.runtime.frozen import PATIENCE, await_event, await_tick, freeze
 
 pytestmark = pytest.mark.usefixtures("_compiled")
@@ -55,7 +55,6 @@ SWING = 300  # the tick at which the first feet leave the ground
 def walked(folder: Path, disturb: Disturb | None = None, **keys: Any) -> Path:
     """The recording of a walk of two robots with all processes."""
     given = {**DATA, "team.robots": 2, "bus.endpoint": free_endpoint(), "world.seed": 5}
-    given |= ORDINARY if "world__mode" not in keys else {}
     given |= {name.replace("__", "."): value for name, value in keys.items()}
     config = load(None, given)
     predictor = ensure_predictor(config, Console(stderr=True))
@@ -292,6 +291,7 @@ def check_exact_up_to_a_loss(path: Path, outcome: ReplayOutcome) -> None:
         assert tick not in {m.tick for m in recording.messages(State, outcome.robot)}
 
 
+@pytest.mark.usefixtures("_alone")
 def test_real_time_is_replayed_to_the_byte(tmp_path: Path) -> None:
     for attempt in range(5):  # on a busy machine links drop messages, and robots pass over states
         run = walked(tmp_path / str(attempt), world__mode="realtime", world__seconds=1.5)
@@ -307,6 +307,7 @@ def test_real_time_is_replayed_to_the_byte(tmp_path: Path) -> None:
     assert list(Recording(run).messages(Consumed, "r1")), "it tells what it took in"
 
 
+@pytest.mark.usefixtures("_alone")
 def test_what_was_taken_in_in_real_time_cannot_be_guessed(tmp_path: Path) -> None:
     for attempt in range(5):
         run = walked(tmp_path / str(attempt), world__mode="realtime", world__seconds=0.5)

@@ -10,7 +10,7 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.shared.bus.zenoh_bus import Bus
-from tests.runtime.conftest import Make
+from tests.runtime.conftest import BEGUN, Make
 from tests.runtime.frozen import PATIENCE, freeze
 
 
@@ -24,7 +24,7 @@ def test_a_walk_with_a_frozen_robot_comes_out_equal(
         world__push="r1:50:90:0.3:0.1",
     )
     with team.launch() as running:
-        team.await_log("sim", "start")
+        team.await_log("sim", BEGUN)
         freeze(running, watcher(team), "r2", tick=100, ticks=300)
         team.await_log("sim", f"silent r2 silent for {PATIENCE:g} s")
         team.await_log("sim", "back r2 answers again")
@@ -44,7 +44,7 @@ def test_a_walk_with_a_fault_that_somebody_asked_for_comes_out_equal(
     )
     given = ("--config", str(team.folder / "config.toml"))
     with team.launch() as running:
-        team.await_log("sim", "start")
+        team.await_log("sim", BEGUN)
         assert main(["fault", "r1/imu", "garbage", "--live", "--for", "0.1", *given]) == 0
         team.await_log("sim", "imu sound again")
         assert main(["fault", "r2/imu", "off", "--live", *given]) == 2
@@ -62,7 +62,7 @@ def test_a_team_that_permits_no_faults_refuses_them(
 ) -> None:
     team = make_team(team__robots=1, world__seconds=600.0)
     with team.launch():
-        team.await_log("sim", "start")
+        team.await_log("sim", BEGUN)
         config = str(team.folder / "config.toml")
         assert main(["fault", "r1/imu", "off", "--live", "--config", config]) == 2
     (line,) = capsys.readouterr().err.splitlines()

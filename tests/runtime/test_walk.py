@@ -21,10 +21,7 @@ from tests.runtime.conftest import WAIT
 
 Start = Callable[..., subprocess.Popen[str]]
 QUADRIGA = (sys.executable, "-m", "quadriga")
-OPTIONS = (
-    *("--robots", "2", "--planner", "none", "--no-report"),
-    *("--set", "runtime.priority=ordinary"),  # as conftest's ORDINARY
-)
+OPTIONS = ("--robots", "2", "--planner", "none", "--no-report")
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 

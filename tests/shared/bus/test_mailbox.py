@@ -73,3 +73,24 @@ def test_an_item_that_was_taken_without_waiting_leaves_no_false_alarm(timeout: f
     assert monotonic() - begin >= timeout
     mailbox.put(3)
     assert mailbox.take(timeout) == 3
+
+
+def test_a_full_mailbox_drops_the_oldest_and_counts() -> None:
+    mailbox = Mailbox[int](3)
+    for k in range(5):
+        mailbox.put(k)
+    assert mailbox.dropped == 2
+    assert mailbox.take(0.0) == 2
+    mailbox.put(5)
+    assert mailbox.drain() == [3, 4, 5]
+    assert mailbox.dropped == 2
+
+
+def test_a_mailbox_that_overflows_while_it_is_read_keeps_the_order() -> None:
+    mailbox, taken = Mailbox[int](50), list[int]()
+    sender = Thread(target=lambda: [mailbox.put(k) for k in range(_ITEMS)])
+    sender.start()
+    while sender.is_alive() or len(mailbox):
+        taken += mailbox.drain()
+    assert taken == sorted(set(taken))
+    assert len(taken) + mailbox.dropped == _ITEMS

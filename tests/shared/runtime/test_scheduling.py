@@ -8,6 +8,8 @@ import sys
 
 import pytest
 
+from quadriga.shared.runtime.scheduling import VARIABLE
+
 _SCRIPT = """
 import os, sys, threading
 from quadriga.shared.runtime.scheduling import leave_priority, take_priority
@@ -20,6 +22,11 @@ if sys.argv[2] == "leave":
 policies = {os.sched_getscheduler(int(task)) for task in os.listdir("/proc/self/task")}
 print(taken, policies == {os.SCHED_RR}, policies == {os.SCHED_OTHER})
 """
+
+
+@pytest.fixture(autouse=True)
+def _no_word_of_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(VARIABLE, raising=False)
 
 
 def answer(priority: str, permission: str) -> tuple[list[str], str]:
@@ -47,6 +54,14 @@ def test_who_leaves_is_ordinary_again() -> None:
     assert answer("realtime", "leave") == (["True", "False", "True"], "")
 
 
+@pytest.mark.parametrize("priority", ["realtime", "ordinary"])
+def test_the_environment_overrides_the_configuration(
+    priority: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, "ordinary")
+    assert answer(priority, "") == (["False", "False", "True"], "")
+
+
 def test_ordinary_is_ordinary() -> None:
     assert answer("ordinary", "") == (["False", "False", "True"], "")
 
@@ -56,6 +71,26 @@ def test_without_the_right_it_runs_all_the_same() -> None:
     found, message = answer("realtime", "deny")
     assert found == ["False", "False", "True"]
     assert message.startswith("no real-time scheduling (Operation not permitted)")
+
+
+_NICE = """
+import os, sys, threading
+from quadriga.shared.runtime.scheduling import precede_ordinary
+threading.Thread(target=threading.Event().wait, daemon=True).start()
+precede_ordinary(sys.argv[1])
+print(*{os.getpriority(os.PRIO_PROCESS, int(task)) for task in os.listdir("/proc/self/task")})
+print(os.sched_getscheduler(0) == os.SCHED_OTHER)
+"""
+
+
+@pytest.mark.skipif(not permitted(), reason="this user may not take precedence")
+@pytest.mark.parametrize(("priority", "change"), [("realtime", -15), ("ordinary", 0)])
+def test_who_precedes_ordinary_processes_stays_behind_those_that_walk(
+    priority: str, change: int
+) -> None:
+    words = [sys.executable, "-c", _NICE, priority]
+    done = subprocess.run(words, check=True, capture_output=True, text=True)
+    assert done.stdout.split() == [str(change or os.getpriority(os.PRIO_PROCESS, 0)), "True"]
 
 
 _FIRST = """
