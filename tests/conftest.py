@@ -45,19 +45,29 @@ def _alone(
         yield
 
 
-# Folders whose tests start processes and take long.
-_LONG: Final = ("docs", "manual", "plugins", "runtime", "quadriga/experiments", "deploy")
+# Folders whose tests start processes and take long, and the one whose teams keep real time.
+_LONG: Final = ("docs", "manual", "plugins", "quadriga/experiments", "deploy")
+_REAL_TIME: Final = "runtime"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What takes long comes first: then at the end no worker waits long for another one's file."""
-    folders = [Path(__file__).parent / name for name in _LONG]
+    """What takes long comes first: then at the end no worker waits long for another one's file.
 
-    def rank(item: pytest.Item) -> int:
-        ranks = (n for n, folder in enumerate(folders) if item.path.is_relative_to(folder))
-        return next(ranks, len(folders))
-
-    items.sort(key=rank)
+    Between two files whose teams keep real time, one at a time, come two whose tests do not.
+    """
+    here = Path(__file__).parent
+    long = [here / name for name in _LONG]
+    items.sort(key=lambda item: not any(map(item.path.is_relative_to, long)))
+    files: dict[Path, list[pytest.Item]] = {}
+    for item in items:
+        files.setdefault(item.path, []).append(item)
+    real_time = [path for path in files if path.is_relative_to(here / _REAL_TIME)]
+    others = [path for path in files if path not in real_time]
+    order = []
+    for n, path in enumerate(real_time):
+        order += [path, *others[2 * n : 2 * n + 2]]
+    order += others[2 * len(real_time) :]
+    items[:] = [item for path in order for item in files[path]]
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
