@@ -88,7 +88,12 @@ def test_a_full_mailbox_drops_the_oldest_and_counts() -> None:
 
 def test_a_mailbox_that_overflows_while_it_is_read_keeps_the_order() -> None:
     mailbox, taken = Mailbox[int](50), list[int]()
-    sender = Thread(target=lambda: [mailbox.put(k) for k in range(_ITEMS)])
+
+    def send() -> None:
+        for k in range(_ITEMS):
+            mailbox.put(k)
+
+    sender = Thread(target=send)
     sender.start()
     while sender.is_alive() or len(mailbox):
         taken += mailbox.drain()
