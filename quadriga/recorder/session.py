@@ -8,6 +8,7 @@ from typing import Final
 
 from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter
+from quadriga.recorder.starvation import Starvation
 from quadriga.shared.bus.lead_watch import LAST_WORDS, Loss, LossWatch, find_loss
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
@@ -17,6 +18,7 @@ from quadriga.shared.recording.admission import OVERSIZED
 from quadriga.shared.recording.mcap_chunk import name_of
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
+from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Event
 from quadriga.shared.wire.topics import EVENT, find_topic
@@ -56,6 +58,7 @@ class Session:
         self._say = say
         self._flushed = self._begun = monotonic()
         self._ended = self._seen = self._announced = self._drops = False
+        self._hurries = config.world.mode == "lockstep"  # then it does from the start
         self._losses = LossWatch(lambda: find_loss(bus, config), config, grace=0.0)
 
     def record(self, *, late: bool, seen: bool) -> None:
@@ -68,14 +71,25 @@ class Session:
         self._seen = seen
         self._say(f"recording team {self._bus.team!r} to {self._parts.paths[0]}")
         self._flushed = self._begun = monotonic()
+        starvation = Starvation(self._begun)
         while not (self._stopped() or self._ended):
             self._take(max(0.0, self._flushed + FLUSH - monotonic()))
+            if starvation.look(monotonic()):
+                self._hurry()
             if late and monotonic() - self._begun > _LOOK and self._parts.messages:
                 late = False
                 self._report_missed()
             sleep(_GATHER)
         if late and self._parts.messages:
             self._report_missed()
+
+    def _hurry(self) -> None:
+        """Be scheduled like those that walk, who leave a recorder too little to keep up."""
+        if not self._hurries and take_priority(self._config.runtime.priority):
+            self._say(
+                "this computer is too busy: the recorder takes the priority of those that walk"
+            )
+        self._hurries = True
 
     def _report_missed(self) -> None:
         first_ticks = self._parts.first_ticks()

@@ -10,7 +10,10 @@ import pytest
 from quadriga.commands.parser import main
 
 WAYS = ("silence", "page", "keyboard", "gamepad")
-OPTIONS = ("--robots", "1", "--planner", "none", "--tries", "1")
+OPTIONS = (
+    *("--robots", "1", "--planner", "none", "--tries", "1"),
+    *("--set", "runtime.refuse_overload=false"),
+)
 
 
 @pytest.mark.usefixtures("_alone", "_compiled")

@@ -55,6 +55,7 @@ SWING = 300  # the tick at which the first feet leave the ground
 def walked(folder: Path, disturb: Disturb | None = None, **keys: Any) -> Path:
     """The recording of a walk of two robots with all processes."""
     given = {**DATA, "team.robots": 2, "bus.endpoint": free_endpoint(), "world.seed": 5}
+    given |= {"runtime.refuse_overload": False}
     given |= {name.replace("__", "."): value for name, value in keys.items()}
     config = load(None, given)
     predictor = ensure_predictor(config, Console(stderr=True))
