@@ -129,8 +129,8 @@ class RuntimeConfig:
         "realtime",
         "-",
         "realtime: agents, planner and plants, in lockstep also the recorder, take precedence over "
-        "ordinary processes (SCHED_RR) if the user may do so; in realtime the recorder has nice -15, "
-        "and takes the same precedence once it gets too little; ordinary: as any other; "
+        "ordinary processes (SCHED_RR) if the user may do so; in realtime the recorder has nice "
+        "-15, and takes the same precedence once it gets too little; ordinary: as any other; "
         "QUADRIGA_PRIORITY of the environment overrides it",
         choices=("realtime", "ordinary"),
     )

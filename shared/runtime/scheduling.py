@@ -20,9 +20,9 @@ def take_priority(priority: str) -> bool:
 
     So a thread that wakes up does not push out one at work, which costs both their caches, and
     no other program delays a command. The system keeps a share (5 % on Linux) for ordinary
-    processes. In real time the recorder stays one of them, see `precede_ordinary`, until it starves; in
-    lock-step, where agents and world wait for nothing but each other, it would at once, and is
-    scheduled like them.
+    processes. In real time the recorder stays one of them, see `precede_ordinary`, until it
+    starves; in lock-step, where agents and world wait for nothing but each other, it would at once,
+    and is scheduled like them.
 
     Args:
         priority: `runtime.priority`, unless the environment has `VARIABLE`.
