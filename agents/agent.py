@@ -23,6 +23,7 @@ from quadriga.agents.controller.whole_body.problem import (
 from quadriga.agents.healing import Healing, may_resume, ramp, step_healing
 from quadriga.agents.held_posture import held_row, hold_or_release
 from quadriga.agents.imu_bridge import ImuState, bridge_imu
+from quadriga.agents.imu_delay import find_delay
 from quadriga.agents.modes import (
     DAMPING,
     ESTOP,
@@ -222,7 +223,7 @@ class Agent:
         """Sense, plan, act. Each of them sees the mode after the stops that came up before it."""
         tick = inputs.state.tick
         dt = 1e-3 if state.tick < 0 else min(_LONGEST_DT, 1e-3 * (tick - state.tick))
-        imu, inputs = _believe(state.imu, inputs, dt)
+        imu, inputs = self._believe(state, inputs, dt)
         references = remember_references(state.references, inputs.references, tick)
         course, healing = self._course(state, tick, imu.missing_ms)
         team = self._look_around(state, inputs)
@@ -324,6 +325,13 @@ class Agent:
             return Mode(WALK, tick), replace(healing, resumed=tick)
         return step_mode(mode, tick, stand_ms, ends), healing
 
+    def _believe(self, state: AgentState, inputs: Inputs, dt: float) -> tuple[ImuState, Inputs]:
+        """What is remembered of the IMU, and the inputs with what is believed of it."""
+        read, memory, robot = inputs.state, state.low_level, self.config.robot
+        delay = find_delay(state.imu.delay, read, memory, read.tick - state.tick, robot)
+        imu, believed = bridge_imu(state.imu, read, dt, robot, delay=delay, memory=memory)
+        return imu, inputs if believed is read else replace(inputs, state=believed)
+
     def _sense(self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float) -> Sensed:
         truth = inputs.truth
         # One that is lost or late is bridged by the filter.
@@ -371,12 +379,6 @@ class Agent:
         if not passive:
             row[:12] = tau
         return Command.from_row(tick, tick * 1_000_000, row)
-
-
-def _believe(imu: ImuState, inputs: Inputs, dt: float) -> tuple[ImuState, Inputs]:
-    """What is remembered of the IMU, and the inputs with what is believed of it."""
-    imu, believed = bridge_imu(imu, inputs.state, dt)
-    return imu, inputs if believed is inputs.state else replace(inputs, state=believed)
 
 
 def _count(

@@ -1,12 +1,12 @@
 """What an agent believes of its IMU; while it says nothing, or what cannot be, the trunk is level.
 
 A reading is not believed that has no attitude, whose attitude has jumped against its gyro, that
-stays the same although its gyro turns, or whose gravity points upwards; nor an accelerometer alone
-that is at the end of its range, says nothing, or stays the same. Then the last attitude is kept,
-with no rates, and with gravity alone in place of the accelerometer: a trot goes on so for some
-tenths of a second. Soon the robot stands by its joints alone (`agents.held_posture`). What an IMU
-says afterwards is believed again once it has agreed with itself for a while; it need not agree with
-what was assumed.
+stays the same although its gyro turns, that is late (`agents.imu_delay`), or whose gravity points
+upwards; nor an accelerometer alone that is at the end of its range, says nothing, or stays the
+same. Then the last attitude is kept, with no rates, and in place of the accelerometer what the feet
+bear by the joints' torques: a trot goes on so for some tenths of a second. Soon the robot stands by
+its joints alone (`agents.held_posture`). What an IMU says afterwards is believed again once it has
+agreed with itself for a while; it need not agree with what was assumed.
 """
 
 from __future__ import annotations
@@ -16,8 +16,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from quadriga.agents.controller.foot_load import FOOT_LOAD
 from quadriga.agents.controller.maths.rows import places, row_size
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.agents.controller.memory import MEMORY, Memory
+from quadriga.agents.imu_delay import Delay, no_delay
+from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
+from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.messages import State
@@ -30,8 +34,14 @@ _TURNS: Final = 1e-3  # rad/s, of a gyro that says that the robot moves
 _RANGE: Final = 150.0  # m/s², of an accelerometer: those of such robots end at 16 g
 _UP_TIME: Final = 0.01  # s, time constant of the force that holds the trunk against gravity
 _UP_LEAST: Final = -3.0  # m/s²; nothing pulls a trunk down by so much for so long
+_UP_AGAIN: Final = 3.0  # m/s²; one that falls freely feels nothing, whichever way its IMU reads
+_LIFT_MOST: Final = 3.0 * GRAVITY  # legs push a trunk up by no more
 _QUAT_NORM2: Final = (0.5, 2.0)  # |q|² of an attitude
 _IMU: Final = slice(State.CUTS["imu_quat_wxyz"].start, State.CUTS["imu_accel"].stop)
+_FOOT_FORCE: Final = slice(
+    MEMORY.foot_load.start + FOOT_LOAD.force.start, MEMORY.foot_load.start + FOOT_LOAD.force.stop
+)
+_NO_FORCE: Final = np.zeros(3 * N_LEGS)
 _QUAT, _GYRO, _ACCEL = slice(0, 4), slice(4, 7), slice(7, 10)  # of what an IMU says
 
 
@@ -94,11 +104,13 @@ class ImuState:
         held: of a robot that stands without an attitude: since which tick, and where its joints
             were then, rad, (13,).
         bridged: whether something else was believed at the last tick than was read.
+        delay: what is known of it.
     """
 
     row: Array = field(default_factory=_initial_row)
     held: Array | None = None
     bridged: bool = False
+    delay: Delay = field(default_factory=no_delay)
 
     @property
     def missing_ms(self) -> float:
@@ -106,26 +118,41 @@ class ImuState:
         return float(self.row[IMU.missing])
 
 
-def bridge_imu(before: ImuState, state: State, dt: float) -> tuple[ImuState, State]:
+def bridge_imu(
+    before: ImuState,
+    state: State,
+    dt: float,
+    robot: RobotSpec,
+    *,
+    delay: Delay | None = None,
+    memory: Memory | None = None,
+) -> tuple[ImuState, State]:
     """What is remembered after a tick, and its state with what is believed of the IMU.
 
     Args:
         before: what was remembered.
         state: what was read.
         dt: time since the last reading, s.
+        robot: its kind.
+        delay: what is known of it now; None: as before.
+        memory: of the low level, which knows what the feet bear; None: it has none yet.
     """
     row, imu = before.row.copy(), state.row[_IMU]
-    if _judge(row, imu, dt):
-        return ImuState(row, before.held), state
+    delay = before.delay if delay is None else delay
+    force = _NO_FORCE if memory is None else memory.flat[_FOOT_FORCE]
+    if _judge(row, imu, dt, delay.late, force, robot.geometry.mass):
+        return ImuState(row, before.held, delay=delay), state
     bridged = state.row.copy()
     bridged[_IMU] = row[IMU.believed]
-    return ImuState(row, before.held, bridged=True), State.from_row(
+    return ImuState(row, before.held, bridged=True, delay=delay), State.from_row(
         state.tick, state.stamp_ns, bridged
     )
 
 
 @compiled
-def _judge(memory: Array, imu: Array, dt: float) -> bool:
+def _judge(
+    memory: Array, imu: Array, dt: float, late: bool, foot_force: Array, mass: float
+) -> bool:
     """Whether all that an IMU says is believed; `memory` is brought up to date."""
     before, believed, ms = memory[IMU.read].copy(), memory[IMU.believed], 1e3 * dt
     attitude = _is_attitude(imu[_QUAT])
@@ -134,12 +161,12 @@ def _judge(memory: Array, imu: Array, dt: float) -> bool:
     memory[IMU.read] = imu
     memory[IMU.begun] = 1.0 if attitude else memory[IMU.begun]
     moves = np.max(np.abs(imu[_GYRO])) > _TURNS
-    agrees = agrees and not (moves and memory[IMU.same] >= _SAME_MS)
-    memory[IMU.agrees] = memory[IMU.agrees] + ms if agrees else 0.0
+    agrees = agrees and not late and not (moves and memory[IMU.same] >= _SAME_MS)
     _note_vertical(memory, imu, dt)
     # Of an IMU that was not believed, gravity must point downwards, too.
-    upright = memory[IMU.missing] <= 0.0 or memory[IMU.up] >= _UP_LEAST
-    whole = agrees and upright and memory[IMU.agrees] >= BELIEVED_AFTER_MS
+    agrees = agrees and (memory[IMU.missing] <= 0.0 or memory[IMU.up] >= _UP_AGAIN)
+    memory[IMU.agrees] = memory[IMU.agrees] + ms if agrees else 0.0
+    whole = agrees and memory[IMU.agrees] >= BELIEVED_AFTER_MS
     if whole:
         believed[:7] = imu[:7]
         memory[IMU.missing] = 0.0
@@ -147,20 +174,37 @@ def _judge(memory: Array, imu: Array, dt: float) -> bool:
         believed[_GYRO] = 0.0
         memory[IMU.missing] += ms
     believes = _judge_accel(memory, imu[_ACCEL], moves, ms)
+    if not believes:
+        lift = _lift(foot_force, mass)
+        believed[_ACCEL] = lift * _vertical(believed[_QUAT])
     return whole and believes
 
 
 @compiled
 def _judge_accel(memory: Array, accel: Array, moves: bool, ms: float) -> bool:
-    """Whether the accelerometer is believed; else what is believed is gravity alone."""
+    """Whether the accelerometer is believed, and if so, what it says."""
     same = moves and memory[IMU.same_accel] >= _SAME_MS
     agrees = _is_in_range(accel) and not same and memory[IMU.up] >= _UP_LEAST
     memory[IMU.agrees_accel] = memory[IMU.agrees_accel] + ms if agrees else 0.0
     long_enough = memory[IMU.agrees_accel] >= BELIEVED_AFTER_MS
     believes = agrees and long_enough and memory[IMU.missing] <= 0.0
-    believed = memory[IMU.believed]
-    believed[_ACCEL] = accel if believes else GRAVITY * _vertical(believed[_QUAT])
+    if believes:
+        memory[IMU.believed][_ACCEL] = accel
     return believes
+
+
+@compiled
+def _lift(foot_force: Array, mass: float) -> float:
+    """The trunk's specific force upwards as the feet tell it, m/s²: a trot bounces.
+
+    Args:
+        foot_force: of the ground on the feet by the joints' torques, (12,), N, odometry frame; all
+            zero where nobody has told it: then gravity alone is balanced.
+        mass: of the robot, kg.
+    """
+    if not np.any(foot_force):
+        return GRAVITY
+    return min(_LIFT_MOST, max(0.0, np.sum(foot_force[2::3]) / mass))
 
 
 @compiled

@@ -10,6 +10,7 @@ import pytest
 
 from quadriga.agents.imu_bridge import BELIEVED_AFTER_MS, ImuState, bridge_imu
 from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robot.a1 import A1
 from quadriga.shared.wire.messages import State
 from tests.a1 import standing
 
@@ -74,7 +75,7 @@ def follow(spoil: Callable[[State], State]) -> tuple[list[State], list[State], l
         state = rocking(tick)
         if FAILS <= tick < BACK:
             state = spoil(state)
-        memory, out = bridge_imu(memory, state, DT)
+        memory, out = bridge_imu(memory, state, DT, A1)
         read.append(state)
         believed.append(out)
         missing.append(memory.missing_ms)
@@ -135,12 +136,12 @@ def test_a_robot_that_stands_still_may_read_the_same_for_long() -> None:
     memory = ImuState()
     for tick in range(500):
         state = standing(tick)
-        memory, believed = bridge_imu(memory, state, DT)
+        memory, believed = bridge_imu(memory, state, DT, A1)
         assert believed is state
 
 
 def test_without_any_reading_the_trunk_is_level() -> None:
     memory = ImuState()
-    memory, believed = bridge_imu(memory, be_off(standing(0)), DT)
+    memory, believed = bridge_imu(memory, be_off(standing(0)), DT, A1)
     np.testing.assert_array_equal(imu_of(believed), [1, 0, 0, 0, 0, 0, 0, 0, 0, GRAVITY])
     assert memory.missing_ms == pytest.approx(1.0)
