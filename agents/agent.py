@@ -22,8 +22,7 @@ from quadriga.agents.controller.whole_body.problem import (
 )
 from quadriga.agents.healing import Healing, may_resume, ramp, step_healing
 from quadriga.agents.held_posture import held_row, hold_or_release
-from quadriga.agents.imu_bridge import ImuState, bridge_imu
-from quadriga.agents.imu_delay import find_delay
+from quadriga.agents.imu_bridge import ImuBridge, ImuState
 from quadriga.agents.modes import (
     DAMPING,
     ESTOP,
@@ -136,6 +135,7 @@ class Agent:
         self._watch, self._rising = TeamWatch(config, robot), Rising(config)
         yoked = neighbours(config.team.robots, config.team.yokes, self.index)
         self._blind_ms = _YOKED_BLIND_MS if yoked else _BLIND_MS
+        self._imu = ImuBridge(config.robot)
         self._schedules = Schedules(config, self.index)
         self._tasks = Tasks(config)
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
@@ -327,9 +327,8 @@ class Agent:
 
     def _believe(self, state: AgentState, inputs: Inputs, dt: float) -> tuple[ImuState, Inputs]:
         """What is remembered of the IMU, and the inputs with what is believed of it."""
-        read, memory, robot = inputs.state, state.low_level, self.config.robot
-        delay = find_delay(state.imu.delay, read, memory, read.tick - state.tick, robot)
-        imu, believed = bridge_imu(state.imu, read, dt, robot, delay=delay, memory=memory)
+        read, ticks = inputs.state, inputs.state.tick - state.tick
+        imu, believed = self._imu.step(state.imu, read, state.low_level, ticks, dt)
         return imu, inputs if believed is read else replace(inputs, state=believed)
 
     def _sense(self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float) -> Sensed:

@@ -1,12 +1,13 @@
-"""What an agent believes of its IMU; while it says nothing, or what cannot be, the trunk is level.
+"""What an agent believes of its IMU, and what else while that says nothing, or what cannot be.
 
 A reading is not believed that has no attitude, whose attitude has jumped against its gyro, that
 stays the same although its gyro turns, that is late (`agents.imu_delay`), or whose gravity points
 upwards; nor an accelerometer alone that is at the end of its range, says nothing, or stays the
-same. Then the last attitude is kept, with no rates, and in place of the accelerometer what the feet
-bear by the joints' torques: a trot goes on so for some tenths of a second. Soon the robot stands by
-its joints alone (`agents.held_posture`). What an IMU says afterwards is believed again once it has
-agreed with itself for a while; it need not agree with what was assumed.
+same. Then the legs stand for it: the attitude goes on from the last one as two feet that stand tell
+how the trunk turns, and what the feet bear is its specific force. They do not tell all, so that a
+trot goes on for some tenths of a second only; soon the robot stands by its joints alone
+(`agents.held_posture`). What an IMU says afterwards is believed again once it has agreed with
+itself for a while; it need not agree with what was assumed.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.agents.controller.foot_load import FOOT_LOAD
-from quadriga.agents.controller.maths.rows import places, row_size
-from quadriga.agents.controller.memory import MEMORY, Memory
-from quadriga.agents.imu_delay import Delay, no_delay
-from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.agents.controller.maths.rows import numbers, places, row_size
+from quadriga.agents.controller.memory import MEMORY, MEMORY_SIZE, Memory
+from quadriga.agents.imu_delay import DELAY, find_delay, nothing_said
+from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robot.spec import N_GEOMETRY, Geometry, RobotSpec
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.messages import State
@@ -32,6 +33,7 @@ _JUMP: Final = 0.1  # rad, of an attitude against its gyro from one reading to t
 _SAME_MS: Final = 20  # for which readings may be equal to the last digit: IMUs may be slow
 _TURNS: Final = 1e-3  # rad/s, of a gyro that says that the robot moves
 _RANGE: Final = 150.0  # m/s², of an accelerometer: those of such robots end at 16 g
+_TURN_MOST: Final = 5.0  # rad/s; faster than any trunk turns that does not fall
 _UP_TIME: Final = 0.01  # s, time constant of the force that holds the trunk against gravity
 _UP_LEAST: Final = -3.0  # m/s²; nothing pulls a trunk down by so much for so long
 _UP_AGAIN: Final = 3.0  # m/s²; one that falls freely feels nothing, whichever way its IMU reads
@@ -41,7 +43,7 @@ _IMU: Final = slice(State.CUTS["imu_quat_wxyz"].start, State.CUTS["imu_accel"].s
 _FOOT_FORCE: Final = slice(
     MEMORY.foot_load.start + FOOT_LOAD.force.start, MEMORY.foot_load.start + FOOT_LOAD.force.stop
 )
-_NO_FORCE: Final = np.zeros(3 * N_LEGS)
+_NO_MEMORY: Final = np.zeros(MEMORY_SIZE)  # no foot stands, none bears
 _QUAT, _GYRO, _ACCEL = slice(0, 4), slice(4, 7), slice(7, 10)  # of what an IMU says
 
 
@@ -101,16 +103,16 @@ class ImuState:
 
     Attributes:
         row: see `ImuLayout`.
+        legs: what `agents.imu_delay` remembers of what the legs said.
         held: of a robot that stands without an attitude: since which tick, and where its joints
             were then, rad, (13,).
         bridged: whether something else was believed at the last tick than was read.
-        delay: what is known of it.
     """
 
     row: Array = field(default_factory=_initial_row)
+    legs: Array = field(default_factory=nothing_said)
     held: Array | None = None
     bridged: bool = False
-    delay: Delay = field(default_factory=no_delay)
 
     @property
     def missing_ms(self) -> float:
@@ -118,42 +120,65 @@ class ImuState:
         return float(self.row[IMU.missing])
 
 
-def bridge_imu(
-    before: ImuState,
-    state: State,
-    dt: float,
-    robot: RobotSpec,
-    *,
-    delay: Delay | None = None,
-    memory: Memory | None = None,
-) -> tuple[ImuState, State]:
-    """What is remembered after a tick, and its state with what is believed of the IMU.
+class ImuBridge:
+    """Fixed data of what an agent believes of its IMU.
 
     Args:
-        before: what was remembered.
-        state: what was read.
-        dt: time since the last reading, s.
         robot: its kind.
-        delay: what is known of it now; None: as before.
-        memory: of the low level, which knows what the feet bear; None: it has none yet.
     """
-    row, imu = before.row.copy(), state.row[_IMU]
-    delay = before.delay if delay is None else delay
-    force = _NO_FORCE if memory is None else memory.flat[_FOOT_FORCE]
-    if _judge(row, imu, dt, delay.late, force, robot.geometry.mass):
-        return ImuState(row, before.held, delay=delay), state
-    bridged = state.row.copy()
-    bridged[_IMU] = row[IMU.believed]
-    return ImuState(row, before.held, bridged=True, delay=delay), State.from_row(
-        state.tick, state.stamp_ns, bridged
-    )
+
+    def __init__(self, robot: RobotSpec) -> None:
+        self._geometry = np.array(robot.geometry)
+
+    def step(
+        self, before: ImuState, state: State, memory: Memory | None, ticks: int, dt: float
+    ) -> tuple[ImuState, State]:
+        """What is remembered after a tick, and its state with what is believed of the IMU.
+
+        Args:
+            before: what was remembered.
+            state: what was read.
+            memory: of the low level, which knows the feet; None: it has none yet.
+            ticks: since the last reading.
+            dt: that time, as far as filters go on by it, s.
+        """
+        row, legs = before.row.copy(), before.legs.copy()
+        flat = _NO_MEMORY if memory is None else memory.flat
+        if _believe(row, legs, state.row, flat, self._geometry, state.tick, ticks, dt):
+            return ImuState(row, legs, before.held), state
+        bridged = state.row.copy()
+        bridged[_IMU] = row[IMU.believed]
+        believed = State.from_row(state.tick, state.stamp_ns, bridged)
+        return ImuState(row, legs, before.held, bridged=True), believed
 
 
 @compiled
-def _judge(
-    memory: Array, imu: Array, dt: float, late: bool, foot_force: Array, mass: float
+def _believe(
+    row: Array,
+    legs: Array,
+    state: Array,
+    memory: Array,
+    constants: Array,
+    tick: int,
+    ticks: int,
+    dt: float,
 ) -> bool:
-    """Whether all that an IMU says is believed; `memory` is brought up to date."""
+    """Whether all that an IMU says is believed; `row` and `legs` are brought up to date."""
+    geometry = Geometry(*numbers(constants, N_GEOMETRY))
+    late = find_delay(legs, state, memory, tick, ticks, geometry)
+    imu, believed = state[_IMU], row[IMU.believed]
+    attitude, accel = _judge(row, imu, dt, late)
+    if not attitude:
+        _turn_on(believed, legs[DELAY.turn], dt)
+    if not accel:
+        lift = _lift(memory[_FOOT_FORCE], geometry.mass)
+        believed[_ACCEL] = lift * _vertical(believed[_QUAT])
+    return attitude and accel
+
+
+@compiled
+def _judge(memory: Array, imu: Array, dt: float, late: bool) -> tuple[bool, bool]:
+    """Whether attitude and gyro are believed, and the accelerometer; `memory` is brought up."""
     before, believed, ms = memory[IMU.read].copy(), memory[IMU.believed], 1e3 * dt
     attitude = _is_attitude(imu[_QUAT])
     agrees = attitude and (memory[IMU.begun] < 0.5 or _follows(before, imu, dt))
@@ -169,15 +194,16 @@ def _judge(
     whole = agrees and memory[IMU.agrees] >= BELIEVED_AFTER_MS
     if whole:
         believed[:7] = imu[:7]
-        memory[IMU.missing] = 0.0
-    else:
-        believed[_GYRO] = 0.0
-        memory[IMU.missing] += ms
-    believes = _judge_accel(memory, imu[_ACCEL], moves, ms)
-    if not believes:
-        lift = _lift(foot_force, mass)
-        believed[_ACCEL] = lift * _vertical(believed[_QUAT])
-    return whole and believes
+    memory[IMU.missing] = 0.0 if whole else memory[IMU.missing] + ms
+    return whole, _judge_accel(memory, imu[_ACCEL], moves, ms)
+
+
+@compiled
+def _turn_on(believed: Array, turn: Array, dt: float) -> None:
+    """Go on from the last attitude as the legs say that the trunk turns, rad/s."""
+    believed[_GYRO] = np.minimum(_TURN_MOST, np.maximum(-_TURN_MOST, turn))
+    quat = _turned(believed[_QUAT], dt * believed[_GYRO])
+    believed[_QUAT] = quat / np.sqrt(np.sum(quat * quat))
 
 
 @compiled
@@ -231,10 +257,21 @@ def _follows(before: Array, imu: Array, dt: float) -> bool:
     """Whether an attitude follows from the one before by the gyro."""
     if not _is_attitude(before[_QUAT]):
         return False
-    w, x, y, z = before[_QUAT]
-    a, b, c = 0.25 * dt * (before[_GYRO] + imu[_GYRO])
-    # q ⊗ (1, ω dt / 2), and half the sine of the angle between it and what is read.
-    expected = np.array(
+    # Half the sine of the angle between what follows and what is read.
+    expected = _turned(before[_QUAT], 0.5 * dt * (before[_GYRO] + imu[_GYRO]))
+    quat = imu[_QUAT]
+    cosine = abs(np.sum(expected * quat)) / np.sqrt(
+        np.sum(expected * expected) * np.sum(quat * quat)
+    )
+    return bool(cosine >= np.cos(0.5 * _JUMP))
+
+
+@compiled
+def _turned(quat_wxyz: Array, angle: Array) -> Array:
+    """An attitude, turned by small angles about the trunk's axes, (3,), rad: q ⊗ (1, angle / 2)."""
+    w, x, y, z = quat_wxyz
+    a, b, c = 0.5 * angle
+    return np.array(
         [
             w - x * a - y * b - z * c,
             x + w * a + y * c - z * b,
@@ -242,11 +279,6 @@ def _follows(before: Array, imu: Array, dt: float) -> bool:
             z + w * c + x * b - y * a,
         ]
     )
-    quat = imu[_QUAT]
-    cosine = abs(np.sum(expected * quat)) / np.sqrt(
-        np.sum(expected * expected) * np.sum(quat * quat)
-    )
-    return bool(cosine >= np.cos(0.5 * _JUMP))
 
 
 @compiled

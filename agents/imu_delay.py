@@ -15,9 +15,9 @@ import numpy as np
 from quadriga.agents.controller.maths.leg_kinematics import leg_kinematics
 from quadriga.agents.controller.maths.rotation import cross
 from quadriga.agents.controller.maths.rows import places, row_size
-from quadriga.agents.controller.memory import MEMORY, Memory
+from quadriga.agents.controller.memory import MEMORY
 from quadriga.shared.robot.conventions import Array
-from quadriga.shared.robot.spec import Geometry, RobotSpec
+from quadriga.shared.robot.spec import Geometry
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import State
 
@@ -26,7 +26,8 @@ _SPAN: Final = 121  # ms, of what is remembered of the legs
 _TIME_MS: Final = 40.0  # time constant of the means
 _DISAGREES: Final = 0.2  # (rad/s)², of the gyro with what the legs say now: it is this far off
 _UNLIKE: Final = 0.5  # at least this share of what it says,
-_ALIKE: Final = 0.15  # and of what they said a while ago by at most this share
+_ALIKE: Final = 0.1  # and of what they said a while ago by at most this share
+_SEEN_MS: Final = 30.0  # for which that must be so: where feet slide, it is for less, by chance
 _DOUBT_MS: Final = 400.0  # for which an IMU that was late is not believed
 _LONG_DOUBT_MS: Final = 1000.0  # if it is late again: a robot that walks stands meanwhile
 _AGAIN_MS: Final = 3000.0  # from the begin of a doubt, for which another one is a long one
@@ -49,6 +50,9 @@ class DelayLayout(NamedTuple):
             the trunk's frame, and whether they said anything.
         misfit: mean square of what the gyro says less what the legs said, by lag, (rad/s)².
         power: mean square of what the gyro says across that line, by lag, (rad/s)².
+        turn: the trunk's rate as far as the legs tell it now, (3,), rad/s, trunk's frame: nothing
+            about the line through two feet that stand, and nothing at all without two.
+        seen: for how long the IMU has seemed late, ms.
         doubt: for how long the IMU is not believed, ms.
         again: for how long another delay is one of several, ms.
     """
@@ -56,108 +60,96 @@ class DelayLayout(NamedTuple):
     legs: slice
     misfit: slice
     power: slice
+    turn: slice
+    seen: int
     doubt: int
     again: int
 
 
 DELAY: Final = DelayLayout(
-    **places(legs=_SPAN * _LEGS, misfit=len(_LAGS), power=len(_LAGS), doubt=1, again=1)
+    **places(
+        legs=_SPAN * _LEGS, misfit=len(_LAGS), power=len(_LAGS), turn=3, seen=1, doubt=1, again=1
+    )
 )
 
 
-class Delay(NamedTuple):
-    """What is known of an IMU's delay.
-
-    Attributes:
-        row: what is remembered, see `DelayLayout`.
-        late: whether the IMU is, or was a while ago, and is not to be believed.
-    """
-
-    row: Array
-    late: bool
+def nothing_said() -> Array:
+    """What is remembered before the first tick."""
+    return np.zeros(row_size(DELAY))
 
 
-def no_delay() -> Delay:
-    """What is known before the first tick."""
-    return Delay(np.zeros(row_size(DELAY)), late=False)
-
-
+@compiled
 def find_delay(
-    before: Delay, state: State, memory: Memory | None, ticks: int, robot: RobotSpec
-) -> Delay:
-    """What is known after a tick.
+    row: Array, state: Array, memory: Array, tick: int, ticks: int, geometry: Geometry
+) -> bool:
+    """Whether the IMU is late, or was a while ago, and is not to be believed.
 
     Args:
-        before: what was known.
-        state: what the robot measures.
-        memory: of the low level, which knows the feet that stand; None: it has none yet.
+        row: what is remembered, see `DelayLayout`; brought up to date.
+        state: what the robot measures, `State.row`.
+        memory: of the low level, which knows the feet that stand, `Memory.flat`.
+        tick: the present one.
         ticks: from the last one to this one, ms.
-        robot: its kind.
+        geometry: of the legs.
     """
-    row = before.row.copy()
-    stands = np.zeros(4) if memory is None else _standing(memory.flat)
-    return Delay(row, _find(row, state.row, state.tick, stands, ticks, robot.geometry))
-
-
-@compiled
-def _standing(memory: Array) -> Array:
-    """Which feet stand by the schedule and bear load, (4,), 0 or 1."""
-    return memory[MEMORY.contact] * (1.0 - memory[MEMORY.early_contact])
-
-
-@compiled
-def _find(
-    row: Array, state: Array, tick: int, stands: Array, ticks: int, geometry: Geometry
-) -> bool:
     legs = row[DELAY.legs].reshape(_SPAN, _LEGS)
     for passed in range(min(ticks, _SPAN)):
         legs[(tick - passed) % _SPAN, _SAID] = 0.0
-    _listen(legs[tick % _SPAN], state, stands, geometry)
+    said = legs[tick % _SPAN]
+    _listen(said, state, memory, geometry)
+    row[DELAY.turn] = said[_SAID] * said[_TURN]
     misfit, power = row[DELAY.misfit], row[DELAY.power]
-    _compare(misfit, power, legs, state[_GYRO], tick)
+    if said[_SAID] > 0.5:
+        _compare(misfit, power, legs, state[_GYRO], tick)
     row[DELAY.doubt] = max(0.0, row[DELAY.doubt] - ticks)
     row[DELAY.again] = max(0.0, row[DELAY.again] - ticks)
-    if row[DELAY.doubt] <= 0.0 and _is_late(misfit, power):
+    row[DELAY.seen] = row[DELAY.seen] + ticks if _seems_late(misfit, power) else 0.0
+    if row[DELAY.doubt] <= 0.0 and row[DELAY.seen] >= _SEEN_MS:
         row[DELAY.doubt] = _LONG_DOUBT_MS if row[DELAY.again] > 0.0 else _DOUBT_MS
         row[DELAY.again] = _AGAIN_MS
     return bool(row[DELAY.doubt] > 0.0)
 
 
 @compiled
-def _listen(said: Array, state: Array, stands: Array, geometry: Geometry) -> None:
+def _listen(said: Array, state: Array, memory: Array, geometry: Geometry) -> None:
     """Note what the legs say now of how the trunk turns, if two of a pair stand.
 
     With feet at p₁ and p₂ that do not move, ω × d = v₂ − v₁ for d = p₁ − p₂ and the velocities v of
     the feet as seen from the trunk; hence ω less its part along d is d × (v₂ − v₁) / |d|².
     """
+    contact, early = memory[MEMORY.contact], memory[MEMORY.early_contact]
     for first, second in _PAIRS:
-        if stands[first] > 0.5 and stands[second] > 0.5:
-            place, velocity, _ = leg_kinematics(state[_Q], state[_V], geometry)
-            line = place[first] - place[second]
-            length2 = np.sum(line * line)
-            said[_TURN] = cross(line, velocity[second] - velocity[first]) / length2
-            said[_LINE] = line / np.sqrt(length2)
-            said[_SAID] = 1.0
-            return
+        if min(contact[first], contact[second]) < 0.5 or max(early[first], early[second]) > 0.5:
+            continue
+        place, velocity, _ = leg_kinematics(state[_Q], state[_V], geometry)
+        line = place[first] - place[second]
+        length2 = np.sum(line * line)
+        said[_TURN] = cross(line, velocity[second] - velocity[first]) / length2
+        said[_LINE] = line / np.sqrt(length2)
+        said[_SAID] = 1.0
+        return
 
 
 @compiled
 def _compare(misfit: Array, power: Array, legs: Array, gyro: Array, tick: int) -> None:
     """Bring the means up to date, at lags at which legs have said something."""
-    if legs[tick % _SPAN, _SAID] < 0.5:
-        return
+    share = 1.0 / _TIME_MS
     for index in range(len(_LAGS)):
         said = legs[(tick - _LAGS[index]) % _SPAN]
         if said[_SAID] < 0.5:
             continue
-        turn = gyro - np.sum(gyro * said[_LINE]) * said[_LINE]
-        error = turn - said[_TURN]
-        misfit[index] += (np.sum(error * error) - misfit[index]) / _TIME_MS
-        power[index] += (np.sum(turn * turn) - power[index]) / _TIME_MS
+        along = gyro[0] * said[3] + gyro[1] * said[4] + gyro[2] * said[5]
+        error2, turn2 = 0.0, 0.0
+        for axis in range(3):
+            turn = gyro[axis] - along * said[3 + axis]
+            turn2 += turn * turn
+            error2 += (turn - said[axis]) ** 2
+        misfit[index] += share * (error2 - misfit[index])
+        power[index] += share * (turn2 - power[index])
 
 
 @compiled
-def _is_late(misfit: Array, power: Array) -> bool:
+def _seems_late(misfit: Array, power: Array) -> bool:
     """Whether the gyro says what the legs said a while ago, and not what they say now."""
     if misfit[0] < max(_DISAGREES, _UNLIKE * power[0]):
         return False

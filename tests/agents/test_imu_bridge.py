@@ -8,13 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quadriga.agents.imu_bridge import BELIEVED_AFTER_MS, ImuState, bridge_imu
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.agents.controller.foot_load import FOOT_LOAD
+from quadriga.agents.controller.memory import MEMORY, Memory, initial_memory
+from quadriga.agents.imu_bridge import BELIEVED_AFTER_MS, ImuBridge, ImuState
 from quadriga.shared.robot.a1 import A1
+from quadriga.shared.robot.conventions import GRAVITY, Array
 from quadriga.shared.wire.messages import State
-from tests.a1 import standing
+from tests.a1 import leg_kinematics, standing
+from tests.agents.still_feet import rates_over_still_feet
 
 DT = 1e-3
+BRIDGE = ImuBridge(A1)
 FAILS, BACK, END = 300, 800, 900  # ms
 
 
@@ -75,7 +79,7 @@ def follow(spoil: Callable[[State], State]) -> tuple[list[State], list[State], l
         state = rocking(tick)
         if FAILS <= tick < BACK:
             state = spoil(state)
-        memory, out = bridge_imu(memory, state, DT, A1)
+        memory, out = BRIDGE.step(memory, state, None, 1, DT)
         read.append(state)
         believed.append(out)
         missing.append(memory.missing_ms)
@@ -97,11 +101,13 @@ def test_an_imu_that_fails_is_bridged_until_it_agrees_with_itself_again(
     read, believed, missing = follow(spoil)
     seen = next(tick for tick in range(FAILS, BACK) if missing[tick])
     assert seen - FAILS < seen_after
-    last = believed[seen - 1]
+    last = believed[seen - 1].imu_quat_wxyz
     for tick in range(seen, BACK):
         state = believed[tick]
         assert missing[tick] == pytest.approx(tick - seen + 1)
-        np.testing.assert_array_equal(state.imu_quat_wxyz, last.imu_quat_wxyz)
+        np.testing.assert_allclose(
+            state.imu_quat_wxyz, last / np.linalg.norm(last), rtol=0, atol=1e-12
+        )
         assert not state.imu_gyro.any()
         assert np.linalg.norm(state.imu_accel) == pytest.approx(GRAVITY)
         np.testing.assert_array_equal(state.q_joint, read[tick].q_joint)
@@ -136,12 +142,50 @@ def test_a_robot_that_stands_still_may_read_the_same_for_long() -> None:
     memory = ImuState()
     for tick in range(500):
         state = standing(tick)
-        memory, believed = bridge_imu(memory, state, DT, A1)
+        memory, believed = BRIDGE.step(memory, state, None, 1, DT)
         assert believed is state
 
 
 def test_without_any_reading_the_trunk_is_level() -> None:
     memory = ImuState()
-    memory, believed = bridge_imu(memory, be_off(standing(0)), DT, A1)
+    memory, believed = BRIDGE.step(memory, be_off(standing(0)), None, 1, DT)
     np.testing.assert_array_equal(imu_of(believed), [1, 0, 0, 0, 0, 0, 0, 0, 0, GRAVITY])
     assert memory.missing_ms == pytest.approx(1.0)
+
+
+def test_what_the_feet_bear_takes_the_place_of_the_accelerometer() -> None:
+    flat = initial_memory()
+    force = flat[MEMORY.foot_load][FOOT_LOAD.force].reshape(4, 3)
+    force[[0, 3], 2] = 0.75 * A1.weight  # a trunk that is pushed up by half of its weight
+    _, believed = BRIDGE.step(ImuState(), be_off(standing(0)), Memory(flat), 1, DT)
+    np.testing.assert_allclose(believed.imu_accel, [0.0, 0.0, 1.5 * GRAVITY])
+    force[:, 2] = -A1.weight, 0.0, 0.0, 0.0  # torques say what cannot be
+    _, believed = BRIDGE.step(ImuState(), be_off(standing(0)), Memory(flat), 1, DT)
+    np.testing.assert_array_equal(believed.imu_accel, 0.0)
+
+
+def test_an_imu_upside_down_is_not_believed_in_free_fall() -> None:
+    memory = ImuState()
+    for tick in range(END):
+        state = rocking(tick)
+        if tick >= FAILS:
+            fall = np.zeros(3) if 500 <= tick < 560 else state.imu_accel
+            state = be_wrong(replace(state, imu_accel=fall))
+        memory, believed = BRIDGE.step(memory, state, None, 1, DT)
+        assert (believed is state) == (tick < FAILS)
+
+
+def test_the_attitude_goes_on_as_the_legs_say_that_the_trunk_turns() -> None:
+    flat, memory = initial_memory(), ImuState()
+    flat[MEMORY.contact] = 1.0, 0.0, 0.0, 1.0
+    place, _, _ = leg_kinematics(A1.q_stand, np.zeros(12))
+    omega = 2.0 * np.cross(place[0] - place[3], [1.0, 0.0, 0.0])  # across the line of the two feet
+    rates = rates_over_still_feet(A1.q_stand, np.zeros(3), omega)
+    for tick in range(250):
+        state = be_off(replace(standing(tick), v_joint=rates))
+        memory, believed = BRIDGE.step(memory, state, Memory(flat), 1, DT)
+        np.testing.assert_allclose(believed.imu_gyro, omega, atol=1e-9)
+    angle = 0.25 * np.linalg.norm(omega)
+    axis = omega / np.linalg.norm(omega)
+    expected = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis])
+    np.testing.assert_allclose(believed.imu_quat_wxyz, expected, atol=1e-6)

@@ -40,6 +40,13 @@ def test_yoked_robots_walk_on_without_the_imu_of_one_for_half_a_second(kind: str
     assert modes == [("stand", ""), ("walk", "")]
 
 
+@pytest.mark.parametrize("robots", [1, 2])
+def test_a_robot_does_not_fall_whose_imu_is_late_for_good(robots: int) -> None:
+    modes, fallen = walk_with(f"imu delayed {1e-3 * FAILS:g}", FAILS + 4000, robots)
+    assert fallen == ()
+    assert modes[-1] == ("stand", "imu-lost")
+
+
 def test_without_an_imu_for_good_a_robot_holds_its_joints() -> None:
     modes, fallen = walk_with(f"imu off {1e-3 * FAILS:g}", FAILS + 4000)
     assert fallen == ()
