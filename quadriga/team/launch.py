@@ -17,6 +17,7 @@ from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import LAST, LEADS, OPERATOR, RECORDER, ROUTER, SIM, Member, has_lead
 from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.scheduling import valid_priority
 from quadriga.team.fork_server import Fork
 from quadriga.team.forked import ForkedProcess, start_forked
 
@@ -71,7 +72,11 @@ def process_table(
         sha256: the predictor's, for the recording.
         armed: whether bridges may command their robots.
         view: URL of a picture of the team, for who drives it; "": none.
+
+    Raises:
+        ConfigError: the environment asks for a priority that there is not.
     """
+    valid_priority(config.runtime.priority)  # or each process would refuse it
     bridged = config.team.plant == BRIDGED
 
     def build_row(member: Member) -> ProcessSpec:

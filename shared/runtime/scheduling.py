@@ -8,7 +8,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
+from quadriga.shared.errors import ConfigError
+
 REALTIME: Final = "realtime"
+ORDINARY: Final = "ordinary"
 VARIABLE: Final = "QUADRIGA_PRIORITY"  # of the environment: what holds instead of the configuration
 _PRIORITY: Final = 1  # of 99: before every ordinary process, after everything else of the system
 _FIRST: Final = 2  # likewise, before those that walk
@@ -30,6 +33,9 @@ def take_priority(priority: str) -> bool:
     Returns:
         Whether it is so now: a user without the right (CAP_SYS_NICE, or an rtprio limit) is not
         refused, the process merely runs as an ordinary one.
+
+    Raises:
+        ConfigError: the environment's priority is none.
     """
     if not _is_realtime(priority):
         return False
@@ -83,8 +89,21 @@ def go_first(*, alone: bool = False) -> None:
         _schedule(os.SCHED_RR | os.SCHED_RESET_ON_FORK * alone, _FIRST)
 
 
+def valid_priority(priority: str) -> str:
+    """The priority that holds: the environment's, or this one of the configuration.
+
+    Raises:
+        ConfigError: the environment's is none.
+    """
+    found = os.environ.get(VARIABLE, priority)
+    if found not in (REALTIME, ORDINARY):
+        expected = f"{REALTIME} or {ORDINARY}, or that it is not set"
+        raise ConfigError(f"{VARIABLE} of the environment", repr(found), expected)
+    return found
+
+
 def _is_realtime(priority: str) -> bool:
-    return os.environ.get(VARIABLE, priority) == REALTIME
+    return valid_priority(priority) == REALTIME
 
 
 def _schedule(policy: int, level: int) -> None:

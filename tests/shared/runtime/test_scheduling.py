@@ -8,7 +8,8 @@ import sys
 
 import pytest
 
-from quadriga.shared.runtime.scheduling import VARIABLE
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.runtime.scheduling import VARIABLE, valid_priority
 
 _SCRIPT = """
 import os, sys, threading
@@ -60,6 +61,16 @@ def test_the_environment_overrides_the_configuration(
 ) -> None:
     monkeypatch.setenv(VARIABLE, "ordinary")
     assert answer(priority, "") == (["False", "False", "True"], "")
+
+
+def test_a_priority_of_the_environment_that_there_is_not_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(VARIABLE, "Realtime")
+    with pytest.raises(ConfigError, match=r"QUADRIGA_PRIORITY .* 'Realtime', expected realtime or"):
+        valid_priority("ordinary")
+    monkeypatch.setenv(VARIABLE, "ordinary")
+    assert valid_priority("realtime") == "ordinary"
 
 
 def test_ordinary_is_ordinary() -> None:
