@@ -15,11 +15,9 @@ from quadriga.agents.controller.foot_load import foot_load_rule
 from quadriga.agents.controller.memory import Memory
 from quadriga.agents.controller.schedule import Schedule
 from quadriga.agents.controller.sensed import Sensed
-from quadriga.agents.controller.whole_body.problem import (
-    UNCONSTRAINED,
-    WholeBodyProblem,
-    WholeBodySolution,
-)
+from quadriga.agents.controller.whole_body.problem import WholeBodyProblem, WholeBodySolution
+from quadriga.agents.counters import ENCODER_BRIDGED, IMU_BRIDGED, count
+from quadriga.agents.encoder_bridge import EncoderBridge
 from quadriga.agents.healing import Healing, may_resume, ramp, step_healing
 from quadriga.agents.held_posture import held_row, hold_or_release
 from quadriga.agents.imu_bridge import ImuBridge, ImuState
@@ -43,8 +41,8 @@ from quadriga.agents.modes import (
     step_mode,
     stop_safely,
 )
-from quadriga.agents.planner.qp_solver import SOLVED, SolvedQp
-from quadriga.agents.planning.interface import Expected, PlanningInputs, PlanningOutputs
+from quadriga.agents.planner.qp_solver import SolvedQp
+from quadriga.agents.planning.interface import Expected, PlanningInputs
 from quadriga.agents.planning.operator_references import reference_at, remember_references
 from quadriga.agents.planning.registry import build_planning
 from quadriga.agents.predictor.predictor import Predictor
@@ -58,7 +56,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import neighbours
 from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import code_of, with_detail
+from quadriga.shared.wire.codes import with_detail
 from quadriga.shared.wire.messages import Command, Measurement, Reference
 from quadriga.shared.wire.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
 
@@ -89,6 +87,7 @@ class AgentState:
     team: Teammates = field(default_factory=Teammates)
     rise: Rise | None = None
     imu: ImuState = field(default_factory=ImuState)
+    encoders: Array | None = None
 
 
 @record
@@ -135,7 +134,7 @@ class Agent:
         self._watch, self._rising = TeamWatch(config, robot), Rising(config)
         yoked = neighbours(config.team.robots, config.team.yokes, self.index)
         self._blind_ms = _YOKED_BLIND_MS if yoked else _BLIND_MS
-        self._imu = ImuBridge(config.robot)
+        self._imu, self._encoders = ImuBridge(config.robot), EncoderBridge(config.robot)
         self._schedules = Schedules(config, self.index)
         self._tasks = Tasks(config)
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
@@ -223,7 +222,7 @@ class Agent:
         """Sense, plan, act. Each of them sees the mode after the stops that came up before it."""
         tick = inputs.state.tick
         dt = 1e-3 if state.tick < 0 else min(_LONGEST_DT, 1e-3 * (tick - state.tick))
-        imu, inputs = self._believe(state, inputs, dt)
+        imu, encoders, inputs, bridged = self._believe(state, inputs, dt)
         references = remember_references(state.references, inputs.references, tick)
         course, healing = self._course(state, tick, imu.missing_ms)
         team = self._look_around(state, inputs)
@@ -261,7 +260,7 @@ class Agent:
         tau = solution.tau if not failures else state.last_tau  # the QP's, or the last good ones
         imu = hold_or_release(imu, inputs.state, stands=mode.name == STAND)
         command = self._command(tick, tau, mode, imu.held, solved=not failures)
-        counters = _count(state.counters, planned, solution, bridged=imu.bridged)
+        counters = count(state.counters, planned, solution, bridged)
         outputs = Outputs(
             command,
             measurement,
@@ -274,7 +273,7 @@ class Agent:
         )
         whole = led and not imu.missing_ms and self._is_whole(tick, mode, team, planning)
         healing = self._heal(healing, mode, inputs, whole=whole)
-        after = (references, tau, failures, counters, healing, team, None, imu)
+        after = (references, tau, failures, counters, healing, team, None, imu, encoders)
         new = AgentState(tick, mode, planning, acted.memory, *after)
         return new, outputs, (sensed, asked, acted)
 
@@ -325,11 +324,18 @@ class Agent:
             return Mode(WALK, tick), replace(healing, resumed=tick)
         return step_mode(mode, tick, stand_ms, ends), healing
 
-    def _believe(self, state: AgentState, inputs: Inputs, dt: float) -> tuple[ImuState, Inputs]:
-        """What is remembered of the IMU, and the inputs with what is believed of it."""
+    def _believe(
+        self, state: AgentState, inputs: Inputs, dt: float
+    ) -> tuple[ImuState, Array, Inputs, tuple[str, ...]]:
+        """What is remembered of the sensors, what is believed of them, and of which not all is."""
         read, ticks = inputs.state, inputs.state.tick - state.tick
-        imu, believed = self._imu.step(state.imu, read, state.low_level, ticks, dt)
-        return imu, inputs if believed is read else replace(inputs, state=believed)
+        encoders, believed = self._encoders.step(state.encoders, read, 1e-3 * ticks)
+        held = () if believed is read else (ENCODER_BRIDGED,)
+        imu, believed = self._imu.step(state.imu, believed, state.low_level, ticks, dt)
+        if believed is read:
+            return imu, encoders, inputs, ()
+        bridged = (*held, IMU_BRIDGED) if imu.bridged else held
+        return imu, encoders, replace(inputs, state=believed), bridged
 
     def _sense(self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float) -> Sensed:
         truth = inputs.truth
@@ -378,22 +384,3 @@ class Agent:
         if not passive:
             row[:12] = tau
         return Command.from_row(tick, tick * 1_000_000, row)
-
-
-def _count(
-    counters: Mapping[str, int],
-    planned: PlanningOutputs,
-    solution: WholeBodySolution,
-    *,
-    bridged: bool,
-) -> Mapping[str, int]:
-    """The counters with what was out of the ordinary at this tick."""
-    names = ["imu_bridged"] if bridged else []
-    if planned.plan is not None and planned.plan.status != SOLVED:
-        names.append(f"plan_{code_of(planned.plan.status)}")
-    names += planned.unusual
-    if solution.status != UNCONSTRAINED:
-        names.append("qp_constrained" if solution.solved else "qp_failed")
-    if not names:
-        return counters
-    return {**counters, **{name: counters.get(name, 0) + 1 for name in names}}

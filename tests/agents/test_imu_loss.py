@@ -1,4 +1,4 @@
-"""A robot that walks, and whose IMU fails: it stands, and does not fall."""
+"""A robot that walks, and whose IMU or encoder fails: it does not fall."""
 
 from __future__ import annotations
 
@@ -58,3 +58,11 @@ def test_half_a_second_without_an_accelerometer_stops_nobody(kind: str) -> None:
     modes, fallen = walk_with(f"accel {kind} {1e-3 * FAILS:g} 0.5", FAILS + 2000)
     assert fallen == ()
     assert modes[-1] == ("walk", "")
+
+
+@pytest.mark.parametrize("kind", ["off", "garbage"])
+def test_half_a_second_without_a_knees_encoder_stops_nobody(kind: str) -> None:
+    fault = f"encoder_FL_calf {kind} {1e-3 * FAILS:g} 0.5"
+    modes, fallen = walk_with(fault, FAILS + 2500, 2, seed=61)
+    assert fallen == ()
+    assert modes == [("stand", ""), ("walk", "")]

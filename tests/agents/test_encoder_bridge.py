@@ -1,0 +1,98 @@
+"""What an agent believes of encoders that fail."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from quadriga.agents.encoder_bridge import EncoderBridge
+from quadriga.shared.robot.a1 import A1
+from quadriga.shared.robot.conventions import Array
+from quadriga.shared.wire.messages import State
+from tests.a1 import standing
+
+DT = 1e-3
+FAILS, BACK, END = 300, 800, 900  # ms
+KNEE = 2
+BRIDGE = EncoderBridge(A1)
+
+
+def swinging(tick: int) -> State:
+    """A robot that swings all joints as fast as a trot does, with encoders of some noise."""
+    chance, t = np.random.default_rng(tick), DT * tick
+    q = A1.q_stand + 0.3 * np.sin(25.0 * t) + 5e-4 * chance.standard_normal(12)
+    v = 7.5 * np.cos(25.0 * t) + 0.05 * chance.standard_normal(12)
+    return replace(standing(tick), q_joint=q, v_joint=v)
+
+
+def with_knee(state: State, q: float, v: float) -> State:
+    angles, rates = state.q_joint.copy(), state.v_joint.copy()
+    angles[KNEE], rates[KNEE] = q, v
+    return replace(state, q_joint=angles, v_joint=rates)
+
+
+def be_off(state: State) -> State:
+    return with_knee(state, 0.0, 0.0)
+
+
+def be_garbage(state: State) -> State:
+    chance = np.random.default_rng(state.tick + 1_000_000)
+    return with_knee(state, chance.uniform(-2.7, -0.9), chance.uniform(-21.0, 21.0))
+
+
+def be_beyond(state: State) -> State:
+    """A reading that drifts away from what can be, at a rate that it tells."""
+    return with_knee(state, state.q_joint[KNEE] + 9.0 * DT * (state.tick - FAILS), 9.0)
+
+
+def follow(spoil: Callable[[State], State]) -> tuple[list[State], list[State]]:
+    """What was read and what was believed, by tick."""
+    memory: Array | None = None
+    read, believed = list[State](), list[State]()
+    for tick in range(END):
+        state = swinging(tick)
+        if FAILS <= tick < BACK:
+            state = spoil(state)
+        memory, out = BRIDGE.step(memory, state, DT)
+        read.append(state)
+        believed.append(out)
+    return read, believed
+
+
+def test_sound_encoders_are_believed_as_they_are() -> None:
+    read, believed = follow(lambda state: state)
+    assert all(a is b for a, b in zip(read, believed, strict=True))
+
+
+@pytest.mark.parametrize(("spoil", "seen_after"), [(be_off, 1), (be_garbage, 5), (be_beyond, 250)])
+def test_an_encoder_that_fails_is_held_until_it_agrees_with_itself_again(
+    spoil: Callable[[State], State], seen_after: int
+) -> None:
+    read, believed = follow(spoil)
+    seen = next(tick for tick in range(FAILS, BACK) if believed[tick] is not read[tick])
+    assert seen - FAILS < seen_after
+    others = np.arange(12) != KNEE
+    for tick in range(seen, BACK):
+        assert believed[tick].q_joint[KNEE] == believed[seen - 1].q_joint[KNEE]
+        assert believed[tick].v_joint[KNEE] == 0.0
+        np.testing.assert_array_equal(believed[tick].q_joint[others], read[tick].q_joint[others])
+        np.testing.assert_array_equal(believed[tick].imu_gyro, read[tick].imu_gyro)
+    sound = next(tick for tick in range(BACK, END) if believed[tick] is read[tick])
+    assert 19 <= sound - BACK <= 21
+
+
+def test_where_ticks_were_passed_over_an_angle_may_be_another() -> None:
+    memory, _ = BRIDGE.step(None, swinging(0), DT)
+    for tick in range(15, 300, 15):
+        memory, believed = BRIDGE.step(memory, swinging(tick), 15 * DT)
+        assert believed.tick == tick
+        np.testing.assert_array_equal(believed.q_joint, swinging(tick).q_joint)
+
+
+def test_the_first_reading_is_believed() -> None:
+    state = be_off(standing(0))
+    _, believed = BRIDGE.step(None, state, DT)
+    assert believed is state
