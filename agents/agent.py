@@ -72,7 +72,7 @@ _LONGEST_DT: Final = 0.02  # s, after a gap in the ticks the filters advance by 
 class AgentState:
     """Everything the agent remembers between ticks; `planning` is known to its planning part.
 
-    `rise` is there while the robot gets up.
+    `rise` is there while the robot gets up; `encoders` is known to `agents.encoder_bridge`.
     """
 
     tick: int

@@ -58,7 +58,7 @@ class ImuLayout(NamedTuple):
         same_accel: likewise of the accelerometer alone.
         agrees: time for which readings have been in agreement, ms.
         agrees_accel: likewise of the accelerometer alone.
-        up: filtered specific force along the trunk's vertical, m/s².
+        up: filtered specific force along the vertical by the attitude that was read, m/s².
         missing: time since the last attitude that was believed, ms.
     """
 
@@ -187,7 +187,8 @@ def _judge(memory: Array, imu: Array, dt: float, late: bool) -> tuple[bool, bool
     memory[IMU.begun] = 1.0 if attitude else memory[IMU.begun]
     moves = np.max(np.abs(imu[_GYRO])) > _TURNS
     agrees = agrees and not late and not (moves and memory[IMU.same] >= _SAME_MS)
-    _note_vertical(memory, imu, dt)
+    if attitude:
+        _note_vertical(memory, imu, dt)
     # Of an IMU that was not believed, gravity must point downwards, too.
     agrees = agrees and (memory[IMU.missing] <= 0.0 or memory[IMU.up] >= _UP_AGAIN)
     memory[IMU.agrees] = memory[IMU.agrees] + ms if agrees else 0.0
@@ -235,9 +236,9 @@ def _lift(foot_force: Array, mass: float) -> float:
 
 @compiled
 def _note_vertical(memory: Array, imu: Array, dt: float) -> None:
-    """Filter the force along the vertical that the accelerometer measures, while it measures."""
+    """Filter the force along the IMU's own vertical that it measures, while it measures."""
     if _is_in_range(imu[_ACCEL]):
-        up = np.sum(_vertical(memory[IMU.believed][_QUAT]) * imu[_ACCEL])
+        up = np.sum(_vertical(imu[_QUAT]) * imu[_ACCEL])
         memory[IMU.up] += dt / (_UP_TIME + dt) * (up - memory[IMU.up])
 
 

@@ -154,13 +154,12 @@ PLANNERS = pytest.mark.parametrize(
 
 
 @PLANNERS
-def test_finite_but_absurd_rates_of_joints_are_one_failure_and_no_crash(planner: str) -> None:
+def test_finite_but_absurd_rates_of_joints_are_not_believed_and_no_crash(planner: str) -> None:
     config = replace(ALONE, planner=replace(ALONE.planner, adaptation=planner or "none"))
     robot = Robot(config, planner=bool(planner))
-    last = robot.run(400).command.tau
-    # No foot is then known to stand, so that the filter makes no use of rates.
+    robot.run(400)
     outputs = robot.step(over_the_bus(replace(standing(400), v_joint=np.full(12, 1e200))))
-    np.testing.assert_array_equal(outputs.command.tau, last)
+    assert np.isfinite(outputs.command.tau).all()
     if planner:
         assert outputs.plan is not None
         assert not outputs.plan.status.startswith("nominal:")
@@ -171,7 +170,8 @@ def test_finite_but_absurd_rates_of_joints_are_one_failure_and_no_crash(planner:
         outputs = robot.step()
         assert np.isfinite(outputs.command.tau).all()
     assert outputs.mode == "walk"
-    assert outputs.counters["qp_failed"] == 1
+    assert outputs.counters["encoder_bridged"] == 1 + ALONE.controller.max_failures
+    assert "qp_failed" not in outputs.counters
 
 
 @PLANNERS
