@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 from quadriga.agents.controller.whole_body.problem import UNCONSTRAINED, WholeBodySolution
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.planning.interface import PlanningOutputs
 from quadriga.shared.wire.codes import code_of
 
-IMU_BRIDGED = "imu_bridged"
-ENCODER_BRIDGED = "encoder_bridged"
+IMU_BRIDGED: Final = "imu_bridged"
+ENCODER_BRIDGED: Final = "encoder_bridged"
 
 
 def count(

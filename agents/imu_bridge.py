@@ -178,7 +178,7 @@ def _believe(
 
 @compiled
 def _judge(memory: Array, imu: Array, dt: float, late: bool) -> tuple[bool, bool]:
-    """Whether attitude and gyro are believed, and the accelerometer; `memory` is brought up."""
+    """Whether attitude and gyro are believed, and the accelerometer; `memory` goes on."""
     before, believed, ms = memory[IMU.read].copy(), memory[IMU.believed], 1e3 * dt
     attitude = _is_attitude(imu[_QUAT])
     agrees = attitude and (memory[IMU.begun] < 0.5 or _follows(before, imu, dt))

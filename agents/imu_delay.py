@@ -138,12 +138,13 @@ def _compare(misfit: Array, power: Array, legs: Array, gyro: Array, tick: int) -
         said = legs[(tick - _LAGS[index]) % _SPAN]
         if said[_SAID] < 0.5:
             continue
-        along = gyro[0] * said[3] + gyro[1] * said[4] + gyro[2] * said[5]
+        told, line = said[_TURN], said[_LINE]
+        along = gyro[0] * line[0] + gyro[1] * line[1] + gyro[2] * line[2]
         error2, turn2 = 0.0, 0.0
         for axis in range(3):
-            turn = gyro[axis] - along * said[3 + axis]
+            turn = gyro[axis] - along * line[axis]
             turn2 += turn * turn
-            error2 += (turn - said[axis]) ** 2
+            error2 += (turn - told[axis]) ** 2
         misfit[index] += share * (error2 - misfit[index])
         power[index] += share * (turn2 - power[index])
 
