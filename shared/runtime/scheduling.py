@@ -6,6 +6,7 @@ import os
 import sys
 from contextlib import suppress
 from pathlib import Path
+from threading import Event
 from typing import Final
 
 from quadriga.shared.errors import ConfigError
@@ -16,6 +17,7 @@ VARIABLE: Final = "QUADRIGA_PRIORITY"  # of the environment: what holds instead 
 _PRIORITY: Final = 1  # of 99: before every ordinary process, after everything else of the system
 _FIRST: Final = 2  # likewise, before those that walk
 _NICE: Final = -15  # of -20 to 19: an ordinary process gets a thirtieth beside it
+_left: Final = Event()  # set once this process has left its priority by itself
 
 
 def take_priority(priority: str) -> bool:
@@ -39,6 +41,7 @@ def take_priority(priority: str) -> bool:
     """
     if not _is_realtime(priority):
         return False
+    _left.clear()
     try:
         _schedule(os.SCHED_RR, _PRIORITY)
     except OSError as error:
@@ -70,12 +73,16 @@ def leave_priority() -> None:
 
     What it still does, to leave, must not hold up others, such as bridges that lay a robot down.
     """
+    if has_priority():
+        _left.set()
     with suppress(OSError):
         _schedule(os.SCHED_OTHER, 0)
 
 
 def has_priority() -> bool:
-    """Whether the first thread of this process is scheduled in real time."""
+    """Whether this process is scheduled in real time, or was until it left its priority."""
+    if _left.is_set():
+        return True
     return os.sched_getscheduler(os.getpid()) in (os.SCHED_RR, os.SCHED_FIFO)
 
 

@@ -26,6 +26,7 @@ _MARK: Final = "QUADRIGA_STARTS"
 _LONGEST: Final = 6.0  # s until a walk is stopped
 _PATIENCE: Final = 60.0  # s until one must have ended
 _LEAVE: Final = 15.0  # s for the others to notice that their launcher was killed
+_SAID: Final = 2000  # letters
 _STOPS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL, None)
 _EXPECTED: Final = {
     signal.SIGINT: {0, 130},  # 0: it was over before
@@ -43,12 +44,14 @@ class Attempt(NamedTuple):
         after: when it was sent, s.
         status: exit status; None of a walk that would not end.
         orphans: command lines of processes that outlived it.
+        said: what it printed last.
     """
 
     stop: signal.Signals | None
     after: float
     status: int | None
     orphans: list[str]
+    said: str
 
     @property
     def wrong(self) -> bool:
@@ -65,6 +68,7 @@ def attempt(number: int, chance: random.Random) -> Attempt:
     with tempfile.TemporaryDirectory() as scratch:
         command = [sys.executable, "-m", "quadriga", "walk", "--planner", "none", "--robots", "2"]
         command += ["--seconds", "1", "--mode", mode, "--no-report", "--out", f"{scratch}/run"]
+        command += ["--set", "runtime.refuse_overload=false"]
         with Path(scratch, "log").open("wb") as log:
             marked = {**os.environ, _MARK: mark}
             walk = subprocess.Popen(
@@ -81,7 +85,8 @@ def attempt(number: int, chance: random.Random) -> Attempt:
         except subprocess.TimeoutExpired:
             status = None
         orphans = _await_no_orphans(mark)
-    return Attempt(stop, after, status, orphans)
+        said = Path(scratch, "log").read_text(encoding="utf-8", errors="replace")
+    return Attempt(stop, after, status, orphans, said[-_SAID:])
 
 
 def _await_no_orphans(mark: str) -> list[str]:
@@ -125,6 +130,7 @@ def main() -> int:
             print(f"{number}: {name} after {found.after:.2f} s: status {found.status}", flush=True)
             for line in found.orphans:
                 print(f"  orphan: {line}", flush=True)
+            print(found.said, flush=True)
     for text, times in sorted(ends.items()):
         print(f"{times:4} {text}")
     print(f"{given.times} starts, {wrong} that did not end as they should")

@@ -23,7 +23,7 @@ def test_an_orphan_is_found_and_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     assert starts._await_no_orphans(mark) == []
 
 
-@pytest.mark.usefixtures("_compiled")
+@pytest.mark.usefixtures("_alone", "_compiled")
 def test_no_process_outlives_a_walk_that_is_stopped() -> None:
     chance = random.Random(11)
     attempts = [starts.attempt(number, chance) for number in range(2)]
