@@ -19,13 +19,12 @@ from quadriga.agents.controller.whole_body.problem import WholeBodyProblem, Whol
 from quadriga.agents.counters import ENCODER_BRIDGED, IMU_BRIDGED, count
 from quadriga.agents.encoder_bridge import EncoderBridge
 from quadriga.agents.healing import Healing, may_resume, ramp, step_healing
-from quadriga.agents.held_posture import held_row, hold_or_release
+from quadriga.agents.held_posture import HeldPosture, hold_or_release
 from quadriga.agents.imu_bridge import ImuBridge, ImuState
 from quadriga.agents.modes import (
     DAMPING,
     ESTOP,
     FALL,
-    IMU_LOST,
     NO_ESTIMATE,
     PEER_LOST,
     REFERENCE_LOST,
@@ -48,6 +47,7 @@ from quadriga.agents.planning.registry import build_planning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.rising import Rise, Rising
 from quadriga.agents.schedules import Schedules
+from quadriga.agents.sensor_loss import SensorLosses
 from quadriga.agents.step_io import Inputs as Inputs
 from quadriga.agents.step_io import Outputs as Outputs
 from quadriga.agents.tasks import Tasks
@@ -61,10 +61,6 @@ from quadriga.shared.wire.messages import Command, Measurement, Reference
 from quadriga.shared.wire.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
 
 _TRUTH_AGE_MS: Final = 20  # of the simulator's truth, where it stands in for an estimator
-# For which a robot walks on without its attitude: yokes keep it level, and one that stands is
-# dragged along by those that walk on.
-_BLIND_MS: Final = 100.0
-_YOKED_BLIND_MS: Final = 600.0
 _LONGEST_DT: Final = 0.02  # s, after a gap in the ticks the filters advance by no more than this
 
 
@@ -72,7 +68,8 @@ _LONGEST_DT: Final = 0.02  # s, after a gap in the ticks the filters advance by 
 class AgentState:
     """Everything the agent remembers between ticks; `planning` is known to its planning part.
 
-    `rise` is there while the robot gets up; `encoders` is known to `agents.encoder_bridge`.
+    `rise` is there while the robot gets up; `encoders` is known to `agents.encoder_bridge`, `held`
+    to `agents.held_posture`.
     """
 
     tick: int
@@ -88,6 +85,7 @@ class AgentState:
     rise: Rise | None = None
     imu: ImuState = field(default_factory=ImuState)
     encoders: Array | None = None
+    held: Array | None = None
 
 
 @record
@@ -133,8 +131,9 @@ class Agent:
         self._height = config.reference.height
         self._watch, self._rising = TeamWatch(config, robot), Rising(config)
         yoked = neighbours(config.team.robots, config.team.yokes, self.index)
-        self._blind_ms = _YOKED_BLIND_MS if yoked else _BLIND_MS
+        self._losses = SensorLosses(yoked=bool(yoked))
         self._imu, self._encoders = ImuBridge(config.robot), EncoderBridge(config.robot)
+        self._posture = HeldPosture(config.robot)
         self._schedules = Schedules(config, self.index)
         self._tasks = Tasks(config)
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
@@ -224,7 +223,8 @@ class Agent:
         dt = 1e-3 if state.tick < 0 else min(_LONGEST_DT, 1e-3 * (tick - state.tick))
         imu, encoders, inputs, bridged = self._believe(state, inputs, dt)
         references = remember_references(state.references, inputs.references, tick)
-        course, healing = self._course(state, tick, imu.missing_ms)
+        loss = self._losses.find(imu.missing_ms, encoders)
+        course, healing = self._course(state, tick, loss.reason)
         team = self._look_around(state, inputs)
         followed = ramp(references, healing, tick)
         reference, reference_age = reference_at(followed, tick, self._height)
@@ -258,8 +258,10 @@ class Agent:
                 mode = resolve_stops(course, tick, stops)
 
         tau = solution.tau if not failures else state.last_tau  # the QP's, or the last good ones
-        imu = hold_or_release(imu, inputs.state, stands=mode.name == STAND)
-        command = self._command(tick, tau, mode, imu.held, solved=not failures)
+        holds = loss.now and mode.name == STAND
+        held = hold_or_release(state.held, inputs.state, holds=holds)
+        posture = None if held is None else self._posture.row(held, tick, loss.joints)
+        command = self._command(tick, tau, mode, posture, solved=not failures)
         counters = count(state.counters, planned, solution, bridged)
         outputs = Outputs(
             command,
@@ -271,9 +273,9 @@ class Agent:
             {"reference": float(reference_age), **planned.ages_ms},
             planned.planner_ns,
         )
-        whole = led and not imu.missing_ms and self._is_whole(tick, mode, team, planning)
+        whole = led and not loss.now and self._is_whole(tick, mode, team, planning)
         healing = self._heal(healing, mode, inputs, whole=whole)
-        after = (references, tau, failures, counters, healing, team, None, imu, encoders)
+        after = (references, tau, failures, counters, healing, team, None, imu, encoders, held)
         new = AgentState(tick, mode, planning, acted.memory, *after)
         return new, outputs, (sensed, asked, acted)
 
@@ -311,11 +313,11 @@ class Agent:
         stop = -1 if inputs.stop is None else min(inputs.stop.tick or tick, tick)
         return step_healing(healing, mode, tick, whole_from=whole_from, word=word, stop=stop)
 
-    def _course(self, state: AgentState, tick: int, blind_ms: float) -> tuple[Mode, Healing]:
-        """The mode if nothing stops the robot at this tick, and its way back from standing."""
+    def _course(self, state: AgentState, tick: int, loss: str) -> tuple[Mode, Healing]:
+        """The mode if nothing but a `loss` stops the robot at this tick, and its way back."""
         mode, healing = state.mode, state.healing
-        if blind_ms > self._blind_ms and mode.name in (WALK, STOPPING):
-            return Mode(STAND, tick, IMU_LOST), healing
+        if loss and mode.name in (WALK, STOPPING):
+            return Mode(STAND, tick, loss), healing
         if mode.name == WALK:
             return mode, healing
         stand_ms, stance_ms = self._stand_ms, self._stance_ms
@@ -369,14 +371,14 @@ class Agent:
         return Measurement(tick, tick * 1_000_000, sensed.memory.mean_force, sensed.outputs, stance)
 
     def _command(
-        self, tick: int, tau: Array, mode: Mode, held: Array | None, *, solved: bool
+        self, tick: int, tau: Array, mode: Mode, posture: Array | None, *, solved: bool
     ) -> Command:
         """The motor command: torques, with damping where they are not this tick's, or damping.
 
-        A posture that is `held` comes before torques.
+        The row of a `posture` comes before torques.
         """
-        if held is not None:
-            return Command.from_row(tick, tick * 1_000_000, held_row(held, tick, self.config.robot))
+        if posture is not None:
+            return Command.from_row(tick, tick * 1_000_000, posture)
         row = np.zeros(60)  # tau, q_des, v_des, kp, kd
         passive = mode.passive
         if passive or not solved:

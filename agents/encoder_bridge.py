@@ -1,19 +1,21 @@
 """What an agent believes of its joints' encoders; those that say what cannot be are held.
 
-A reading is not believed that is beyond the joint's end stops, or that has jumped against the
-joint's rate. Then the last angle is kept, at rest: a knee that is held for half a second where it
-was is a small error beside one that is read as 0, on which a leg folds or kicks. An encoder is
-believed again once it has agreed with itself for a while, and with the end stops.
+A reading is not believed that is beyond the joint's end stops, that has jumped against the joint's
+rate, or has drifted away from it. Then the last angle is kept, at rest: a knee that is held for
+half a second where it was is a small error beside one that is read as 0, on which a leg folds or
+kicks. An encoder is believed again once it has agreed with itself for a while, and with the end
+stops. A robot that has not believed one for `LOST_MS` stands.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from quadriga.agents.controller.maths.rows import places, row_size
-from quadriga.shared.robot.conventions import N_JOINTS, Array
+from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import State
@@ -21,6 +23,12 @@ from quadriga.shared.wire.messages import State
 _BELIEVED_AFTER: Final = 0.02  # s, for which a reading must agree once one did not
 _BEYOND: Final = 0.3  # rad beyond an end stop; encoders have an error of their zero
 _JUMP: Final = 0.1  # rad, of an angle against its rate from one reading to the next
+_DRIFT: Final = 0.15  # rad, likewise, within the time of `_FORGET`; rates may lag by some ms
+_RETURN: Final = 0.05  # rad, of one that had drifted, for it to be believed again
+_FORGET: Final = 0.1  # s
+_DISTRUST: Final = 0.1  # s more, for which one must agree that had drifted
+_BESIDE: Final = 0.15  # rad beside the range of late, within which one is believed again
+_RANGE_TIME: Final = 2.0  # s, within which that range narrows to where the joint is
 _FASTEST: Final = 20.0  # rad/s, of such joints: where readings are missing, more may have happened
 
 _Q: Final = State.CUTS["q_joint"]
@@ -33,17 +41,26 @@ class EncoderLayout(NamedTuple):
     Attributes:
         believed: angle that was believed last, rad.
         q, v: what was read last, rad and rad/s.
-        agrees: time for which readings have been in agreement, s.
+        agrees: time for which readings have been in agreement, s; less than 0 after a drift.
+        drift: of the angle against the rate, of late, rad.
+        least, most: of the angles that were believed of late, rad.
+        held: time for which the joint has been held, s.
+        longest: the longest of these times, s; one number.
     """
 
     believed: slice
     q: slice
     v: slice
     agrees: slice
+    drift: slice
+    least: slice
+    most: slice
+    held: slice
+    longest: int
 
 
 ENCODERS: Final = EncoderLayout(
-    **places(believed=N_JOINTS, q=N_JOINTS, v=N_JOINTS, agrees=N_JOINTS)
+    **places(**dict.fromkeys(EncoderLayout._fields, N_JOINTS) | {"longest": 1})
 )
 
 
@@ -76,9 +93,23 @@ class EncoderBridge:
         return row, State.from_row(state.tick, state.stamp_ns, bridged)
 
 
+def joints_lost(row: Array, most_ms: float) -> tuple[int, ...]:
+    """Joints (of the robot's 12) that have been held for longer than this."""
+    if 1e3 * row[ENCODERS.longest] <= most_ms:
+        return ()
+    return tuple(np.flatnonzero(1e3 * row[ENCODERS.held] > most_ms).tolist())
+
+
+def name_joints(joints: Iterable[int]) -> str:
+    """Names of some of the robot's 12 joints, as FL_calf,RR_hip."""
+    return ",".join(JOINT_NAMES[joint].removesuffix("_joint") for joint in joints)
+
+
 def _first(state: State) -> Array:
     row = np.full(row_size(ENCODERS), _BELIEVED_AFTER)
-    row[ENCODERS.believed] = row[ENCODERS.q] = state.q_joint
+    row[ENCODERS.held] = row[ENCODERS.drift] = row[ENCODERS.longest] = 0.0
+    for angle in (ENCODERS.believed, ENCODERS.q, ENCODERS.least, ENCODERS.most):
+        row[angle] = state.q_joint
     row[ENCODERS.v] = state.v_joint
     return row
 
@@ -88,16 +119,35 @@ def _judge(row: Array, state: Array, lower: Array, upper: Array, dt: float) -> b
     """Whether all encoders are believed; `row` is brought up to date."""
     q, v = state[_Q], state[_V]
     q0, v0 = row[ENCODERS.q], row[ENCODERS.v]
-    agrees, believed = row[ENCODERS.agrees], row[ENCODERS.believed]
+    agrees, believed, held = row[ENCODERS.agrees], row[ENCODERS.believed], row[ENCODERS.held]
+    drift, kept = row[ENCODERS.drift], max(0.0, 1.0 - dt / _FORGET)
+    least, most = row[ENCODERS.least], row[ENCODERS.most]
+    narrows = dt / _RANGE_TIME
     whole, jump = True, _JUMP + _FASTEST * max(0.0, dt - 1e-3)
     for joint in range(N_JOINTS):
-        follows = abs(q[joint] - q0[joint] - 0.5 * dt * (v0[joint] + v[joint])) <= jump
-        within = lower[joint] <= q[joint] <= upper[joint]
-        agrees[joint] = min(agrees[joint] + dt, 1.0) if follows and within else 0.0
-        if agrees[joint] >= _BELIEVED_AFTER:
-            believed[joint] = q[joint]
+        gained = q[joint] - q0[joint] - 0.5 * dt * (v0[joint] + v[joint])
+        if abs(gained) > jump or not lower[joint] <= q[joint] <= upper[joint]:
+            agrees[joint] = min(agrees[joint], 0.0)
         else:
+            agrees[joint] = min(agrees[joint] + dt, 1.0)
+            drift[joint] = kept * drift[joint] + gained
+        if agrees[joint] < _BELIEVED_AFTER:
+            if not least[joint] - _BESIDE <= q[joint] <= most[joint] + _BESIDE:
+                agrees[joint] = min(agrees[joint], 0.0)
+            if agrees[joint] >= 0.0:
+                drift[joint] = 0.0  # it begins anew after a jump
+        away = abs(drift[joint])
+        if away > _DRIFT or (agrees[joint] < 0.0 and away > _RETURN):
+            agrees[joint] = -_DISTRUST
+            drift[joint] = min(max(drift[joint], -_DRIFT), _DRIFT)
+        if agrees[joint] >= _BELIEVED_AFTER:
+            believed[joint], held[joint] = q[joint], 0.0
+            least[joint] = min(q[joint], least[joint] + narrows * (q[joint] - least[joint]))
+            most[joint] = max(q[joint], most[joint] + narrows * (q[joint] - most[joint]))
+        else:
+            held[joint] += dt
             whole = False
+    row[ENCODERS.longest] = held.max()
     q0[:], v0[:] = q, v
     return whole
 

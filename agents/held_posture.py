@@ -1,15 +1,19 @@
-"""Standing without knowing one's attitude: the joints are led to the stand, and held there."""
+"""Standing by the joints alone, without an attitude or a joint's angle: led to a posture, and held.
+
+The motors lead their joints to the stand and hold them there. One whose encoder is not believed
+cannot be led: its motor gives the torque that bears its share of the weight in the stand.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
-from quadriga.agents.imu_bridge import ImuState
+from quadriga.agents.controller.maths.leg_reaction import foot_forces
 from quadriga.plant.late import hold_joints
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS, N_LEGS, Array
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.wire.messages import Command, State
 
@@ -17,33 +21,61 @@ _LEAD_MS: Final = 200.0  # from where the joints are to the stand: a swinging fo
 
 _STILL: Final = State(0, 0, *(np.zeros(cut.stop - cut.start) for cut in State.CUTS.values()))
 _HOLD: Final = hold_joints(_STILL).row  # gains alone
+_CUT: Final = Command.CUTS
 
 
-def hold_or_release(imu: ImuState, state: State, *, stands: bool) -> ImuState:
-    """Begin to hold a robot that stands while its attitude is missing, and only then.
-
-    Args:
-        imu: what is known of the IMU, and what is held already.
-        state: what the robot measures now.
-        stands: whether it is to.
-    """
-    if not (stands and imu.missing_ms):
-        return imu if imu.held is None else replace(imu, held=None)
-    if imu.held is not None:
-        return imu
-    return replace(imu, held=np.concatenate([[state.tick], state.q_joint]))
-
-
-def held_row(held: Array, tick: int, robot: RobotSpec) -> Array:
-    """The row of the command at a tick, (60,).
+def hold_or_release(held: Array | None, state: State, *, holds: bool) -> Array | None:
+    """Begin to hold a robot that stands without knowing enough, and only then.
 
     Args:
-        held: since which tick, and where the joints were then, rad, (13,).
-        tick: the present one.
-        robot: how it stands.
+        held: since which tick it is held, and where its joints were then, rad, (13,); None: not.
+        state: what is believed now.
+        holds: whether it is to be held.
     """
-    share = min(1.0, (tick - held[0]) / _LEAD_MS)
-    smooth = share * share * (3.0 - 2.0 * share)
-    row: Array = _HOLD.copy()
-    row[Command.CUTS["q_des"]] = held[1:] + smooth * (robot.q_stand - held[1:])
-    return row
+    if not holds:
+        return None
+    return np.concatenate([[state.tick], state.q_joint]) if held is None else held
+
+
+class HeldPosture:
+    """Fixed data of a robot's posture.
+
+    Args:
+        robot: its kind.
+    """
+
+    def __init__(self, robot: RobotSpec) -> None:
+        self._stand = robot.q_stand
+        self._bears = _standing_torques(robot)
+
+    def row(self, held: Array, tick: int, lost: Sequence[int]) -> Array:
+        """The row of the command at a tick, (60,).
+
+        Args:
+            held: see `hold_or_release`.
+            tick: the present one.
+            lost: joints whose angle is not known, of 0 … 11.
+        """
+        share = min(1.0, (tick - held[0]) / _LEAD_MS)
+        smooth = share * share * (3.0 - 2.0 * share)
+        row: Array = _HOLD.copy()
+        row[_CUT["q_des"]] = held[1:] + smooth * (self._stand - held[1:])
+        for joint in lost:
+            row[_CUT["tau"]][joint] = self._bears[joint]
+            row[_CUT["kp"]][joint] = row[_CUT["kd"]][joint] = 0.0
+        return row
+
+
+def _standing_torques(robot: RobotSpec) -> Array:
+    """Of the motors of a robot that stands on four feet, legs without a mass, (12,), N·m."""
+    weight = np.array([0.0, 0.0, GRAVITY * robot.geometry.mass / N_LEGS])
+    torques = np.zeros(N_JOINTS)
+    for leg in range(N_LEGS):
+        joints = slice(3 * leg, 3 * leg + 3)
+        forces = np.empty((3, 3))  # of a unit torque of each joint
+        for joint in range(3):
+            unit = np.zeros(N_JOINTS)
+            unit[3 * leg + joint] = -1.0
+            forces[:, joint] = foot_forces(unit, robot.q_stand, robot.geometry)[leg]
+        torques[joints] = np.linalg.solve(forces, weight)
+    return torques

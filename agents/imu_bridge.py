@@ -104,14 +104,11 @@ class ImuState:
     Attributes:
         row: see `ImuLayout`.
         legs: what `agents.imu_delay` remembers of what the legs said.
-        held: of a robot that stands without an attitude: since which tick, and where its joints
-            were then, rad, (13,).
         bridged: whether something else was believed at the last tick than was read.
     """
 
     row: Array = field(default_factory=_initial_row)
     legs: Array = field(default_factory=nothing_said)
-    held: Array | None = None
     bridged: bool = False
 
     @property
@@ -145,11 +142,11 @@ class ImuBridge:
         row, legs = before.row.copy(), before.legs.copy()
         flat = _NO_MEMORY if memory is None else memory.flat
         if _believe(row, legs, state.row, flat, self._geometry, state.tick, ticks, dt):
-            return ImuState(row, legs, before.held), state
+            return ImuState(row, legs), state
         bridged = state.row.copy()
         bridged[_IMU] = row[IMU.believed]
         believed = State.from_row(state.tick, state.stamp_ns, bridged)
-        return ImuState(row, legs, before.held, bridged=True), believed
+        return ImuState(row, legs, bridged=True), believed
 
 
 @compiled

@@ -27,8 +27,9 @@ PEER_LOST: Final = "peer-lost"  # no plan of a peer for that long
 PLANNER_LOST: Final = "planner-lost"  # no plan came for as long as a team waits for one
 LED_DOWN: Final = "led-down"  # its motors had no commands: the agent was away, or cut off
 IMU_LOST: Final = "imu-lost"  # its attitude is not known
+ENCODER_LOST: Final = "encoder-lost"  # the angle of a joint is not known
 LOSSES: Final = frozenset(
-    (REFERENCE_LOST, WINDOW_LOST, PEER_LOST, PLANNER_LOST, LED_DOWN, IMU_LOST)
+    (REFERENCE_LOST, WINDOW_LOST, PEER_LOST, PLANNER_LOST, LED_DOWN, IMU_LOST, ENCODER_LOST)
 )
 
 # Reasons for which a robot stands because somebody has said so, and walks only when told to.

@@ -110,6 +110,28 @@ def test_a_robot_without_an_attitude_stands_by_its_joints(nothing: float) -> Non
     assert (outputs.mode, outputs.reason) == ("stand", "imu-lost")
 
 
+def test_a_robot_without_the_encoder_of_a_knee_does_not_lead_that_knee() -> None:
+    robot, knee = Robot(), 5
+    robot.run(400)
+    for _ in range(600):
+        state = standing(robot.tick)
+        state.row[State.CUTS["q_joint"].start + knee] = 0.0
+        outputs = robot.step(state)
+    assert (outputs.mode, outputs.reason) == ("stand", "encoder-lost:FR_calf")
+    command, others = outputs.command, np.arange(12) != knee
+    assert command.kp[knee] == command.kd[knee] == 0.0
+    assert command.kp[others].all()
+    np.testing.assert_array_equal(command.q_des[others], ALONE.robot.q_stand[others])
+    # It bears a quarter of the weight: a foot behind the knee by link · sin(thigh + calf).
+    geometry = ALONE.robot.geometry
+    lever = -geometry.link * np.sin(ALONE.robot.q_stand[4] + ALONE.robot.q_stand[5])
+    assert command.tau[knee] == pytest.approx(geometry.mass * GRAVITY / 4 * lever)
+    assert not command.tau[others].any()
+    robot.step()
+    outputs = robot.run(robot.tick + 40)
+    assert not outputs.command.kp.any()  # it knows the knee again
+
+
 def fail(monkeypatch: pytest.MonkeyPatch) -> None:
     def no_solution(_free: bool, row: Array, contact: Array) -> WholeBodySolution:
         return WholeBodySolution(np.zeros_like(row[LIMITED.x]), "infeasible:-1", contact)

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quadriga.agents.encoder_bridge import EncoderBridge
+from quadriga.agents.encoder_bridge import EncoderBridge, joints_lost, name_joints
 from quadriga.shared.robot.a1 import A1
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import State
 from tests.a1 import standing
 
 DT = 1e-3
-FAILS, BACK, END = 300, 800, 900  # ms
+FAILS, BACK, END = 300, 800, 1200  # ms
 KNEE = 2
 BRIDGE = EncoderBridge(A1)
 
@@ -44,8 +44,21 @@ def be_garbage(state: State) -> State:
 
 
 def be_beyond(state: State) -> State:
-    """A reading that drifts away from what can be, at a rate that it tells."""
-    return with_knee(state, state.q_joint[KNEE] + 9.0 * DT * (state.tick - FAILS), 9.0)
+    """A reading that leaves what can be, at a rate that it tells."""
+    away = 9.0 * (state.tick - FAILS)
+    return with_knee(state, state.q_joint[KNEE] + DT * away, state.v_joint[KNEE] + 9.0)
+
+
+def be_adrift(state: State) -> State:
+    """An angle that turns the wrong way from where it was."""
+    past = swinging(FAILS).q_joint[KNEE]
+    return with_knee(state, 2.0 * past - state.q_joint[KNEE], state.v_joint[KNEE])
+
+
+def be_stuck(state: State) -> State:
+    """The reading of a joint in motion, again and again."""
+    first = swinging(FAILS)
+    return with_knee(state, first.q_joint[KNEE], first.v_joint[KNEE])
 
 
 def follow(spoil: Callable[[State], State]) -> tuple[list[State], list[State]]:
@@ -67,9 +80,18 @@ def test_sound_encoders_are_believed_as_they_are() -> None:
     assert all(a is b for a, b in zip(read, believed, strict=True))
 
 
-@pytest.mark.parametrize(("spoil", "seen_after"), [(be_off, 1), (be_garbage, 5), (be_beyond, 250)])
+@pytest.mark.parametrize(
+    ("spoil", "seen_after", "believed_after"),
+    [
+        (be_off, 1, 20),
+        (be_garbage, 5, 20),
+        (be_beyond, 250, 20),
+        (be_adrift, 50, 230),
+        (be_stuck, 100, 230),
+    ],
+)
 def test_an_encoder_that_fails_is_held_until_it_agrees_with_itself_again(
-    spoil: Callable[[State], State], seen_after: int
+    spoil: Callable[[State], State], seen_after: int, believed_after: int
 ) -> None:
     read, believed = follow(spoil)
     seen = next(tick for tick in range(FAILS, BACK) if believed[tick] is not read[tick])
@@ -81,7 +103,23 @@ def test_an_encoder_that_fails_is_held_until_it_agrees_with_itself_again(
         np.testing.assert_array_equal(believed[tick].q_joint[others], read[tick].q_joint[others])
         np.testing.assert_array_equal(believed[tick].imu_gyro, read[tick].imu_gyro)
     sound = next(tick for tick in range(BACK, END) if believed[tick] is read[tick])
-    assert 19 <= sound - BACK <= 21
+    assert abs(sound - BACK - believed_after) <= (1 if believed_after == 20 else 20)
+
+
+def test_a_reading_at_rest_where_the_joint_has_not_been_of_late_is_never_believed() -> None:
+    thigh, memory = KNEE - 1, None
+    for tick in range(BACK):
+        state = swinging(tick)
+        if tick >= FAILS:
+            state.row[
+                [State.CUTS["q_joint"].start + thigh, State.CUTS["v_joint"].start + thigh]
+            ] = 0
+        memory, believed = BRIDGE.step(memory, state, DT)
+        assert (believed is state) == (tick < FAILS)
+    assert memory is not None
+    assert joints_lost(memory, BACK - FAILS - 2.0) == (thigh,)
+    assert joints_lost(memory, BACK - FAILS + 2.0) == ()
+    assert name_joints((thigh, 6)) == "FL_thigh,RL_hip"
 
 
 def test_where_ticks_were_passed_over_an_angle_may_be_another() -> None:

@@ -66,3 +66,16 @@ def test_half_a_second_without_a_knees_encoder_stops_nobody(kind: str) -> None:
     modes, fallen = walk_with(fault, FAILS + 2500, 2, seed=61)
     assert fallen == ()
     assert modes == [("stand", ""), ("walk", "")]
+
+
+@pytest.mark.parametrize("kind", ["off", "garbage", "wrong"])
+@pytest.mark.parametrize("joint", ["FL_calf", "RR_thigh", "FR_hip"])
+def test_a_robot_alone_stands_without_the_encoder_of_a_joint_for_good(
+    joint: str, kind: str
+) -> None:
+    modes, fallen = walk_with(f"encoder_{joint} {kind} {1e-3 * FAILS:g}", FAILS + 3000)
+    assert fallen == ()
+    if (joint, kind) == ("FR_hip", "off"):  # that reads 0, which is where a hip is
+        assert modes[-1] == ("walk", "")
+    else:
+        assert modes[-1] == ("stand", f"encoder-lost:{joint}")

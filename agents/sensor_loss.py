@@ -1,0 +1,61 @@
+"""When a robot knows too little of itself to walk on: it stands at once, by its joints alone.
+
+Yokes keep a robot level, and one that stands is dragged along by those that walk on: so a yoked one
+walks on for longer than one that is alone.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from quadriga.agents.encoder_bridge import joints_lost, name_joints
+from quadriga.agents.modes import ENCODER_LOST, IMU_LOST
+from quadriga.shared.robot.conventions import Array
+from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.codes import with_detail
+
+_ALONE_MS: Final = 100.0
+_YOKED_IMU_MS: Final = 600.0
+_YOKED_ENCODER_MS: Final = 800.0
+
+
+@record
+class SensorLoss:
+    """What a robot does not know of itself.
+
+    Attributes:
+        reason: why it can walk no more; "": it can.
+        joints: those whose angle has been unknown for so long, of 0 … 11.
+        now: whether anything is unknown that it must know to stand by feedback, or to walk again.
+    """
+
+    reason: str
+    joints: tuple[int, ...]
+    now: bool
+
+
+class SensorLosses:
+    """How long a robot can do without one of its sensors.
+
+    Args:
+        yoked: whether it is yoked to others.
+    """
+
+    def __init__(self, *, yoked: bool) -> None:
+        self._imu_ms = _YOKED_IMU_MS if yoked else _ALONE_MS
+        self._encoder_ms = _YOKED_ENCODER_MS if yoked else _ALONE_MS
+
+    def find(self, missing_ms: float, encoders: Array) -> SensorLoss:
+        """What is lost at a tick.
+
+        Args:
+            missing_ms: for how long no attitude has been believed.
+            encoders: what is remembered of them, see `EncoderLayout`.
+        """
+        joints = joints_lost(encoders, self._encoder_ms)
+        reason = ""
+        if missing_ms > self._imu_ms:
+            reason = IMU_LOST
+        elif joints:
+            reason = with_detail(ENCODER_LOST, name_joints(joints))
+        return SensorLoss(reason, joints, bool(joints) or missing_ms > 0)
