@@ -19,7 +19,7 @@ from quadriga.agents.controller.whole_body.problem import WholeBodyProblem, Whol
 from quadriga.agents.counters import ENCODER_BRIDGED, IMU_BRIDGED, count
 from quadriga.agents.encoder_bridge import EncoderBridge
 from quadriga.agents.healing import Healing, may_resume, ramp, step_healing
-from quadriga.agents.held_posture import HeldPosture, hold_or_release
+from quadriga.agents.held_posture import HeldPosture
 from quadriga.agents.imu_bridge import ImuBridge, ImuState
 from quadriga.agents.modes import (
     DAMPING,
@@ -259,8 +259,7 @@ class Agent:
 
         tau = solution.tau if not failures else state.last_tau  # the QP's, or the last good ones
         holds = loss.now and mode.name == STAND
-        held = hold_or_release(state.held, inputs.state, holds=holds)
-        posture = None if held is None else self._posture.row(held, tick, loss.joints)
+        held, posture = self._posture.step(state.held, inputs.state, loss.joints, holds=holds)
         command = self._command(tick, tau, mode, posture, solved=not failures)
         counters = count(state.counters, planned, solution, bridged)
         outputs = Outputs(

@@ -24,19 +24,6 @@ _HOLD: Final = hold_joints(_STILL).row  # gains alone
 _CUT: Final = Command.CUTS
 
 
-def hold_or_release(held: Array | None, state: State, *, holds: bool) -> Array | None:
-    """Begin to hold a robot that stands without knowing enough, and only then.
-
-    Args:
-        held: since which tick it is held, and where its joints were then, rad, (13,); None: not.
-        state: what is believed now.
-        holds: whether it is to be held.
-    """
-    if not holds:
-        return None
-    return np.concatenate([[state.tick], state.q_joint]) if held is None else held
-
-
 class HeldPosture:
     """Fixed data of a robot's posture.
 
@@ -48,22 +35,31 @@ class HeldPosture:
         self._stand = robot.q_stand
         self._bears = _standing_torques(robot)
 
-    def row(self, held: Array, tick: int, lost: Sequence[int]) -> Array:
-        """The row of the command at a tick, (60,).
+    def step(
+        self, held: Array | None, state: State, lost: Sequence[int], *, holds: bool
+    ) -> tuple[Array | None, Array | None]:
+        """Begin to hold a robot that stands without knowing enough, go on, or release it.
 
         Args:
-            held: see `hold_or_release`.
-            tick: the present one.
+            held: since which tick it is held, and where its joints were then, rad, (13,); None: not.
+            state: what is believed now.
             lost: joints whose angle is not known, of 0 … 11.
+            holds: whether it is to be held.
+
+        Returns:
+            The new `held`, and the row of the command, (60,); both None if it is not to be held.
         """
-        share = min(1.0, (tick - held[0]) / _LEAD_MS)
+        if not holds:
+            return None, None
+        held = np.concatenate([[state.tick], state.q_joint]) if held is None else held
+        share = min(1.0, (state.tick - held[0]) / _LEAD_MS)
         smooth = share * share * (3.0 - 2.0 * share)
         row: Array = _HOLD.copy()
         row[_CUT["q_des"]] = held[1:] + smooth * (self._stand - held[1:])
         for joint in lost:
             row[_CUT["tau"]][joint] = self._bears[joint]
             row[_CUT["kp"]][joint] = row[_CUT["kd"]][joint] = 0.0
-        return row
+        return held, row
 
 
 def _standing_torques(robot: RobotSpec) -> Array:
