@@ -258,20 +258,12 @@ class Agent:
                 mode = resolve_stops(course, tick, stops)
 
         tau = solution.tau if not failures else state.last_tau  # the QP's, or the last good ones
-        holds = loss.now and mode.name == STAND
-        held, posture = self._posture.step(state.held, inputs.state, loss.joints, holds=holds)
+        held, posture = self._posture.step(state.held, mode, inputs.state, loss)
         command = self._command(tick, tau, mode, posture, solved=not failures)
         counters = count(state.counters, planned, solution, bridged)
-        outputs = Outputs(
-            command,
-            measurement,
-            planned.plan,
-            mode.name,
-            mode.reason,
-            counters,
-            {"reference": float(reference_age), **planned.ages_ms},
-            planned.planner_ns,
-        )
+        ages = {"reference": float(reference_age), **planned.ages_ms}
+        said = (measurement, planned.plan, mode.name, mode.reason, counters, ages)
+        outputs = Outputs(command, *said, planned.planner_ns)
         whole = led and not loss.now and self._is_whole(tick, mode, team, planning)
         healing = self._heal(healing, mode, inputs, whole=whole)
         after = (references, tau, failures, counters, healing, team, None, imu, encoders, held)

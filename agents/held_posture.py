@@ -6,12 +6,13 @@ cannot be led: its motor gives the torque that bears its share of the weight in 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from quadriga.agents.controller.maths.leg_reaction import foot_forces
+from quadriga.agents.modes import STAND, Mode
+from quadriga.agents.sensor_loss import SensorLoss
 from quadriga.plant.late import hold_joints
 from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS, N_LEGS, Array
 from quadriga.shared.robot.spec import RobotSpec
@@ -36,27 +37,27 @@ class HeldPosture:
         self._bears = _standing_torques(robot)
 
     def step(
-        self, held: Array | None, state: State, lost: Sequence[int], *, holds: bool
+        self, held: Array | None, mode: Mode, state: State, loss: SensorLoss
     ) -> tuple[Array | None, Array | None]:
         """Begin to hold a robot that stands without knowing enough, go on, or release it.
 
         Args:
-            held: since which tick it is held, and where its joints were then, rad, (13,); None: not.
+            held: since which tick, and where its joints were then, rad, (13,); None: it is not.
+            mode: the present one.
             state: what is believed now.
-            lost: joints whose angle is not known, of 0 … 11.
-            holds: whether it is to be held.
+            loss: what the robot does not know.
 
         Returns:
             The new `held`, and the row of the command, (60,); both None if it is not to be held.
         """
-        if not holds:
+        if not loss.now or mode.name != STAND:
             return None, None
         held = np.concatenate([[state.tick], state.q_joint]) if held is None else held
         share = min(1.0, (state.tick - held[0]) / _LEAD_MS)
         smooth = share * share * (3.0 - 2.0 * share)
         row: Array = _HOLD.copy()
         row[_CUT["q_des"]] = held[1:] + smooth * (self._stand - held[1:])
-        for joint in lost:
+        for joint in loss.joints:
             row[_CUT["tau"]][joint] = self._bears[joint]
             row[_CUT["kp"]][joint] = row[_CUT["kd"]][joint] = 0.0
         return held, row
