@@ -26,7 +26,7 @@ from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.collector import end_collection
-from quadriga.shared.runtime.scheduling import leave_priority, take_priority
+from quadriga.shared.runtime.scheduling import at_work
 from quadriga.shared.runtime.signals import interruptible, stop_on_signals
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.codes import code_of
@@ -70,12 +70,9 @@ def run(
         with interruptible(stopped):
             rehearse_central(config, Central(config, planner))
         end_collection()
-        take_priority(config.runtime.priority)
-        bus.declare(READY)
-        try:
+        with at_work(config.runtime.priority):
+            bus.declare(READY)
             shell.work(stopped)
-        finally:
-            leave_priority()
 
 
 class _CentralShell:

@@ -19,7 +19,7 @@ from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
-from quadriga.shared.runtime.scheduling import leave_priority, take_priority
+from quadriga.shared.runtime.scheduling import at_work
 from quadriga.shared.runtime.signals import interruptible
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import State
@@ -110,12 +110,9 @@ def answer_states(
         with interruptible(stopped):
             rehearse(joined)
         shell = AgentShell(config, agent, inbox, bus)
-        take_priority(config.runtime.priority)
-        bus.declare(READY)
-        try:
+        with at_work(config.runtime.priority):
+            bus.declare(READY)
             shell.walk(stopped)
-        finally:
-            leave_priority()
 
 
 class AgentShell(Generic[S]):

@@ -20,7 +20,7 @@ from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.runtime.places import make_runtime_dir
-from quadriga.shared.runtime.scheduling import leave_priority, take_priority
+from quadriga.shared.runtime.scheduling import at_work
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Clock, Event, Reference
@@ -90,12 +90,8 @@ def run(config: Config, stopped: Callable[[], bool] | None = None, view: str = "
             joined = join(bus, config, stopped)
             if not joined:
                 return
-            # Without a reference the robots stop.
-            take_priority(config.runtime.priority)
-            try:
+            with at_work(config.runtime.priority):  # without a reference the robots stop
                 _Operator(config, bus, controls).operate(stopped, late=joined == REJOINS)
-            finally:
-                leave_priority()
 
 
 def _socket_path(team: str) -> Path | None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Event
 from typing import Final
@@ -77,6 +78,20 @@ def leave_priority() -> None:
         _left.set()
     with suppress(OSError):
         _schedule(os.SCHED_OTHER, 0)
+
+
+@contextmanager
+def at_work(priority: str) -> Iterator[None]:
+    """Within the block, this process has priority: see `take_priority`, `leave_priority`.
+
+    Raises:
+        ConfigError: the environment's priority is none.
+    """
+    take_priority(priority)
+    try:
+        yield
+    finally:
+        leave_priority()
 
 
 def has_priority() -> bool:
