@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import os
+from collections import Counter
 from collections.abc import Iterator
 from fcntl import LOCK_EX, flock
 from pathlib import Path
@@ -45,6 +47,9 @@ def _alone(
         yield
 
 
+_LONG_RUN: Final = 300.0  # s of tests; of a shorter run nobody asks which files take long
+_SLOWEST: Final = 40  # files that are named
+
 # Folders whose tests start processes and take long, and the one whose teams keep real time.
 _LONG: Final = ("docs", "manual", "plugins", "quadriga/experiments", "deploy")
 _REAL_TIME: Final = "runtime"
@@ -71,8 +76,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """How well the golden recording was reproduced: to the byte, or only nearly."""
-    for report in terminalreporter.stats.get("passed", []):
+    """How well the golden recording was reproduced, and which files take the time of a long run."""
+    stats = terminalreporter.stats
+    for report in stats.get("passed", []):
         for name, text in report.user_properties:
             if name == "golden" and report.when == "call":
                 terminalreporter.write_line(f"golden recording, {text}")
+    seconds = Counter[str]()
+    for report in itertools.chain.from_iterable(stats.values()):
+        if isinstance(report, pytest.TestReport):
+            seconds[report.nodeid.partition("::")[0]] += report.duration
+    if seconds.total() < _LONG_RUN:
+        return
+    shares = (f"{file} {time:.0f}" for file, time in seconds.most_common(_SLOWEST))
+    terminalreporter.write_line(f"{seconds.total():.0f} s of tests: {', '.join(shares)}")
