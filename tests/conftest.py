@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Iterator
 from fcntl import LOCK_EX, flock
 from pathlib import Path
@@ -82,11 +82,12 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         for name, text in report.user_properties:
             if name == "golden" and report.when == "call":
                 terminalreporter.write_line(f"golden recording, {text}")
-    seconds = Counter[str]()
+    seconds: dict[str, float] = defaultdict(float)
     for report in itertools.chain.from_iterable(stats.values()):
         if isinstance(report, pytest.TestReport):
             seconds[report.nodeid.partition("::")[0]] += report.duration
-    if seconds.total() < _LONG_RUN:
-        return
-    shares = (f"{file} {time:.0f}" for file, time in seconds.most_common(_SLOWEST))
-    terminalreporter.write_line(f"{seconds.total():.0f} s of tests: {', '.join(shares)}")
+    total = sum(seconds.values())
+    if total >= _LONG_RUN:
+        slowest = sorted(seconds.items(), key=lambda item: -item[1])[:_SLOWEST]
+        shares = ", ".join(f"{file} {time:.0f}" for file, time in slowest)
+        terminalreporter.write_line(f"{total:.0f} s of tests: {shares}")
