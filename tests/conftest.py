@@ -13,6 +13,7 @@ from typing import Final
 import pytest
 from hypothesis import HealthCheck, settings
 
+from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.runtime.scheduling import VARIABLE
 
 # The same examples each time, so that a change is judged by itself and not by chance; and no
@@ -38,15 +39,20 @@ def _ordinary() -> None:
 
 @pytest.fixture
 def _alone(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+    tmp_path_factory: pytest.TempPathFactory,
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
 ) -> Iterator[None]:
     """One at a time of the tests whose team has to keep real time; it precedes all else."""
     with (tmp_path_factory.getbasetemp().parent / "alone.lock").open("w") as file:
+        begun = monotonic()
         flock(file, LOCK_EX)
+        request.node.user_properties.append((_WAITED, monotonic() - begun))
         monkeypatch.delenv(VARIABLE)
         yield
 
 
+_WAITED: Final = "waited"  # s, of a test for its turn to keep real time
 _LONG_RUN: Final = 300.0  # s of tests; of a shorter run nobody asks which files take long
 _SLOWEST: Final = 40  # files that are named
 
@@ -77,17 +83,22 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """How well the golden recording was reproduced, and which files take the time of a long run."""
-    stats = terminalreporter.stats
-    for report in stats.get("passed", []):
-        for name, text in report.user_properties:
-            if name == "golden" and report.when == "call":
-                terminalreporter.write_line(f"golden recording, {text}")
+    stats, waited = terminalreporter.stats, 0.0
     seconds: dict[str, float] = defaultdict(float)
     for report in itertools.chain.from_iterable(stats.values()):
-        if isinstance(report, pytest.TestReport):
-            seconds[report.nodeid.partition("::")[0]] += report.duration
+        if not isinstance(report, pytest.TestReport):
+            continue
+        seconds[report.nodeid.partition("::")[0]] += report.duration
+        for name, told in report.user_properties if report.when == "teardown" else ():
+            if name == _WAITED and isinstance(told, float):
+                waited += told
+            if name == "golden":
+                terminalreporter.write_line(f"golden recording, {told}")
     total = sum(seconds.values())
     if total >= _LONG_RUN:
         slowest = sorted(seconds.items(), key=lambda item: -item[1])[:_SLOWEST]
         shares = ", ".join(f"{file} {time:.0f}" for file, time in slowest)
-        terminalreporter.write_line(f"{total:.0f} s of tests: {shares}")
+        terminalreporter.write_line(
+            f"{total:.0f} s of tests, {waited:.0f} of them waits for a turn"
+        )
+        terminalreporter.write_line(shares)
