@@ -128,7 +128,7 @@ def replay_all(out: Path) -> str:
     done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT, check=False)
     said = done.stdout + done.stderr
     whole = "equal to the byte" in said and "differ" not in said
-    lost = done.returncode == 2 and "input missing from the recording" in said
+    lost = done.returncode == 1 and "input missing from the recording" in said
     return "" if whole and (done.returncode == 0 or lost) else said
 
 
