@@ -3,8 +3,8 @@
 A reading is not believed that is beyond the joint's end stops, that has jumped against the joint's
 rate, or has drifted away from it. Then the last angle is kept, at rest: a knee that is held for
 half a second where it was is a small error beside one that is read as 0, on which a leg folds or
-kicks. An encoder is believed again once it has agreed with itself for a while, and with the end
-stops. A robot that has not believed one for `LOST_MS` stands.
+kicks. An encoder is believed again once it has agreed with itself for a while, and reads what is
+near to where the joint has been of late. Soon a robot that lacks one stands (`agents.sensor_loss`).
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class EncoderBridge:
         return row, State.from_row(state.tick, state.stamp_ns, bridged)
 
 
-def joints_lost(row: Array, most_ms: float) -> tuple[int, ...]:
+def joints_held(row: Array, most_ms: float) -> tuple[int, ...]:
     """Joints (of the robot's 12) that have been held for longer than this."""
     if 1e3 * row[ENCODERS.longest] <= most_ms:
         return ()
@@ -126,7 +126,7 @@ def _judge(row: Array, state: Array, lower: Array, upper: Array, dt: float) -> b
     whole, jump = True, _JUMP + _FASTEST * max(0.0, dt - 1e-3)
     for joint in range(N_JOINTS):
         gained = q[joint] - q0[joint] - 0.5 * dt * (v0[joint] + v[joint])
-        if abs(gained) > jump or not lower[joint] <= q[joint] <= upper[joint]:
+        if not (abs(gained) <= jump and lower[joint] <= q[joint] <= upper[joint]):  # or no number
             agrees[joint] = min(agrees[joint], 0.0)
         else:
             agrees[joint] = min(agrees[joint] + dt, 1.0)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.agents.encoder_bridge import joints_lost, name_joints
+from quadriga.agents.encoder_bridge import joints_held, name_joints
 from quadriga.agents.modes import ENCODER_LOST, IMU_LOST
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.record import record
@@ -25,7 +25,7 @@ class SensorLoss:
 
     Attributes:
         reason: why it can walk no more; "": it can.
-        joints: those whose angle has been unknown for so long, of 0 … 11.
+        joints: those whose angle is not known at the moment, of 0 … 11.
         now: whether anything is unknown that it must know to stand by feedback, or to walk again.
     """
 
@@ -52,10 +52,9 @@ class SensorLosses:
             missing_ms: for how long no attitude has been believed.
             encoders: what is remembered of them, see `EncoderLayout`.
         """
-        joints = joints_lost(encoders, self._encoder_ms)
-        reason = ""
+        lost, reason = joints_held(encoders, self._encoder_ms), ""
         if missing_ms > self._imu_ms:
             reason = IMU_LOST
-        elif joints:
-            reason = with_detail(ENCODER_LOST, name_joints(joints))
-        return SensorLoss(reason, joints, bool(joints) or missing_ms > 0)
+        elif lost:
+            reason = with_detail(ENCODER_LOST, name_joints(lost))
+        return SensorLoss(reason, joints_held(encoders, 0.0), bool(lost) or missing_ms > 0)

@@ -132,6 +132,20 @@ def test_a_robot_without_the_encoder_of_a_knee_does_not_lead_that_knee() -> None
     assert not outputs.command.kp.any()  # it knows the knee again
 
 
+def test_who_stands_without_an_attitude_does_not_lead_a_knee_that_is_not_known() -> None:
+    robot, knee = Robot(), 5
+    robot.run(400)
+    for _ in range(150):
+        robot.step(replace(standing(robot.tick), imu_quat_wxyz=np.full(4, np.nan)))
+    state = replace(standing(robot.tick), imu_quat_wxyz=np.full(4, np.nan))
+    state.row[State.CUTS["q_joint"].start + knee] = 0.0
+    outputs = robot.step(state)
+    assert (outputs.mode, outputs.reason) == ("stand", "imu-lost")
+    assert outputs.command.kp[knee] == outputs.command.kd[knee] == 0.0
+    assert outputs.command.tau[knee] > 0.0
+    assert np.count_nonzero(outputs.command.kp) == 11
+
+
 def fail(monkeypatch: pytest.MonkeyPatch) -> None:
     def no_solution(_free: bool, row: Array, contact: Array) -> WholeBodySolution:
         return WholeBodySolution(np.zeros_like(row[LIMITED.x]), "infeasible:-1", contact)
