@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -20,12 +21,22 @@ def warm_up(config: Config, console: Console) -> None:
     The compiler is imported only then: whoever starts a team need not wait for it.
     """
     folder = compiled_folder()
-    if is_switched_off() or (folder is not None and (folder / _DONE).exists()):
+    if is_switched_off() or _is_compiled(folder):
         return
     with console.status("compiling the agents (the first time only)"):
         _rehearse_lone_agent(config)
     if folder is not None:
         (folder / _DONE).touch()
+
+
+def load_compiled() -> None:
+    """Load what has been compiled, and compile nothing: what this process forks then has it."""
+    if not is_switched_off() and _is_compiled(compiled_folder()):
+        _rehearse_lone_agent(Config())
+
+
+def _is_compiled(folder: Path | None) -> bool:
+    return folder is not None and (folder / _DONE).exists()
 
 
 def _rehearse_lone_agent(config: Config) -> None:

@@ -6,6 +6,7 @@ import argparse
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Final
 
 from quadriga.commands.command import Run
@@ -75,6 +76,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return status
 
 
+@cache
 def build_parser(*, everything: bool = False) -> CommandLine:
     """The parser of the whole command line.
 

@@ -30,7 +30,8 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     from rich.console import Console
 
     from quadriga.shared.recording.reader import Recording
-    from quadriga.team.run_report import has_failed, report_file, report_folder
+    from quadriga.team.run_report import report_file, report_folder
+    from quadriga.team.run_summary import has_failed
 
     html, pictures = arguments.html, not arguments.no_render
     if html is not None and html.suffix.lower() not in (".html", ".htm"):

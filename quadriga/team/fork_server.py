@@ -1,21 +1,27 @@
-"""Program that becomes several processes of a team: it imports once what each of them needs.
+"""Program that becomes the processes of a team, of one walk after the other.
 
-An interpreter that starts and imports keeps a core busy for a second. A team on one computer is
-half a dozen of them, which share its cores.
+An interpreter that starts and imports keeps a core busy for a second, and an agent that loads its
+machine code for almost as long. A team on one computer is half a dozen of them, which share its
+cores. So all that is done once, here, and whatever is forked has it.
 """
 
 from __future__ import annotations
 
 import gc
+import importlib
 import json
 import os
 import runpy
 import signal
+import socket
 import sys
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Final, NoReturn
+
+from quadriga.shared.runtime.installed import code_digest, package_versions
+from quadriga.shared.runtime.signals import die_with_parent
 
 # What each command imports once it is called, by the command.
 _IMPORTED: Final = {
@@ -27,8 +33,11 @@ _IMPORTED: Final = {
     "router": ("quadriga.team.router",),
     "sim": ("quadriga.plant.process", "quadriga.team.plants", "quadriga.sim_server.world.world"),
 }
+_AGENT: Final = "agent"
 _PROGRAM: Final = "quadriga"
+_ROOM: Final = 2_000  # bytes for the command line that a fork is shown with
 _ARG_START: Final = 48  # field of /proc/PID/stat, see proc(5)
+LARGEST: Final = 1 << 17  # bytes of an order, or of the answer to it
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,54 +55,114 @@ class Fork:
 
 @dataclass(frozen=True, slots=True)
 class ForkOrder:
-    """What this program is to do.
+    """What this program is to become.
+
+    With it comes a pipe that is open for reading: a fork takes a byte from it before it begins.
 
     Attributes:
         prefix: how many words of a command line come before the command's name.
-        go: a pipe that is open for reading; a fork takes a byte from it before it begins.
         forks: in the order in which they begin.
     """
 
     prefix: int
-    go: int
     forks: tuple[Fork, ...]
 
-    def to_json(self) -> str:
-        return json.dumps(asdict(self))
+    @property
+    def commands(self) -> list[str]:
+        """The commands of its forks."""
+        return list(dict.fromkeys(fork.words[self.prefix] for fork in self.forks))
+
+    def to_json(self) -> bytes:
+        return json.dumps(asdict(self)).encode()
 
     @classmethod
-    def from_json(cls, text: str) -> ForkOrder:
+    def from_json(cls, text: bytes) -> ForkOrder:
         raw = json.loads(text)
         forks = (Fork(tuple(fork["words"]), fork["log"]) for fork in raw["forks"])
-        return cls(raw["prefix"], raw["go"], tuple(forks))
+        return cls(raw["prefix"], tuple(forks))
 
 
-def command_line(forks: tuple[Fork, ...]) -> tuple[str, ...]:
-    """How this program is started for `forks`: its last word keeps room for their command lines."""
-    room = max(len(_joined(fork.words)) for fork in forks)
-    return (sys.executable, "-m", __name__, " " * room)
+def command_line(line: int, commands: Collection[str]) -> tuple[str, ...]:
+    """How this program is started.
+
+    Args:
+        line: number of its end of a pair of sockets, over which orders come.
+        commands: what will be ordered first, as far as that is known.
+
+    Returns:
+        Words of which the last one keeps room for a fork's command line.
+    """
+    words = (str(line), str(os.getpid()), ",".join(commands))
+    return (sys.executable, "-m", __name__, *words, " " * _ROOM)
 
 
-def main() -> None:
-    """Read an order, fork, and write the process ids as a line of JSON."""
-    order = ForkOrder.from_json(sys.stdin.read())
-    import_module("quadriga.commands.parser")
-    for command in dict.fromkeys(fork.words[order.prefix] for fork in order.forks):
+def main() -> NoReturn:
+    """Answer each order with the process ids, a list in JSON, until there is nobody to order."""
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+    number, parent, commands = sys.argv[1:4]
+    die_with_parent(int(parent))
+    line, ready = socket.socket(fileno=int(number)), set[str]()
+    _prepare(commands.split(","), ready)
+    while True:
+        text, handles, _, _ = socket.recv_fds(line, LARGEST, 1)
+        if not text:
+            os._exit(0)
+        order = ForkOrder.from_json(text)
+        _prepare(order.commands, ready)
+        pids, fork = _fork_apart(order)
+        if fork is not None:
+            line.close()
+            _become(fork, order.prefix, handles[0])
+        os.close(handles[0])
+        line.send(json.dumps(pids).encode())
+
+
+def _prepare(commands: Collection[str], ready: set[str]) -> None:
+    """Import, load and find out what these need that are not `ready` yet."""
+    if not ready:
+        importlib.import_module("quadriga.commands.parser").build_parser()
+        code_digest()  # of the files that are imported here: forks must not read later ones
+        package_versions()
+    for command in commands:
+        if command in ready:
+            continue
+        ready.add(command)
         for module in _IMPORTED.get(command, ()):
-            import_module(module)
+            importlib.import_module(module)
+        if command == _AGENT:
+            importlib.import_module("quadriga.warm_up").load_compiled()
     gc.freeze()  # or the first collection of each fork copies all pages
-    pids: list[int] = []
+
+
+def _fork_apart(order: ForkOrder) -> tuple[list[int], Fork | None]:
+    """Fork all from a process in between, which ends: so whoever orders them can adopt them.
+
+    Returns:
+        Their process ids, none if the system permits no more processes, and None; or in a fork
+        what it is to become.
+    """
+    read, write = os.pipe()
+    between = os.fork()
+    if between:
+        os.close(write)
+        with open(read, "rb") as said:  # until the last fork has closed it too
+            pids = json.loads(said.read() or b"[]")
+        os.waitpid(between, 0)
+        return pids, None
+    pids = []
     fork = _fork_all(order, pids)
-    if fork is not None:
-        _become(fork, order)
-    print(json.dumps(pids), flush=True)
+    if fork is None:
+        os.write(write, json.dumps(pids).encode())
+        os._exit(0)
+    os.close(read)
+    os.close(write)
+    return [], fork
 
 
 def _fork_all(order: ForkOrder, pids: list[int]) -> Fork | None:
-    """What this process is to become if it is a fork; None for the program, which gets `pids`.
+    """What this process is to become if it is a fork; None for who forks them, who gets `pids`.
 
-    Raises:
-        OSError: the system permits no more processes; there is none then.
+    It ends if the system permits no more processes; there is none then.
     """
     for fork in order.forks:
         try:
@@ -101,22 +170,24 @@ def _fork_all(order: ForkOrder, pids: list[int]) -> Fork | None:
         except OSError:
             for started in pids:
                 os.kill(started, signal.SIGKILL)
-            raise
+                os.waitpid(started, 0)
+            os._exit(1)
         if pid == 0:
             return fork
         pids.append(pid)
     return None
 
 
-def _become(fork: Fork, order: ForkOrder) -> NoReturn:
+def _become(fork: Fork, prefix: int, go: int) -> NoReturn:
     """Be the fork's command once it may begin; end if nobody is left to say so."""
     os.setsid()
     _redirect(fork.log)
-    if not os.read(order.go, 1):
+    if not os.read(go, 1):
         os._exit(0)
-    os.close(order.go)
+    os.close(go)
     _show_words(fork.words)
-    sys.argv[1:] = fork.words[order.prefix :]
+    sys.argv[1:] = fork.words[prefix:]
+    importlib.invalidate_caches()  # there may be files that were not when they were filled
     runpy.run_module(_PROGRAM, run_name="__main__", alter_sys=True)
     os._exit(0)  # it has ended the process
 

@@ -1,23 +1,32 @@
-"""Processes that a fork server starts, and that become this process's own children."""
+"""Processes that a fork server starts, and that become this process's own children.
+
+A process that starts one team after the other keeps its fork server between them.
+"""
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import json
 import os
 import select
 import signal
+import socket
 import subprocess
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Final
 
-from quadriga.team.fork_server import Fork, ForkOrder, command_line
+from quadriga.team.fork_server import LARGEST, Fork, ForkOrder, command_line
 
 _PR_SET_CHILD_SUBREAPER: Final = 36  # linux/prctl.h
 _PR_GET_CHILD_SUBREAPER: Final = 37
+# What threadpoolctl sets where it is imported, and pytest for each test; nothing else reads them.
+_IGNORED: Final = {"KMP_DUPLICATE_LIB_OK", "PYTEST_CURRENT_TEST"}
 _one_at_a_time = threading.Lock()  # whether a process adopts is one word of it all
+_kept: list[_ForkServer] = []  # one at most, and this process's own
+os.register_at_fork(after_in_child=_kept.clear)
 
 
 class ForkedProcess:
@@ -66,6 +75,60 @@ class ForkedProcess:
             os.kill(self.pid, number)
 
 
+class _ForkServer:
+    """A fork server that runs, and how it is asked.
+
+    Args:
+        commands: what will be ordered first, as far as that is known.
+        environment: its own, and that of all that it starts.
+    """
+
+    def __init__(self, commands: Collection[str], environment: Mapping[str, str]) -> None:
+        self._made_for = _surroundings(environment)
+        self._line, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            self._process = subprocess.Popen(
+                command_line(theirs.fileno(), commands),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                env=environment,
+                pass_fds=(theirs.fileno(),),
+                start_new_session=True,
+            )
+
+    def fits(self, environment: Mapping[str, str]) -> bool:
+        """Whether it runs, and what it starts has this environment and this process's folder."""
+        return self._made_for == _surroundings(environment) and self._process.poll() is None
+
+    def start(self, order: ForkOrder, go: int) -> list[int]:
+        """Process ids of an order's forks, which wait for a byte each from the pipe `go`.
+
+        There are none where the server has failed, or the system permits no more processes.
+        """
+        try:
+            socket.send_fds(self._line, [order.to_json()], [go])
+            return list(json.loads(self._line.recv(LARGEST) or b"[]"))
+        except OSError:
+            return []
+
+    def close(self) -> None:
+        """End it. What it has started goes on; what has not begun yet, never does."""
+        self._line.close()
+        self._process.kill()
+        self._process.wait()
+
+
+def _surroundings(environment: Mapping[str, str]) -> tuple[str, Mapping[str, str]]:
+    return os.getcwd(), {name: environment[name] for name in environment.keys() - _IGNORED}
+
+
+def expect_forks(commands: Collection[str], environment: Mapping[str, str]) -> None:
+    """Have what these commands need imported, beside whatever is done until they are started."""
+    with _one_at_a_time:
+        _fitting_server(commands, environment)
+
+
 def start_forked(
     forks: Sequence[Fork], prefix: int, environment: Mapping[str, str]
 ) -> list[ForkedProcess]:
@@ -79,10 +142,17 @@ def start_forked(
     Returns:
         One child of this process for each, in a session of its own; none if there can be none.
     """
+    order = ForkOrder(prefix, tuple(forks))
     go, begin = os.pipe()
     try:
         with _one_at_a_time, _adopting():
-            pids = _fork(ForkOrder(prefix, go, tuple(forks)), environment)
+            server = _fitting_server(order.commands, environment)
+            pids = list[int]()
+            try:
+                pids = server.start(order, go)
+            finally:
+                if not pids:  # it has failed, or its answer is not waited for
+                    _end_server()
         os.write(begin, b"." * len(pids))
     finally:
         os.close(go)
@@ -90,24 +160,19 @@ def start_forked(
     return [ForkedProcess(pid) for pid in pids]
 
 
-def _fork(order: ForkOrder, environment: Mapping[str, str]) -> list[int]:
-    server = subprocess.Popen(
-        command_line(order.forks),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        env=environment,
-        pass_fds=(order.go,),
-        start_new_session=True,
-        text=True,
-    )
-    try:
-        said, _ = server.communicate(order.to_json())
-    except BaseException:  # interrupted: what it has forked ends by itself, without a start
-        server.kill()
-        server.wait()
-        raise
-    return [int(pid) for pid in json.loads(said)] if server.returncode == 0 else []
+def _fitting_server(commands: Collection[str], environment: Mapping[str, str]) -> _ForkServer:
+    """The server that is kept, or a new one in its place if it does not fit."""
+    if _kept and not _kept[0].fits(environment):
+        _end_server()
+    if not _kept:
+        _kept.append(_ForkServer(commands, environment))
+    return _kept[0]
+
+
+@atexit.register
+def _end_server() -> None:
+    while _kept:
+        _kept.pop().close()
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from quadriga.shared.members import LAST, LEADS, OPERATOR, RECORDER, ROUTER, SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.scheduling import valid_priority
 from quadriga.team.fork_server import Fork
-from quadriga.team.forked import ForkedProcess, start_forked
+from quadriga.team.forked import ForkedProcess, expect_forks, start_forked
 
 _ONE_THREAD: Final = (
     "OMP_NUM_THREADS",
@@ -77,7 +77,6 @@ def process_table(
         ConfigError: the environment asks for a priority that there is not.
     """
     valid_priority(config.runtime.priority)  # or each process would refuse it
-    bridged = config.team.plant == BRIDGED
 
     def build_row(member: Member) -> ProcessSpec:
         role, options = member.role, list[str]()
@@ -92,12 +91,23 @@ def process_table(
         if role.name == SIM and armed:
             options.append("--armed")
         options += ["--config", str(run_dir / "config.toml")]
-        command = "bridge" if role.name == SIM and bridged else role.command
+        command = _command(config, member)
         # Down from the stand, or out of a walk, and some time for the legs to sink.
         rest = 2.0 * config.bridge.stand_s if command == "bridge" and armed else 0.0
         return ProcessSpec(member.name, (*QUADRIGA, command, *options), role.grace + rest, rest)
 
     return tuple(map(build_row, processes(config)))
+
+
+def expect_launch(config: Config) -> None:
+    """Have what the team's processes need imported, beside all that is done before they start."""
+    expect_forks({_command(config, member) for member in processes(config)}, _environment())
+
+
+def _command(config: Config, member: Member) -> str:
+    """What the command line calls a member's process."""
+    bridged = member.role.name == SIM and config.team.plant == BRIDGED
+    return "bridge" if bridged else member.role.command
 
 
 def router_row(config: Config, run_dir: Path) -> ProcessSpec:

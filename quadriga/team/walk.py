@@ -19,7 +19,7 @@ from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.team.controller_program import check_controller
 from quadriga.team.drive_page import DrivePage
-from quadriga.team.launch import Launch, ProcessSpec, process_table
+from quadriga.team.launch import Launch, ProcessSpec, expect_launch, process_table
 from quadriga.team.plants import check_plant
 from quadriga.team.progress import WalkProgress
 from quadriga.team.registry import team_registered
@@ -78,6 +78,7 @@ def walk(
         ProcessError: a process failed or left too early, or the walk did not come to its end.
         QuadrigaError: anything a user can put right before the walk begins.
     """
+    expect_launch(config)
     check_walk(config)
     run_dir = make_run_dir(out)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
@@ -101,12 +102,15 @@ def walk(
             return INTERRUPTED
     if not config.recorder.enabled:
         return FELL if fallen else OK
-    # Imported late, as the predictor's part is: the processes need not wait for what draws figures.
-    from quadriga.team.run_report import has_failed, report_folder, sum_up
+    # Imported late, as the predictor's part is: the processes need not wait for what reads a
+    # recording, nor a mere table for what draws figures.
+    from quadriga.team.run_summary import has_failed, sum_up
 
     if report is Report.TABLE:
         summary = sum_up(run_dir, console)
     else:
+        from quadriga.team.run_report import report_folder
+
         summary = report_folder(run_dir, pictures=report is Report.PICTURES, console=console)
     return FELL if fallen or has_failed(summary) else OK
 

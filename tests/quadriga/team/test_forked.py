@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -14,8 +14,8 @@ import pytest
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.team import forked
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.fork_server import Fork, ForkOrder, command_line
-from quadriga.team.forked import ForkedProcess, start_forked
+from quadriga.team.fork_server import Fork, ForkOrder
+from quadriga.team.forked import ForkedProcess, _ForkServer, start_forked
 from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec
 
 WAIT = 20.0  # s
@@ -33,10 +33,9 @@ def start(*forks: Fork) -> list[ForkedProcess]:
 
 def ready(forks: Sequence[Fork]) -> None:
     """Wait until each has said something."""
-    deadline = monotonic() + WAIT
-    while not all(Path(fork.log).exists() and Path(fork.log).stat().st_size for fork in forks):
-        assert monotonic() < deadline
-        sleep(0.02)
+    wait_until(
+        lambda: all(Path(fork.log).exists() and Path(fork.log).stat().st_size for fork in forks)
+    )
 
 
 @pytest.fixture
@@ -97,20 +96,70 @@ def test_a_wrong_command_has_its_own_status_and_says_why(tmp_path: Path) -> None
 def test_nobody_begins_whose_start_is_not_known(forks: list[Fork]) -> None:
     """As when who starts them is interrupted between the forks and the word to begin."""
     go, begin = os.pipe()
-    order = ForkOrder(len(QUADRIGA), go, tuple(forks))
-    with subprocess.Popen(
-        command_line(order.forks), stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=(go,)
-    ) as server:
-        said, _ = server.communicate(order.to_json().encode())
-    pids = [int(word) for word in said.decode().strip("[]\n").split(",")]
+    server = _ForkServer([], os.environ)
+    pids = server.start(ForkOrder(len(QUADRIGA), tuple(forks)), go)
     assert all(Path("/proc", str(pid)).exists() for pid in pids)
     os.close(begin)
     os.close(go)
+    wait_until(lambda: not any(map(_runs, pids)))
+    server.close()
+    assert [Path(fork.log).read_text() for fork in forks] == ["", ""]
+
+
+def test_the_next_team_comes_from_the_same_server(
+    forks: list[Fork], routers: list[ForkedProcess]
+) -> None:
+    (server,) = forked._kept
+    ready(forks)
+    more = start(*forks)
+    assert forked._kept == [server]
+    assert all(process.poll() is None for process in routers)
+    for process in more:
+        process.kill()
+        assert process.wait(WAIT) == -signal.SIGKILL
+
+
+def test_another_environment_has_a_server_of_its_own(
+    forks: list[Fork], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (first,) = start(forks[0])
+    (server,) = forked._kept
+    monkeypatch.setenv("OF_ANOTHER_TEAM", "1")
+    (second,) = start(forks[1])
+    assert forked._kept != [server]
+    ready(forks)
+    assert b"OF_ANOTHER_TEAM=1" in Path(f"/proc/{second.pid}/environ").read_bytes()
+    for process in (first, second):
+        process.kill()
+        assert process.wait(WAIT) == -signal.SIGKILL
+
+
+def test_a_server_that_has_been_killed_is_replaced(forks: list[Fork]) -> None:
+    forked.expect_forks(["router"], os.environ)
+    (server,) = forked._kept
+    server._process.kill()
+    server._process.wait()
+    (process,) = start(forks[0])
+    ready(forks[:1])
+    process.kill()
+    assert process.wait(WAIT) == -signal.SIGKILL
+
+
+def test_a_server_does_not_outlive_whoever_keeps_it() -> None:
+    code = (
+        "import os; from quadriga.team import forked;"
+        "forked.expect_forks(['agent'], os.environ);"
+        "print(forked._kept[0]._process.pid, flush=True); os._exit(0)"
+    )
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
+    wait_until(lambda: not _runs(int(said.stdout)))
+
+
+def wait_until(seen: Callable[[], bool]) -> None:
     deadline = monotonic() + WAIT
-    while any(_runs(pid) for pid in pids):
+    while not seen():
         assert monotonic() < deadline
         sleep(0.02)
-    assert [Path(fork.log).read_text() for fork in forks] == ["", ""]
 
 
 def _runs(pid: int) -> bool:
@@ -124,7 +173,8 @@ def test_a_team_starts_without_a_fork_server_too(
     forks: list[Fork], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fails = (sys.executable, "-c", "raise SystemExit(3)")
-    monkeypatch.setattr(forked, "command_line", lambda _: fails)
+    monkeypatch.setattr(forked, "_kept", [])
+    monkeypatch.setattr(forked, "command_line", lambda *_: fails)
     assert start(*forks) == []
     words = [fork.words[:-2] for fork in forks]
     rows = [ProcessSpec(name, of, 5.0) for name, of in zip(("one", "two"), words, strict=True)]
