@@ -1,10 +1,11 @@
 """What an agent believes of its joints' encoders; those that say what cannot be are held.
 
 A reading is not believed that is beyond the joint's end stops, that has jumped against the joint's
-rate, or has drifted away from it. Then the last angle is kept, at rest: a knee that is held for
-half a second where it was is a small error beside one that is read as 0, on which a leg folds or
-kicks. An encoder is believed again once it has agreed with itself for a while, and reads what is
-near to where the joint has been of late. Soon a robot that lacks one stands (`agents.sensor_loss`).
+rate, has drifted away from it, or stays the same number while its leg moves. Then the last angle is
+kept, at rest: a knee that is held for half a second where it was is a small error beside one that
+is read as 0, on which a leg folds or kicks. An encoder is believed again once it has agreed with
+itself for a while, and reads what is near to where the joint has been of late. Soon a robot that
+lacks one stands (`agents.sensor_loss`).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.agents.controller.maths.rows import places, row_size
-from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
+from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, N_LEGS, Array
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import State
@@ -29,8 +30,11 @@ _FORGET: Final = 0.1  # s
 _DISTRUST: Final = 0.1  # s more, for which one must agree that had drifted
 _BESIDE: Final = 0.15  # rad beside the range of late, within which one is believed again
 _RANGE_TIME: Final = 2.0  # s, within which that range narrows to where the joint is
+_TRAVEL: Final = 0.5  # rad, of a leg's other joints together, for which none reads the same number
+_MOVES: Final = 0.3  # rad/s, of a joint that is not at rest
 _FASTEST: Final = 20.0  # rad/s, of such joints: where readings are missing, more may have happened
 
+_OF_A_LEG: Final = N_JOINTS // N_LEGS
 _Q: Final = State.CUTS["q_joint"]
 _V: Final = State.CUTS["v_joint"]
 
@@ -44,6 +48,7 @@ class EncoderLayout(NamedTuple):
         agrees: time for which readings have been in agreement, s; less than 0 after a drift.
         drift: of the angle against the rate, of late, rad.
         least, most: of the angles that were believed of late, rad.
+        travel: of the leg's other joints since the reading has changed, rad.
         held: time for which the joint has been held, s.
         longest: the longest of these times, s; one number.
     """
@@ -55,6 +60,7 @@ class EncoderLayout(NamedTuple):
     drift: slice
     least: slice
     most: slice
+    travel: slice
     held: slice
     longest: int
 
@@ -93,9 +99,9 @@ class EncoderBridge:
         return row, State.from_row(state.tick, state.stamp_ns, bridged)
 
 
-def joints_held(row: Array, most_ms: float) -> tuple[int, ...]:
-    """Joints (of the robot's 12) that have been held for longer than this."""
-    if 1e3 * row[ENCODERS.longest] <= most_ms:
+def joints_held(row: Array, most_ms: float | Array) -> tuple[int, ...]:
+    """Joints (of the robot's 12) that have been held for longer than this, or each than its own."""
+    if not row[ENCODERS.longest]:
         return ()
     return tuple(np.flatnonzero(1e3 * row[ENCODERS.held] > most_ms).tolist())
 
@@ -107,7 +113,8 @@ def name_joints(joints: Iterable[int]) -> str:
 
 def _first(state: State) -> Array:
     row = np.full(row_size(ENCODERS), _BELIEVED_AFTER)
-    row[ENCODERS.held] = row[ENCODERS.drift] = row[ENCODERS.longest] = 0.0
+    for nothing in (ENCODERS.drift, ENCODERS.travel, ENCODERS.held, ENCODERS.longest):
+        row[nothing] = 0.0
     for angle in (ENCODERS.believed, ENCODERS.q, ENCODERS.least, ENCODERS.most):
         row[angle] = state.q_joint
     row[ENCODERS.v] = state.v_joint
@@ -121,7 +128,7 @@ def _judge(row: Array, state: Array, lower: Array, upper: Array, dt: float) -> b
     q0, v0 = row[ENCODERS.q], row[ENCODERS.v]
     agrees, believed, held = row[ENCODERS.agrees], row[ENCODERS.believed], row[ENCODERS.held]
     drift, kept = row[ENCODERS.drift], max(0.0, 1.0 - dt / _FORGET)
-    least, most = row[ENCODERS.least], row[ENCODERS.most]
+    least, most, travel = row[ENCODERS.least], row[ENCODERS.most], row[ENCODERS.travel]
     narrows = dt / _RANGE_TIME
     whole, jump = True, _JUMP + _FASTEST * max(0.0, dt - 1e-3)
     for joint in range(N_JOINTS):
@@ -136,6 +143,12 @@ def _judge(row: Array, state: Array, lower: Array, upper: Array, dt: float) -> b
                 agrees[joint] = min(agrees[joint], 0.0)
             if agrees[joint] >= 0.0:
                 drift[joint] = 0.0  # it begins anew after a jump
+        if q[joint] == q0[joint]:
+            travel[joint] += dt * _speed_beside(q, q0, v, joint)
+        else:
+            travel[joint] = 0.0
+        if travel[joint] > _TRAVEL:
+            agrees[joint] = min(agrees[joint], 0.0)
         away = abs(drift[joint])
         if away > _DRIFT or (agrees[joint] < 0.0 and away > _RETURN):
             agrees[joint] = -_DISTRUST
@@ -150,6 +163,19 @@ def _judge(row: Array, state: Array, lower: Array, upper: Array, dt: float) -> b
     row[ENCODERS.longest] = held.max()
     q0[:], v0[:] = q, v
     return whole
+
+
+@compiled
+def _speed_beside(q: Array, q0: Array, v: Array, joint: int) -> float:
+    """How fast the other joints of a joint's leg move together, rad/s.
+
+    One at rest trembles. Where all read what they did, the whole message is an old one.
+    """
+    speed, hip = 0.0, joint - joint % _OF_A_LEG
+    for other in range(hip, hip + _OF_A_LEG):
+        if other != joint and q[other] != q0[other] and abs(v[other]) > _MOVES:
+            speed += abs(v[other])
+    return speed
 
 
 @compiled

@@ -42,9 +42,10 @@ def rehearse(config: Config, agent: Agent, note: Callable[[], None] = lambda: No
     ticks earlier: an attitude that jumps is not believed at once.
     """
     memory, lean = agent.initial(), _LEAN * config.controller.fall_tilt
+    still = standing(config.robot, 0)
     upright = config.gait.stand_ms + SAMPLE_MS * config.planner.T_ini + 2 * step_ms(config)
     for tick in range(upright + BELIEVED_AFTER_MS + 2 * step_ms(config) + 1):
-        sent = encode(standing(config.robot, tick, lean if tick > upright else 0.0))
+        sent = encode(_at(still, tick, lean if tick > upright else 0.0))
         inputs = Inputs(decode(sent, State), references=(_stay(config, tick),))
         memory, outputs = agent.step(memory, inputs)
         encode(outputs.command)
@@ -87,17 +88,23 @@ def _standing_torques(robot: RobotSpec, force: float) -> Array:
 
 def standing(robot: RobotSpec, tick: int, lean: float = 0.0) -> State:
     """What a robot that stands still on flat ground measures, or leans to its right, rad."""
-    zero = np.zeros(N_JOINTS)
-    quat = np.array([np.cos(0.5 * lean), np.sin(0.5 * lean), 0.0, 0.0])
-    share = robot.weight / N_LEGS
-    return State(
-        tick,
-        tick * 1_000_000,
+    zero, share = np.zeros(N_JOINTS), robot.weight / N_LEGS
+    still = State(
+        0,
+        0,
         robot.q_stand,
         zero,
         _standing_torques(robot, share),
-        quat,
+        np.zeros(4),
         np.zeros(3),
         np.array([0.0, 0.0, GRAVITY]),
         np.full(N_LEGS, share),
     )
+    return _at(still, tick, lean)
+
+
+def _at(still: State, tick: int, lean: float) -> State:
+    """`still` as it is at another tick, and leaning to its right, rad."""
+    row = still.row.copy()
+    row[State.CUTS["imu_quat_wxyz"]] = np.cos(0.5 * lean), np.sin(0.5 * lean), 0.0, 0.0
+    return State.from_row(tick, tick * 1_000_000, row)

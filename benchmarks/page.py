@@ -15,6 +15,7 @@ TARGETS: Final[Targets] = (
     ("low_level_us_median", "<=", 150.0), ("low_level_vs_tsid", ">=", 1.0), ("rtf.3", ">=", 1.2),
     ("rtf.5", ">=", 0.8), ("messaging_share.3", "<=", 0.55),
     ("recorder_msgs_per_s", ">=", 19_900.0), ("recorder_gaps", "<=", 0.0),
+    ("start_s", "<=", 4.0),
 )  # fmt: skip
 _WIDTH: Final = 11
 _NO_TSID: Final = "not measured: `import tsid` fails or crashes here"
@@ -34,6 +35,7 @@ def headline(parts: dict[str, Part]) -> dict[str, Any]:
         "recorder_msgs_per_s": recorder.get("per_s"),
         "recorder_gaps": recorder.get("gaps"),
         "recorder_core_share": recorder.get("core"),
+        "start_s": parts["start"]["median"] if "start" in parts else None,
         "recorder_cost": 1.0 - fmean(cost["with"]) / fmean(cost["without"]) if cost else None,
     }
 
@@ -142,6 +144,14 @@ def _fit(part: Part) -> list[str]:
     ]
 
 
+def _start(part: Part) -> list[str]:
+    least, most = min(part["seconds"]), max(part["seconds"])
+    return [
+        f"n = {part['robots']}, from the command to the first tick: {part['median']:.1f} s, "
+        f"{least:.1f} to {most:.1f} (× {part['ratio']:.1f} of what one agent imports alone)"
+    ]
+
+
 def _walks(part: Part) -> list[str]:
     lines = []
     for row in part["rows"]:
@@ -176,5 +186,6 @@ def _memory(figures: dict[str, dict[str, float]]) -> str:
 
 LINES: Final[dict[str, Callable[[Part], list[str]]]] = {
     "machine": _machine, "planner": _planner, "low-level": _low_level, "bus": _bus,
-    "world": _world, "clock": _clock, "recorder": _recorder, "fit": _fit, "walks": _walks,
+    "world": _world, "clock": _clock, "recorder": _recorder, "fit": _fit, "start": _start,
+    "walks": _walks,
 }  # fmt: skip

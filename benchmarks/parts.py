@@ -103,6 +103,17 @@ def fit(options: Options, _console: Console, _tell: Tell) -> Part:
     return dict(result_of(measure, size.robots, samples, "ridge"))
 
 
+def start(options: Options, console: Console, tell: Tell) -> Part:
+    """From the command of a walk to its first tick."""
+    from benchmarks.start import measure
+    from quadriga.warm_up import warm_up
+
+    config, _, _ = team(options, options.middle, 0.5, console)
+    warm_up(config, console)
+    tell(f"n = {config.team.robots}")
+    return measure(config, 1 if options.quick else 7)
+
+
 def walks(options: Options, console: Console, tell: Tell) -> Part:
     """Real walks of every team size, and of one size with and without recorder in turns."""
     from benchmarks.children import result_of
@@ -167,5 +178,5 @@ def team(
 
 PARTS: dict[str, Callable[[Options, Console, Tell], Part]] = {
     "planner": planner, "low-level": low_level, "bus": bus, "world": world, "clock": clock,
-    "recorder": recorder, "fit": fit, "walks": walks,
+    "recorder": recorder, "fit": fit, "start": start, "walks": walks,
 }  # fmt: skip

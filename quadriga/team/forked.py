@@ -24,6 +24,7 @@ _PR_SET_CHILD_SUBREAPER: Final = 36  # linux/prctl.h
 _PR_GET_CHILD_SUBREAPER: Final = 37
 # What threadpoolctl sets where it is imported, and pytest for each test; nothing else reads them.
 _IGNORED: Final = {"KMP_DUPLICATE_LIB_OK", "PYTEST_CURRENT_TEST"}
+_NETWORK: Final = "/proc/thread-self/ns/net"  # of this thread: its namespace
 _one_at_a_time = threading.Lock()  # whether a process adopts is one word of it all
 _kept: list[_ForkServer] = []  # one at most, and this process's own
 os.register_at_fork(after_in_child=_kept.clear)
@@ -98,7 +99,7 @@ class _ForkServer:
             )
 
     def fits(self, environment: Mapping[str, str]) -> bool:
-        """Whether it runs, and what it starts has this environment and this process's folder."""
+        """Whether it runs, and starts what this process would start with this environment."""
         return self._made_for == _surroundings(environment) and self._process.poll() is None
 
     def start(self, order: ForkOrder, go: int) -> list[int]:
@@ -119,8 +120,10 @@ class _ForkServer:
         self._process.wait()
 
 
-def _surroundings(environment: Mapping[str, str]) -> tuple[str, Mapping[str, str]]:
-    return os.getcwd(), {name: environment[name] for name in environment.keys() - _IGNORED}
+def _surroundings(environment: Mapping[str, str]) -> tuple[str, str, Mapping[str, str]]:
+    """What a process that is started now gets: its folder, its network and its environment."""
+    variables = {name: environment[name] for name in environment.keys() - _IGNORED}
+    return os.getcwd(), os.readlink(_NETWORK), variables
 
 
 def expect_forks(commands: Collection[str], environment: Mapping[str, str]) -> None:

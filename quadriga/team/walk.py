@@ -14,6 +14,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import OPERATOR
 from quadriga.shared.planner_kinds import find_kind
+from quadriga.shared.runtime.scheduling import valid_priority
 from quadriga.shared.runtime.signals import stop_flag
 from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
@@ -46,9 +47,10 @@ def check_walk(config: Config) -> None:
     """Refuse what cannot be walked, before anything is written or started.
 
     Raises:
-        ConfigError: there is no such plant or controller, its world cannot be built, or the trace
-            that it follows cannot be read.
+        ConfigError: there is no such plant or controller, its world cannot be built, the trace that
+            it follows cannot be read, or the environment asks for a priority that there is not.
     """
+    valid_priority(config.runtime.priority)
     check_plant(config)
     check_controller(config)
     build_scenario(config, build_loads(config))

@@ -31,7 +31,7 @@ from quadriga.shared.wire.topics import RECEIVED
 Packet = tuple[str, bytes]  # key, payload as received
 Arrival = tuple[int, str, bytes]  # when, ns of `monotonic_ns`, and the packet
 
-POLL: Final = 0.1  # s, longest wait before a loop looks at its stop flag
+POLL: Final = 0.05  # s, longest wait before a loop looks at its stop flag
 _ACK_TIMEOUT: Final = 2.0  # s
 _LINK_TIMEOUT: Final = 5.0  # s
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quadriga.agents.encoder_bridge import EncoderBridge, joints_held, name_joints
+from quadriga.agents.encoder_bridge import ENCODERS, EncoderBridge, joints_held, name_joints
 from quadriga.shared.robot.a1 import A1
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import State
@@ -65,6 +65,11 @@ def be_stuck(state: State) -> State:
     return with_knee(state, first.q_joint[KNEE], first.v_joint[KNEE])
 
 
+def be_stuck_at_rest(state: State) -> State:
+    """An angle that stays what it was, and a rate that agrees."""
+    return with_knee(state, swinging(FAILS).q_joint[KNEE], 0.0)
+
+
 def follow(spoil: Callable[[State], State]) -> tuple[list[State], list[State]]:
     """What was read and what was believed, by tick."""
     memory: Array | None = None
@@ -92,7 +97,8 @@ def test_sound_encoders_are_believed_as_they_are() -> None:
         (be_garbage, 5, 20),
         (be_beyond, 250, 20),
         (be_adrift, 50, 230),
-        (be_stuck, 100, 230),
+        (be_stuck, 100, 20),
+        (be_stuck_at_rest, 100, 20),
     ],
 )
 def test_an_encoder_that_fails_is_held_until_it_agrees_with_itself_again(
@@ -125,6 +131,26 @@ def test_a_reading_at_rest_where_the_joint_has_not_been_of_late_is_never_believe
     assert joints_held(memory, BACK - FAILS - 2.0) == (thigh,)
     assert joints_held(memory, BACK - FAILS + 2.0) == ()
     assert name_joints((thigh, 6)) == "FL_thigh,RL_hip"
+
+
+def test_one_number_again_and_again_is_believed_while_the_leg_rests() -> None:
+    memory: Array | None = None
+    for tick in range(END):
+        chance, state = np.random.default_rng(tick), standing(tick)
+        trembling = state.q_joint + 5e-4 * chance.standard_normal(12)
+        state = replace(state, q_joint=trembling, v_joint=0.07 * chance.standard_normal(12))
+        state = with_knee(state, -1.6, 0.0)
+        memory, believed = BRIDGE.step(memory, state, DT)
+        assert believed is state
+
+
+def test_a_message_that_comes_again_and_again_tells_of_no_encoder() -> None:
+    memory: Array | None = None
+    for tick in range(FAILS + 20):
+        state = replace(swinging(min(tick, FAILS)), tick=tick)
+        memory, _ = BRIDGE.step(memory, state, DT)
+    assert memory is not None
+    assert memory[ENCODERS.travel].max() == 0.0
 
 
 def test_where_ticks_were_passed_over_an_angle_may_be_another() -> None:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from quadriga.agents.controller.maths.rows import row_size
+from quadriga.agents.encoder_bridge import ENCODERS
+from quadriga.agents.sensor_loss import SensorLosses
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.load import load
+from quadriga.shared.robot.conventions import JOINT_NAMES
 from quadriga.team.operator import references_of
 
 FAILS = 2000  # tick
@@ -79,3 +84,19 @@ def test_a_robot_alone_stands_without_the_encoder_of_a_joint_for_good(
         assert modes[-1] == ("walk", "")
     else:
         assert modes[-1] == ("stand", f"encoder-lost:{joint}")
+
+
+@pytest.mark.parametrize("part", ["hip", "thigh", "calf"])
+@pytest.mark.parametrize("yoked", [True, False])
+def test_a_yoked_robot_does_without_a_knee_for_longer_than_without_a_thigh(
+    part: str, yoked: bool
+) -> None:
+    losses, joint = SensorLosses(yoked=yoked), JOINT_NAMES.index(f"RR_{part}_joint")
+    longest = {"hip": 800, "thigh": 300, "calf": 800}[part] if yoked else 100
+    for held_ms in (longest - 1, longest + 1):
+        row = np.zeros(row_size(ENCODERS))
+        row[ENCODERS.held][joint] = row[ENCODERS.longest] = 1e-3 * held_ms
+        loss = losses.find(0.0, row)
+        assert loss.reason == ("" if held_ms < longest else f"encoder-lost:RR_{part}")
+        assert loss.joints == (joint,)
+        assert loss.now is (held_ms > longest)

@@ -67,6 +67,14 @@ def test_plants_whose_clocks_are_far_apart_begin_ticks_together(tmp_path: Path) 
     assert "two plants" in page
 
 
+def test_a_start_is_measured(tmp_path: Path) -> None:
+    page, found = run(tmp_path / "b.json", "start", "--planner", "none", "--robots", "1")
+    part = found["parts"]["start"]
+    assert [found["start_s"]] == part["seconds"]
+    assert min(*part["seconds"], *part["imports"]) > 0.0
+    assert "from the command to the first tick" in page
+
+
 def test_walks_are_measured_with_and_without_the_bus(tmp_path: Path) -> None:
     words = ("walks", "--planner", "none", "--robots", "1", "--seconds", "1")
     page, found = run(tmp_path / "b.json", *words)

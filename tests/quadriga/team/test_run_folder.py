@@ -42,3 +42,12 @@ def test_a_new_folder_is_named_by_date_and_time(
     monkeypatch.setattr("quadriga.team.run_folder.wall_ns", lambda: 10**18)
     names = [make_run_dir(None).name for _ in range(3)]  # of walks begun in the same second
     assert names == [names[0], f"{names[0]}-2", f"{names[0]}-3"]
+
+
+def test_a_refused_priority_leaves_no_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("QUADRIGA_PRIORITY", "Realtime")
+    assert main(["walk", "--out", str(tmp_path / "run")]) == 2
+    assert "QUADRIGA_PRIORITY" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
