@@ -26,7 +26,7 @@ from quadriga.shared.wire.topics import MEASUREMENT, SAMPLE_MS
 FRESH: Final = "fresh"  # the newest plan that may be used: that of step k−1
 SHIFTED: Final = "shifted"  # an older one, shifted by its age
 HELD: Final = "held"  # too old: the effect of the peer's last terms stays in force
-LOST: Final = "lost"  # held long enough: the team stops
+LOST: Final = "lost"  # held long enough, or the peer has stopped: the team stops
 
 
 @record
@@ -177,23 +177,28 @@ class Neighbours:
 
     def lost_peers(self, memory: PeerMemory, last: int, first_step: int) -> tuple[str, ...]:
         """Names of the peers given up, those that `select` would call lost."""
-        newest = {
-            name: next((plan for plan in reversed(history.plans) if plan.step <= last), None)
-            for name, history in memory.peers.items()
-        }
         return tuple(
             name
-            for name, plan in newest.items()
-            if self._status(_age(plan, last, first_step)) == LOST
+            for name, history in memory.peers.items()
+            if self._status(history, _newest(history, last), last, first_step) == LOST
         )
 
-    def _status(self, age: int) -> str:
-        """Status of a peer whose newest plan is `age` steps older than the newest one allowed."""
-        if age > patience(self._config):
+    def _status(self, history: PeerHistory, newest: Plan | None, last: int, first_step: int) -> str:
+        """Status of a peer at step `last`, whose newest plan until then this is."""
+        age = _age(newest, last, first_step)
+        if age > patience(self._config) or self._has_stopped(history, newest, last):
             return LOST
         if age > self._config.planner.max_peer_age:
             return HELD
         return FRESH if age <= 0 else SHIFTED
+
+    def _has_stopped(self, history: PeerHistory, newest: Plan | None, last: int) -> bool:
+        """Whether a peer has come to stand since its newest plan: it makes none any more."""
+        end = last * step_ms(self._config)
+        sample = next((s for s in reversed(history.measurements) if s.tick <= end), None)
+        if newest is None or sample is None or sample.tick <= newest.tick:
+            return False
+        return _on_all_feet(sample)
 
     def _select_peer(
         self, robot: str, history: PeerHistory, last: int, end: int, first_step: int
@@ -203,7 +208,7 @@ class Neighbours:
         usable = [plan for plan in history.plans if plan.step <= last]
         newest = usable[-1] if usable else None
         age = _age(newest, last, first_step)
-        status = self._status(age)
+        status = self._status(history, newest, last, first_step)
         known, du_ini, y_ini = self._window(index, history, usable, last, end)
         du = np.zeros((planner.N, N_FORCES))
         skipped = planner.applied * (end - newest.step) if newest is not None else planner.N
@@ -247,9 +252,18 @@ class Neighbours:
         return known, du, y
 
 
+def _newest(history: PeerHistory, last: int) -> Plan | None:
+    """A peer's newest plan of steps up to `last`."""
+    return next((plan for plan in reversed(history.plans) if plan.step <= last), None)
+
+
 def _stands(history: PeerHistory) -> bool:
     """Whether a peer stood on all four feet when it was last heard."""
-    return bool((history.measurements[-1].stance > 0.5).all())
+    return _on_all_feet(history.measurements[-1])
+
+
+def _on_all_feet(sample: Measurement) -> bool:
+    return bool((sample.stance > 0.5).all())
 
 
 def _deviations(samples: Collection[Measurement], weight: float) -> tuple[Array, Array]:

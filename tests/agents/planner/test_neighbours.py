@@ -138,6 +138,29 @@ def test_a_peer_that_never_plans_is_lost_in_the_end() -> None:
     assert seen == [FRESH, SHIFTED, SHIFTED, HELD, HELD, HELD, LOST]
 
 
+@pytest.mark.parametrize(
+    ("stands_at", "status"),
+    [
+        (760, FRESH),  # it planned since: it walks again
+        (800, FRESH),  # the sample of the very tick of its plan
+        (810, LOST),
+        (840, LOST),
+        (850, SHIFTED),  # later than what may be used
+    ],
+)
+def test_a_peer_that_has_come_to_stand_since_its_plan_is_lost_at_once(
+    stands_at: int, status: str
+) -> None:
+    step = 21 if status == FRESH else 22
+    walked = [("r2", measurement("r2", tick)) for tick in range(700, stands_at, 10)]
+    stood = replace(measurement("r2", stands_at), stance=np.ones(4))
+    memory = NEIGHBOURS.remember(
+        NEIGHBOURS.initial(), 40 * step + 10, [*walked, ("r2", stood)], [("r2", plan("r2", 20))]
+    )
+    assert of(memory, step).status == status
+    assert ("r2" in NEIGHBOURS.lost_peers(memory, step - 1, FIRST)) == (status == LOST)
+
+
 def test_lost_samples_are_taken_from_the_peers_own_prediction() -> None:
     """With the newest plan that covers a sample; a measured one always has precedence."""
     ticks = window_ticks(20)
