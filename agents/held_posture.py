@@ -20,7 +20,6 @@ from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS, N_LEGS, Array
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.wire.messages import Command, State
 
-_OF_A_LEG: Final = N_JOINTS // N_LEGS
 _LEAD_MS: Final = 200.0  # from where the joints are to the stand: a swinging foot is soon down
 
 _SUNK: Final = 0.04  # m, of a corner, at which its leg bears twice its share
@@ -66,7 +65,7 @@ class HeldPosture:
         row: Array = _HOLD.copy()
         row[_CUT["q_des"]] = held[1:] + smooth * (self._stand - held[1:])
         for joint in loss.joints:
-            share = _share(self._corners[joint // _OF_A_LEG], state)
+            share = _share(self._corners[joint // 3], state)
             row[_CUT["tau"]][joint] = share * self._bears[joint]
             row[_CUT["kp"]][joint] = row[_CUT["kd"]][joint] = 0.0
         return held, row

@@ -155,7 +155,7 @@ def start_forked(
                 pids = server.start(order, go)
             finally:
                 if not pids:  # it has failed, or its answer is not waited for
-                    _end_server()
+                    end_fork_server()
         os.write(begin, b"." * len(pids))
     finally:
         os.close(go)
@@ -166,14 +166,15 @@ def start_forked(
 def _fitting_server(commands: Collection[str], environment: Mapping[str, str]) -> _ForkServer:
     """The server that is kept, or a new one in its place if it does not fit."""
     if _kept and not _kept[0].fits(environment):
-        _end_server()
+        end_fork_server()
     if not _kept:
         _kept.append(_ForkServer(commands, environment))
     return _kept[0]
 
 
 @atexit.register
-def _end_server() -> None:
+def end_fork_server() -> None:
+    """End the server that is kept, if there is one: no other team is to be started for now."""
     while _kept:
         _kept.pop().close()
 

@@ -20,6 +20,7 @@ from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.team.controller_program import check_controller
 from quadriga.team.drive_page import DrivePage
+from quadriga.team.forked import end_fork_server
 from quadriga.team.launch import Launch, ProcessSpec, expect_launch, process_table
 from quadriga.team.plants import check_plant
 from quadriga.team.progress import WalkProgress
@@ -151,6 +152,7 @@ def watch_walk(
         ProcessError: a process failed or left too early.
     """
     with Launch(rows, run_dir / "logs") as launch, WalkProgress(config, console) as progress:
+        end_fork_server()
         page = DrivePage(config, launch.pids.get(OPERATOR, 0), console)
 
         def update() -> bool:
