@@ -1,12 +1,12 @@
 """What an agent believes of its joints' encoders; those that say what cannot be are held.
 
 A reading is not believed that is beyond the joint's end stops, that has jumped against the joint's
-rate, has drifted away from it, or, of a hip or thigh, stays the same number while its leg moves.
-Then the last angle is kept, at rest: a knee that is held for half a second where it was is a small
-error beside one that is read as 0, on which a leg folds or kicks. An encoder is believed again once
-it has agreed with itself for a while, and reads what is near to where the joint has been of late.
-Soon a robot that lacks one stands (`agents.sensor_loss`); on a knee that is stuck it walks better
-than it would stand in a team that walks.
+rate, has drifted away from it, or, of a thigh, stays the same number while its leg moves. Then the
+last angle is kept, at rest: a knee that is held for half a second where it was is a small error
+beside one that is read as 0, on which a leg folds or kicks. An encoder is believed again once it
+has agreed with itself for a while, and reads what is near to where the joint has been of late.
+Soon a robot that lacks one stands (`agents.sensor_loss`); on a hip or knee that is stuck it walks
+better than it stands.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _MOVES: Final = 0.3  # rad/s, of a joint that is not at rest
 _FASTEST: Final = 20.0  # rad/s, of such joints: where readings are missing, more may have happened
 
 _OF_A_LEG: Final = N_JOINTS // N_LEGS
-_KNEE: Final = 2  # of these
+_THIGH: Final = 1  # of these
 _Q: Final = State.CUTS["q_joint"]
 _V: Final = State.CUTS["v_joint"]
 
@@ -145,11 +145,11 @@ def _judge(row: Array, state: Array, lower: Array, upper: Array, dt: float) -> b
                 agrees[joint] = min(agrees[joint], 0.0)
             if agrees[joint] >= 0.0:
                 drift[joint] = 0.0  # it begins anew after a jump
-        if q[joint] == q0[joint]:
+        if joint % _OF_A_LEG == _THIGH and q[joint] == q0[joint]:
             travel[joint] += dt * _speed_beside(q, q0, v, joint)
         else:
             travel[joint] = 0.0
-        if travel[joint] > _TRAVEL and joint % _OF_A_LEG != _KNEE:
+        if travel[joint] > _TRAVEL:
             agrees[joint] = min(agrees[joint], 0.0)
         away = abs(drift[joint])
         if away > _DRIFT or (agrees[joint] < 0.0 and away > _RETURN):

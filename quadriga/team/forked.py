@@ -26,7 +26,7 @@ _PR_GET_CHILD_SUBREAPER: Final = 37
 _IGNORED: Final = {"KMP_DUPLICATE_LIB_OK", "PYTEST_CURRENT_TEST"}
 _NETWORK: Final = "/proc/thread-self/ns/net"  # of this thread: its namespace
 _one_at_a_time = threading.Lock()  # whether a process adopts is one word of it all
-_kept: list[_ForkServer] = []  # one at most, and this process's own
+_kept: list[ForkServer] = []  # one at most, and this process's own
 os.register_at_fork(after_in_child=_kept.clear)
 
 
@@ -76,7 +76,7 @@ class ForkedProcess:
             os.kill(self.pid, number)
 
 
-class _ForkServer:
+class ForkServer:
     """A fork server that runs, and how it is asked.
 
     Args:
@@ -163,12 +163,12 @@ def start_forked(
     return [ForkedProcess(pid) for pid in pids]
 
 
-def _fitting_server(commands: Collection[str], environment: Mapping[str, str]) -> _ForkServer:
+def _fitting_server(commands: Collection[str], environment: Mapping[str, str]) -> ForkServer:
     """The server that is kept, or a new one in its place if it does not fit."""
     if _kept and not _kept[0].fits(environment):
         end_fork_server()
     if not _kept:
-        _kept.append(_ForkServer(commands, environment))
+        _kept.append(ForkServer(commands, environment))
     return _kept[0]
 
 

@@ -15,7 +15,7 @@ from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.team import forked
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.fork_server import Fork, ForkOrder
-from quadriga.team.forked import ForkedProcess, _ForkServer, start_forked
+from quadriga.team.forked import ForkedProcess, ForkServer, start_forked
 from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec
 
 WAIT = 20.0  # s
@@ -96,7 +96,7 @@ def test_a_wrong_command_has_its_own_status_and_says_why(tmp_path: Path) -> None
 def test_nobody_begins_whose_start_is_not_known(forks: list[Fork]) -> None:
     """As when who starts them is interrupted between the forks and the word to begin."""
     go, begin = os.pipe()
-    server = _ForkServer([], os.environ)
+    server = ForkServer([], os.environ)
     pids = server.start(ForkOrder(len(QUADRIGA), tuple(forks)), go)
     assert all(Path("/proc", str(pid)).exists() for pid in pids)
     os.close(begin)
