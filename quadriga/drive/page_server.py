@@ -22,6 +22,7 @@ from websockets.http11 import Request, Response
 
 from quadriga.drive.attend import Attendant
 from quadriga.drive.driver_words import MOST_BYTES
+from quadriga.shared.security.own_page import LOOPBACK, is_of_own_page
 
 HOST: Final = "127.0.0.1"
 _PAGES: Final = MappingProxyType(
@@ -78,7 +79,7 @@ class _Page:
 
     def answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Give the page's files, refuse foreigners, and let connections be opened (None)."""
-        if not self._is_own(request):
+        if not is_of_own_page(request.headers, LOOPBACK):
             return connection.respond(_FORBIDDEN, "only for this computer's own page\n")
         parts = urlsplit(request.path)
         if parts.path in ("/", _DRIVE, _STOP):
@@ -92,13 +93,6 @@ class _Page:
         name, kind = _PAGES[parts.path]
         text = files("quadriga.drive").joinpath("page", name).read_text(encoding="utf-8")
         return _respond(text.replace("{{view}}", self._view).encode(), kind)
-
-    def _is_own(self, request: Request) -> bool:
-        """Whether a request is to this computer, and from no page but this one."""
-        own = {f"{host}:{self.port}" for host in (HOST, "localhost")}
-        origin = request.headers.get("Origin")
-        from_here = origin is None or origin in {f"http://{host}" for host in own}
-        return request.headers.get("Host") in own and from_here
 
 
 def _respond(body: bytes, kind: str) -> Response:

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, redirect_stdout
+from typing import Any, Final
 
 import viser
+import websockets.asyncio.server
+from websockets.asyncio.server import ServerConnection
+from websockets.http11 import Request, Response
 
-from quadriga.view.port import PageAddress, check_port, taken_error
+from quadriga.shared.security.own_page import LOOPBACK, is_of_own_page
+from quadriga.view.port import HOST, PageAddress, check_port, taken_error
+
+_FORBIDDEN: Final = 403
 
 
 class LocalServer(viser.ViserServer):
@@ -33,7 +40,8 @@ def open_server(address: PageAddress, title: str) -> Iterator[LocalServer]:
     check_port(port, host=host)
     # What it prints about itself would stand between the lines of this project.
     with open(os.devnull, "w", encoding="utf-8") as nowhere:
-        with redirect_stdout(nowhere):
+        names = LOOPBACK if host == HOST else ()
+        with redirect_stdout(nowhere), _refusing_foreigners(names):
             server = LocalServer(host=host, port=port, label=title, verbose=False)
         try:
             if port and server.get_port() != port:  # it takes the next one that is free
@@ -46,3 +54,39 @@ def open_server(address: PageAddress, title: str) -> Iterator[LocalServer]:
         finally:
             with redirect_stdout(nowhere):
                 server.stop()
+
+
+@contextmanager
+def _refusing_foreigners(names: Collection[str]) -> Iterator[None]:
+    """Have the server that is made within the context refuse requests of other pages.
+
+    Viser has no option for it, so what it serves with is replaced meanwhile.
+
+    Args:
+        names: of the computers at which the page is found; empty: any.
+
+    Raises:
+        RuntimeError: Viser serves in another way, so nobody would be refused.
+    """
+    module, has_served = websockets.asyncio.server, False
+    usual = module.serve
+
+    def serve(*args: Any, process_request: Any, **options: Any) -> websockets.asyncio.server.serve:
+        nonlocal has_served
+        has_served = True
+
+        def answer(connection: ServerConnection, request: Request) -> Response | None:
+            if not is_of_own_page(request.headers, names):
+                return connection.respond(_FORBIDDEN, "only for this view's own page\n")
+            answered: Response | None = process_request(connection, request)
+            return answered
+
+        return usual(*args, process_request=answer, **options)
+
+    module.serve = serve  # type: ignore[misc, assignment]
+    try:
+        yield
+    finally:
+        module.serve = usual  # type: ignore[misc]
+    if not has_served:
+        raise RuntimeError("viser does not serve with websockets.asyncio.server.serve")

@@ -10,7 +10,7 @@ import viser
 import zstandard
 from viser import _messages
 from websockets.sync.client import connect
-from websockets.typing import Subprotocol
+from websockets.typing import Origin, Subprotocol
 
 from quadriga.shared.runtime.clock import monotonic
 
@@ -19,12 +19,23 @@ Sent = dict[str, Any]
 
 
 class Page:
-    """What a browser would do once it has loaded the page at a URL."""
+    """What a browser would do once it has loaded the page at a URL.
 
-    def __init__(self, url: str) -> None:
+    Args:
+        url: of the view.
+        origin: whose page it says it is; "": it says nothing, as a program that is no browser.
+    """
+
+    def __init__(self, url: str, origin: str = "") -> None:
         protocol = Subprotocol(f"viser-v{viser.__version__}")
         address = url.replace("http", "ws", 1)
-        self._socket = connect(address, subprotocols=[protocol], max_size=None, compression=None)
+        self._socket = connect(
+            address,
+            origin=Origin(origin) if origin else None,
+            subprotocols=[protocol],
+            max_size=None,
+            compression=None,
+        )
         upright, ahead = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
         self._send(
             _messages.ViewerCameraMessage(

@@ -13,9 +13,12 @@ from contextlib import contextmanager
 from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import pytest
 from rich.console import Console
+from websockets.exceptions import InvalidStatus
 
 from quadriga.commands.parser import main
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
@@ -54,6 +57,20 @@ def end(process: subprocess.Popen[str], number: signal.Signals) -> None:
     process.send_signal(number)
     out, _ = process.communicate(timeout=WAIT)
     assert (process.returncode, out) == (0, "")
+
+
+def test_a_page_of_another_origin_is_refused() -> None:
+    with viewing(str(RECORDING)) as (_, url):
+        own = url.removeprefix("http://")
+        assert b"<html" in urlopen(url).read()
+        for headers in ({"Host": "evil.example"}, {"Origin": "http://evil.example"}):
+            with pytest.raises(HTTPError, match="403"):
+                urlopen(Request(url, headers=headers))
+        for origin in ("http://evil.example", "http://127.0.0.1:1", "null", f"https://{own}"):
+            with pytest.raises(InvalidStatus, match="403"):
+                Page(url, origin)
+        with Page(url, url) as page:
+            page.await_message(labelled("pause"))
 
 
 def test_a_recording_plays_and_pauses() -> None:
