@@ -92,7 +92,7 @@ def acting_constants(config: Config, body: RigidBody, weights: Weights) -> Array
             [body.mass],
             body.com,
             body.inertia_inverse.ravel(),
-            trunk_gains(controller),
+            trunk_gains(config),
             feet_gains(config),
             weights,
             friction_rule(controller),

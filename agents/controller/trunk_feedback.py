@@ -8,17 +8,23 @@ import numpy as np
 
 from quadriga.agents.controller.maths.rotation import cross, heading, roll_pitch_yaw, wrap_angle
 from quadriga.agents.controller.sensed import TrunkState
-from quadriga.shared.config.sections import ControllerConfig
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robot.conventions import GRAVITY, Array
 from quadriga.shared.runtime.jit import compiled
 
 _Z_LIMIT = 0.05  # m·s, height integrator
 _SPEED_LIMIT = 0.15  # m, speed integrator
 _YAW_LIMIT = 0.3  # rad, of the heading error that is acted on
+_COURSE_LIMIT = 0.2  # rad, of the course error that is acted on: a push soon passes
+_COURSE_SPEED = 0.1  # m/s, below which a desired velocity has no direction worth following
 
 
 class TrunkGains(NamedTuple):
-    """Gains of `feedback`: the keys of these names in the section `controller`, units there."""
+    """Gains of `feedback`: the keys of these names in the section `controller`, units there.
+
+    `course_time` is 0 without yokes: nobody shares a course then.
+    """
 
     kp_z: float
     kd_z: float
@@ -32,14 +38,17 @@ class TrunkGains(NamedTuple):
     kd_yaw: float
     position_error_limit: float
     leak_xy: float
+    course_time: float
 
 
 N_TRUNK_GAINS: Final = len(TrunkGains._fields)
 
 
-def trunk_gains(config: ControllerConfig) -> TrunkGains:
+def trunk_gains(config: Config) -> TrunkGains:
     """The gains that a configuration sets."""
-    return TrunkGains(*(getattr(config, name) for name in TrunkGains._fields))
+    gains = TrunkGains(*(getattr(config.controller, name) for name in TrunkGains._fields))
+    yoked = yoke_pairs(config.team.robots, config.team.yokes)
+    return gains if yoked else gains._replace(course_time=0.0)
 
 
 class TrunkReference(NamedTuple):
@@ -115,7 +124,8 @@ def feedback(
     height = min(_Z_LIMIT, max(-_Z_LIMIT, before.height + dt * z_error))
     out[2] = gains.kp_z * z_error - gains.kd_z * trunk.velocity[2] + gains.ki_z * height
     speed, position_error, out[:2] = _plane_feedback(before, gains, trunk, reference, c, s, dt)
-    yaw = _desired_heading(before.yaw, rpy[2], reference.wz, dt)
+    wz = reference.wz + _course_rate(gains, trunk.velocity, v_des)
+    yaw = _desired_heading(before.yaw, rpy[2], wz, dt)
     out[3:] = _attitude_feedback(gains, trunk, rpy, yaw, reference)
     return Integrators(height, speed, position_error, yaw), out, v_des
 
@@ -163,6 +173,20 @@ def _desired_heading(before: float, yaw: float, wz: float, dt: float) -> float:
     if wz * wrap_angle(before - yaw) > abs(wz) * _YAW_LIMIT:
         return before
     return wrap_angle(before + dt * wz)
+
+
+@compiled
+def _course_rate(gains: TrunkGains, velocity: Array, v_des: Array) -> float:
+    """How fast the heading turns towards the course over ground, rad/s.
+
+    Yoked robots share one course. One whose IMU's yaw has drifted is drawn along aslant to its
+    heading and pulls at the yokes; that angle is its drift against the others.
+    """
+    squared = v_des[0] * v_des[0] + v_des[1] * v_des[1]
+    if gains.course_time == 0.0 or squared < _COURSE_SPEED * _COURSE_SPEED:
+        return 0.0
+    error: float = (v_des[0] * velocity[1] - v_des[1] * velocity[0]) / squared
+    return min(_COURSE_LIMIT, max(-_COURSE_LIMIT, error)) / gains.course_time
 
 
 @compiled

@@ -279,7 +279,7 @@ def test_the_tick_in_one_piece_is_its_parts_one_by_one() -> None:
         )
         integrators, trunk, _ = trunk_acceleration(
             integrators,
-            trunk_gains(config.controller),
+            trunk_gains(config),
             controller.body,
             estimate,
             replace(task, deviation=task.deviation * np.repeat(TROT, 3)),
