@@ -23,7 +23,7 @@ _COURSE_SPEED = 0.1  # m/s, below which a desired velocity has no direction wort
 class TrunkGains(NamedTuple):
     """Gains of `feedback`: the keys of these names in the section `controller`, units there.
 
-    `course_time` is 0 without yokes: nobody shares a course then.
+    `kp_course` is 0 without yokes: nobody shares a course then.
     """
 
     kp_z: float
@@ -38,7 +38,7 @@ class TrunkGains(NamedTuple):
     kd_yaw: float
     position_error_limit: float
     leak_xy: float
-    course_time: float
+    kp_course: float
 
 
 N_TRUNK_GAINS: Final = len(TrunkGains._fields)
@@ -48,7 +48,7 @@ def trunk_gains(config: Config) -> TrunkGains:
     """The gains that a configuration sets."""
     gains = TrunkGains(*(getattr(config.controller, name) for name in TrunkGains._fields))
     yoked = yoke_pairs(config.team.robots, config.team.yokes)
-    return gains if yoked else gains._replace(course_time=0.0)
+    return gains if yoked else gains._replace(kp_course=0.0)
 
 
 class TrunkReference(NamedTuple):
@@ -180,13 +180,14 @@ def _course_rate(gains: TrunkGains, velocity: Array, v_des: Array) -> float:
     """How fast the heading turns towards the course over ground, rad/s.
 
     Yoked robots share one course. One whose IMU's yaw has drifted is drawn along aslant to its
-    heading and pulls at the yokes; that angle is its drift against the others.
+    heading and pulls at the yokes. The angle between them, small, is the cross product of desired
+    and true velocity over the square of the desired one.
     """
     squared = v_des[0] * v_des[0] + v_des[1] * v_des[1]
-    if gains.course_time == 0.0 or squared < _COURSE_SPEED * _COURSE_SPEED:
+    if squared < _COURSE_SPEED * _COURSE_SPEED:
         return 0.0
     error: float = (v_des[0] * velocity[1] - v_des[1] * velocity[0]) / squared
-    return min(_COURSE_LIMIT, max(-_COURSE_LIMIT, error)) / gains.course_time
+    return gains.kp_course * min(_COURSE_LIMIT, max(-_COURSE_LIMIT, error))
 
 
 @compiled
