@@ -15,6 +15,7 @@ from typing import Final, Self
 from quadriga.faults.network.layout import NetworkLayout
 from quadriga.faults.network.order import RadioOrder
 from quadriga.shared.errors import ProcessError, system_reason
+from quadriga.shared.runtime.process_use import read_use
 from quadriga.team.launch import ProcessSpec
 
 _MODULE: Final = "quadriga.faults.network.air"
@@ -68,9 +69,8 @@ class EmulatedNetwork:
     @property
     def processor_s(self) -> float:
         """Time of a processor that the air has used so far, s."""
-        stat = Path(f"/proc/{self._air.pid}/stat").read_text(encoding="ascii")
-        user, system = stat.rpartition(")")[2].split()[11:13]
-        return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+        use = read_use(self._air.pid)
+        return 0.0 if use is None else use.cpu_s
 
     def enter(self, place: str) -> tuple[str, ...]:
         """What a command line must begin with to be run at a place."""
