@@ -5,6 +5,7 @@ rate, has drifted away from it, or, of a thigh, stays the same number while its 
 last angle is kept, at rest: a knee that is held for half a second where it was is a small error
 beside one that is read as 0, on which a leg folds or kicks. An encoder is believed again once it
 has agreed with itself for a while, and reads what is near to where the joint has been of late.
+After a pause in which nothing was read, all that was believed is believed anew, wherever it is.
 Soon a robot that lacks one stands (`agents.sensor_loss`); on a hip or knee that is stuck it walks
 better than it stands.
 """
@@ -34,6 +35,9 @@ _RANGE_TIME: Final = 2.0  # s, within which that range narrows to where the join
 _TRAVEL: Final = 0.5  # rad, of a leg's other joints together, for which none reads the same number
 _MOVES: Final = 0.3  # rad/s, of a joint that is not at rest
 _FASTEST: Final = 20.0  # rad/s, of such joints: where readings are missing, more may have happened
+_PAUSE: Final = (
+    0.05  # s, after which a joint may be anywhere and a reading says nothing of the next
+)
 
 _OF_A_LEG: Final = N_JOINTS // N_LEGS
 _THIGH: Final = 1  # of these
@@ -94,7 +98,11 @@ class EncoderBridge:
         if before is None:
             return _first(state), state
         row, read = before.copy(), state.row
-        if _judge(row, read, self._lower, self._upper, dt):
+        if dt > _PAUSE:
+            all_believed = _begin_anew(row, read, self._lower, self._upper)
+        else:
+            all_believed = _judge(row, read, self._lower, self._upper, dt)
+        if all_believed:
             return row, state
         bridged = read.copy()
         _hold(bridged, row)
@@ -164,6 +172,29 @@ def _judge(row: Array, state: Array, lower: Array, upper: Array, dt: float) -> b
             whole = False
     row[ENCODERS.longest] = held.max()
     q0[:], v0[:] = q, v
+    return whole
+
+
+@compiled
+def _begin_anew(row: Array, state: Array, lower: Array, upper: Array) -> bool:
+    """As `_judge`, after a pause in which the agent or its bus stood still.
+
+    An encoder that was believed is, if it says what can be; nobody held a joint meanwhile.
+    """
+    q, v = state[_Q], state[_V]
+    agrees, held, whole = row[ENCODERS.agrees], row[ENCODERS.held], True
+    for joint in range(N_JOINTS):
+        possible = lower[joint] <= q[joint] <= upper[joint] and np.isfinite(v[joint])
+        if agrees[joint] >= _BELIEVED_AFTER and possible:
+            for angle in (ENCODERS.believed, ENCODERS.least, ENCODERS.most):
+                row[angle][joint] = q[joint]
+            row[ENCODERS.drift][joint] = row[ENCODERS.travel][joint] = 0.0
+        else:
+            agrees[joint] = min(agrees[joint], 0.0)
+            held[joint] += 1e-3
+            whole = False
+    row[ENCODERS.longest] = held.max()
+    row[ENCODERS.q], row[ENCODERS.v] = q, v
     return whole
 
 

@@ -39,10 +39,8 @@ from quadriga.warm_up import warm_up
 
 WAYS: Final = ("directly", "router", "router with certificates")
 _INTERRUPTED: Final = 130
-_COLUMNS: Final = (
-    "seed", "way", "real-time factor", "late %", "oldest command ms", "lost messages",
-    "router, of a core", "fell", "end",
-)  # fmt: skip
+_FIGURES: Final = ("real-time factor", "late %", "oldest command ms", "lost messages")
+_COLUMNS: Final = ("seed", "way", *_FIGURES, "router, of a core", "fell", "end")
 
 
 def main() -> int:

@@ -172,6 +172,38 @@ def test_where_ticks_were_passed_over_an_angle_may_be_another() -> None:
         np.testing.assert_array_equal(believed.q_joint, swinging(tick).q_joint)
 
 
+def lowered(tick: int) -> State:
+    """A robot that was led down while nobody looked."""
+    return replace(standing(tick), q_joint=A1.q_stand + np.tile([0.0, 0.4, -0.8], 4))
+
+
+def test_after_a_pause_joints_may_be_anywhere() -> None:
+    memory: Array | None = None
+    for tick in (*range(FAILS), *range(FAILS + 400, END)):
+        state = swinging(tick) if tick < FAILS else lowered(tick)
+        dt = 400 * DT if tick == FAILS + 400 else DT
+        memory, believed = BRIDGE.step(memory, state, dt)
+        assert believed is state
+    assert memory is not None
+    assert joints_held(memory, 0.0) == ()
+
+
+def test_a_pause_makes_no_failed_encoder_sound() -> None:
+    memory: Array | None = None
+    for tick in range(BACK):
+        failed = be_off(swinging(tick)) if tick >= FAILS else swinging(tick)
+        memory, _ = BRIDGE.step(memory, failed, DT)
+    for tick in range(BACK + 400, END + 400):
+        failed = be_beyond(be_off(lowered(tick)))
+        failed.row[State.CUTS["v_joint"].start + KNEE + 3] = np.nan
+        memory, believed = BRIDGE.step(memory, failed, 400 * DT if tick == BACK + 400 else DT)
+        assert believed.q_joint[KNEE] == swinging(FAILS - 1).q_joint[KNEE]
+        assert believed.v_joint[KNEE + 3] == 0.0
+    assert memory is not None
+    assert joints_held(memory, END - BACK - 1.0) == (KNEE, KNEE + 3)
+    assert memory[ENCODERS.held][KNEE + 3] == pytest.approx(DT * (END - BACK))
+
+
 def test_the_first_reading_is_believed() -> None:
     state = be_off(standing(0))
     _, believed = BRIDGE.step(None, state, DT)
