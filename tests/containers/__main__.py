@@ -34,7 +34,11 @@ endpoint = "tls/router:7447"
 certificates = "/secrets"
 barrier_timeout = 300.0
 
+[team]
+auto_resume = true
+
 [world]
+mode = "{mode}"
 seconds = {seconds}
 
 [identification]
@@ -135,7 +139,9 @@ def judge(folder: Path, *, rejoins: bool) -> None:
 def main() -> int:
     """Run it; the exit status."""
     parser = argparse.ArgumentParser(prog="make test-containers", description=__doc__)
-    parser.add_argument("--rejoin", action="store_true", help="a restarted agent walks on")
+    parser.add_argument(
+        "--rejoin", action="store_true", help="in real time, a restarted agent walks on"
+    )
     parser.add_argument("--seconds", type=float, default=40.0, help="of the walk")
     arguments = parser.parse_args()
     interrupt_on_sigterm()  # whoever ends it leaves nothing behind either
@@ -148,7 +154,9 @@ def main() -> int:
         return 2
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "team.toml").write_text(TEAM.format(seconds=arguments.seconds), encoding="utf-8")
+        mode = "realtime" if arguments.rejoin else "lockstep"
+        text = TEAM.format(seconds=arguments.seconds, mode=mode)
+        (folder / "team.toml").write_text(text, encoding="utf-8")
         (folder / "runs").mkdir()
         variables = {"TEAM": str(folder / "team.toml"), "TEAM_SIZE": str(ROBOTS)}
         team, status = Containers(engine, variables), 1
