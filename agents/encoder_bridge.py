@@ -35,9 +35,7 @@ _RANGE_TIME: Final = 2.0  # s, within which that range narrows to where the join
 _TRAVEL: Final = 0.5  # rad, of a leg's other joints together, for which none reads the same number
 _MOVES: Final = 0.3  # rad/s, of a joint that is not at rest
 _FASTEST: Final = 20.0  # rad/s, of such joints: where readings are missing, more may have happened
-_PAUSE: Final = (
-    0.05  # s, after which a joint may be anywhere and a reading says nothing of the next
-)
+_PAUSE: Final = 0.05  # s between two readings, after which a joint may be anywhere
 
 _OF_A_LEG: Final = N_JOINTS // N_LEGS
 _THIGH: Final = 1  # of these

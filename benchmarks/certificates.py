@@ -39,6 +39,7 @@ from quadriga.warm_up import warm_up
 
 WAYS: Final = ("directly", "router", "router with certificates")
 _INTERRUPTED: Final = 130
+_GRACE: Final = 30.0  # s, for a router to see that its team has left
 _FIGURES: Final = ("real-time factor", "late %", "oldest command ms", "lost messages")
 _COLUMNS: Final = ("seed", "way", *_FIGURES, "router, of a core", "fell", "end")
 
@@ -96,7 +97,8 @@ def walk_once(config: Config, way: str, predictor: Path | None) -> tuple[str, ..
         (folder / CONFIG).write_text(to_toml(ready), encoding="utf-8")
         rows = process_table(ready, folder, predictor, "")
         if way != WAYS[0]:
-            rows = (router_row(ready, folder), *rows)
+            router = router_row(ready, folder)
+            rows = (replace(router, command=(*router.command, "--once"), grace=_GRACE), *rows)
         begun, used = monotonic(), 0.0
         with Launch(rows, folder / "logs") as launch:
 

@@ -35,7 +35,7 @@ certificates = "/secrets"
 barrier_timeout = 300.0
 
 [team]
-auto_resume = true
+auto_resume = {resumes}
 
 [world]
 mode = "{mode}"
@@ -154,8 +154,8 @@ def main() -> int:
         return 2
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        mode = "realtime" if arguments.rejoin else "lockstep"
-        text = TEAM.format(seconds=arguments.seconds, mode=mode)
+        mode, resumes = ("realtime", "true") if arguments.rejoin else ("lockstep", "false")
+        text = TEAM.format(seconds=arguments.seconds, mode=mode, resumes=resumes)
         (folder / "team.toml").write_text(text, encoding="utf-8")
         (folder / "runs").mkdir()
         variables = {"TEAM": str(folder / "team.toml"), "TEAM_SIZE": str(ROBOTS)}
