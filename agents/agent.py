@@ -171,8 +171,9 @@ class Agent:
 
     def _why_rise(self, state: AgentState, inputs: Inputs) -> str:
         """Why the robot begins to get up at this tick; "": it does not."""
+        lowered = self._watch.is_led_down(inputs.events)
         return self._rising.why_now(
-            state.mode, state.tick, inputs.state.tick, inputs.reset, inputs.estop
+            state.mode, state.tick, inputs.state.tick, inputs.reset, inputs.estop, lowered=lowered
         )
 
     def _rise(self, state: AgentState, inputs: Inputs) -> tuple[AgentState, Outputs]:

@@ -87,11 +87,19 @@ class Rising:
         self._damping = config.controller.damping
 
     def why_now(
-        self, mode: Mode, last: int, tick: int, reset: Reset | None, estop: EStop | None
+        self,
+        mode: Mode,
+        last: int,
+        tick: int,
+        reset: Reset | None,
+        estop: EStop | None,
+        *,
+        lowered: bool = False,
     ) -> str:
         """Why a robot is to begin to get up at this tick; "": it is not.
 
-        It has been led down since the agent's last command, or the operator has released it.
+        It has been led down since the agent's last command, or because all of its commands came
+        too late, which the plant alone knows; or the operator has released it.
 
         Args:
             mode: the agent's before this tick.
@@ -99,13 +107,14 @@ class Rising:
             tick: the present one.
             reset: the operator's release, if it came; of what was in force when it was said.
             estop: an emergency stop, if one came: it outranks a release.
+            lowered: whether the plant has just said that it has led the robot down.
         """
         if mode.passive:
             if reset is None or estop is not None or not self._rises or reset.tick < mode.since:
                 return ""
             return with_detail(RESET, reset.by)[:REASON_MOST]
         away = tick > self._latest_ms if last < 0 else tick - last > self._away_ms
-        if not (self._is_led_down and away):
+        if not (self._is_led_down and (away or lowered)):
             return ""
         return mode.reason if code_of(mode.reason) in COMMANDED else LED_DOWN
 

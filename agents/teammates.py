@@ -20,12 +20,13 @@ from quadriga.agents.modes import STAND, STOPPING, WALK, Mode, rests
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import BACK, GONE, OPERATOR_BACK, OPERATOR_GONE, SILENT
+from quadriga.shared.wire.codes import BACK, GONE, LOWERED, OPERATOR_BACK, OPERATOR_GONE, SILENT
 from quadriga.shared.wire.messages import Event, Reference, Status
 
 SILENCE_MS: Final = 500  # without a status, after which a robot is lost
 GRACE_MS: Final = 1000  # for which robots that walk again may begin one after the other
 _OF_ROBOTS: Final = frozenset((GONE, SILENT, BACK))
+_OF_ONESELF: Final = frozenset((LOWERED,))
 _OF_OPERATOR: Final = frozenset((OPERATOR_GONE, OPERATOR_BACK))
 _COMING_TO_REST: Final = (STAND, STOPPING)
 
@@ -67,7 +68,7 @@ class TeamWatch:
 
     def __init__(self, config: Config, robot: str) -> None:
         self.names = tuple(n for n in robot_names(config.team.robots) if n != robot)
-        self._hears = config.world.mode == "realtime"
+        self._robot, self._hears = robot, config.world.mode == "realtime"
 
     def remember(
         self, known: Teammates, statuses: Iterable[tuple[str, Status]], events: Iterable[Event]
@@ -81,9 +82,13 @@ class TeamWatch:
                 gone = event.tick if event.code == OPERATOR_GONE else -1
             elif event.code == BACK:
                 lost.pop(event.robot, None)
-            elif event.robot in self.names:
+            elif event.robot in self.names and event.code in _OF_ROBOTS:
                 lost[event.robot] = event.tick
         return Teammates(heard, lost, gone)
+
+    def is_led_down(self, events: Iterable[Event]) -> bool:
+        """Whether one of these tells that the plant has led down the robot that watches."""
+        return any(e.code == LOWERED and e.robot == self._robot for e in events)
 
     def find_lost(self, known: Teammates, tick: int, since: int) -> tuple[str, ...]:
         """Robots because of which one may not walk on.
@@ -125,8 +130,12 @@ class TeamWatch:
 
 
 def concerns_agents(event: Event) -> bool:
-    """Whether an event of the plant tells that a robot's commands, or the operator, come or not."""
-    return event.code in _OF_OPERATOR or (event.code in _OF_ROBOTS and bool(event.robot))
+    """Whether an event of the plant tells that a robot's commands, or the operator, come or not.
+
+    Or that a robot has been led down: its agent may not know that its commands came too late.
+    """
+    of_robot = event.code in _OF_ROBOTS or event.code in _OF_ONESELF
+    return event.code in _OF_OPERATOR or (of_robot and bool(event.robot))
 
 
 def has_operator(known: Teammates, references: Sequence[Reference]) -> bool:

@@ -13,7 +13,7 @@ from quadriga.agents.rising import Rise, Rising
 from quadriga.plant.late import damp_joints
 from quadriga.plant.lost import LostCommands
 from quadriga.shared.config.load import load
-from quadriga.shared.wire.codes import LIES
+from quadriga.shared.wire.codes import LIES, LOWERED
 from quadriga.shared.wire.messages import EStop, Event, Reset, State
 from quadriga.sim_server.world.world import World
 from tests.a1 import standing
@@ -99,6 +99,17 @@ def test_who_is_led_down_on_the_way_up_begins_anew() -> None:
     memory, outputs = agent.step(memory, Inputs(lying(FROM + 2000)))
     assert (outputs.mode, memory.mode.since) == (RISING, FROM + 2000)
     assert np.abs(outputs.command.q_des - ROBOT.q_lying).max() < 0.01, "from where it is now"
+
+
+def test_who_did_not_know_that_its_commands_came_too_late_gets_up_when_told() -> None:
+    agent, told = Agent(CONFIG, "r1", None), Event.of(50, LOWERED, "r1", "led down")
+    memory = agent.initial()
+    for tick in range(50):
+        memory, outputs = agent.step(memory, Inputs(standing(tick)))
+    assert outputs.mode == STAND
+    memory, outputs = agent.step(memory, Inputs(lying(50), events=(told,)))
+    assert memory.mode == Mode(RISING, 50, "led-down")
+    assert np.abs(outputs.command.q_des - ROBOT.q_lying).max() < 0.01, "no torque of a stand"
 
 
 def test_a_fall_and_an_emergency_stop_damp_it_for_good() -> None:

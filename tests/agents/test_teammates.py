@@ -85,7 +85,15 @@ def test_whom_the_plant_calls_lost_is_until_it_answers_again(code: str) -> None:
     assert concerns_agents(gone)
     assert concerns_agents(back)
     assert not concerns_agents(Event.of(NOW, PUSH, "r2", ""))
-    assert not concerns_agents(Event.of(NOW, LOWERED, "r2", ""))
+    lowered = Event.of(NOW, LOWERED, "r2", "")
+    assert known(lowered, **walking()) == known(**walking()), "its own affair"
+
+
+def test_who_is_led_down_is_told_so_by_the_plant() -> None:
+    told, of_another = (Event.of(NOW, LOWERED, name, "led down") for name in ("r1", "r2"))
+    assert concerns_agents(told)
+    assert WATCH.is_led_down((of_another, told))
+    assert not WATCH.is_led_down((of_another, Event.of(NOW, SILENT, "r1", "late")))
 
 
 def test_there_is_no_operator_from_the_plants_word_until_its_return_is_told_or_seen() -> None:
