@@ -31,6 +31,7 @@ from quadriga.shared.wire.topics import (
 
 Packet = tuple[str, bytes]  # key, payload
 Serial = tuple[str, int, int]  # topic of an output and its order
+ALL_TOLD: Final = 1 << 62  # ms
 _REPORT_AFTER: Final = 2000  # entries
 
 
@@ -46,6 +47,8 @@ class AgentLog:
         sent: commands, measurements and own plans by topic and order, payloads as above.
         peers_awake: ticks of the 100 Hz grid at which a peer gave a command, by peer.
         last: tick of its last command or record, at most that of the last state; −1: none.
+        told: tick up to which the records tell all that it took in: a process that was killed may
+            have sent a command, which goes first, and no record of that step.
     """
 
     states: dict[int, list[bytes]] = field(default_factory=lambda: defaultdict(list))
@@ -57,6 +60,7 @@ class AgentLog:
     sent: dict[Serial, list[bytes]] = field(default_factory=lambda: defaultdict(list))
     peers_awake: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
     last: int = -1
+    told: int = ALL_TOLD
 
 
 def read_agent_log(

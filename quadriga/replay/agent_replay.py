@@ -78,7 +78,8 @@ def replay_agent(
     log = read_agent_log(recording, config, recorded, inbox, lambda tick: show("reading", tick))
     curves = Curves(config.planner.applied) if changed else None
     comparison = Comparison(log, None if curves is None else curves.add)
-    lives = split_lives(log)
+    paced = config.world.mode == "realtime"
+    lives = split_lives(log, paced=paced, whole=recording.complete)
     begins = tuple(map(first_tick, lives))  # now: what is replayed is taken out of the logs
     with collector_off():  # a long log need not be looked through again and again
         for life in lives:
@@ -87,6 +88,7 @@ def replay_agent(
             _replay_steps(current, inputs, comparison, show, stop_at, changed=bool(changed))
             if comparison.verdict.missing and not changed:
                 break  # nothing after it could be equal but by chance
+            comparison.end_life(life)
     verdict = comparison.finish()
     wall = monotonic() - begun
     if stop_at is not None:
@@ -160,7 +162,7 @@ def _replay_steps(
             stop_at.before_step(agent, memory, step.inputs, comparison)
         before = memory
         memory, outputs = agent.step(memory, step.inputs)
-        comparison.add(ReplayedStep(before, step.inputs, outputs))
+        comparison.add(ReplayedStep(before, step.inputs, outputs), told=step.told)
 
 
 def _draw_curves(job: ReplayJob, curves: Curves, changed: str) -> Path:

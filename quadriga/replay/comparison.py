@@ -46,6 +46,8 @@ class ReplayVerdict:
         unrecorded: recomputed messages that the recording lacks, by topic.
         first: the first difference.
         step: the step at which it is.
+        untold: messages that its agent sent before it was killed, and are not recomputed so, since
+            it could not tell any more what it had taken in.
         missing: inputs that are not in the recording, with the tick of their step.
         last: the last tick replayed.
     """
@@ -53,6 +55,7 @@ class ReplayVerdict:
     equal: Counter[str] = field(default_factory=Counter)
     differing: Counter[str] = field(default_factory=Counter)
     unrecorded: Counter[str] = field(default_factory=Counter)
+    untold: Counter[str] = field(default_factory=Counter)
     first: Difference | None = None
     step: ReplayedStep | None = None
     missing: list[tuple[int, str]] = field(default_factory=list)
@@ -88,8 +91,8 @@ class Comparison:
                     messages[name] = message
         return messages
 
-    def add(self, step: ReplayedStep) -> None:
-        """Compare the messages of one step."""
+    def add(self, step: ReplayedStep, *, told: bool = True) -> None:
+        """Compare the messages of one step; `told`: whether all that it took in is known."""
         verdict, tick = self.verdict, step.inputs.state.tick
         verdict.last = tick
         for topic in COMPARED:
@@ -103,6 +106,8 @@ class Comparison:
                 verdict.unrecorded[topic.name] += 1
             elif encode(message) in recorded:
                 verdict.equal[topic.name] += 1
+            elif not told:
+                verdict.untold[topic.name] += 1
             else:
                 verdict.differing[topic.name] += 1
                 if verdict.first is None:
@@ -115,6 +120,21 @@ class Comparison:
         old = _decode_first(name, recorded)
         if old is not None:
             self._on_pair(old, message)
+
+    def end_life(self, log: AgentLog) -> None:
+        """Pass over what a process sent, and is not recomputed, after it last told what it took in.
+
+        Args:
+            log: of the process, see `quadriga.replay.lives`.
+        """
+        if log.told >= log.last:
+            return
+        for serial, payloads in tuple(self._sent.items()):
+            name = serial[0]
+            message = _decode_first(name, payloads)
+            if message is not None and log.told < message.tick <= log.last:
+                del self._sent[serial]
+                self.verdict.untold[name] += 1
 
     def finish(self) -> ReplayVerdict:
         """The verdict, with messages counted that were recorded but are not recomputed."""

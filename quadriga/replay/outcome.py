@@ -95,7 +95,13 @@ def _format_counts(outcome: ReplayOutcome) -> str:
     lost = [
         _format_count(verdict.unrecorded[name], name) for name in names if verdict.unrecorded[name]
     ]
-    parts = ((differing, "differ"), (equal, "equal to the byte"), (lost, "not in the recording"))
+    untold = [_format_count(verdict.untold[name], name) for name in names if verdict.untold[name]]
+    parts = (
+        (differing, "differ"),
+        (equal, "equal to the byte"),
+        (lost, "not in the recording"),
+        (untold, "of a process that was killed before it told what it had taken in"),
+    )
     return "; ".join(f"{', '.join(names)} {what}" for names, what in parts if names) or "nothing"
 
 

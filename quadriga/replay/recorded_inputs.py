@@ -27,11 +27,13 @@ class StepInputs:
         tick: its tick.
         inputs: what it took in; None without a state.
         missing: what of it is not in the recording.
+        told: whether the agent lived to tell what it took in.
     """
 
     tick: int
     inputs: Inputs | None
     missing: tuple[str, ...] = ()
+    told: bool = True
 
 
 class RecordedInputs:
@@ -80,7 +82,8 @@ class RecordedInputs:
         if state is None:
             missing.append(f"state of {self._agent.robot} at tick {tick}")
             return StepInputs(tick, None, tuple(missing))
-        return StepInputs(tick, self._inbox.pop_inputs(state, awaited), tuple(missing))
+        inputs = self._inbox.pop_inputs(state, awaited)
+        return StepInputs(tick, inputs, tuple(missing), told=tick <= self._log.told)
 
     def _take_state(self, tick: int) -> State | None:
         """The first valid state of a tick: the agent would not have stepped at a second one."""
