@@ -182,7 +182,7 @@ class Agent:
         before, mode = state.rise, state.mode
         if reason := self._why_rise(state, inputs):  # maybe once more
             before, mode = None, Mode(RISING, tick, reason)
-        still = self._watch.are_still(team, tick, mode.since)
+        still = self._watch.are_still(team, tick, mode.since) and not team.unheeded
         mode, rise, command = self._rising.step(
             mode, before, inputs.state, may_begin=still, estop=inputs.estop
         )

@@ -133,7 +133,8 @@ class Rising:
             mode: before it; of a robot that begins now, that it does and why.
             rise: what is remembered; None: the robot begins at this tick.
             state: what the robot measures.
-            may_begin: whether the others stand.
+            may_begin: whether the others stand, and the plant follows the commands: else the motion
+                would have gone on without the robot, which would have to catch up with it at once.
             estop: an emergency stop, if one came.
         """
         tick = state.tick

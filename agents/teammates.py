@@ -48,11 +48,13 @@ class Teammates:
         heard: of each that has spoken.
         lost: of those whose commands no longer come, tick at which the plant has said so.
         operator_gone: tick at which the plant has said that the operator is gone; −1: it is not.
+        unheeded: whether the plant has said that it does not follow the own commands.
     """
 
     heard: Mapping[str, Heard] = field(default_factory=dict)
     lost: Mapping[str, int] = field(default_factory=dict)
     operator_gone: int = -1
+    unheeded: bool = False
 
 
 class TeamWatch:
@@ -75,16 +77,19 @@ class TeamWatch:
     ) -> Teammates:
         """What is known with what has arrived; the last of several counts."""
         heard, lost, gone = dict(known.heard), dict(known.lost), known.operator_gone
+        unheeded = known.unheeded
         for name, status in statuses:
             heard[name] = Heard(status.tick, status.mode, status.reason)
         for event in events:
             if event.code in _OF_OPERATOR:
                 gone = event.tick if event.code == OPERATOR_GONE else -1
+            elif event.robot == self._robot:
+                unheeded = event.code != BACK
             elif event.code == BACK:
                 lost.pop(event.robot, None)
             elif event.robot in self.names and event.code in _OF_ROBOTS:
                 lost[event.robot] = event.tick
-        return Teammates(heard, lost, gone)
+        return Teammates(heard, lost, gone, unheeded)
 
     def is_led_down(self, events: Iterable[Event]) -> bool:
         """Whether one of these tells that the plant has led down the robot that watches."""

@@ -13,7 +13,7 @@ from quadriga.agents.rising import Rise, Rising
 from quadriga.plant.late import damp_joints
 from quadriga.plant.lost import LostCommands
 from quadriga.shared.config.load import load
-from quadriga.shared.wire.codes import LIES, LOWERED
+from quadriga.shared.wire.codes import BACK, LIES, LOWERED
 from quadriga.shared.wire.messages import EStop, Event, Reset, State
 from quadriga.sim_server.world.world import World
 from tests.a1 import standing
@@ -110,6 +110,14 @@ def test_who_did_not_know_that_its_commands_came_too_late_gets_up_when_told() ->
     memory, outputs = agent.step(memory, Inputs(lying(50), events=(told,)))
     assert memory.mode == Mode(RISING, 50, "led-down")
     assert np.abs(outputs.command.q_des - ROBOT.q_lying).max() < 0.01, "no torque of a stand"
+    for tick in range(51, 1500):
+        memory, outputs = agent.step(memory, Inputs(lying(tick)))
+    assert memory.rise is not None
+    assert memory.rise.begun == -1, "it waits until the plant follows its commands"
+    back = Event.of(1500, BACK, "r1", "answers again")
+    memory, outputs = agent.step(memory, Inputs(lying(1500), events=(back,)))
+    assert memory.rise is not None
+    assert memory.rise.begun == 1500
 
 
 def test_a_fall_and_an_emergency_stop_damp_it_for_good() -> None:

@@ -110,8 +110,11 @@ def test_there_is_no_operator_from_the_plants_word_until_its_return_is_told_or_s
     assert concerns_agents(back)
 
 
-def test_of_itself_nobody_is_told() -> None:
-    assert known(Event.of(NOW, GONE, "r1", "gone")) == Teammates()
+@pytest.mark.parametrize("code", [GONE, SILENT, LOWERED])
+def test_of_itself_a_robot_is_told_whether_its_commands_are_followed(code: str) -> None:
+    lost, back = Event.of(NOW, code, "r1", "lost"), Event.of(NOW + 1, BACK, "r1", "answers again")
+    assert known(lost) == Teammates(unheeded=True)
+    assert known(lost, back) == Teammates()
 
 
 def test_all_are_ready_once_each_has_said_so() -> None:
