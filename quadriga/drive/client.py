@@ -110,7 +110,7 @@ class ControlLink:
             answer = json.loads(line)
         except (TimeoutError, ConnectionError):
             raise self._wrong(f"no answer within {patience:g} s") from None
-        except ValueError:
+        except (ValueError, RecursionError):  # the latter for what nests too deeply
             raise self._wrong("an answer that is no JSON") from None
         if not isinstance(answer, dict):
             raise self._wrong("an answer that is no JSON object")

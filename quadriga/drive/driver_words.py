@@ -78,9 +78,13 @@ def _read_wish(body: dict[str, Any]) -> Wish:
 
 
 def _read_number(value: Any, name: str) -> float:
-    if type(value) not in (int, float) or not math.isfinite(value):
+    try:
+        number = float(value) if type(value) in (int, float) else math.nan
+    except OverflowError:  # an integer beyond all floating-point numbers
+        number = math.inf
+    if not math.isfinite(number):
         raise _wrong(f"{name} {value!r}"[:80], "a finite number")
-    return float(value)
+    return number
 
 
 def _wrong(got: str, expected: str) -> MessageError:

@@ -10,6 +10,7 @@ from typing import Final
 from quadriga.shared.errors import ConfigError
 
 _SHOWN: Final = 6  # of many teams, in an error
+_LONGEST: Final = 200  # characters of one's name or file there
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,7 @@ def read_running_team(text: str) -> RunningTeam | None:
     try:
         body = json.loads(text)
         values = {item.name: body[item.name] for item in fields(RunningTeam)}
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         return None
     texts = [values[name] for name in ("team", "endpoint", "config", "folder", "directory")]
     numbers = [values["pid"], values["started"]]
@@ -82,7 +83,8 @@ def choose_team(teams: Sequence[RunningTeam], wanted: str = "") -> RunningTeam |
         return meant[0] if meant else None
     names = {team.team for team in meant}
     by_name = len(names) == len(meant)
-    choices = [f"--team {t.team}" if by_name else f"--config {t.config}" for t in meant]
+    choices = [f"--team {t.team}" if by_name else f"--config {t.config}" for t in meant[:_SHOWN]]
+    choices = [choice[:_LONGEST] for choice in choices]
     more = [f"and {len(meant) - _SHOWN} more"] if len(meant) > _SHOWN else []
     got = f"{len(meant)} that run on this machine"
-    raise ConfigError("team", got, "the choice of one", "; ".join([*choices[:_SHOWN], *more]))
+    raise ConfigError("team", got, "the choice of one", "; ".join([*choices, *more]))

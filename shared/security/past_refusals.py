@@ -13,6 +13,8 @@ from quadriga.shared.security.roll import split_common_name
 _MOST_EACH: Final = 6  # kinds of one sender
 _MOST: Final = 60  # kinds in all: the answer must fit into one message
 _LONGEST: Final = 100  # characters of a text: an unusual key must not fill the answer
+_MOST_TIMES: Final = 1 << 62  # that one thing was refused
+_OLDEST: Final = 1e9  # s since the last time: as long as no router runs
 
 
 class PastRefusal(NamedTuple):
@@ -70,8 +72,11 @@ def _read(entry: str) -> PastRefusal | None:
         return None
     if len(given) != 6 or type(given[5]) not in (int, float) or given[3] not in REASONS:
         return None
+    times, age = given[4:]
+    if not (0 <= times < _MOST_TIMES and abs(age) < _OLDEST):
+        return None
     who, action, key, reason = (printable_line(text) for text in given[:4])
-    return PastRefusal(Refused(who, action, key, reason), given[4], float(given[5]))
+    return PastRefusal(Refused(who, action, key, reason), times, float(age))
 
 
 def refusals_of(identity: str, past: Iterable[PastRefusal]) -> tuple[PastRefusal, ...]:

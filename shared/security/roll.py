@@ -34,6 +34,7 @@ from quadriga.shared.wire.topics import TABLE
 REVOKED: Final = "revoked.json"  # in the router's folder: by identity the last number revoked
 # Certificates of one identity that are valid at a time; more are given only after a revocation.
 MOST_VALID: Final = 32
+_DIGITS: Final = 15  # of a certificate's number
 _OTHERS: Final = (LAUNCHER, ESTOP, STOP, RESET, RESUME, DOCTOR, OBSERVER, PROBE, ROUTER)
 _LOOKS_ON: Final = re.compile(r".+-\d+")  # such as echo-4711
 
@@ -82,7 +83,8 @@ def common_name(identity: str, number: int) -> str:
 def split_common_name(name: str) -> tuple[str, int]:
     """The identity and the number of a common name; the number is 0 if it is none of these."""
     identity, _, number = name.rpartition(".")
-    return (identity, int(number)) if identity and number.isdecimal() else (name, 0)
+    known = identity and number.isdecimal() and len(number) <= _DIGITS
+    return (identity, int(number)) if known else (name, 0)
 
 
 def valid_names(identity: str, revoked: int) -> list[str]:

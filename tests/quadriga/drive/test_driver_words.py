@@ -59,6 +59,7 @@ def test_a_wish_beyond_the_limits_is_brought_within_them() -> None:
         text(kind=DRIVE, **{**WISH, "vx": True}),
         text(kind=DRIVE, **{**WISH, "vx": float("nan")}),
         text(kind=DRIVE, **{**WISH, "wz": None}),
+        text(kind=DRIVE, **{**WISH, "vy": 10**400}),
         text(kind=ESTOP, text="x" * MOST_BYTES),
     ],
 )

@@ -35,6 +35,7 @@ def test_what_a_later_version_adds_is_passed_over() -> None:
         "[]",
         "null",
         "{",
+        "[" * 30_000,
         to_json(WALK).replace('"pid": 10', '"pid": "10"'),
         to_json(WALK).replace('"pid": 10', '"pid": -1'),
         to_json(WALK).replace('"pid": 10', '"pid": true'),
@@ -75,3 +76,10 @@ def test_of_several_one_must_be_chosen(teams: list[RunningTeam], wanted: str, ca
     with pytest.raises(ConfigError, match=r"that run on this machine, expected the choice") as got:
         choose_team(teams, wanted)
     assert str(got.value).endswith(cause)
+
+
+def test_names_of_any_length_are_shown_in_part() -> None:
+    teams = [replace(WALK, team="a" * 60_000), replace(WALK, team="b" * 60_000)]
+    with pytest.raises(ConfigError) as error:
+        choose_team(teams)
+    assert len(str(error.value)) < 600

@@ -44,6 +44,8 @@ def test_what_is_no_entry_is_left_out_and_the_rest_is_fit_for_a_terminal() -> No
         *("", "[", "{}", "[" * 100_000, "[1]", '["a", "b", "c", "denied", 1]'),
         *('["a", "b", "c", "other", 1, 1]', '["a", "b", "c", "denied", "1", 1]'),
         *('["a", "b", "c", "denied", true, 1]', '["a", "b", "c", "denied", 1, "x"]'),
+        *('["a", "b", "c", "denied", -1, 1]', f'["a", "b", "c", "denied", 1{"0" * 99}, 1]'),
+        *(f'["a", "b", "c", "denied", 1, {"9" * 400}]', '["a", "b", "c", "denied", 1, NaN]'),
     )
     (found,) = read_entries((*wrong, good))
     assert "\x1b" not in found.refused.key

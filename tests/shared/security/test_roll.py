@@ -61,3 +61,7 @@ def test_numbers_are_read_as_they_are_written() -> None:
 def test_other_text_is_one_clear_error(text: str) -> None:
     with pytest.raises(ConfigError, match=r"^/x/revoked\.json: got "):
         read_numbers(text, "/x/revoked.json")
+
+
+def test_a_number_of_thousands_of_digits_is_none() -> None:
+    assert split_common_name("r1." + "9" * 5000) == ("r1." + "9" * 5000, 0)
