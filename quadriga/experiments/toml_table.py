@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
+from quadriga.shared.config.load import is_finite, show_value
 from quadriga.shared.errors import ConfigError, did_you_mean
 
 
@@ -15,7 +15,7 @@ class TomlTable:
     def __init__(self, where: str, body: Any, known: Collection[str]) -> None:
         self.where, self._body = where, body
         if not isinstance(body, dict):
-            raise ConfigError(where, repr(body), "a table")
+            raise ConfigError(where, show_value(body), "a table")
         for name in body:
             self.check_one("a key", name, known)
 
@@ -23,7 +23,7 @@ class TomlTable:
         """Refuse what is not among the known ones."""
         if got not in known:
             one_of, hint = f"one of {', '.join(known)}", did_you_mean(got, known)
-            raise ConfigError(f"{self.where}: {what}", repr(got), one_of, hint)
+            raise ConfigError(f"{self.where}: {what}", show_value(got), one_of, hint)
 
     def has(self, name: str) -> bool:
         return name in self._body
@@ -38,7 +38,7 @@ class TomlTable:
 
     def number(self, name: str) -> float:
         def right(value: Any) -> bool:
-            return type(value) in (int, float) and math.isfinite(value)
+            return type(value) in (int, float) and is_finite(value)
 
         return float(self._get(name, None, right, "a finite number"))
 
@@ -49,11 +49,11 @@ class TomlTable:
         value = self._body.get(name, default)
         values = [value] if isinstance(value, str) else value
         if not isinstance(values, (list, tuple)) or not all(isinstance(v, str) for v in values):
-            raise ConfigError(f"{self.where}: {name}", repr(value), "a list of texts")
+            raise ConfigError(f"{self.where}: {name}", show_value(value), "a list of texts")
         for one in values if known else ():
             self.check_one(name, one, known)
         if len(set(values)) < len(values):
-            raise ConfigError(f"{self.where}: {name}", repr(value), "each once")
+            raise ConfigError(f"{self.where}: {name}", show_value(value), "each once")
         return tuple(values)
 
     def table(self, name: str, known: Collection[str]) -> TomlTable:
@@ -76,6 +76,6 @@ class TomlTable:
         value = self._body.get(name, default)
         if value is None or not right(value):
             raise ConfigError(
-                f"{self.where}: {name}", "nothing" if value is None else repr(value), what
+                f"{self.where}: {name}", "nothing" if value is None else show_value(value), what
             )
         return value

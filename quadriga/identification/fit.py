@@ -124,5 +124,5 @@ def _read_fit_seconds(path: Path, digest: str) -> float | None:
     try:
         report = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
         return float(report["fit_seconds"]) if report["sha256"] == digest else None
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return None  # fitted by a walk, which keeps no report

@@ -70,7 +70,7 @@ def kept_summary(recording: Recording) -> dict[str, Any] | None:
     try:
         newer = path.stat().st_mtime_ns >= recording.path.stat().st_mtime_ns
         found = json.loads(path.read_text(encoding="utf-8")) if newer else None
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):  # the last for what nests too deeply
         return None
     if not isinstance(found, dict):
         return None

@@ -14,6 +14,7 @@ from quadriga.shared.errors import ConfigError, name_file_errors
 from quadriga.team.run_folder import CONFIG
 
 ROWS: Final = "rows.jsonl"
+_ROW: Final = "what a walk left there, a JSON object in a line"
 _SEED: Final = "world.seed"  # differs from walk to walk
 
 
@@ -21,7 +22,7 @@ def open_rows(config: Config, folder: Path) -> list[dict[str, Any]]:
     """What has been walked already in a folder, which is made if there is none.
 
     Raises:
-        ConfigError: it cannot be written to, or holds walks of another configuration.
+        ConfigError: it cannot be written to, or holds walks of another configuration or none.
     """
     with _written_to(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -41,11 +42,27 @@ def append_row(row: dict[str, Any], folder: Path) -> None:
 
 
 def read_rows(folder: Path) -> list[dict[str, Any]]:
-    """What has been walked already."""
+    """What has been walked already.
+
+    Raises:
+        ConfigError: a line of the file is no row.
+    """
     path = folder / ROWS
     if not path.is_file():
         return []
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    with name_file_errors(ConfigError, path, _ROW):
+        lines = path.read_text(encoding="utf-8").split("\n")
+    return [_read_row(line, f"{path}, line {k}") for k, line in enumerate(lines, 1) if line]
+
+
+def _read_row(line: str, name: str) -> dict[str, Any]:
+    try:
+        row = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(name, str(error), _ROW, "written half, or edited by hand?") from None
+    if not isinstance(row, dict):
+        raise ConfigError(name, type(row).__name__, _ROW, "edited by hand?")
+    return row
 
 
 def keep_config(config: Config, folder: Path) -> None:

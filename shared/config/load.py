@@ -136,7 +136,7 @@ def parse_assignment(text: str, option: str = "--set") -> tuple[str, Any]:
     """
     name, separator, value = text.partition("=")
     if not separator:
-        raise ConfigError(option, _describe(text), "section.key=value")
+        raise ConfigError(option, show_value(text), "section.key=value")
     try:
         return name.strip(), _parse_toml(name.strip(), f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
@@ -188,7 +188,7 @@ def _parse_toml(name: str, text: str) -> dict[str, Any]:
 def _build_section(item: Field[Any], given: Any) -> Any:
     kind = item.default_factory
     if not isinstance(given, dict):
-        raise ConfigError(item.name, _describe(given), f"a section, written [{item.name}]")
+        raise ConfigError(item.name, show_value(given), f"a section, written [{item.name}]")
     known = {key.name: key for key in fields(kind)}  # type: ignore[arg-type]
     for name in given.keys() - known.keys():
         raise _unknown_name(f"{item.name}.{name}", [f"{item.name}.{key}" for key in known], "a key")
@@ -203,11 +203,11 @@ def _check_value(name: str, key: Field[Any], value: Any) -> Any:
     default, meta = key.default, key.metadata
     if isinstance(default, tuple):
         if not isinstance(value, (list, tuple)) or len(value) != len(default):
-            raise ConfigError(name, _describe(value), f"{len(default)} numbers{_unit(meta)}")
+            raise ConfigError(name, show_value(value), f"{len(default)} numbers{_unit(meta)}")
         return tuple(_check_number(f"{name}[{i}]", meta, float, v) for i, v in enumerate(value))
     if isinstance(default, bool):
         if not isinstance(value, bool):
-            raise ConfigError(name, _describe(value), "true or false")
+            raise ConfigError(name, show_value(value), "true or false")
         return value
     if isinstance(default, str):
         return _check_text(name, meta, value)
@@ -219,13 +219,13 @@ def _check_text(name: str, meta: Mapping[str, Any], value: Any) -> str:
     if choices and value not in choices and not meta["more"]:
         meant = did_you_mean(value, choices) if isinstance(value, str) else ""
         hint = "; ".join(filter(None, (meta["hint"], meant)))
-        raise ConfigError(name, _describe(value), f"one of {', '.join(choices)}", hint)
+        raise ConfigError(name, show_value(value), f"one of {', '.join(choices)}", hint)
     if not isinstance(value, str) or not value.isprintable():
-        raise ConfigError(name, _describe(value), "text without control characters")
+        raise ConfigError(name, show_value(value), "text without control characters")
     return value
 
 
-def _describe(value: Any) -> str:
+def show_value(value: Any) -> str:
     """A value in a few words; what nests deeply or has thousands of digits has no other text."""
     try:
         return truncate_text(repr(value), _SHOWN)
@@ -233,7 +233,8 @@ def _describe(value: Any) -> str:
         return f"a {type(value).__name__} that is too large to show"
 
 
-def _is_finite(value: float) -> bool:
+def is_finite(value: float) -> bool:
+    """Whether a number of a TOML file is one that can be computed with."""
     try:
         return math.isfinite(value)
     except OverflowError:  # an integer beyond all floating-point numbers
@@ -249,10 +250,10 @@ def _check_number(name: str, meta: Mapping[str, Any], kind: type, value: Any) ->
         what += f" ≥ {low:g}"
     what += _unit(meta)
     right_type = type(value) is int or (kind is float and type(value) is float)
-    if not right_type or not _is_finite(value):
-        raise ConfigError(name, _describe(value), what)
+    if not right_type or not is_finite(value):
+        raise ConfigError(name, show_value(value), what)
     if (low is not None and value < low) or (high is not None and value > high):
-        raise ConfigError(name, _describe(value), what, "out of range")
+        raise ConfigError(name, show_value(value), what, "out of range")
     return kind(value)
 
 

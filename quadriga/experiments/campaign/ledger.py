@@ -93,7 +93,7 @@ def manifest_of(text: bytes, name: str) -> Manifest:
     try:
         body: Mapping[str, Any] = json.loads(text)
         return Manifest.from_dict(body)
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise ConfigError(name, str(error) or type(error).__name__, _WRITTEN) from None
 
 

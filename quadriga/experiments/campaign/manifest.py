@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from quadriga.experiments.plan import Group
 from quadriga.experiments.trial.origin import is_same_code
 from quadriga.shared.config.renamed import current_name, current_value
 from quadriga.shared.errors import ConfigError
 
+_T = TypeVar("_T", "GroupEntry", "SweepEntry", "Manifest")
+
 FILE: Final = "campaign.json"
 FORMAT: Final = 1
+_SHOWN: Final = 80  # characters of a value that is wrong
 _REMEDY: Final = "trials of both must not be mixed: use a new folder"
+# By the annotation of a field whether a value read from a file is of it.
+_FITS: Final[Mapping[str, Callable[[Any], bool]]] = {
+    "str": lambda value: isinstance(value, str),
+    "float | None": lambda value: value is None or type(value) in (int, float),
+    "tuple[str, ...]": lambda value: all(isinstance(each, str) for each in value),
+    "tuple[int, ...]": lambda value: all(type(each) is int and each >= 0 for each in value),
+}
 _UNKNOWN: Final = (
     "this machine's last digits are others (arithmetic) and the sources have changed, so that "
     "nobody can tell whether the code does the same: use a new folder"
@@ -86,11 +96,12 @@ class Manifest:
         if body["format"] != FORMAT:
             raise ValueError(f"format {body['format']} instead of {FORMAT}")
         groups = tuple(
-            GroupEntry(**{**g, "swept": tuple(g["swept"]), "seeds": tuple(g["seeds"])})
+            _checked(GroupEntry(**{**g, "swept": tuple(g["swept"]), "seeds": tuple(g["seeds"])}))
             for g in body["groups"]
         )
         sweeps = tuple(
-            SweepEntry(**{**sweep, "key": current_name(sweep["key"])}) for sweep in body["sweeps"]
+            _checked(SweepEntry(**{**sweep, "key": current_name(sweep["key"])}))
+            for sweep in body["sweeps"]
         )
         variants = {
             variant: {
@@ -100,7 +111,7 @@ class Manifest:
             for variant, keys in dict(body["variants"]).items()
         }
         read = {"groups": groups, "sweeps": sweeps, "variants": variants}
-        return cls(**{**body, "typed": tuple(body["typed"]), **read})
+        return _checked(cls(**{**body, "typed": tuple(body["typed"]), **read}))
 
     @property
     def trials(self) -> int:
@@ -161,3 +172,16 @@ class Manifest:
             groups=tuple(groups.values()),
             versions=self.versions,  # of the same code by another name, perhaps
         )
+
+
+def _checked(entry: _T) -> _T:
+    """An entry, whose fields are of the types that they should be.
+
+    Raises:
+        ValueError: one is not; it is named.
+    """
+    for item in fields(entry):
+        fits, value = _FITS.get(str(item.type)), getattr(entry, item.name)
+        if fits is not None and not fits(value):
+            raise ValueError(f"{item.name} {value!r}"[:_SHOWN])
+    return entry

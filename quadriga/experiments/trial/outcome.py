@@ -150,7 +150,7 @@ def build_outcome(
         planner_ms_p50=result.planner_ms_median,
         planner_ms_p99=result.planner_ms_p99,
         solves=result.solves,
-        plans=", ".join(f"{name}={count}" for name, count in result.plans.items()),
+        plans=", ".join(f"{_status(name)}={count}" for name, count in result.plans.items()),
         seconds=result.seconds,
     )
 
@@ -177,7 +177,9 @@ def from_cells(cells: Sequence[str]) -> TrialOutcome:
         raise ValueError(f"{len(cells)} cells")
     mine = [*cells[:2], *cells[2 + swept :]]
     values = {name: _value(_KINDS[name], c) for name, c in zip(_NAMES, mine, strict=True)}
-    return TrialOutcome(swept=tuple(cells[2 : 2 + swept]), **values)
+    row = TrialOutcome(swept=tuple(cells[2 : 2 + swept]), **values)
+    row.count_plans()  # refuses what is no count
+    return row
 
 
 def to_columns(rows: Sequence[TrialOutcome], sweeps: Sequence[str]) -> Mapping[str, list[Any]]:
@@ -213,3 +215,8 @@ def _value(kind: str, cell: str) -> Any:
 
 def _line(text: str) -> str:
     return " ".join(text.split())
+
+
+def _status(text: str) -> str:
+    """What a planner calls its plan, without the marks that stand between two of them."""
+    return _line(text).replace(",", ";")

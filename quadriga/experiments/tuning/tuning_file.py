@@ -22,7 +22,7 @@ _KEYS: Final = (
 _DIGITS: Final = 3  # of a tuned value: more would say nothing, and be longer to read
 _LEAST_POPULATION: Final = 4
 _LARGEST_SEED: Final = 2**32 - 1  # of NumPy's generators
-_ELEMENT: Final = re.compile(r"(?P<key>[^\[\]]+)(\[(?P<place>\d+)\])?")
+_ELEMENT: Final = re.compile(r"(?P<key>[^\[\]]+)(\[(?P<place>\d{1,4})\])?")
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,9 @@ from hypothesis import strategies as st
 from quadriga.experiments.campaign.ledger import ROWS, Ledger, read_manifest, read_rows
 from quadriga.experiments.campaign.manifest import Manifest
 from quadriga.experiments.plan import Group
+from quadriga.experiments.trial.figures_of_merit import Figures
 from quadriga.experiments.trial.outcome import build_outcome, column_names, from_cells, to_cells
+from quadriga.recordings.traces import ERRORS
 from quadriga.shared.errors import ConfigError
 from tests.quadriga.experiments.rows import manifest, row
 
@@ -118,6 +120,7 @@ def test_what_would_not_belong_together_is_refused(tmp_path: Path) -> None:
         (lambda text: text.replace("scenario", "where"), "line 1: got other columns"),
         (lambda text: text + "one,two\n", "line 3: got"),
         (lambda text: text + "one\rtwo\n", "line 3: got"),
+        (lambda text: text.replace(",0,,8.0", ",0,solved,8.0"), "line 2: got invalid literal"),
         (lambda text: text.replace("code 1", "code 2"), "line 2: got a trial with code and versi"),
     ],
 )
@@ -132,7 +135,21 @@ def test_rows_edited_by_hand_cost_one_line(tmp_path: Path, change: Any, message:
 
 
 def test_a_folder_of_something_else_is_no_campaign(tmp_path: Path) -> None:
-    for text in ("", "{}", '{"format": 0}', "[]"):
+    good = json.loads(json.dumps(asdict(manifest("none"))))
+    (group,) = good["groups"]
+    changed = (
+        {"versions": None},
+        {"baseline": ["none"]},
+        {"typed": [1]},
+        {"variants": 5},
+        {"groups": [{**group, "scenario": ["steps"]}]},
+        {"groups": [{**group, "seeds": [0.5]}]},
+        {"groups": [{**group, "radius": "1"}]},
+        {"groups": [{**group, "seeds": [-1]}]},
+        {"sweeps": [{"key": "world.friction", "name": 3}]},
+    )
+    wrong = [json.dumps({**good, **change}) for change in changed]
+    for text in ("", "{}", '{"format": 0}', "[]", "[" * 30_000, *wrong):
         (tmp_path / "campaign.json").write_text(text, encoding="utf-8")
         with pytest.raises(ConfigError, match=r"campaign\.json"):
             read_manifest(tmp_path)
@@ -144,3 +161,11 @@ def test_keys_of_an_earlier_version_are_read_under_todays_names() -> None:
     read = Manifest.from_dict(json.loads(json.dumps(old)))
     assert read.variants == {"soft": {"controller.position_error_limit": 0.1}}
     assert [sweep.key for sweep in read.sweeps] == ["controller.mu_min"]
+
+
+def test_whatever_a_planner_calls_its_plans_they_are_counted() -> None:
+    plans = {"solved": 3, "at a limit, x=1\n": 2}
+    rmse = dict.fromkeys(ERRORS)
+    figures = Figures(8.0, {}, {}, {"vx": 0.5}, rmse, None, None, None, None, None, 5, plans)
+    row = build_outcome(Group("steps", "mine", ()), 0, ("ab", ""), figures, 0.1, "code 1")
+    assert from_cells(to_cells(row)).count_plans() == {"solved": 3, "at a limit; x=1": 2}
