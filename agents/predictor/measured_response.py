@@ -21,7 +21,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorFileError
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.atomic import atomic_write
-from quadriga.shared.runtime.npz import UNREADABLE, open_npz
+from quadriga.shared.runtime.npz import UNREADABLE, as_counts, as_measured, open_npz
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 # What a true response depends on, as far as a predictor's meta says it.
@@ -30,6 +30,7 @@ _TEAM: Final = (
     "controller",
 )  # fmt: skip
 _PLANT: Final = ("motors", "sensors", "estimator")  # sections, what it says nothing of
+_SHOWN: Final = 300  # characters of what the team should have
 _RANK: Final = 1e-6  # two stance feet have no moment about their own line: no response to that
 
 
@@ -97,7 +98,11 @@ def read_pulse_responses(path: Path) -> PulseResponses:
     try:
         with open_npz(path) as archive:
             team = json.loads(str(archive["team"]))
-            return PulseResponses(archive["ticks"], archive["u"], archive["y"], team)
+            if not isinstance(team, dict):
+                raise ValueError("no team")
+            ticks = as_counts("ticks", archive["ticks"], 1)
+            u, y = as_measured("u", archive["u"], 5), as_measured("y", archive["y"], 6)
+            return PulseResponses(ticks, u, y, team)
     except UNREADABLE as error:
         raise PredictorFileError(
             f"identification.response {path}",
@@ -122,7 +127,7 @@ def _check_team(measured: dict[str, Any], asked: dict[str, Any]) -> None:
             raise PredictorFileError(
                 "identification.response",
                 f"responses of a team with {name} {got}",
-                f"{expected}",
+                f"{expected}"[:_SHOWN],
                 "measure this team: `quadriga probe`",
             )
 
@@ -159,6 +164,8 @@ def fit_measured_response(responses: PulseResponses, meta: PredictorMeta) -> Arr
         2.0 * np.pi * ((responses.ticks - meta.stand_ms) % period) / period, DEGREE
     )
     wrenches = responses.u @ wrench_map(meta.robot).T  # (P, n, D, N, 6)
+    if not wrenches.any():
+        raise PredictorFileError("identification.response", "pulses of nothing", "forces")
     hold = int(np.flatnonzero(np.abs(wrenches).max(axis=(0, 1, 2, 4)))[-1]) + 1
     g = np.empty((values.shape[1], N, n, N_WRENCH, n, N_OUTPUTS))
     for j in range(n):

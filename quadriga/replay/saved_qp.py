@@ -25,11 +25,12 @@ from quadriga.agents.agent import Agent, AgentState, Inputs, StepProblems
 from quadriga.agents.planner.qp_solver import SolvedQp
 from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.robot.conventions import Array
-from quadriga.shared.runtime.npz import UNREADABLE, open_npz
+from quadriga.shared.runtime.npz import UNREADABLE, as_measured, open_npz
 
 WHOLE_BODY: Final = "command"  # the topic that is made of it
 PLANNER: Final = "plan"
 _FAR: Final = 1e30  # DAQP's infinity
+_AXES: Final = {"H": 2, "f": 1, "A": 2, "lower": 1, "upper": 1, "x": 1}
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +78,14 @@ def load(path: Path) -> SavedQp:
     """
     try:
         with open_npz(path) as archive:
-            arrays = {name: archive[name] for name in ("H", "f", "A", "lower", "upper", "x")}
+            arrays = {
+                name: as_measured(name, archive[name], axes, gaps=name == "x", most=_FAR)
+                for name, axes in _AXES.items()
+            }
+            n, rows = len(arrays["f"]), len(arrays["A"])
+            expected = ((n, n), (n,), (rows, n), (n + rows,), (n + rows,), (n,))
+            if not n or tuple(array.shape for array in arrays.values()) != expected:
+                raise ValueError(f"a problem of {n} unknowns and {rows} rows that are others")
             return SavedQp(**arrays, about=str(archive["about"]))
     except UNREADABLE as error:
         raise RecordingError(str(path), str(error) or "another file", "a saved problem") from None

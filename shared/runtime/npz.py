@@ -11,12 +11,15 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.lib.npyio import NpzFile
+from numpy.typing import NDArray
 
 _LARGEST: Final = 1 << 31  # bytes of all arrays together; those of ten robots take a tenth
+GREATEST: Final = 1e15  # that anything measured can be, whatever its unit
+_NUMBERS: Final = "fiu"  # NumPy's kinds of types
 _ARCHIVE: Final = b"PK\x03\x04"
 
 # What NumPy, its parsers and the archive's raise on bytes that are damaged, and what checks of the
@@ -39,6 +42,38 @@ UNREADABLE: Final = (
     tokenize.TokenError,
     zipfile.BadZipFile,
 )
+
+
+def as_measured(
+    name: str, array: Any, axes: int, *, gaps: bool = False, most: float = GREATEST
+) -> NDArray[np.float64]:
+    """An array of a file as measured numbers, of any unit.
+
+    Args:
+        name: its own.
+        array: what the file has; bytes if that is no array.
+        axes: how many it should have.
+        gaps: whether it may hold NaN, of what could not be measured.
+        most: that a number may be, and less than nothing as much.
+
+    Raises:
+        one of UNREADABLE: it has others, or holds what is no number that can be computed with.
+    """
+    found = np.asarray(array)
+    if found.dtype.kind not in _NUMBERS:
+        raise ValueError(f"{name} of {found.dtype}")
+    numbers = np.ascontiguousarray(found, dtype=np.float64)
+    fine = np.abs(numbers) <= most
+    if gaps:
+        fine |= np.isnan(numbers)
+    if numbers.ndim != axes or not fine.all():
+        raise ValueError(f"{name} of shape {numbers.shape}, or what nobody measures in it")
+    return numbers
+
+
+def as_counts(name: str, array: Any, axes: int) -> NDArray[np.int64]:
+    """An array of a file as integers, such as ticks in ms; see `as_measured`."""
+    return as_measured(name, array, axes).astype(np.int64)
 
 
 @contextmanager

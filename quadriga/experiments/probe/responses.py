@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.shared.errors import PredictorFileError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.atomic import atomic_write
-from quadriga.shared.runtime.npz import UNREADABLE, open_npz
+from quadriga.shared.runtime.npz import UNREADABLE, as_counts, as_measured, open_npz
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +57,16 @@ class Responses:
 
 
 def average(repetitions: Sequence[Repetition]) -> Responses | None:
-    """Means over the repetitions in which nobody fell; None if a pulse has no such repetition."""
+    """Means over the repetitions in which nobody fell; None if a pulse has no such repetition.
+
+    Raises:
+        PredictorFileError: they are of different teams or horizons.
+    """
+    shapes = {each.y.shape for each in repetitions}
+    if len(shapes) > 1:
+        raise PredictorFileError(
+            "responses", f"some of the shapes {shapes}", "one", "delete them to measure anew"
+        )
     u, y = (np.stack([getattr(each, name) for each in repetitions]) for name in ("u", "y"))
     whole = np.isfinite(y).all(axis=(-3, -2, -1))  # (repetition, phase, pulsed robot, direction)
     count = whole.sum(axis=0)
@@ -92,7 +102,9 @@ def read_repetition(path: Path) -> Repetition:
     """
     try:
         with open_npz(path) as archive:
-            return Repetition(int(archive["seed"]), archive["ticks"], archive["u"], archive["y"])
+            seed, ticks = int(archive["seed"]), as_counts("ticks", archive["ticks"], 1)
+            u, y = _check_signals(archive["u"], archive["y"], len(ticks))
+            return Repetition(seed, ticks, u, y)
     except UNREADABLE as error:
         raise PredictorFileError(
             f"responses {path}",
@@ -100,3 +112,18 @@ def read_repetition(path: Path) -> Repetition:
             "a file of `quadriga probe`",
             "delete it to measure anew",
         ) from None
+
+
+def _check_signals(u: Any, y: Any, phases: int) -> tuple[Array, Array]:
+    """Forces and outputs of a file.
+
+    Raises:
+        one of UNREADABLE: they are none, or do not belong together.
+    """
+    u, y = as_measured("u", u, 5, gaps=True), as_measured("y", y, 6, gaps=True)
+    team = y.shape[4]
+    if y.shape[:4] != u.shape[:4] or y.shape[:2] != (phases, team):
+        raise ValueError(f"u of shape {u.shape} with y of shape {y.shape}")
+    if u.shape[4] != N_FORCES or y.shape[5] != N_OUTPUTS:
+        raise ValueError(f"{u.shape[4]} forces and {y.shape[5]} outputs of a robot")
+    return u, y

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,7 @@ import pytest
 from quadriga.agents.predictor.measured_response import (
     PulseResponses,
     check_measured_plant,
+    fit_measured_response,
     plant_of,
     read_pulse_responses,
     team_of,
@@ -125,3 +128,45 @@ def test_responses_of_another_team_are_refused(
     write_pulse_responses(file, replace(measured, team=other))
     with pytest.raises(PredictorFileError, match=message):
         fit_periodic([team.episode(1, 1000)], meta_of(2, response=str(file)))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"team": json.dumps(["r1"])},
+        {"team": "[" * 30_000},
+        {"ticks": np.zeros(2, dtype="<U3")},
+        {"ticks": np.zeros((2, 1))},
+        {"u": np.zeros((2, 1, 6, 8))},
+        {"u": np.full((2, 1, 6, 8, 12), np.nan)},
+        {"y": np.full((2, 1, 6, 8, 1, 6), 1e200)},
+        {"y": np.zeros((2, 1, 6, 8, 1, 6), dtype="<M8[s]")},
+        {"y": np.array("y")},
+    ],
+)
+def test_what_nobody_has_measured_is_no_response(
+    changes: Mapping[str, Any], tmp_path: Path
+) -> None:
+    file, u, y = tmp_path / "responses.npz", np.ones((2, 1, 6, 8, 12)), np.ones((2, 1, 6, 8, 1, 6))
+    good: dict[str, Any] = {"ticks": np.array([0, 100]), "u": u, "y": y, "team": "{}"}
+    np.savez(file, **good)
+    assert read_pulse_responses(file).team == {}
+    np.savez(file, **{**good, **changes})
+    with pytest.raises(PredictorFileError, match=r"identification\.response"):
+        read_pulse_responses(file)
+
+
+def test_what_a_foreign_team_is_called_is_shown_in_part() -> None:
+    meta = meta_of(2)
+    responses = responses_of(Trotters(2, ((0, 1), (1, 0))), meta)
+    foreign = {**responses.team, "yokes": {"x" * 9000: 1}}
+    with pytest.raises(PredictorFileError) as error:
+        fit_measured_response(replace(responses, team=foreign), meta)
+    assert len(str(error.value)) < 1500
+
+
+def test_pulses_of_nothing_tell_no_response() -> None:
+    meta = meta_of(2)
+    responses = responses_of(Trotters(2, ((0, 1), (1, 0))), meta)
+    with pytest.raises(PredictorFileError, match="pulses of nothing"):
+        fit_measured_response(replace(responses, u=0.0 * responses.u), meta)

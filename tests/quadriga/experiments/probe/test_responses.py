@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -74,3 +76,31 @@ def test_a_damaged_file_is_one_clear_error(tmp_path: Path, content: bytes) -> No
     path.write_bytes(content)
     with pytest.raises(PredictorFileError, match="delete it to measure anew"):
         read_repetition(path)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"ticks": np.zeros(3)},
+        {"u": np.zeros((2, 3, 5, 4, 11))},
+        {"u": np.zeros((2, 3, 5, 5, 12))},
+        {"u": np.zeros(SHAPE_U, dtype="<U3")},
+        {"y": np.zeros((2, 3, 5, 4, 2, 6))},
+        {"y": np.full(SHAPE_Y, np.inf)},
+        {"y": np.zeros(())},
+    ],
+)
+def test_arrays_that_do_not_belong_together_are_refused(
+    changes: Mapping[str, Any], tmp_path: Path
+) -> None:
+    file = tmp_path / "responses.npz"
+    good = {"seed": 1, "ticks": np.zeros(2), "u": np.zeros(SHAPE_U), "y": np.zeros(SHAPE_Y)}
+    np.savez(file, **{**good, **changes})
+    with pytest.raises(PredictorFileError, match=r"responses\.npz: got .*quadriga probe"):
+        read_repetition(file)
+
+
+def test_repetitions_of_two_teams_have_no_mean() -> None:
+    other = Repetition(1, np.array([0]), np.zeros((1, 1, 5, 4, 12)), np.zeros((1, 1, 5, 4, 1, 6)))
+    with pytest.raises(PredictorFileError, match="some of the shapes"):
+        average([repetition(0), other])
