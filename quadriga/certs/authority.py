@@ -18,6 +18,7 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
+from quadriga.certs.certificate import UNREADABLE, load_certificate
 from quadriga.shared.errors import ConfigError
 
 _YEARS: Final = timedelta(days=3650)  # of the authority itself
@@ -56,9 +57,9 @@ class Authority:
         """
         self.pair = pair
         try:
-            self._certificate = x509.load_pem_x509_certificate(pair.certificate)
+            self._certificate = load_certificate(pair.certificate)
             key = load_pem_private_key(pair.key, password=None)
-        except (ValueError, TypeError) as error:
+        except (*UNREADABLE, TypeError) as error:
             raise _unreadable("authority of the team", error) from None
         if not isinstance(key, ec.EllipticCurvePrivateKey):
             raise _unreadable("key of the team's authority", type(key).__name__)

@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
+from typing import Final
 
 from cryptography import x509
-from cryptography.exceptions import InvalidSignature
+from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
 from cryptography.x509.oid import NameOID
 
 from quadriga.shared.errors import ConfigError, name_file_errors
+
+# What is raised on bytes that are no certificate, or one that nobody can use.
+UNREADABLE: Final = (
+    ValueError,
+    UnsupportedAlgorithm,
+    x509.InvalidVersion,
+    x509.DuplicateExtension,
+    x509.UnsupportedGeneralNameType,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +53,10 @@ def read_certificate(path: Path) -> Certificate:
     """
     found = _load(path)
     try:
-        names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
-        hosts = _hosts_of(found)
-    except ValueError as error:
+        with _without_warnings():
+            names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+            hosts = _hosts_of(found)
+    except UNREADABLE as error:
         raise _damaged(path, error) from None
     name = str(names[0].value) if names else ""
     return Certificate(name, hosts, found.not_valid_after_utc)
@@ -56,21 +70,39 @@ def is_signed(path: Path, authority: Path) -> bool:
     """
     try:
         _load(path).verify_directly_issued_by(_load(authority))
-    except (ValueError, TypeError, InvalidSignature):  # another name, another key
+    except (*UNREADABLE, TypeError, InvalidSignature):  # another name, another key
         return False
     return True
+
+
+def load_certificate(text: bytes) -> x509.Certificate:
+    """A certificate of a PEM text.
+
+    Raises:
+        one of UNREADABLE: it is none.
+    """
+    with _without_warnings():
+        return x509.load_pem_x509_certificate(text)
 
 
 def _load(path: Path) -> x509.Certificate:
     with name_file_errors(ConfigError, path, "a certificate", "`quadriga certs make` makes it"):
         text = path.read_bytes()
     try:
-        return x509.load_pem_x509_certificate(text)
-    except ValueError as error:
+        return load_certificate(text)
+    except UNREADABLE as error:
         raise _damaged(path, error) from None
 
 
-def _damaged(path: Path, error: ValueError) -> ConfigError:
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """Say nothing of what is unusual in a certificate that can be read all the same."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _damaged(path: Path, error: Exception) -> ConfigError:
     return ConfigError(str(path), str(error)[:200], "a certificate", "damaged?")
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import base64
 import stat
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
+from quadriga.certs.authority import Authority, Pair
 from quadriga.certs.certificate import read_certificate
 from quadriga.certs.folder import CertificateFolder
 from quadriga.shared.errors import ConfigError
@@ -135,3 +137,40 @@ def test_without_the_authority_nothing_is_renewed(tmp_path: Path) -> None:
 def test_an_address_that_is_none_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"--router: got 'räuter'"):
         CertificateFolder(tmp_path / "certs", ROLL).make("team", ["räuter"], NOW, 1.0)
+
+
+def packed(pem: bytes) -> bytes:
+    return base64.b64decode(b"".join(pem.splitlines()[1:-1]))
+
+
+def as_pem(content: bytes) -> bytes:
+    text = base64.encodebytes(content)
+    return b"-----BEGIN CERTIFICATE-----\n" + text + b"-----END CERTIFICATE-----\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b"\xa0\x03\x02\x01\x02", b"\xa0\x03\x02\x01\x15"),  # no version that there is
+        (b"\x06\x03\x55\x1d\x0f", b"\x06\x03\x55\x1d\x13"),  # an extension twice
+    ],
+)
+def test_a_certificate_that_no_library_takes_is_damaged(
+    old: bytes, new: bytes, folder: CertificateFolder
+) -> None:
+    files = tls_files(str(folder.path), "router")
+    content = packed(files.certificate.read_bytes())
+    assert content.count(old) == 1
+    files.certificate.write_bytes(as_pem(content.replace(old, new)))
+    with pytest.raises(ConfigError, match=r"certificate\.pem: got .*, expected a certificate"):
+        read_certificate(files.certificate)
+
+
+def test_a_key_of_a_curve_that_no_library_knows_is_no_authoritys() -> None:
+    pair = Authority.create("team", NOW).pair
+    body = base64.b64decode(b"".join(pair.key.splitlines()[1:-1]))
+    curve = b"\x2a\x86\x48\xce\x3d\x03\x01\x07"
+    text = base64.encodebytes(body.replace(curve, curve[:-2] + b"\x01\x63"))
+    key = b"-----BEGIN PRIVATE KEY-----\n" + text + b"-----END PRIVATE KEY-----\n"
+    with pytest.raises(ConfigError, match="authority of the team"):
+        Authority(Pair(pair.certificate, key))
