@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
@@ -16,6 +17,7 @@ from quadriga.shared.wire.messages import Consumed, State
 from quadriga.shared.wire.topics import INPUTS, MEASUREMENT, SAMPLE_MS, STATE, WORDS
 
 _BEFORE: Final = (-1, 0)
+_LONGEST_GAP: Final = 1000  # ticks without a state or a record that are gone through one by one
 _WORDS: Final = frozenset(word.name for word in WORDS)
 
 
@@ -55,17 +57,27 @@ class RecordedInputs:
         references = (parse_message_id(text) for r in log.records.values() for text in r.taken)
         self._claimed = {reference for reference in references if reference}
         self._queues = {source: sorted(packets) for source, packets in log.received.items()}
+        self._known = sorted({*log.states, *log.records})
+        self._awake = {peer: sorted(ticks) for peer, ticks in log.peers_awake.items()}
         self._due: dict[Source, Order] = {}  # in lock-step: up to where all has been awaited
 
     def steps(self) -> Iterator[StepInputs]:
-        """Every step up to the agent's last command."""
+        """Every step up to the agent's last command.
+
+        Of a longer gap the first ticks are enough: forged ticks must not ask for years of steps.
+        """
         tick = self._next(-1)
         while tick <= self._log.last:
             yield self._replay_step(tick)
             tick = self._next(tick)
 
     def _next(self, tick: int) -> int:
-        return self._after.get(tick, tick + 1)
+        following = self._after.get(tick, tick + 1)
+        place = bisect_left(self._known, following)
+        before = self._known[place - 1] if place else -1
+        if following - before <= _LONGEST_GAP:
+            return following
+        return self._known[place] if place < len(self._known) else self._log.last + 1
 
     def _replay_step(self, tick: int) -> StepInputs:
         record = self._log.records.get(tick)
@@ -145,11 +157,11 @@ class RecordedInputs:
         topic, peer = source
         if topic != MEASUREMENT.name:
             return []
-        before, awake = self._due.get(source, _BEFORE), self._log.peers_awake[peer]
+        before, awake = self._due.get(source, _BEFORE), self._awake.get(peer, [])
         first = max(before[0], 0) // SAMPLE_MS * SAMPLE_MS + SAMPLE_MS
-        ticks = range(first, due[0], SAMPLE_MS)
+        ticks = awake[bisect_left(awake, first) : bisect_left(awake, due[0])]
         received = self._log.received.get(source, {})
-        return [(tick, 0) for tick in ticks if tick in awake and (tick, 0) not in received]
+        return [(tick, 0) for tick in ticks if (tick, 0) not in received]
 
 
 def _find_lost_records(records: dict[int, Consumed], robot: str) -> dict[int, tuple[str, ...]]:

@@ -243,3 +243,16 @@ def test_a_lost_state_and_a_lost_record_are_named() -> None:
     assert missing[0][0] == before + 1 <= lost.tick
     assert "1 of inputs of r2 between ticks" in missing[0][1][0]
     assert (400, ("state of r2 at tick 400",)) in missing
+
+
+@pytest.mark.parametrize("known", [(), (0, 1, 2, 5), (0, 1 << 40)])
+def test_forged_ticks_do_not_ask_for_years_of_steps(known: tuple[int, ...]) -> None:
+    config, agent = AGENTS["realtime"]
+    log = AgentLog(last=1 << 41)
+    for tick in known:
+        log.states[tick].append(encode(standing(tick)))
+    inputs = RecordedInputs(config, agent, Inbox(config, "r2", agent.peers), log)
+    steps = [step.tick for step in inputs.steps()]
+    assert len(steps) < 3000
+    assert {*known} <= {*steps}
+    assert steps == sorted(steps)
