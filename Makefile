@@ -69,7 +69,9 @@ image-lock: $(TOOLS)
 fuzz: $(TOOLS)
 	$(BIN)/python -m tests.bridges.fuzz $(ARGS)
 
-# 100,000 damaged messages, configurations, predictors and recordings each through their readers.
+# 100,000 damaged inputs through every reader of bytes that others may have written: messages, words,
+# configurations, predictors, campaigns, certificates, recordings. One that takes long, needs much
+# memory or ends in anything but an error of the tree fails. ARGS='--only KIND', '--json FILE'.
 fuzz-readers: $(TOOLS)
 	$(BIN)/python -m tests.fuzz $(ARGS)
 

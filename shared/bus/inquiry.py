@@ -50,7 +50,7 @@ def ask(bus: Bus, names: Collection[str] = ALL, wait: Pause = pause) -> Told:
     for question in questions:
         for arrived_ns, key, payload in question.take():
             name = key.split("/")[1]
-            answer = MemberAnswer(_read(name, payload), question.asked_ns, arrived_ns)
+            answer = MemberAnswer(read_about(name, payload), question.asked_ns, arrived_ns)
             told.setdefault(name, []).append(answer)
     return told
 
@@ -164,7 +164,7 @@ def _wait_for(seconds: float, wait: Pause, over: Callable[[], bool] = lambda: Fa
         wait()
 
 
-def _read(name: str, payload: bytes) -> About | None:
+def read_about(name: str, payload: bytes) -> About | None:
     """What a process says of itself; None if it cannot be read, or is not about this process."""
     try:
         about = decode(payload, About)

@@ -1,0 +1,118 @@
+"""Texts that people write: configurations, experiments, tunings, traces of references."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, Final, cast
+
+import numpy as np
+
+from quadriga.experiments.published.experiment_file import read_experiment
+from quadriga.experiments.tuning.tuning_file import read_tuning
+from quadriga.experiments.variants import parse_variants
+from quadriga.shared.config.load import load
+from quadriga.shared.config.reference_trace import ROW_END, inline_trace, trace_of
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.errors import QuadrigaError
+from quadriga.shared.recording.config import recorded_config
+from quadriga.shared.recording.reader import Recording
+from tests.fuzz.damage import damage
+from tests.fuzz.target import VALUES, FileReader, change_toml, toml_lines
+
+_DEPLOY: Final = Path(__file__).parents[2] / "deploy"
+
+
+class Configurations:
+    """Files of a configuration, and the configurations of recordings."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / "team.toml"
+        self._keys: dict[str, list[str]] = {}
+        for line in to_toml(load()).splitlines():
+            if line.startswith("["):
+                section = self._keys.setdefault(line, [])
+            elif "=" in line and not line.startswith("#"):
+                section.append(line)
+
+    def make(self, random: np.random.Generator) -> bytes:
+        lines = []
+        for section in random.permutation(list(self._keys))[: random.integers(1, 4)]:
+            lines.append(section)
+            for key in random.permutation(self._keys[section])[: random.integers(1, 5)]:
+                name, _, value = str(key).partition(" = ")
+                if random.random() < 0.5:
+                    value = VALUES[int(random.integers(len(VALUES)))]
+                lines.append(f"{name} = {value}")
+        text = "\n".join(lines).encode()
+        return text if random.random() < 0.5 else damage(text, random)
+
+    def read(self, content: bytes) -> None:
+        self._path.write_bytes(content)
+        with suppress(QuadrigaError):
+            text = content.decode("utf-8", "replace")
+            text = json.dumps({"world": {"seed": text}}) if len(text) % 2 else text
+            recorded: Any = SimpleNamespace(path=self._path, metadata={"config_json": text})
+            recorded_config(cast(Recording, recorded))
+        to_toml(load(self._path))
+
+
+class TomlFiles:
+    """Files that say what is walked: of experiments, of tunings, of variants.
+
+    Args:
+        path: of the file that is read.
+        good: files of this kind.
+        read: reads one.
+    """
+
+    def __init__(self, path: Path, good: list[Path], read: Any) -> None:
+        self._path, self._read = path, read
+        self._texts = [toml_lines(file.read_text(encoding="utf-8")) for file in good]
+
+    def make(self, random: np.random.Generator) -> bytes:
+        return change_toml(self._texts[int(random.integers(len(self._texts)))], random)
+
+    def read(self, content: bytes) -> None:
+        self._path.write_bytes(content)
+        self._read(self._path)
+
+
+def experiments(folder: Path) -> TomlFiles:
+    """Files of experiments."""
+    return TomlFiles(
+        folder / "mine.toml", sorted((_DEPLOY / "experiments").glob("*.toml")), read_experiment
+    )
+
+
+def tunings(folder: Path) -> TomlFiles:
+    """Files of tunings."""
+    return TomlFiles(
+        folder / "tuning.toml", sorted((_DEPLOY / "tuning").glob("*.toml")), read_tuning
+    )
+
+
+def variants(folder: Path) -> TomlFiles:
+    """Files of variants, which are configurations of several names."""
+    good = folder / "good-variants.toml"
+    good.write_text(to_toml(load()), encoding="utf-8")
+    return TomlFiles(
+        folder / "variants.toml", [good], lambda path: parse_variants(["a:world.seed=3"], path)
+    )
+
+
+def reference_traces(folder: Path) -> FileReader:
+    """Courses of the velocity reference, in files and in configurations."""
+    good = (_DEPLOY / "scenarios" / "joystick.csv").read_bytes()
+    short = b"".join(good.splitlines(keepends=True)[:12])
+
+    def read(path: Path) -> None:
+        line = inline_trace(path)
+        if ROW_END in line and line.isprintable():
+            trace = trace_of(load(None, {"reference.trace": line}))
+            assert trace is not None
+            assert np.isfinite(trace.at(1e6)).all()
+
+    return FileReader(folder / "trace.csv", (good, short, short), read)

@@ -1,0 +1,205 @@
+"""Bytes from the bus, and texts of those who drive: every type of message, every answer."""
+
+from __future__ import annotations
+
+import json
+import socket
+from collections.abc import Callable
+from itertools import cycle
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from quadriga.agents.inbox.inbox import Inbox
+from quadriga.agents.inbox.intake_log import parse_message_id
+from quadriga.agents.planning.interface import Expected
+from quadriga.drive.client import ControlLink
+from quadriga.drive.driver_words import read_driver_word
+from quadriga.drive.gamepad import EVENT_BYTES, Gamepad, take, wish_of
+from quadriga.drive.wish import standing
+from quadriga.plant.commands import CommandBox
+from quadriga.recordings.echo import format_entry
+from quadriga.shared.bus.absence import MemberAnswer, TeamView, describe_absent, diagnose
+from quadriga.shared.bus.agreement import TeamNorm
+from quadriga.shared.bus.inquiry import read_about
+from quadriga.shared.bus.introduction import describe_process
+from quadriga.shared.config.load import load
+from quadriga.shared.errors import MessageError
+from quadriga.shared.members import SIM, team_members
+from quadriga.shared.printable import printable_line
+from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.shared.security.past_refusals import RefusalMemory, read_entries, refusals_of
+from quadriga.shared.security.refusals import REASONS, Refused
+from quadriga.shared.wire.about import QUESTIONS, Refusals
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.messages import LiveFault
+from quadriga.shared.wire.topics import TABLE
+from quadriga.sim_server.world.faults.components import build_components
+from quadriga.sim_server.world.faults.fault import KINDS as FAULT_KINDS
+from quadriga.sim_server.world.faults.fault import parse_faults, with_time
+from quadriga.status.gather import StatusFold
+from quadriga.team.running_team import RunningTeam, choose_team, read_running_team, to_json
+from tests.a1 import standing as standing_state
+from tests.fuzz.damage import damage
+from tests.fuzz.target import Texts, change_json, choose, example
+
+_EVERYTHING: Final = Expected((1 << 40, 0), 1 << 40, 1 << 40, True)
+_LOOK_EVERY: Final = 100  # messages
+
+
+class Messages:
+    """Every type of message, at everybody who takes it."""
+
+    def __init__(self) -> None:
+        config = load(None, {"team.robots": 2, "estimator.kind": "truth"})
+        self._inbox = Inbox(config, "r1", ("r2",))
+        self._box = CommandBox(config.team.name, ("r1", "r2"), config.robot)
+        self._fold, self._heard = StatusFold(config), 0
+        self._good = [(topic, encode(example(topic.type))) for topic in TABLE]
+        self._topic = TABLE[0]
+
+    def make(self, random: np.random.Generator) -> bytes:
+        self._topic, good = self._good[int(random.integers(len(self._good)))]
+        return damage(good, random)
+
+    def read(self, content: bytes) -> None:
+        for robot in ("r1", "r2"):
+            self._inbox.take(self._topic.key("team", robot), content)
+            self._box.take(self._topic.key("team", robot), content, tick=1 << 20, oldest=0)
+        while self._inbox.pop_state() is not None:
+            pass
+        self._inbox.pop_inputs(standing_state(0), _EVERYTHING)
+        head = envelope(content)
+        key = self._topic.key("team", "r1")
+        entry = ChunkEntry(key, -1 if head is None else head[0], 0, content)
+        self._heard += 1
+        self._fold.add(entry.key, content, entry.tick, self._heard)
+        if self._heard % _LOOK_EVERY == 0:
+            self._fold.look(self._heard)
+        line = format_entry(entry, full=True)
+        assert line == printable_line(line)
+        decode(content, self._topic.type)
+
+
+class Answers:
+    """What processes say of themselves when they are asked, and a router of what it has refused."""
+
+    def __init__(self) -> None:
+        config = load(None, {"team.robots": 2})
+        memory = RefusalMemory()
+        for reason in REASONS:
+            memory.note(Refused("r1.1", "put", "team/r1/command", reason), 3, 1.0)
+        self._about, self._entries = describe_process(config, "r1"), memory.entries(2.0)
+        others = [encode(example(question.type)) for question in QUESTIONS]
+        refusals = encode(Refusals(0, 0, self._entries))
+        self._good = (*others, encode(self._about), refusals)
+        self._members = team_members(("r1", "r2"), central=False, recorded=False, plant_each=False)
+        self._norm = TeamNorm(describe_process(config, SIM), "abc", "r1")
+
+    def make(self, random: np.random.Generator) -> bytes:
+        if random.random() < 0.5:
+            return damage(choose(self._good, random), random)
+        entries = [change_json(entry.encode(), random) for entry in self._entries]
+        return encode(Refusals(0, 0, tuple(each.decode("utf-8", "replace") for each in entries)))
+
+    def read(self, content: bytes) -> None:
+        about = read_about("r1", content)
+        past = None
+        try:
+            past = read_entries(decode(content, Refusals).entries)
+            refusals_of("r1", past)
+        except MessageError as error:
+            if about is None:
+                raise error
+        told = {"r1": [MemberAnswer(about, 0, 1)]}
+        names = frozenset(("r1", "r2", SIM))
+        view = TeamView(True, names, frozenset(), names, told, self._norm, past)
+        for member in self._members:
+            for found in diagnose(member, view):
+                assert found.text == printable_line(found.text)
+        describe_absent(self._members, view)
+
+
+class Orders:
+    """Texts in messages that order something while the team walks: faults, references of inputs."""
+
+    def __init__(self) -> None:
+        config = load(None, {"team.robots": 2})
+        self._components = tuple(build_components(config.robot))
+        parts = zip(self._components, cycle(FAULT_KINDS))
+        kinds = [f"r1/{part} {kind} 1.5 2" for part, kind in parts]
+        ids = ("state:r1:5", "plan:r2:40.1", "reference::12")
+        self._good = tuple(text.encode() for text in (*kinds, "r2/imu stuck 1", *ids))
+
+    def make(self, random: np.random.Generator) -> bytes:
+        text = damage(choose(self._good, random), random).decode("utf-8", "replace")
+        return encode(LiveFault(0, 0, text))
+
+    def read(self, content: bytes) -> None:
+        text = decode(content, LiveFault).fault
+        parse_message_id(text)
+        timed = with_time(text, 1 << 40) if len(text.split()) in (2, 3) else text
+        parse_faults(timed, ("r1", "r2"), self._components)
+
+
+class Drivers:
+    """What drivers say to an operator, from a page or a program, and what a gamepad does."""
+
+    def __init__(self) -> None:
+        self._rest = standing(load())
+        words = (
+            {"kind": "drive", "vx": 0.1, "vy": 0, "wz": -0.2, "height": 0.3, "held": True},
+            {"kind": "estop", "text": "why", "number": 7},
+            {"kind": "news"},
+        )
+        self._good = tuple(json.dumps(word).encode() for word in words)
+
+    def make(self, random: np.random.Generator) -> bytes:
+        return change_json(choose(self._good, random), random)
+
+    def read(self, content: bytes) -> None:
+        pad = Gamepad()
+        for at in range(0, len(content) - EVENT_BYTES + 1, EVENT_BYTES):
+            pad, _ = take(pad, content[at : at + EVENT_BYTES])
+        wish_of(pad, self._rest)
+        said = read_driver_word(content)
+        assert said.text == printable_line(said.text)
+
+
+class OperatorAnswers:
+    """What an operator answers a program of its machine."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / "team-1.sock"
+        news = {"kind": "news", "driver": "page 1", "modes": {"r1": "walk"}, "number": 3}
+        self._good = (json.dumps(news).encode() + b"\n", b'{"kind": "heard"}\n{"kind": "estop"}\n')
+
+    def make(self, random: np.random.Generator) -> bytes:
+        return change_json(choose(self._good, random), random)
+
+    def read(self, content: bytes) -> None:
+        self._path.unlink(missing_ok=True)
+        with socket.socket(socket.AF_UNIX) as server:
+            server.bind(str(self._path))
+            server.listen()
+            with ControlLink(self._path) as link:
+                operator, _ = server.accept()
+                with operator:
+                    operator.sendall(content)
+                link.await_stop()
+
+
+def running_teams() -> Texts:
+    """Files by which the teams of this machine are found."""
+    team = RunningTeam("team", "tcp/127.0.0.1:7447", "/tmp/a.toml", "", "/tmp", 4711, 12)
+
+    def read(content: bytes) -> None:
+        found = read_running_team(content.decode("utf-8", errors="replace"))
+        if found is None:
+            raise MessageError("team", "something else", "what a team leaves")
+        choose_team([found, team])
+
+    reader: Callable[[bytes], None] = read
+    return Texts([to_json(team).encode()], reader)
