@@ -102,18 +102,6 @@ def add_workers(command: argparse.ArgumentParser) -> None:
     )
 
 
-def refuse_configuration(arguments: argparse.Namespace, why: str) -> None:
-    """Refuse keys on the command line of what is configured by a file of its own.
-
-    Raises:
-        ConfigError: an option sets a key, or names a scenario or a configuration.
-    """
-    given = {**arguments.overrides, "--config": arguments.config, "--scenario": arguments.scenario}
-    for name, value in given.items():
-        if value is not None:
-            raise ConfigError(name, str(value), "no key", why)
-
-
 def read_workers(arguments: argparse.Namespace, before: str) -> Workers:
     """The workers asked for; names of what is walked stand `before` the address of a scheduler.
 

@@ -1,4 +1,4 @@
-"""The options that every command has: where its configuration comes from."""
+"""Where a command's configuration comes from: the options that all have but a few without one."""
 
 from __future__ import annotations
 
@@ -48,9 +48,12 @@ _CONNECTING: Final = frozenset(
     )
 )
 
-# Commands that look at none of it, and do not mention it in their help.
-_UNCONFIGURED: Final = frozenset(
-    ("scenarios", "info", "check", "recover", "version", "completion", "experiments")
+# Commands without one: what they read is a file with its own, or none at all.
+UNCONFIGURED: Final = frozenset(
+    (
+        *("scenarios", "info", "check", "recover", "report", "export", "resim"),
+        *("experiments", "tune", "version", "completion"),
+    )
 )
 _DEFAULTS: Final = Config()
 _ABOUT: Final = (
@@ -68,11 +71,13 @@ def build_config_options(command: str, *, hidden: bool) -> argparse.ArgumentPars
     """
     options = argparse.ArgumentParser(add_help=False)
     options.add_argument("--parent", type=int, default=0, help=argparse.SUPPRESS)
+    if command in UNCONFIGURED:
+        options.set_defaults(config=None, scenario=None, assignments=[])
+        return options
     options.add_argument(
         "--help-all", action="help", help="show the options of the configuration, too, and exit"
     )
-    about = _ABOUT if hidden and command not in _UNCONFIGURED else None
-    group = options.add_argument_group("configuration", about)
+    group = options.add_argument_group("configuration", _ABOUT if hidden else None)
 
     def add(*names: str, help: str, **named: Any) -> None:
         group.add_argument(*names, help=argparse.SUPPRESS if hidden else help, **named)

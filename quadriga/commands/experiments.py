@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from quadriga.commands.campaign import add_workers, read_workers, refuse_configuration
+from quadriga.commands.campaign import add_workers, read_workers
 from quadriga.commands.command import AddCommand, Given, say
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
@@ -223,7 +223,6 @@ def _show(experiment: Experiment, tables: Iterable[Table]) -> None:
 
 def _check_options(arguments: argparse.Namespace) -> None:
     read_workers(arguments, "names")
-    refuse_configuration(arguments, "those of an experiment stand in its file")
     if arguments.only_publish and arguments.seeds:
         raise ConfigError("--seeds", repr(arguments.seeds), "none", "--only-publish walks nothing")
     if arguments.from_published and (arguments.only_publish or arguments.seeds):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from quadriga.commands.command import AddCommand, Given, refuse_configuration
+from quadriga.commands.command import AddCommand, Given
 from quadriga.commands.options import add_file
 from quadriga.shared.config.sections import Config
 
@@ -24,14 +24,13 @@ def add(add_command: AddCommand) -> None:
     )
 
 
-def run(arguments: argparse.Namespace, _config: Config, given: Given) -> int:
+def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     """Convert a recording, a cut one as far as it goes."""
     from rich.console import Console
 
     from quadriga.export import run as exporter
     from quadriga.shared.recording.reader import Recording
 
-    refuse_configuration(given)
     exporter.run(arguments.file, arguments.to, arguments.output, Console())
     Recording(arguments.file).require_whole()
     return 0

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from difflib import get_close_matches
+from typing import Final
 
 from quadriga.shared.errors import ConfigError, did_you_mean
+
+_ALIKE: Final = 0.75  # of 1: what is less like a stray word is no hint
 
 
 def check_words(words: Sequence[str], options: Mapping[str, Collection[str]]) -> None:
@@ -30,7 +34,40 @@ def check_words(words: Sequence[str], options: Mapping[str, Collection[str]]) ->
             return
         option = word.partition("=")[0]
         if option.startswith("--") and option not in options[command]:
-            known = f"`quadriga {command} --help-all` lists them"
+            every = "--help-all" if "--help-all" in options[command] else "--help"
+            known = f"`quadriga {command} {every}` lists them"
             hint = did_you_mean(option, [name for name in options[command] if name[:2] == "--"])
             expected = "an option that it has"
             raise ConfigError(f"quadriga {command}", option, expected, hint or known)
+
+
+def refuse_strays(
+    command: str,
+    strays: Sequence[str],
+    places: Sequence[str],
+    options: Collection[str],
+    scenarios: Iterable[str],
+) -> None:
+    """Refuse words of a command line that its command has no place for.
+
+    Args:
+        command: its name.
+        strays: the words that are left over.
+        places: of words without an option, as the help shows them.
+        options: the command's options.
+        scenarios: names of what can be walked, which is easily typed without its option.
+
+    Raises:
+        ConfigError: there is such a word; it tells what was likely meant.
+    """
+    if not strays:
+        return
+    word = strays[0]
+    expected = f"nothing but options and {' '.join(places)}" if places else "nothing but options"
+    meant = {name.removeprefix("--"): name for name in options if name[:2] == "--"}
+    if "--scenario" in options:
+        meant |= {name: f"--scenario {name}" for name in scenarios}
+    close = get_close_matches(word.lstrip("-"), list(meant), 1, _ALIKE)
+    help_text = f"`quadriga {command} --help` tells what it takes"
+    hint = f"did you mean {meant[close[0]]!r}?" if close else help_text
+    raise ConfigError(f"quadriga {command}", repr(word), expected, hint)

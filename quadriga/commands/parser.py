@@ -12,7 +12,7 @@ from typing import Final
 from quadriga.commands.command import Run
 from quadriga.commands.command_table import GROUPS
 from quadriga.commands.config_options import build_config_options, read_config
-from quadriga.commands.mistakes import check_words
+from quadriga.commands.mistakes import check_words, refuse_strays
 from quadriga.commands.running import registered
 from quadriga.commands.version import ShowVersion
 from quadriga.shared.errors import ConfigError, ProcessError, QuadrigaError, system_reason
@@ -50,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = build_parser(everything=_ALL in typed)
     try:
         check_words(typed, parser.list_options())
-        arguments = parser.parse_args(typed)
+        arguments = _parse(parser, typed)
         arguments.typed = shlex.join(["quadriga", *typed])
         arguments.every_command = lambda: build_parser(everything=True).commands
         interrupt_on_sigterm()
@@ -74,6 +74,22 @@ def main(argv: Sequence[str] | None = None) -> int:
         what, reason = error.filename or "a file or a connection", system_reason(error)
         return _complain(ConfigError(str(what), reason, "one that can be used"), WRONG)
     return status
+
+
+def _parse(parser: CommandLine, typed: Sequence[str]) -> argparse.Namespace:
+    """The options and words that were typed.
+
+    Raises:
+        ConfigError: the command has no place for one of the words.
+    """
+    arguments, strays = parser.parse_known_args(typed)
+    if strays:
+        from quadriga.team.scenarios import names
+
+        command = parser.commands[arguments.command]
+        places = [takes(action) for action in command._actions if not action.option_strings]
+        refuse_strays(arguments.command, strays, places, list_options(command), names())
+    return arguments
 
 
 @cache
@@ -124,6 +140,13 @@ def build_parser(*, everything: bool = False) -> CommandLine:
 def list_options(parser: argparse.ArgumentParser) -> list[str]:
     """All options of a parser, also those that its help does not show."""
     return [option for action in parser._actions for option in action.option_strings]
+
+
+def takes(action: argparse.Action) -> str:
+    """What stands for an argument's value in a usage line."""
+    choices = "|".join(map(str, action.choices or ()))
+    name = str(action.metavar or choices or action.dest.upper())
+    return {"*": f"[{name} …]", "+": f"{name} …", "?": f"[{name}]"}.get(str(action.nargs), name)
 
 
 def _format_groups(groups: Sequence[tuple[str, Sequence[tuple[str, str]]]]) -> str:

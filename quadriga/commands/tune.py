@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from quadriga.commands.campaign import add_workers, read_workers, refuse_configuration
+from quadriga.commands.campaign import add_workers, read_workers
 from quadriga.commands.command import AddCommand, Given
 from quadriga.shared.config.sections import Config
 
@@ -35,7 +35,6 @@ def run(arguments: argparse.Namespace, _config: Config, _given: Given) -> int:
     from quadriga.experiments.tuning.tuning_file import read_tuning
     from quadriga.tables import print_tables
 
-    refuse_configuration(arguments, "those of a search stand in its file")
     console = Console(stderr=True)
     tuning = read_tuning(arguments.file)
     out = arguments.out or Path("runs/tune") / arguments.file.stem

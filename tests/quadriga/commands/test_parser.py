@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from quadriga.commands.command_table import GROUPS
-from quadriga.commands.config_options import KEYS, read_config
+from quadriga.commands.config_options import KEYS, UNCONFIGURED, read_config
 from quadriga.commands.parser import build_parser, main
 from quadriga.shared.config.load import load
 
@@ -152,6 +152,57 @@ def test_what_was_likely_meant_is_told(
     assert run(capsys, *words) == (2, "", f"quadriga: {error}\n")
 
 
+@pytest.mark.parametrize("command", sorted(UNCONFIGURED))
+@pytest.mark.parametrize("option", ["--robots", "--set", "--config", "--scenario", "--help-all"])
+def test_who_reads_no_configuration_takes_none(
+    capsys: pytest.CaptureFixture[str], command: str, option: str
+) -> None:
+    status, out, err = run(capsys, command, option, "2")
+    assert (status, out) == (2, "")
+    assert err.startswith(f"quadriga: quadriga {command}: got {option}, expected an option that it")
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        (
+            ["walk", "nosuch"],
+            "walk: got 'nosuch', expected nothing but options "
+            "(`quadriga walk --help` tells what it takes)",
+        ),
+        (
+            ["walk", "--robots", "2", "hard-block"],
+            "walk: got 'hard-block', expected nothing but options "
+            "(did you mean '--scenario hard-blocks'?)",
+        ),
+        (
+            ["walk", "robots", "2"],
+            "walk: got 'robots', expected nothing but options (did you mean '--robots'?)",
+        ),
+        (
+            ["desk", "x"],
+            "desk: got 'x', expected nothing but options "
+            "(`quadriga desk --help` tells what it takes)",
+        ),
+        (
+            ["info", "run.mcap", "other.mcap"],
+            "info: got 'other.mcap', expected nothing but options and FILE "
+            "(`quadriga info --help` tells what it takes)",
+        ),
+        (
+            ["scenarios", "hard-blocks"],
+            "scenarios: got 'hard-blocks', expected nothing but options "
+            "(`quadriga scenarios --help` tells what it takes)",
+        ),
+        (["walk", "-vx"], "walk: got '-vx', expected nothing but options (did you mean '--vx'?)"),
+    ],
+)
+def test_a_stray_word_is_named(
+    capsys: pytest.CaptureFixture[str], words: list[str], error: str
+) -> None:
+    assert run(capsys, *words) == (2, "", f"quadriga: quadriga {error}\n")
+
+
 def test_what_stands_behind_two_dashes_is_no_option(capsys: pytest.CaptureFixture[str]) -> None:
     status, _, err = run(capsys, "info", "--", "--robts")
     assert (status, err) == (
@@ -176,8 +227,12 @@ def test_a_command_shows_its_own_options(capsys: pytest.CaptureFixture[str], com
     with pytest.raises(SystemExit, match="0"):
         main([command, "--help"])
     own = capsys.readouterr().out
+    told_of = any(name in own for name in ("--help-all", "--config", "--scenario", "--set"))
+    assert told_of is (command not in UNCONFIGURED)
     assert "--terrain-height" not in own
     assert "--parent" not in own
+    if command in UNCONFIGURED:
+        return
     with pytest.raises(SystemExit, match="0"):
         main([command, "--help-all"])
     every = capsys.readouterr().out
