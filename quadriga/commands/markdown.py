@@ -9,7 +9,7 @@ from typing import Final
 
 from quadriga.commands.command_table import GROUPS
 from quadriga.commands.config_options import build_config_options
-from quadriga.commands.parser import build_parser
+from quadriga.commands.parser import build_parser, takes
 
 _HEAD: Final = """\
 # Command line
@@ -20,7 +20,7 @@ one line on stderr.
 
 | exit status | meaning |
 |---|---|
-| 0 | done; of a walk: every robot walked to the end |
+| 0 | done; of a walk: every robot walked to the end, or until somebody stopped it |
 | 1 | a robot fell or stopped, a process failed, or what was to be checked is not so |
 | 2 | the command, the configuration or a file is wrong |
 | 130 | interrupted |
@@ -73,7 +73,7 @@ def _describe_command(parser: argparse.ArgumentParser) -> Iterator[str]:
     name = parser.prog.rpartition(" ")[2]
     shown = [action for action in parser._actions if action.help != argparse.SUPPRESS]
     own = [action for action in shown if not isinstance(action, argparse._HelpAction)]
-    places = [_takes(action) for action in own if not action.option_strings]
+    places = [takes(action) for action in own if not action.option_strings]
     options = ["[options]"] * any(action.option_strings for action in own)
     yield f"\n### {name}\n\n"
     yield f"`{' '.join(('quadriga', name, *options, *places))}` – {parser.description}.\n"
@@ -93,17 +93,10 @@ def _describe_configuration() -> Iterator[str]:
 
 def _row(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
     """A row of a table: the option or place with what it takes, and its help."""
-    takes = "" if action.nargs == 0 else _takes(action)
-    name = " ".join(filter(None, (", ".join(action.option_strings), takes)))
+    value = "" if action.nargs == 0 else takes(action)
+    name = " ".join(filter(None, (", ".join(action.option_strings), value)))
     text = parser._get_formatter()._expand_help(action) if action.help else ""
     return f"| `{name.replace('|', _BAR)}` | {_escape(text)} |\n"
-
-
-def _takes(action: argparse.Action) -> str:
-    """What stands for an argument's value in a usage line."""
-    choices = "|".join(map(str, action.choices or ()))
-    name = str(action.metavar or choices or action.dest.upper())
-    return {"*": f"[{name} …]", "+": f"{name} …", "?": f"[{name}]"}.get(str(action.nargs), name)
 
 
 def _escape(text: str) -> str:

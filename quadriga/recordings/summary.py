@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from quadriga.recordings.falls import find_falls
 from quadriga.recordings.gaps import end_of_world, missing_ticks, repeated_ticks
 from quadriga.recordings.metadata import recorded_versions
 from quadriga.recordings.stops import find_stops
@@ -31,7 +32,7 @@ from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import END, RECORDING
 from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.shared.runtime.histogram import QUANTILES
-from quadriga.shared.wire.codes import FALL, LOWERED, code_of
+from quadriga.shared.wire.codes import FALL, code_of
 from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import STATE
 
@@ -116,10 +117,9 @@ def steady_from(traces: Traces) -> int:
 
 
 def _world(traces: Traces) -> dict[str, Any]:
-    truth, seen = traces.truth, _seen_down(traces)
-    reported = {event.robot for event in traces.events if event.code == FALL}
+    truth, fallen = traces.truth, set(find_falls(traces))
     if not len(truth.tick):  # then the robots' own word must do
-        reported |= {
+        fallen |= {
             r
             for r, statuses in traces.statuses.items()
             if any(code_of(s.reason) == FALL for s in statuses)
@@ -127,8 +127,8 @@ def _world(traces: Traces) -> dict[str, Any]:
     end = next((event for event in reversed(traces.events) if event.kind == "stop"), None)
     vanished = traces.notes.get(END, {})
     return {
-        "fell": bool(seen | reported),
-        "fallen": sorted(seen | reported),
+        "fell": bool(fallen),
+        "fallen": sorted(fallen),
         "distance": distance(truth, 2 * traces.config.gait.stance_ms),
         "end": end.detail if end is not None else vanished.get("detail", ""),
         "end_code": end.code if end is not None else vanished.get("code", ""),
@@ -138,19 +138,6 @@ def _world(traces: Traces) -> dict[str, Any]:
             for e in traces.events
         ],
     }
-
-
-def _seen_down(traces: Traces) -> set[str]:
-    """Robots that lay on the ground, those aside that the plant had led there."""
-    truth, seen = traces.truth, set[str]()
-    led_down = {e.robot: e.tick for e in reversed(traces.events) if e.code == LOWERED}
-    for i, robot in enumerate(traces.robots):
-        down = truth.down[:, i]
-        if robot in led_down:
-            down = np.where(truth.tick < led_down[robot], down, truth.tilted[:, i])
-        if down.any():
-            seen.add(robot)
-    return seen
 
 
 def _tracking(traces: Traces) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from quadriga.sim_server.world.team_model import formation
 Ticks = NDArray[np.int64]
 _FALL_TILT: Final = 1.0  # rad
 _FALL_HEIGHT: Final = 0.12  # m above the terrain
+_RISEN: Final = 0.06  # m, above that height a robot is up again that was down
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +54,19 @@ class TruthTrace:
         return self.tilt > _FALL_TILT
 
     @property
+    def low(self) -> NDArray[np.bool_]:
+        """Whether a robot's trunk is on the ground, however it is turned, shape (T, n)."""
+        return self.y[..., 0] < _FALL_HEIGHT
+
+    @property
     def down(self) -> NDArray[np.bool_]:
         """Whether a robot lies on the ground, shape (T, n)."""
-        return self.tilted | (self.y[..., 0] < _FALL_HEIGHT)
+        return self.tilted | self.low
+
+    @property
+    def up(self) -> NDArray[np.bool_]:
+        """Whether a robot surely stands, shape (T, n)."""
+        return ~self.tilted & (self.y[..., 0] >= _FALL_HEIGHT + _RISEN)
 
 
 def build_truth_trace(messages: Sequence[Truth], config: Config) -> TruthTrace:

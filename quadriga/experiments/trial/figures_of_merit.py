@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.gait import nominal_forces
+from quadriga.recordings.falls import find_falls
 from quadriga.recordings.stops import find_stops
 from quadriga.recordings.summary import steady_from
 from quadriga.recordings.traces import (
@@ -25,7 +26,6 @@ from quadriga.recordings.traces import (
 from quadriga.recordings.truth import distance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, OUTPUTS, Array
-from quadriga.shared.wire.codes import FALL
 from quadriga.shared.wire.messages import Measurement
 
 _SHORTEST: Final = 0.5  # m; over a shorter way a cost of transport is that of starting
@@ -96,9 +96,9 @@ class Figures:
 def compute_figures(walk: Walk) -> Figures:
     """The figures of merit of a walk."""
     traces, truth = walk.traces, walk.traces.truth
-    config, fallen = traces.config, _find_falls(traces)
-    planner = config.planner
-    end = round(1000 * min(fallen.values())) if fallen else int(truth.tick.max(initial=0))
+    config, falls = traces.config, find_falls(traces)
+    planner, fallen = config.planner, {robot: tick / 1000.0 for robot, tick in falls.items()}
+    end = min(falls.values()) if falls else int(truth.tick.max(initial=0))
     begin = steady_from(traces)
     y, error = tracking_errors(traces, begin, end)
     squares = {name: mean_of(error[..., i] ** 2) for i, name in enumerate(OUTPUTS)}
@@ -132,17 +132,6 @@ def _cost_of_transport(config: Config, work: float | None, way: float | None) ->
         return None
     mass = config.team.robots * config.robot.mass + config.world.payload
     return work / (mass * GRAVITY * way)
-
-
-def _find_falls(traces: Traces) -> dict[str, float]:
-    """When each robot fell: what the world says, and what its truth shows, whichever is first."""
-    truth = traces.truth
-    times = {e.robot: e.tick / 1000.0 for e in reversed(traces.events) if e.code == FALL}
-    down = truth.down
-    for i in np.flatnonzero(down.any(axis=0)):
-        robot, seen = traces.robots[i], float(truth.tick[down[:, i].argmax()]) / 1000.0
-        times[robot] = min(seen, times.get(robot, seen))
-    return dict(sorted(times.items()))
 
 
 def _find_stops(walk: Walk, fallen: Mapping[str, float]) -> dict[str, str]:
