@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     from quadriga.team.emergency_stop import stop_team, wait_and_stop
 
     if not arguments.armed:
-        stop_team(config, arguments.reason, lambda text: print(text, flush=True))
+        stop_team(config, arguments.reason, lambda text: print(text, flush=True), say)
         return 0
     if wait_and_stop(config, arguments.reason, _STDIN, say):
         return 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import getpass
 
-from quadriga.commands.command import AddCommand, Given
+from quadriga.commands.command import AddCommand, Given, say
 from quadriga.shared.config.sections import Config
 
 
@@ -24,7 +24,7 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     from quadriga.team.reset import reset_team
 
     by = arguments.by or _logged_in()
-    done, description = reset_team(config, by, stand=arguments.stand)
+    done, description = reset_team(config, by, stand=arguments.stand, tell=say)
     print(description)
     return int(not done)
 

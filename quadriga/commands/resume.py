@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from quadriga.commands.command import AddCommand, Given
+from quadriga.commands.command import AddCommand, Given, say
 from quadriga.shared.config.sections import Config
 
 
@@ -16,6 +16,6 @@ def run(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Print what each robot does then; 1 if some do not walk."""
     from quadriga.team.resume import resume_team
 
-    walk, description = resume_team(config)
+    walk, description = resume_team(config, say)
     print(description)
     return int(not walk)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from quadriga.commands.command import AddCommand, Given
+from quadriga.commands.command import AddCommand, Given, say
 from quadriga.shared.config.sections import Config
 
 
@@ -20,6 +20,7 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Print what each robot does then; 1 if some do not stand or the walk is not over."""
     from quadriga.team.safe_stop import stop_safely
 
-    done, description = stop_safely(config, arguments.reason, ends=not arguments.stand)
+    ends = not arguments.stand
+    done, description = stop_safely(config, arguments.reason, ends=ends, tell=say)
     print(description)
     return int(not done)

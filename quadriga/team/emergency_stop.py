@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import select
-from collections.abc import Callable
 from typing import Final, Self
 
 from quadriga.drive.stop_proof import unconfirmed
@@ -14,15 +13,14 @@ from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import truncate_text
 from quadriga.shared.wire.messages import EStop
 from quadriga.shared.wire.topics import ESTOP
-from quadriga.team.talk import SEARCH, TeamTalk
+from quadriga.team.talk import SEARCH, Say, TeamTalk, keep_quiet
 
 _LOOK: Final = 0.005  # s, between two looks at who is there
 _ARMED_LOOK: Final = 0.05  # s, likewise, of a process that waits; a key interrupts it
 _PATIENCE: Final = 0.5  # s, in which all that hear it must have stopped
+_LONG: Final = 0.5  # s, after which the person is told what is waited for
 _LONGEST_REASON: Final = 200  # characters; it becomes part of every agent's status
 _LINE: Final = 4096  # bytes that are read at once from the keyboard
-
-Say = Callable[[str], None]
 
 
 class EmergencyStop:
@@ -32,6 +30,8 @@ class EmergencyStop:
 
     Args:
         config: the team's configuration.
+        tell: is told who is waited for if that takes long; not before the stop is sent to those
+            that hear it, as nothing may hold it up.
 
     Attributes:
         wanted: agents and plants that are to hear it.
@@ -40,7 +40,8 @@ class EmergencyStop:
         BusError: the bus cannot be opened.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, tell: Say = keep_quiet) -> None:
+        self._tell = tell
         self._talk = TeamTalk(config, members.ESTOP)
         self._plant_each = config.team.plants == "each"
         self._say = self._talk.publisher(ESTOP)
@@ -67,13 +68,16 @@ class EmergencyStop:
         self._talk.statuses.clear()
         self._talk.events.clear()
         reached, begun = frozenset[str](), monotonic()
-        pressed = begun
+        pressed, told = begun, False
         while reached < self.wanted and monotonic() < begun + SEARCH:
             there = self.look(_LOOK)
             if there and not reached:  # at once, whoever is still absent: they hear it later
                 pressed = monotonic()
                 self.press(reason)
             reached |= there
+            if not told and reached < self.wanted and monotonic() > begun + _LONG:
+                told = True
+                self._tell(_describe_wait(reached, self.wanted))
         absent = sorted(self.wanted - reached)
         if absent:
             self.press(reason)  # for one who is there but does not say so
@@ -109,7 +113,7 @@ class EmergencyStop:
         self._talk.bus.close()
 
 
-def stop_team(config: Config, reason: str, say: Say) -> None:
+def stop_team(config: Config, reason: str, say: Say, tell: Say = keep_quiet) -> None:
     """Send one emergency stop to every robot of the team.
 
     Args:
@@ -117,12 +121,13 @@ def stop_team(config: Config, reason: str, say: Say) -> None:
         reason: told to every agent.
         say: tells what came of it, in a line, before this process leaves the bus: that takes 2 s
             beside one that is frozen.
+        tell: is told who is waited for, if that takes long.
 
     Raises:
         BusError: the bus cannot be opened, some agents or plants were not reached, or they have
             not stopped.
     """
-    with EmergencyStop(config) as stop:
+    with EmergencyStop(config, tell) as stop:
         say(stop.press_until_all_heard(reason))
 
 
@@ -142,7 +147,7 @@ def wait_and_stop(config: Config, reason: str, keyboard: int, say: Say) -> bool:
         BusError: the bus cannot be opened, some agents or plants were not reached, or they have
             not stopped.
     """
-    with EmergencyStop(config) as stop:
+    with EmergencyStop(config, say) as stop:
         known: frozenset[str] | None = None
         while not select.select([keyboard], [], [], _ARMED_LOOK)[0]:
             there = stop.look()
@@ -153,6 +158,13 @@ def wait_and_stop(config: Config, reason: str, keyboard: int, say: Say) -> bool:
             return False
         say(stop.press_until_all_heard(reason))
     return True
+
+
+def _describe_wait(reached: frozenset[str], wanted: frozenset[str]) -> str:
+    """Who has been stopped, and whom the stop still has to reach."""
+    stopped = f"stopped {', '.join(sorted(reached))}" if reached else "nobody hears it yet"
+    absent = ", ".join(sorted(wanted - reached))
+    return f"emergency stop: {stopped}; waiting for {absent}, at most {SEARCH:g} s"
 
 
 def _describe(there: frozenset[str], wanted: frozenset[str]) -> str:

@@ -10,13 +10,17 @@ from quadriga.shared import members
 from quadriga.shared.config.sections import Config
 from quadriga.shared.wire.messages import Resume
 from quadriga.shared.wire.topics import RESUME
-from quadriga.team.talk import TeamTalk
+from quadriga.team.talk import Say, TeamTalk, keep_quiet
 
 PATIENCE: Final = 1e-3 * WORD_MS + 1.0  # s, in which robots that may go on do so
 
 
-def resume_team(config: Config) -> tuple[bool, str]:
+def resume_team(config: Config, tell: Say = keep_quiet) -> tuple[bool, str]:
     """Tell all robots to go on, and wait for those that may.
+
+    Args:
+        config: the team's configuration.
+        tell: is told what is done, before what comes of it.
 
     Returns:
         Whether all of them walk, and what each does.
@@ -24,9 +28,10 @@ def resume_team(config: Config) -> tuple[bool, str]:
     Raises:
         BusError: the bus cannot be opened, or some agents are not there: then nobody is told.
     """
-    with TeamTalk(config, members.RESUME) as talk:
+    with TeamTalk(config, members.RESUME, tell) as talk:
         say = talk.publisher(RESUME)
         talk.await_all("word to go on")
         say(Resume(*talk.time))
+        tell(f"asked {', '.join(talk.agents)}; waiting until all walk, at most {PATIENCE:g} s")
         walks = talk.follow(lambda: talk.all_are(WALK), PATIENCE)
         return walks, talk.describe()

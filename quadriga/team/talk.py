@@ -21,7 +21,13 @@ from quadriga.shared.wire.topics import EVENT, STATUS, topics_for
 
 SEARCH: Final = 5.0  # s, longest search for the team
 _AGAIN, _OFTEN_FOR = 0.1, 1.0  # s: how often a word is said again at first, and for how long
+Say = Callable[[str], None]
+"""Tells the person, in a line, what is done for them meanwhile."""
 _MOST_EVENTS: Final = 10_000  # that are kept; more can only be a flood
+
+
+def keep_quiet(_line: str) -> None:
+    """Tell nobody what is done meanwhile."""
 
 
 class TeamTalk:
@@ -30,6 +36,7 @@ class TeamTalk:
     Args:
         config: the team's configuration.
         role: of this process on the bus.
+        tell: is told what is done, as it may take a while.
 
     Attributes:
         agents: names of the team's robots.
@@ -37,13 +44,16 @@ class TeamTalk:
         statuses: the newest status of each agent that has spoken.
         events: what the plants have announced.
         time: tick and stamp of the team's clock, as last heard; zeros before.
+        tell: as given.
 
     Raises:
         BusError: the bus cannot be opened.
     """
 
-    def __init__(self, config: Config, role: str) -> None:
+    def __init__(self, config: Config, role: str, tell: Say = keep_quiet) -> None:
         team = config.team.name
+        self.tell = tell
+        tell(f"connecting to team {team!r} at {config.bus.endpoint}")
         self.agents = robot_names(config.team.robots)
         rows = processes(config)
         self.wanted = frozenset(row.name for row in rows if row.role.name in (AGENT, SIM))

@@ -125,7 +125,10 @@ def test_who_is_not_there_is_named_and_the_others_stop(
     config: Config, team: dict[str, Bus], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(emergency_stop, "SEARCH", 0.3)
+    monkeypatch.setattr(emergency_stop, "_LONG", 0.1)
+    told = list[str]()
     match = r"no r1 on the bus after 0.3 s.*\(sim heard it at once"
     with pytest.raises(BusError, match=match):
-        stop_team(config, "dog", print)
+        stop_team(config, "dog", print, told.append)
+    assert told == ["emergency stop: stopped sim; waiting for r1, at most 0.3 s"]
     assert team[SIM].get(WAIT) is not None

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event, Thread
+
+import numpy as np
+import pytest
+
+from quadriga.commands.parser import main
 from quadriga.shared import members
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import SIM
 from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import SafeStop
-from quadriga.shared.wire.topics import STOP
+from quadriga.shared.wire.messages import SafeStop, Status
+from quadriga.shared.wire.topics import STATUS, STOP
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.talk import TeamTalk
 
@@ -33,3 +44,63 @@ def test_a_word_is_repeated_for_a_second_and_to_those_who_turn_up_later() -> Non
             assert talk.follow(lambda: bool(late.drain()), 20.0)
         assert not talk.follow(lambda: False, 0.3)
         assert len(plant.drain()) == 1, "once for who is new"
+
+
+@contextmanager
+def robot_that_is(mode: str, config: Config) -> Iterator[None]:
+    """A plant and an agent that say how the robot is, and hear whatever is said."""
+    nothing, over = np.zeros(0), Event()
+    status = Status(5, 5_000_000, mode, "", "kalman", {}, {}, nothing, nothing)
+    with Bus.open(config.bus, "team", SIM) as plant, Bus.open(config.bus, "team", "r1") as agent:
+        put = agent.publisher(STATUS.key("team", "r1"))
+
+        def say_so() -> None:
+            while not over.wait(0.05):
+                put(encode(status))
+
+        thread = Thread(target=say_so)
+        thread.start()
+        for bus in (plant, agent):
+            bus.declare(HERE)
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+
+@pytest.mark.parametrize(
+    ("words", "mode", "asked"),
+    [
+        (("stop", "--stand"), "stand", ["asked r1; waiting until all stand, at most 5 s"]),
+        (("resume",), "walk", ["asked r1; waiting until all walk, at most "]),
+        (
+            ("reset", "--by", "ann"),
+            "walk",
+            [
+                "released r1; waiting until all stand, at most 15 s",
+                "asked r1 to go on; waiting until all walk, at most ",
+            ],
+        ),
+    ],
+)
+def test_a_person_is_told_what_is_done_before_what_comes_of_it(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    words: tuple[str, ...],
+    mode: str,
+    asked: list[str],
+) -> None:
+    """On stderr, which is no terminal here; stdout has the result alone."""
+    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint()})
+    file = tmp_path / "team.toml"
+    file.write_text(to_toml(config), encoding="utf-8")
+    with robot_that_is(mode, config):
+        assert main([*words, "--config", str(file)]) == 0
+    out, err = capsys.readouterr()
+    assert out == f"r1: {mode}\n"
+    begins = [f"connecting to team 'team' at {config.bus.endpoint}", *asked]
+    told = err.splitlines()
+    assert len(told) == len(begins)
+    for line, begin in zip(told, begins, strict=True):
+        assert line.startswith(f"quadriga: {begin}")
