@@ -189,7 +189,7 @@ def _draw_curves(axes: Axes, panel: Panel, points: int, tall: float) -> None:
     axes.yaxis.set_major_formatter(StrMethodFormatter("{x:,.9g}"))
     axes.set_ylim(low, high)
     if panel.beside is not None:
-        _add_beside(axes, *panel.beside, max(2, int(tall // 25)))
+        add_beside(axes, *panel.beside, max(2, int(tall // 25)))
     for level, name in panel.levels:
         if low < level < high:
             axes.axhline(level, **LINES["level"])
@@ -200,7 +200,7 @@ def _draw_curves(axes: Axes, panel: Panel, points: int, tall: float) -> None:
             )  # fmt: skip
 
 
-def _add_beside(axes: Axes, factor: float, sign: str, ticks: int) -> None:
+def add_beside(axes: Axes, factor: float, sign: str, ticks: int = 5) -> None:
     """The same values in another unit at the right, with `ticks` numbers or fewer."""
 
     def convert(values: Any) -> Any:

@@ -11,6 +11,8 @@ from quadriga.shared.robot.conventions import Array
 
 TIME: Final = "time [s]"
 DEGREES: Final = (180.0 / math.pi, "°")  # beside rad and rad/s
+# What is read beside each of `OUTPUTS` in SI units, as in `Panel.beside`.
+BESIDE: Final = (None, None, None, DEGREES, DEGREES, (DEGREES[0], "°/s"))
 LEFT: Final = 58.0  # points, for the values of the vertical axis
 
 

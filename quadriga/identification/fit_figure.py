@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from quadriga.charts.colours import PALETTE
-from quadriga.charts.draw import tidy_axes
+from quadriga.charts.draw import add_beside, tidy_axes
 from quadriga.charts.files import save_png
+from quadriga.charts.panels import BESIDE
 from quadriga.identification.fit_report import FitReport
 from quadriga.shared.robot.conventions import OUTPUTS
 from quadriga.shared.wire.topics import SAMPLE_MS
@@ -47,6 +48,9 @@ def draw(reports: Sequence[FitReport], path: Path) -> None:
         panel.set_ylabel(f"RMSE {LABELS[i]}")
         panel.set_ylim(bottom=0.0)
         tidy_axes(panel)
+        beside = BESIDE[i]
+        if beside is not None:
+            add_beside(panel, beside[0] / factor, beside[1])
     for panel in axes[-1]:
         panel.set_xlabel("ahead [ms]")
     handles, labels = axes[0, 0].get_legend_handles_labels()

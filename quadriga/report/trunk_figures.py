@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from quadriga.charts.colours import robot_style, truth_style, yoke_style
 from quadriga.charts.draw import Legend, draw_panels
-from quadriga.charts.panels import DEGREES, Curve, Mark, Panel, PanelGrid
+from quadriga.charts.panels import BESIDE, Curve, Mark, Panel, PanelGrid
 from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.recordings.traces import demanded_outputs, estimate_errors
 from quadriga.recordings.truth import Ticks
@@ -21,7 +21,6 @@ from quadriga.shared.wire.topics import SAMPLE_MS
 from quadriga.tables import LABELS, UNITS
 
 NAMES: Final = ("z [m]", "vx [m/s]", "vy [m/s]", "roll [rad]", "pitch [rad]", "wz [rad/s]")
-_BESIDE: Final = (None, None, None, DEGREES, DEGREES, (DEGREES[0], "°/s"))
 _SPANS: Final = (0.04, 0.3, 0.2, 0.1, 0.1, 0.4)
 _ORDER: Final = (0, 3, 1, 4, 2, 5)  # of the panels, two in a row: z roll, vx pitch, vy wz
 _GAP: Final = 0.05  # s without a sample, after which a curve is not joined
@@ -91,7 +90,7 @@ def draw_trajectory(
         curves.append(Curve(reference_tick / 1000, commanded[:, i], "asked"))
         span = _SPANS[i] if part is None else 0.5 * _SPANS[i]
         until = first_fall(run)
-        panels.append(Panel(NAMES[i], curves, span=span, until=until, beside=_BESIDE[i]))
+        panels.append(Panel(NAMES[i], curves, span=span, until=until, beside=BESIDE[i]))
     legend = [
         *([(truth_style(index), "measured (truth)")] if run.has_truth else []),
         ("own", "estimated by the agent"),
@@ -119,7 +118,7 @@ def draw_reference(run: ReportedRun) -> Figure:
             curves.append(Curve(tick / 1000, mean, robot_style(index), gap=_GAP))
         curves.append(Curve(reference_tick / 1000, commanded[:, i], "asked"))
         span, until = _SPANS[i] / 2, first_fall(run)
-        panels.append(Panel(NAMES[i], curves, span=span, until=until, beside=_BESIDE[i]))
+        panels.append(Panel(NAMES[i], curves, span=span, until=until, beside=BESIDE[i]))
     legend = [*robot_legend(run), ("asked", "asked for")]
     title = "What was asked for, and each robot's mean over one gait period"
     return draw_over_run(run, panels, legend, title, most=_share_points(run, 10))
@@ -137,7 +136,7 @@ def draw_estimator_errors(run: ReportedRun) -> Figure:
             Curve(tick / 1000, factor * error[:, i], robot_style(index), gap=_GAP)
             for index, (tick, error) in enumerate(errors)
         ]
-        turned = _BESIDE[i]
+        turned = BESIDE[i]
         beside = None if turned is None else (turned[0] / factor, turned[1])
         span, until = 0.02 * factor * _SPANS[i], first_fall(run)
         panels.append(Panel(LABELS[i], curves, span=span, until=until, beside=beside))

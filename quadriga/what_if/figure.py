@@ -8,7 +8,7 @@ from typing import Final
 from quadriga.charts.colours import truth_style
 from quadriga.charts.draw import draw_panels
 from quadriga.charts.files import save_png
-from quadriga.charts.panels import Curve, Mark, Panel, PanelGrid
+from quadriga.charts.panels import DEGREES, Curve, Mark, Panel, PanelGrid
 from quadriga.recordings.truth import TruthTrace
 from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.robot.conventions import Array
@@ -16,10 +16,10 @@ from quadriga.what_if.outcome import WalkCourse
 
 _RECORDED, _BRANCH = "true", "planned"  # styles
 _ASIDE: Final = 0.5  # s shown before the moment
-_QUANTITIES: Final = (  # title, least span, of one robot
-    ("trunk's height [m]", 0.1),
-    ("forward speed [m/s]", 0.5),
-    ("tilt [rad]", 0.3),
+_QUANTITIES: Final = (  # title, least span, unit that is read beside its own, of one robot
+    ("trunk's height [m]", 0.1, None),
+    ("forward speed [m/s]", 0.5, None),
+    ("tilt [rad]", 0.3, DEGREES),
 )
 
 
@@ -51,8 +51,9 @@ def draw_branch(
                 for trace, style in ((recorded.truth, truth_style(index)), (branch.truth, _BRANCH))
             ],
             span=span,
+            beside=beside,
         )
-        for row, (name, span) in enumerate(_QUANTITIES)
+        for row, (name, span, beside) in enumerate(_QUANTITIES)
         for index, robot in enumerate(robots)
     ]
     begin = max(0.0, 1e-3 * moment - _ASIDE)
