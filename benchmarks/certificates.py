@@ -18,6 +18,7 @@ from typing import Any, Final
 
 from rich.console import Console
 
+from benchmarks.realtime import late_commands
 from quadriga.certs.secured import secure, utc_now
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.recordings.summary import summarise
@@ -27,7 +28,6 @@ from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.members import ROUTER
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.runtime.process_use import read_use
 from quadriga.shared.runtime.signals import interrupt_on_sigterm
@@ -124,17 +124,15 @@ def _way_of(config: Config, way: str) -> Iterator[tuple[Config, Path]]:
 
 
 def _cells(summary: dict[str, Any], config: Config, router: float | None) -> tuple[str, ...]:
-    robots = [summary["realtime"][name] for name in robot_names(config.team.robots)]
-    late = max(robot["late_share"] for robot in robots)
-    oldest = max(robot["command_age_ms"]["max"] for robot in robots)
+    walk = late_commands(summary, config)
     return (
-        f"{summary['real_time_factor']:.2f}",
-        f"{100.0 * late:.1f}",
-        f"{oldest:.0f}",
-        f"{summary['gaps']:,}",
+        f"{walk['rtf']:.2f}",
+        f"{100.0 * walk['late_share']:.1f}",
+        f"{walk['oldest_ms']:.0f}",
+        f"{walk['gaps']:,}",
         "–" if router is None else f"{router:.2f}",
-        ", ".join(summary["fallen"]) or "nobody",
-        summary["end"],
+        ", ".join(walk["fallen"]) or "nobody",
+        walk["end"],
     )
 
 

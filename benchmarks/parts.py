@@ -114,6 +114,27 @@ def start(options: Options, console: Console, tell: Tell) -> Part:
     return measure(config, 1 if options.quick else 7)
 
 
+def realtime(options: Options, console: Console, tell: Tell) -> Part:
+    """Late commands of two robots in real time, three walks."""
+    from dataclasses import replace
+
+    from benchmarks.realtime import measure
+    from quadriga.agents.predictor.store import predictor_sha256
+    from quadriga.warm_up import warm_up
+
+    seconds, seeds = (1.5, (0,)) if options.quick else (10.0, (0, 1, 2))
+    config, path, predictor = team(options, 2, seconds, console)
+    warm_up(config, console)
+    # A computer that is too slow is not refused here: its figure is what was asked for.
+    config = replace(
+        config,
+        world=replace(config.world, mode="realtime"),
+        runtime=replace(config.runtime, refuse_overload=False),
+    )
+    sha256 = "" if predictor is None else predictor_sha256(predictor)
+    return measure(config, path, sha256, seeds, tell)
+
+
 def walks(options: Options, console: Console, tell: Tell) -> Part:
     """Real walks of every team size, and of one size with and without recorder in turns."""
     from benchmarks.children import result_of
@@ -178,5 +199,5 @@ def team(
 
 PARTS: dict[str, Callable[[Options, Console, Tell], Part]] = {
     "planner": planner, "low-level": low_level, "bus": bus, "world": world, "clock": clock,
-    "recorder": recorder, "fit": fit, "start": start, "walks": walks,
+    "recorder": recorder, "fit": fit, "start": start, "real-time": realtime, "walks": walks,
 }  # fmt: skip

@@ -29,6 +29,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import Array
 
 AS_WRITTEN = "as written"
+_AT_BOUND = 1e-6  # N, of the exact answer
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,12 @@ class Contender:
     run: Callable[[Case], Array]
     times: list[float] = field(default_factory=list)
     errors: list[tuple[float, float, float]] = field(default_factory=list)
+
+
+def is_at_bound(problem: PlannerProblem, x: Array) -> bool:
+    """Whether any bound holds the minimiser."""
+    values = np.concatenate([x, problem.A @ x])
+    return bool(np.minimum(problem.upper - values, values - problem.lower).min() < _AT_BOUND)
 
 
 class Local:
