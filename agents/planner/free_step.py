@@ -102,15 +102,8 @@ def _free_step(
     u_ini, y_ini, stance_ini, y_base_ini, y_base, y_des = own
     Y_past, Y_v, columns, nominal, nominal_table = prediction
     gradient, minus_inverse, lower, upper, slope = minimiser
-    T_ini, N = len(u_ini), len(y_des)
-    past = np.empty(T_ini * (N_FORCES + N_OUTPUTS))
-    for k in range(T_ini):
-        pattern = 0
-        for leg in range(4):
-            pattern = 2 * pattern + stance_ini[k, leg]
-        past[N_FORCES * k : N_FORCES * (k + 1)] = u_ini[k] - nominal_table[pattern]
-        at = N_FORCES * T_ini + N_OUTPUTS * k
-        past[at : at + N_OUTPUTS] = y_ini[k] - y_base_ini[k]
+    N = len(y_des)
+    past = past_deviations(u_ini, y_ini, stance_ini, y_base_ini, nominal_table)
     y_free = Y_past @ past + effect
     error = y_free - (y_des - y_base).ravel()
     x, usable = minimise_freely(minus_inverse, gradient @ error, lower, upper, slope)
@@ -125,3 +118,24 @@ def _free_step(
         if not abs(output) <= OUTPUT_MAX:
             usable = False
     return forces, outputs, usable
+
+
+@compiled
+def past_deviations(
+    u_ini: Array,
+    y_ini: Array,
+    stance_ini: NDArray[np.bool_],
+    y_base_ini: Array,
+    nominal_table: Array,
+) -> Array:
+    """Deviations [u_ini; y_ini] as `PlannerInputs.past` has them. Shape (18 T_ini,)."""
+    T_ini = len(u_ini)
+    past = np.empty(T_ini * (N_FORCES + N_OUTPUTS))
+    for k in range(T_ini):
+        pattern = 0
+        for leg in range(4):
+            pattern = 2 * pattern + stance_ini[k, leg]
+        past[N_FORCES * k : N_FORCES * (k + 1)] = u_ini[k] - nominal_table[pattern]
+        at = N_FORCES * T_ini + N_OUTPUTS * k
+        past[at : at + N_OUTPUTS] = y_ini[k] - y_base_ini[k]
+    return past

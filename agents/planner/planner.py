@@ -17,7 +17,7 @@ from quadriga.agents.planner.cooperation import (
     stay_near_last,
 )
 from quadriga.agents.planner.damping import kept_by_agent
-from quadriga.agents.planner.free_step import FreeStep, OwnWindow
+from quadriga.agents.planner.free_step import FreeStep, OwnWindow, past_deviations
 from quadriga.agents.planner.neighbours import PeerSelection
 from quadriga.agents.planner.peer_terms import Peers, PeerTerms
 from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem, unpack
@@ -344,5 +344,7 @@ def _plan_freely(free: FreeStep, inputs: PlannerInputs, peers: PeerTerms) -> Pla
 
 def _free_response(setup: _Setup, inputs: PlannerInputs, peers: PeerTerms) -> Array:
     """Output deviations under nominal forces, y_free of eq. 11. Shape (6 N,)."""
-    y_free: Array = setup.problem.condensed.Y_past @ inputs.past() + peers.effect
+    table = nominal_table(inputs.weight)
+    past = past_deviations(inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini, table)
+    y_free: Array = setup.problem.condensed.Y_past @ past + peers.effect
     return y_free

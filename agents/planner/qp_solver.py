@@ -271,15 +271,32 @@ def residuals(
     """Karush-Kuhn-Tucker residuals; positive multipliers belong to upper bounds."""
     low = problem.lower if lower is None else lower
     high = problem.upper if upper is None else upper
-    nv = len(v)
-    Hv, pull = problem.H @ v, multipliers[:nv] + problem.A.T @ multipliers[nv:]
-    scale = max(1.0, *(float(np.abs(term).max()) for term in (Hv, f, pull)))
     values = np.concatenate([v, problem.A @ v])
-    violation = np.maximum(values - high, low - values)
-    bound = np.where(multipliers > 0, high, low)
-    slack = np.where(multipliers != 0, values - bound, 0.0)
-    return Residuals(
-        float(np.abs(Hv + f + pull).max()) / scale,
-        float(np.maximum(violation, 0.0).max()),
-        float(np.abs(multipliers * slack).max()) / scale,
-    )
+    pull = problem.A.T @ multipliers[len(v) :]
+    return Residuals(*_largest(problem.H @ v, f, pull, values, multipliers, low, high))
+
+
+@compiled
+def _largest(
+    Hv: Array, f: Array, pull: Array, values: Array, multipliers: Array, low: Array, high: Array
+) -> tuple[float, float, float]:
+    """The figures of `Residuals` from H v, Aᵀ λ_A and [v; A v]; NaN if a number is."""
+    off = bent = asked = pulled = beyond = loose = 0.0
+    for i in range(len(Hv)):
+        total = multipliers[i] + pull[i]
+        off = _worse(off, abs(Hv[i] + f[i] + total))
+        bent, asked = _worse(bent, abs(Hv[i])), _worse(asked, abs(f[i]))
+        pulled = _worse(pulled, abs(total))
+    for i in range(len(values)):
+        beyond = _worse(_worse(beyond, values[i] - high[i]), low[i] - values[i])
+        if multipliers[i] != 0.0:
+            bound = high[i] if multipliers[i] > 0.0 else low[i]
+            loose = _worse(loose, abs(multipliers[i] * (values[i] - bound)))
+    scale = max(1.0, bent, asked, pulled)
+    return off / scale, beyond, loose / scale
+
+
+@compiled
+def _worse(a: float, b: float) -> float:
+    """The larger of two numbers, NaN if one is."""
+    return b if b > a or b != b else a

@@ -146,6 +146,9 @@ def test_residuals_see_what_is_wrong() -> None:
     slack = good.multipliers.copy()
     slack[np.flatnonzero(slack == 0)[0]] = 1e3
     assert residuals(problem, f, good.x, slack).complementarity > 1e-3
+    nowhere = np.where(np.arange(len(f)) == 1, np.nan, good.x)
+    unknown = residuals(problem, f, nowhere, good.multipliers)
+    assert np.isnan([unknown.stationarity, unknown.primal]).all()
 
 
 @pytest.mark.parametrize("name", sorted(SOLVERS))
