@@ -20,11 +20,18 @@ _TOLERANCES: Final = (1e-13, 1e-11, 1e-9)
 _EXACT: Final = 1e4  # weight of a slack's 1-norm with which no slack is used, without noise
 
 
+class NoAnswer(Exception):
+    """Clarabel failed, whatever its tolerance."""
+
+
 def solve_tightly(solve: Callable[..., Any]) -> Any:
     """Call a function that solves by CVXPY, with the tightest tolerance that Clarabel reaches.
 
     Args:
         solve: takes the settings of the solver.
+
+    Raises:
+        NoAnswer: with its usual tolerance it fails too.
     """
     from cvxpy.error import SolverError
 
@@ -34,7 +41,10 @@ def solve_tightly(solve: Callable[..., Any]) -> Any:
             return solve(solver="CLARABEL", max_iter=500, **settings)
         except SolverError:
             pass
-    return solve(solver="CLARABEL")
+    try:
+        return solve(solver="CLARABEL")
+    except SolverError as error:
+        raise NoAnswer(str(error)) from None
 
 
 class TankPlanner(Protocol):
