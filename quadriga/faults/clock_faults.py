@@ -14,7 +14,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from quadriga.faults import skewed
-from quadriga.faults.fault import OWN, Draw, FaultScene, SetStage, Stage, TeamFault
+from quadriga.faults.fault import OWN, Draw, FaultScene, SetStage, Stage, TeamFault, robot_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER, SIM
 from quadriga.team.launch import QUADRIGA, ProcessSpec
@@ -57,7 +57,8 @@ def _skewed(draw_skew: Callable[[np.random.Generator], _Skew], whose: tuple[str,
             os.kill(scene.launch.pids[name], signal.SIGUSR1)
             scene.facts |= {"process": name, "step_s": step_s, "drift": rate}
 
-        yield Stage(config, strike, wrap)
+        by = f"{step_s:+g} s" if step_s else f"{1e6 * rate:+g} ppm"
+        yield Stage(config, strike, wrap, robot_of(named, draw), f"of {name}, by {by}")
 
     return stage
 

@@ -28,6 +28,10 @@ class Draw(NamedTuple):
     seed: int
 
 
+def _say_nothing() -> None:
+    return
+
+
 @dataclass(slots=True)
 class FaultScene:
     """A team that walks, as a fault finds it.
@@ -39,6 +43,7 @@ class FaultScene:
         launch: its processes.
         struck: processes that will not leave by themselves any more; they are killed at the end.
         facts: what the fault itself has to tell; they become fields of the row.
+        announce: tells the recording that the fault has come; of a stage that is `late`.
     """
 
     config: Config
@@ -47,6 +52,7 @@ class FaultScene:
     launch: Launch
     struck: set[str] = field(default_factory=set)
     facts: dict[str, Any] = field(default_factory=dict)
+    announce: Callable[[], None] = _say_nothing
 
     def name_of(self, process: str) -> str:
         """The name of a process, which is the drawn robot's in place of `OWN`."""
@@ -67,11 +73,19 @@ class Stage(NamedTuple):
         config: it is walked with this. In client mode a router is started with it.
         strike: is called at the fault's moment; None where the world itself makes the fault.
         wrap: each process is started as the row that this makes of its own.
+        robot: whose agent or link the fault meets; "": no robot's in particular.
+        detail: what the event of its beginning tells beside the fault's name.
+        lasts: how long the fault goes on after `strike` has returned, s; None: it never ends.
+        late: whether `strike` waits for the fault, and tells itself when it has come.
     """
 
     config: Config
     strike: Strike | None = None
     wrap: Callable[[ProcessSpec], ProcessSpec] = _unchanged
+    robot: str = ""
+    detail: str = ""
+    lasts: float | None = None
+    late: bool = False
 
 
 SetStage: TypeAlias = Callable[[Config, Draw, Path], AbstractContextManager[Stage]]
@@ -97,11 +111,22 @@ class TeamFault:
     given: tuple[str, int] | None = None
 
 
-def strike_with(strike: Strike) -> SetStage:
-    """The stage of a fault that needs no more than its moment."""
+def robot_of(process: str, draw: Draw) -> str:
+    """The robot of a process that a fault meets; "" of a process that is for all."""
+    return draw.robot if process == OWN else ""
+
+
+def strike_with(strike: Strike, process: str = "", lasts: float | None = None) -> SetStage:
+    """The stage of a fault that needs no more than its moment.
+
+    Args:
+        strike: makes the fault.
+        process: that it meets; `OWN` is the agent of the robot that is drawn.
+        lasts: as of `Stage`.
+    """
 
     @contextmanager
-    def stage(config: Config, _draw: Draw, _folder: Path) -> Iterator[Stage]:
-        yield Stage(config, strike)
+    def stage(config: Config, draw: Draw, _folder: Path) -> Iterator[Stage]:
+        yield Stage(config, strike, robot=robot_of(process, draw), lasts=lasts)
 
     return stage

@@ -57,7 +57,8 @@ def _stage(
             def strike(_scene: FaultScene) -> None:
                 network.order(RadioOrder(draw.robot, faults, seconds))
 
-            yield Stage(layout.with_endpoints(config), strike, network.wrap)
+            own = layout.with_endpoints(config)
+            yield Stage(own, strike, network.wrap, draw.robot, lasts=seconds)
 
     return stage
 

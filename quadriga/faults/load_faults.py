@@ -67,7 +67,7 @@ class _Bystander:
             self._process.wait()
 
 
-def _with_bystander(kind: str) -> SetStage:
+def _with_bystander(kind: str, lasts: float | None = None) -> SetStage:
     """A team and a bystander at one router, long enough for that to be full."""
 
     @contextmanager
@@ -76,7 +76,7 @@ def _with_bystander(kind: str) -> SetStage:
         seconds = max(config.world.seconds, 1e-3 * draw.tick + _FULL_S)
         world, bus = replace(config.world, seconds=seconds), replace(config.bus, mode="client")
         try:
-            yield Stage(replace(config, world=world, bus=bus), beside)
+            yield Stage(replace(config, world=world, bus=bus), beside, lasts=lasts)
         finally:
             beside.end()
 
@@ -92,8 +92,10 @@ def _fill_disk(scene: FaultScene) -> None:
 _HALF: Final = f"runs half of the time only for {_SLOW_S:g} s"
 
 LOAD_FAULTS: Final = (
-    TeamFault("agent-slow", f"an agent's process {_HALF}", strike_with(_SlowDown(OWN))),
-    TeamFault("recorder-slow", f"the recorder {_HALF}", strike_with(_SlowDown(RECORDER))),
+    TeamFault("agent-slow", f"an agent's process {_HALF}", strike_with(_SlowDown(OWN), OWN, 0.0)),
+    TeamFault(
+        "recorder-slow", f"the recorder {_HALF}", strike_with(_SlowDown(RECORDER), lasts=0.0)
+    ),
     TeamFault(
         "subscriber-slow",
         "behind a router a process joins, hears all and stands still for good",
@@ -102,7 +104,7 @@ LOAD_FAULTS: Final = (
     TeamFault(
         "flood",
         f"a process sends what it can for {bystander.FLOOD_S:g} s, behind a router",
-        _with_bystander(bystander.FLOOD),
+        _with_bystander(bystander.FLOOD, bystander.FLOOD_S),
     ),
     TeamFault("disk-full", "the recorder's disk is full", strike_with(_fill_disk)),
 )

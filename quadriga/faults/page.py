@@ -8,6 +8,7 @@ from typing import Final
 from quadriga.faults.catalogue import FAULTS
 from quadriga.faults.goals import build_goal_table
 from quadriga.faults.table import build_team_fault_tables
+from quadriga.faults.teller import LEAD_MS
 from quadriga.shared.config.load import load
 from quadriga.tables import Table
 from quadriga.team.run_folder import CONFIG
@@ -15,7 +16,7 @@ from quadriga.team.trial_rows import read_rows
 
 PUBLISHED: Final = Path("docs/results/faults")
 _NOTE: Final = "note.md"  # of a folder of rows, if it has one: with which code they were walked
-_HEAD: Final = """\
+_HEAD: Final = f"""\
 # When something goes wrong
 
 `quadriga fault NAME` walks a simulated team in which one thing goes wrong, 1.5 to 4 s into the
@@ -24,6 +25,11 @@ fail in lock-step, where the same seed gives the same walk; everything else in r
 robots at most, since a computer must keep up. `quadriga fault --table --tries 20 --jobs 2` walks
 with all of them, goes on where an earlier call with the same `--out` was stopped, and writes rows
 with `--json`.
+
+The recording of each walk has an event when the fault begins, and one when it ends, if it does:
+those of sensors and motors on `sim/event`, all others on `injected`, in the name of the launcher
+that makes them. The begin is told {LEAD_MS} ms before, so that it is recorded even where the
+recorder is killed; that of a certificate that expires when it does. No process of the team listens.
 
 This page is generated from the configuration and the rows that are in a folder each of
 `docs/results/faults`: `make docs`, or `python -m quadriga.faults.page > docs/faults.md`.

@@ -45,8 +45,9 @@ class _Strike:
 
 def _stage(process: str, signals: _Signals) -> SetStage:
     strike = _Strike(process, signals)
+    lasts = 0.0 if signals[-1][0] == signal.SIGCONT else None
     if process != ROUTER and (process, signals) != (RECORDER, _STOP):
-        return strike_with(strike)
+        return strike_with(strike, process, lasts)
 
     @contextmanager
     def stage(config: Config, draw: Draw, _folder: Path) -> Iterator[Stage]:
@@ -54,7 +55,8 @@ def _stage(process: str, signals: _Signals) -> SetStage:
         # might hold it up, but only once all that lies between them is full.
         bus = replace(config.bus, mode="client", reconnect_timeout=_RECONNECT_S)
         seconds = max(config.world.seconds, 1e-3 * draw.tick + _FULL_S)
-        yield Stage(replace(config, bus=bus, world=replace(config.world, seconds=seconds)), strike)
+        world = replace(config.world, seconds=seconds)
+        yield Stage(replace(config, bus=bus, world=world), strike, lasts=lasts)
 
     return stage
 

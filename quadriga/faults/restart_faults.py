@@ -10,7 +10,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from quadriga.faults.fault import OWN, Draw, FaultScene, SetStage, Stage, TeamFault, strike_with
+from quadriga.faults.fault import (
+    OWN,
+    Draw,
+    FaultScene,
+    SetStage,
+    Stage,
+    TeamFault,
+    robot_of,
+    strike_with,
+)
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER, ROUTER, SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
@@ -60,6 +69,8 @@ def _restarted(process: str, down_s: float = _DOWN_S) -> SetStage:
                 world=replace(config.world, seconds=seconds),
             ),
             _Restart(process, down_s),
+            robot=robot_of(process, draw),
+            lasts=0.0,
         )
 
     return stage

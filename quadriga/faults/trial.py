@@ -15,23 +15,21 @@ import numpy as np
 
 from quadriga.faults.aftermath import await_end, consult_doctor, read_log
 from quadriga.faults.continued import ContinuedRecording
-from quadriga.faults.fault import Draw, FaultScene, Strike, TeamFault
+from quadriga.faults.fault import Draw, FaultScene, Stage, TeamFault
 from quadriga.faults.outcome import Moment, describe_outcome
+from quadriga.faults.teller import LEAD_MS, FaultTeller
 from quadriga.recordings.summary import RECORDING
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.bus.lead_watch import missed_ns_of
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
-from quadriga.shared.errors import MessageError, ProcessError, RecordingError
+from quadriga.shared.errors import ProcessError, RecordingError
 from quadriga.shared.members import LAUNCHER, SIM, has_lead
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.runtime.scheduling import go_first, leave_priority
-from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.event_line import parse_events
-from quadriga.shared.wire.messages import Clock
-from quadriga.shared.wire.topics import CLOCK
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table, router_row
 from quadriga.team.run_folder import CONFIG
@@ -69,7 +67,7 @@ def run_fault_trial(
             rows = (router_row(config, folder), *rows)
         with Launch(tuple(map(stage.wrap, rows)), folder / "logs") as launch:
             scene = FaultScene(config, draw, folder, launch)
-            moment = _FaultTrial(scene, stage.strike).run()
+            moment = _FaultTrial(scene, fault, stage).run()
     outcome = _describe(config, moment, folder)
     return {"fault": fault.name, "seed": seed} | outcome | scene.facts
 
@@ -95,28 +93,40 @@ def _walk_config(config: Config, fault: TeamFault, draw: Draw) -> Config:
 
 
 class _FaultTrial:
-    def __init__(self, scene: FaultScene, strike: Strike | None) -> None:
-        self._scene, self._strike = scene, strike
+    def __init__(self, scene: FaultScene, fault: TeamFault, stage: Stage) -> None:
+        self._scene, self._fault, self._stage = scene, fault, stage
         self._config, self._launch = scene.config, scene.launch
 
     def run(self) -> Moment:
         """Wait for the moment, let the fault happen, and wait until the walk is over."""
-        draw = self._scene.draw
-        if self._strike is None:
+        draw, strike = self._scene.draw, self._stage.strike
+        if strike is None:
             await_end(self._scene)
             return Moment(draw.robot, draw.tick)
         with Bus.open(self._config.bus, self._config.team.name, LAUNCHER, lambda: False) as bus:
-            bus.subscribe(CLOCK.key(bus.team))
+            teller = FaultTeller(bus, self._fault.name, self._stage)
             go_first(alone=True)  # or, on a busy computer, the clock it has read is an old one
             try:
-                tick = self._await_tick(bus)
+                self._announce(teller)
+                tick = self._await_tick(teller, draw.tick)
                 at, begun = wall_ns(), monotonic()
-                self._strike(self._scene)
+                strike(self._scene)
+                struck = monotonic()
             finally:
                 leave_priority()
             # To leave the bus takes seconds where somebody is frozen: only once the walk is over.
-            self._await_outcome(begun)
+            with teller.telling_end(struck):
+                self._await_outcome(begun)
         return Moment(draw.robot, tick, at)
+
+    def _announce(self, teller: FaultTeller) -> None:
+        """Tell the recording of the fault a little before it comes, or let that be told later."""
+        if self._stage.late:
+            self._scene.announce = lambda: teller.tell_begin(teller.read_clock())
+            return
+        tick = self._scene.draw.tick
+        self._await_tick(teller, max(1, tick - LEAD_MS))
+        teller.tell_begin(tick)
 
     def _await_outcome(self, begun: float) -> None:
         """Ask the doctor, wait until the walk is over, and end whoever cannot end by itself."""
@@ -128,16 +138,12 @@ class _FaultTrial:
             with suppress(OSError):  # it has ended by itself
                 os.kill(self._launch.pids[name], signal.SIGKILL)
 
-    def _await_tick(self, bus: Bus) -> int:
-        """Wait until the world's clock has come to the moment of the fault; what it shows then."""
-        wanted, tick = self._scene.draw.tick, 0
+    def _await_tick(self, teller: FaultTeller, wanted: int) -> int:
+        """Wait until the world's clock has come to a tick; what it shows then."""
         deadline = monotonic() + _START_S + 1e-3 * wanted
         while monotonic() < deadline and has_lead(self._launch.alive):
-            for _, payload in bus.drain():
-                with suppress(MessageError):
-                    tick = max(tick, decode(payload, Clock).tick)
-            if tick >= wanted:
-                return tick
+            if teller.read_clock() >= wanted:
+                return teller.tick
             sleep(_LOOK)
         raise ProcessError("the team", "no walk", f"one that comes to {1e-3 * wanted:g} s")
 

@@ -1,4 +1,4 @@
-"""What happened in a walk: events of the world and of the agents, in order of time."""
+"""What happened in a walk: events of the world, of agents and of who injects faults, by time."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from collections.abc import Sequence
 from typing import Final
 
 from quadriga.shared.errors import MessageError
+from quadriga.shared.members import LAUNCHER
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Event
-from quadriga.shared.wire.topics import AGENT_EVENT, EVENT, topic_of
+from quadriga.shared.wire.topic import Topic
+from quadriga.shared.wire.topics import AGENT_EVENT, EVENT, INJECTED, topic_of
 
-_NAMES: Final = frozenset((EVENT.name, AGENT_EVENT.name))
+_NAMES: Final = frozenset((EVENT.name, AGENT_EVENT.name, INJECTED.name))
 
 
 def read_events(recording: Recording, robots: Sequence[str]) -> tuple[Event, ...]:
@@ -25,20 +27,30 @@ def read_events(recording: Recording, robots: Sequence[str]) -> tuple[Event, ...
     Raises:
         RecordingError: the messages are of a schema later than this version's.
     """
-    by_robot: defaultdict[str, list[Event]] = defaultdict(list)
+    by_teller: defaultdict[str, list[Event]] = defaultdict(list)
     for entry in recording.entries(_NAMES):
         try:
             event = decode(entry.payload, Event)
         except MessageError:
             continue
-        by_robot[topic_of(entry.key)[1]].append(event)
-    return merge_events(by_robot[""], [by_robot[robot] for robot in robots])
+        by_teller[teller_of(*topic_of(entry.key))].append(event)
+    return merge_events(by_teller[""], [by_teller[name] for name in tellers(robots)])
+
+
+def tellers(robots: Sequence[str]) -> tuple[str, ...]:
+    """Who tells of events beside the world."""
+    return (*robots, LAUNCHER)
+
+
+def teller_of(topic: Topic, robot: str) -> str:
+    """Who sends on a key: the robot in it, the launcher what it injects; "" is the world."""
+    return LAUNCHER if topic is INJECTED else robot
 
 
 def merge_events(
-    of_world: Sequence[Event], of_agents: Sequence[Sequence[Event]]
+    of_world: Sequence[Event], of_others: Sequence[Sequence[Event]]
 ) -> tuple[Event, ...]:
-    """All events, by time if agents told of some, too."""
+    """All events, by time if others than the world told of some, too."""
     # Only who drives time announces the end of a walk.
-    told = [event for events in of_agents for event in events if event.kind != "stop"]
+    told = [event for events in of_others for event in events if event.kind != "stop"]
     return tuple(sorted([*of_world, *told], key=lambda event: event.tick) if told else of_world)

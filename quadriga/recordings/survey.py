@@ -17,11 +17,12 @@ from quadriga.shared.recording.salvage import Damage
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Event, Message, Status
-from quadriga.shared.wire.topics import AGENT_EVENT, EVENT, STATUS, TABLE, topic_of
+from quadriga.shared.wire.topics import AGENT_EVENT, EVENT, INJECTED, STATUS, TABLE, topic_of
 
 _DECODED: dict[str, type[Message]] = {
     EVENT.name: Event,
     AGENT_EVENT.name: Event,
+    INJECTED.name: Event,
     STATUS.name: Status,
 }
 _TYPES = {topic.name: topic.type.__name__ for topic in TABLE}

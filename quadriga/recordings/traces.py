@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.recordings.events import merge_events
+from quadriga.recordings.events import merge_events, teller_of, tellers
 from quadriga.recordings.truth import Ticks, TruthTrace, build_truth_trace, stack, ticks_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
@@ -120,7 +120,7 @@ def read_traces(
             if message is None:
                 invalid[key] += 1
                 continue
-            decoded[topic.type, robot].append(message)
+            decoded[topic.type, teller_of(topic, robot)].append(message)
         elif topic is STATE:
             log_times = (log_time if log_times is None else log_times[0], log_time)
         ticks[key].append(tick)
@@ -139,7 +139,7 @@ def read_traces(
         measurements={robot: _measurements(decoded[Measurement, robot]) for robot in robots},
         plans={robot: tuple(decoded[Plan, robot]) for robot in robots},
         statuses={name: tuple(decoded[Status, name]) for name in (*robots, PLANNER)},
-        events=merge_events(decoded[Event, ""], [decoded[Event, robot] for robot in robots]),
+        events=merge_events(decoded[Event, ""], [decoded[Event, who] for who in tellers(robots)]),
         plants={
             robot: tuple(decoded[Status, SIM] or decoded[Status, plant_name(robot)])
             for robot in robots

@@ -17,6 +17,7 @@ from quadriga.shared.wire.topic import Topic
 from quadriga.shared.wire.topics import (
     AGENT_EVENT,
     EVENT,
+    INJECTED,
     MEASUREMENT,
     PLAN,
     POSTURE,
@@ -65,7 +66,7 @@ class _Feed:
         self.gatherer, self.traffic = Gatherer(shape), Traffic(now)
         self.happenings: list[tuple[int, str]] = []
         per_robot = (POSTURE, MEASUREMENT, PLAN, STATUS, AGENT_EVENT)
-        wanted = [(topic, "") for topic in (TRUTH, REFERENCE, EVENT)]
+        wanted = [(topic, "") for topic in (TRUTH, REFERENCE, EVENT, INJECTED)]
         wanted += [(topic, robot) for robot in shape.robots for topic in per_robot]
         self._sources = [
             _Source(key.partition("/")[2], topic, robot, bus.keep_newest(key, _KEPT))

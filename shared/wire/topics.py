@@ -78,6 +78,9 @@ EVENT: Final = Topic(
 AGENT_EVENT: Final = Topic(
     "event", msg.Event, (AGENT,), (LAUNCHER,), per_robot=True, period_ms=0, repeats=True
 )
+# What `quadriga fault` does to processes, links and clocks, told by who does it. What is done to
+# sensors and motors the world tells.
+INJECTED: Final = Topic("injected", msg.Event, (LAUNCHER,), (), period_ms=0, repeats=True)
 # Not recorded: the states of every tick tell the same.
 CLOCK: Final = Topic(
     "clock", msg.Clock, (SIM,), (OPERATOR, LAUNCHER, *_SPEAKERS, SIM),
@@ -101,7 +104,7 @@ REFUSED: Final = Topic("refused", msg.Refusal, (ROUTER,), (), period_ms=0, repea
 
 _OWN: Final = (
     STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, *WORDS, LIVE_FAULT, TRUTH,
-    EVENT, AGENT_EVENT, CLOCK, POSTURE, CLOCK_ASK, CLOCK_ANSWER, REFUSED,
+    EVENT, AGENT_EVENT, INJECTED, CLOCK, POSTURE, CLOCK_ASK, CLOCK_ANSWER, REFUSED,
 )  # fmt: skip
 TABLE: Final = (*_OWN, *plugin_topics(_OWN))
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}

@@ -8,6 +8,12 @@ from pathlib import Path
 import pytest
 
 from quadriga.commands.parser import main
+from quadriga.recordings.check import check
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.codes import FAULT_BEGINS
+from quadriga.shared.wire.messages import Event
+from quadriga.shared.wire.topics import INJECTED
 from tests.runtime.conftest import DATA
 
 EARLY = 37  # a world's seed with which things go wrong early in a walk
@@ -16,6 +22,14 @@ ARGUMENTS = (
     *("--planner", "none", "--robots", "2", "--jobs", "2", "--set", f"world.seed={EARLY}"),
     *(word for name, value in DATA.items() for word in ("--set", f"{name}={value:g}")),
 )
+
+
+def injected(folder: Path) -> list[Event]:
+    """What the launcher has told of its fault; only of who is killed are messages missing."""
+    found = check(folder / "run.mcap")
+    assert all(finding.passed for finding in found if finding.name != "gaps"), found
+    entries = Recording(folder / "run.mcap").entries({INJECTED.name})
+    return [decode(entry.payload, Event) for entry in entries]
 
 
 @pytest.mark.usefixtures("_alone", "_compiled")
@@ -37,6 +51,10 @@ def test_a_killed_agent_and_a_dead_knee(tmp_path: Path) -> None:
     assert killed["falls"] == knee["lowered"] == []
     assert 0 <= killed["detect_ms"] < 1000
     assert killed["recover_ms"] is None
+    told = injected(folder / f"agent-killed-{EARLY}")
+    assert [(event.code, event.robot) for event in told] == [(FAULT_BEGINS, killed["robot"])]
+    assert abs(told[0].tick - killed["tick"]) < 1000
+    assert told[0].detail == "agent-killed"
     assert killed["doctor"] == {killed["robot"]: "not-started"}
     # Half a second without a knee: the robot falls, or limps on; nobody else is touched by it.
     assert set(knee["falls"]) <= {knee["robot"]}

@@ -31,8 +31,11 @@ _WAIT_S: Final = 60.0  # wall time after which it is given up
 _Plan: TypeAlias = Callable[[Config, Draw], Attack]
 
 
-def _stage(plan: _Plan) -> SetStage:
-    """A team behind a router with certificates, and an attacker at the fault's moment."""
+def _stage(plan: _Plan, *, of_robot: bool = False) -> SetStage:
+    """A team behind a router with certificates, and an attacker at the fault's moment.
+
+    It attacks the robot that is drawn if it is `of_robot`, by its certificate or by its name.
+    """
 
     @contextmanager
     def stage(config: Config, draw: Draw, folder: Path) -> Iterator[Stage]:
@@ -40,7 +43,8 @@ def _stage(plan: _Plan) -> SetStage:
             secured = secure(config, Path(private) / "certs", utc_now())
             strike = _AttackStrike(plan(secured, draw), Path(private))
             world = replace(secured.world, seconds=secured.world.seconds + _LASTS_S)
-            yield Stage(replace(secured, world=world), strike)
+            robot = draw.robot if of_robot else ""
+            yield Stage(replace(secured, world=world), strike, robot=robot, lasts=0.0)
             strike.conclude(folder)
 
     return stage
@@ -90,12 +94,12 @@ ATTACK_FAULTS: Final = (
     TeamFault(
         "certificate-forged",
         "somebody connects with a robot's certificate of another authority",
-        _stage(attacks.forged_certificate),
+        _stage(attacks.forged_certificate, of_robot=True),
     ),
     TeamFault(
         "message-forged",
         "stolen certificates of other roles command, stop, plan and lie",
-        _stage(attacks.forged_messages),
+        _stage(attacks.forged_messages, of_robot=True),
     ),
     TeamFault(
         "message-replayed",
@@ -105,12 +109,12 @@ ATTACK_FAULTS: Final = (
     TeamFault(
         "message-malformed",
         "a robot's stolen certificate sends what is no message under its own keys",
-        _stage(attacks.malformed_messages),
+        _stage(attacks.malformed_messages, of_robot=True),
     ),
     TeamFault(
         "message-oversized",
         "a robot's stolen certificate sends messages of up to 512 KiB under its own keys",
-        _stage(attacks.oversized_messages),
+        _stage(attacks.oversized_messages, of_robot=True),
     ),
     TeamFault(
         "stranger",

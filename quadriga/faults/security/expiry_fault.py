@@ -47,7 +47,8 @@ def _stage(config: Config, draw: Draw, folder: Path) -> Iterator[Stage]:
         certificate = tls_files(config.bus.certificates, draw.robot).certificate
         strike = _Expiry(round(1e9 * read_certificate(certificate).expires.timestamp()))
         seconds = max(config.world.seconds, _LIVES_S + _AFTER_S)
-        yield Stage(replace(config, world=replace(config.world, seconds=seconds)), strike)
+        world = replace(config.world, seconds=seconds)
+        yield Stage(replace(config, world=world), strike, robot=draw.robot, late=True)
         strike.conclude(folder)
 
 
@@ -62,6 +63,7 @@ class _Expiry:
         self._scene = scene
         scene.struck.add(scene.draw.robot)  # it may wait for the router for ever
         sleep(1e-9 * (self._at_ns - wall_ns()))
+        scene.announce()
 
     def conclude(self, folder: Path) -> None:
         """Tell by the recording when it was noticed, and whether the link was closed."""

@@ -57,6 +57,32 @@ def test_every_fault_is_one_that_can_be_made(fault: TeamFault, tmp_path: Path) -
                 assert found.start == draw.tick
 
 
+@pytest.mark.parametrize(
+    ("name", "robot", "lasts"),
+    [
+        ("agent-killed", "r3", None),
+        ("agent-paused", "r3", 0.0),
+        ("operator-paused", "", 0.0),
+        ("router-frozen", "", None),
+        ("router-paused", "", 0.0),
+        ("agent-restarted", "r3", 0.0),
+        ("sim-killed", "", None),
+        ("agent-slow", "r3", 0.0),
+        ("subscriber-slow", "", None),
+        ("flood", "", 2.0),
+        ("message-forged", "r3", 0.0),
+        ("certificate-expired", "", 0.0),
+        ("certificate-expires", "r3", None),
+    ],
+)
+def test_whom_a_fault_meets_and_whether_it_ends_is_known_before(
+    name: str, robot: str, lasts: float | None, tmp_path: Path
+) -> None:
+    with BY_NAME[name].stage(Config(), Draw("r3", 3000, 7), tmp_path) as stage:
+        assert (stage.robot, stage.lasts) == (robot, lasts)
+        assert stage.late == (name == "certificate-expires")  # others are told of before
+
+
 def test_who_is_paused_goes_on(tmp_path: Path) -> None:
     draw = draw_fault(Config(), 7)
     with Launch([_SLEEPER], tmp_path) as launch:
@@ -93,6 +119,8 @@ def test_the_clocks_of_one_process_go_wrong(name: str, tmp_path: Path) -> None:
         (own,) = (row for row in rows if row.name == changed[0])
         assert stage.wrap(own).command[4:] == own.command[2:]
         assert (tmp_path / "clock").read_text(encoding="ascii") == "0 0"
+        assert stage.detail.startswith(f"of {own.name}, by ")
+        assert stage.robot in ("", own.name)
 
 
 def test_chance_of_the_seed_alone_decides_whom_and_when() -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from quadriga.faults.outcome import Moment, describe_outcome, moment_at, tick_at
+from quadriga.recordings.events import read_events
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import END
@@ -115,6 +116,25 @@ def test_what_the_world_announces_is_a_notice_and_the_fault_itself_is_not(
     assert row["falls"] == ["r2", "r3"]
     assert row["falls_of_others"] == 1
     assert row["lowered"] == ["r2"]
+
+
+def test_what_the_launcher_tells_of_a_fault_is_an_event_and_changes_no_figure(
+    write_run: WriteRun,
+) -> None:
+    told = [
+        Event.of(FAULT, codes.FAULT_BEGINS, "r2", "agent-paused"),
+        Event.of(FAULT + 300, codes.FAULT_ENDS, "r2", "agent-paused is over"),
+        Event.of(FAULT + 400, codes.SIGNAL, "", "only who drives time ends a walk"),
+    ]
+    notice = ("team/sim/event", Event.of(FAULT + 70, codes.GONE, "r2", "gone"))
+    folder = write_run(CONFIG, extra=[*(("team/injected", event) for event in told), notice])
+    row = outcome(folder, Moment("r2", FAULT))
+    assert (row["tick"], row["detect_ms"], row["lost_messages"]) == (FAULT, 70, 0)
+    assert row["end"] == "none announced"
+    found = read_traces(Recording(folder / "run.mcap")).events
+    assert read_events(Recording(folder / "run.mcap"), ("r1", "r2", "r3")) == found
+    ticks = [event.tick for event in found if event.tick >= FAULT]
+    assert ticks == [FAULT, FAULT + 70, FAULT + 300]
 
 
 def test_the_tick_of_a_signal_is_that_of_the_newest_state_by_then(write_run: WriteRun) -> None:

@@ -15,6 +15,7 @@ from quadriga.shared.wire.messages import Flat, Message
 from quadriga.shared.wire.topics import (
     AGENT_EVENT,
     CONFIGURED,
+    INJECTED,
     POSTURE,
     STATUS,
     TABLE,
@@ -80,11 +81,12 @@ def test_the_page_is_in_step_with_the_tables() -> None:
 
 
 def test_every_message_type_has_a_row_and_every_row_a_name() -> None:
-    """Events have two rows: those of the plant, which may end a walk, and those of agents.
+    """Events have three rows: only those of the plant, not of agents or launcher, may end a walk.
 
-    So have states, of which some are for who watches.
+    States have two, of which one is for who watches.
     """
-    types = [topic.type.__name__ for topic in TABLE if topic not in (AGENT_EVENT, POSTURE)]
+    others = (AGENT_EVENT, INJECTED, POSTURE)
+    types = [topic.type.__name__ for topic in TABLE if topic not in others]
     kinds = {*Message.__subclasses__(), *Flat.__subclasses__()} - {Flat}
     kinds = {kind for kind in kinds if kind.__module__ == Message.__module__}
     assert sorted(types) == sorted(kind.__name__ for kind in kinds)
@@ -108,6 +110,7 @@ def test_the_keys_are_the_contract_with_other_tools() -> None:
         "team/sim/truth",
         "team/sim/event",
         "team/r1/event",
+        "team/injected",
         "team/clock",
         "team/r1/posture",
         "team/r1/clock_ask",

@@ -1,0 +1,106 @@
+"""What the recording is told of a fault, by a recorder that hears it on the bus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from quadriga.faults.fault import Stage
+from quadriga.faults.teller import FaultTeller
+from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.members import LAUNCHER, RECORDER, SIM
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.wire import codes
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Clock, Event
+from quadriga.shared.wire.topics import CLOCK, INJECTED
+from quadriga.team.endpoint import free_endpoint
+
+WAIT = 10.0  # s
+
+
+@pytest.fixture
+def config() -> Config:
+    return load(None, {"bus.endpoint": free_endpoint()})
+
+
+@pytest.fixture
+def sim(config: Config) -> Iterator[Bus]:
+    with Bus.open(config.bus, "team", SIM) as bus:
+        yield bus
+
+
+def open_recorder(config: Config) -> Bus:
+    bus = Bus.open(config.bus, "team", RECORDER)
+    bus.subscribe(INJECTED.key("team"))
+    return bus
+
+
+def await_word(told: Callable[[], bool]) -> None:
+    deadline = monotonic() + WAIT
+    while not told():
+        assert monotonic() < deadline
+        sleep(0.02)
+
+
+def run_clock(sim: Bus, teller: FaultTeller, tick: int) -> None:
+    put = sim.publisher(CLOCK.key("team"))
+
+    def shows() -> bool:
+        put(encode(Clock(tick, 0)))
+        return teller.read_clock() == tick
+
+    await_word(shows)
+
+
+def hear(recorder: Bus, count: int) -> list[Event]:
+    packets = list[bytes]()
+
+    def all_there() -> bool:
+        packets.extend(payload for _, payload in recorder.drain())
+        return len(packets) >= count
+
+    await_word(all_there)
+    return [decode(payload, Event) for payload in packets]
+
+
+def test_a_fault_is_told_with_its_robot_its_tick_and_its_end(config: Config, sim: Bus) -> None:
+    stage = Stage(config, robot="r2", detail="of r2, by +1 s", lasts=0.0)
+    with open_recorder(config) as recorder, Bus.open(config.bus, "team", LAUNCHER) as bus:
+        teller = FaultTeller(bus, "clock-step", stage)
+        run_clock(sim, teller, 1700)
+        teller.tell_begin(2000)
+        run_clock(sim, teller, 2500)
+        with teller.telling_end(monotonic()):
+            begins, ends = hear(recorder, 2)
+    assert begins == Event.of(2000, codes.FAULT_BEGINS, "r2", "clock-step: of r2, by +1 s")
+    assert ends == Event.of(2500, codes.FAULT_ENDS, "r2", "clock-step is over")
+
+
+def test_who_records_only_afterwards_hears_that_it_is_over(config: Config, sim: Bus) -> None:
+    with Bus.open(config.bus, "team", LAUNCHER) as bus:
+        teller = FaultTeller(bus, "recorder-restarted", Stage(config, lasts=0.0))
+        run_clock(sim, teller, 2500)
+        with teller.telling_end(monotonic()), open_recorder(config) as recorder:
+            (ends,) = hear(recorder, 1)
+    assert ends == Event.of(2500, codes.FAULT_ENDS, "", "recorder-restarted is over")
+
+
+@pytest.mark.parametrize("lasts", [None, 60.0])
+def test_of_what_is_not_over_when_the_walk_is_nobody_hears_an_end(
+    config: Config, sim: Bus, lasts: float | None
+) -> None:
+    with open_recorder(config) as recorder, Bus.open(config.bus, "team", LAUNCHER) as bus:
+        teller = FaultTeller(bus, "agent-killed", Stage(config, robot="r1", lasts=lasts))
+        run_clock(sim, teller, 1700)
+        teller.tell_begin(2000)
+        begun = monotonic()
+        with teller.telling_end(begun):
+            (begins,) = hear(recorder, 1)
+        assert monotonic() - begun < WAIT
+        sleep(0.1)
+        assert recorder.drain() == []
+    assert begins == Event.of(2000, codes.FAULT_BEGINS, "r1", "agent-killed")
