@@ -16,15 +16,22 @@ _SHORTEST_S: Final = 0.5  # of a walk, as far as its own fault asks for no more
 
 
 def add(add_command: AddCommand) -> None:
-    command = add_command("fault", run, "walk with a fault of a process, a sensor or a motor")
+    command = add_command(
+        "fault", run, "walk with a fault of a process, a link, a sensor or a motor"
+    )
     option = command.add_argument
     option(
         "names",
         nargs="*",
         metavar="FAULT",
-        help="what goes wrong 1.5 to 4 s into each walk, or with --at: ROBOT/COMPONENT KIND",
+        help="what goes wrong 1.5 to 4 s into each walk; with --at also [ROBOT/]PART KIND",
     )
-    option("--at", type=float, metavar="S", help="with r2/imu stuck: when it is, in world time")
+    option(
+        "--at",
+        type=float,
+        metavar="S",
+        help="with a name, r2/imu stuck, r2/agent killed or operator frozen: when, in world time",
+    )
     option("--for", type=float, dest="span", metavar="S", help="for how long (until the end)")
     option(
         "--live",
@@ -100,17 +107,21 @@ def _ask(arguments: argparse.Namespace, config: Config) -> int:
 
 
 def _names_of(arguments: argparse.Namespace) -> list[str]:
-    """The faults asked for; the words of one with --at are one, as `world.faults` has it.
+    """The faults asked for; the words of one with --at are one, as `find_given_fault` has it.
 
     Raises:
-        ConfigError: --at without such a fault, or the other way round.
+        ConfigError: a robot, a process or --for without --at, or --at without a fault.
     """
+    from quadriga.faults.catalogue import BY_NAME
+    from quadriga.faults.given import GRAMMAR
+
     names: list[str] = arguments.names
     given, timed = any("/" in name for name in names), arguments.at is not None
     if not given and not timed and arguments.span is None:
         return names
-    if not (given and timed):
-        got = " ".join(names) or "none"
-        raise ConfigError("fault", got, "ROBOT/COMPONENT KIND --at S [--for S]", "docs/world.md")
-    words = [*names, f"{arguments.at:g}"]
-    return [" ".join(words if arguments.span is None else [*words, f"{arguments.span:g}"])]
+    if not (names and timed):
+        raise ConfigError("fault", " ".join(names) or "none", GRAMMAR, "docs/how/safety.md")
+    times = [f"{arguments.at:g}", *([] if arguments.span is None else [f"{arguments.span:g}"])]
+    if all(name in BY_NAME for name in names):
+        return [" ".join([name, *times]) for name in names]
+    return [" ".join([*names, *times])]

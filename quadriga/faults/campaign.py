@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 from rich.console import Console
 
 from quadriga.faults.catalogue import find_fault
-from quadriga.faults.fault import TeamFault
+from quadriga.faults.fault import REALTIME_ROBOTS, TeamFault
 from quadriga.faults.trial import run_fault_trial
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.shared.config.sections import Config
@@ -29,7 +29,6 @@ _TIMES: Final = (
     ("stand_ms", "others stood after"),
     ("recover_ms", "all walked again after"),
 )
-REALTIME_ROBOTS: Final = 2  # at most: a computer of two cores keeps up with no more
 
 
 class _Try(NamedTuple):

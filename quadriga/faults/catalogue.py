@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import Final
 
 from quadriga.faults.clock_faults import CLOCK_FAULTS
-from quadriga.faults.component_faults import COMPONENT_FAULTS, given_fault
+from quadriga.faults.component_faults import COMPONENT_FAULTS
 from quadriga.faults.fault import TeamFault
+from quadriga.faults.given import find_given_fault
 from quadriga.faults.link_faults import LINK_FAULTS
 from quadriga.faults.load_faults import LOAD_FAULTS
 from quadriga.faults.process_faults import PROCESS_FAULTS
@@ -31,13 +32,13 @@ BY_NAME: Final = {fault.name: fault for fault in FAULTS}
 
 
 def find_fault(name: str, config: Config) -> TeamFault:
-    """A fault by its name, or that of one component by a text as in `world.faults`.
+    """A fault by its name, or one with its time by a text, see `find_given_fault`.
 
     Raises:
         ConfigError: there is no such fault.
     """
-    if "/" in name:
-        return given_fault(name, config)
+    if " " in name:
+        return find_given_fault(name, config, BY_NAME)
     if name not in BY_NAME:
         hint = did_you_mean(name, (ALL, *BY_NAME)) or "`quadriga fault --list` lists them"
         raise ConfigError("fault", repr(name), "the name of a fault, or all", hint)
@@ -50,6 +51,6 @@ def select_faults(names: Sequence[str], config: Config) -> list[TeamFault]:
     Raises:
         ConfigError: there is no such fault.
     """
-    found = {find_fault(name, config) for name in names if name != ALL}
+    found = [find_fault(name, config) for name in dict.fromkeys(names) if name != ALL]
     own = [fault for fault in FAULTS if ALL in names or fault in found]
     return [*own, *(fault for fault in found if fault.given is not None)]

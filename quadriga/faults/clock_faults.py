@@ -37,12 +37,13 @@ def _draw_drift(chance: np.random.Generator) -> _Skew:
 
 
 def _skewed(draw_skew: Callable[[np.random.Generator], _Skew], whose: tuple[str, ...]) -> SetStage:
-    """The clock of one of the processes `whose`, which the seed draws, goes wrong."""
+    """The clock of a chosen robot's agent, or of one of `whose` that is drawn, goes wrong."""
 
     @contextmanager
     def stage(config: Config, draw: Draw, folder: Path) -> Iterator[Stage]:
         chance = np.random.default_rng((draw.seed, _STREAM))
         named, (step_s, rate) = str(chance.choice(whose)), draw_skew(chance)
+        named = OWN if draw.chosen else named
         name, file = draw.robot if named == OWN else named, folder / "clock"
         file.write_text(_SOUND, encoding="ascii")
 

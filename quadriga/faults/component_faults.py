@@ -46,7 +46,7 @@ COMPONENT_FAULTS: Final = tuple(_build())
 """In the order of the table."""
 
 
-def given_fault(text: str, config: Config) -> TeamFault:
+def given_component_fault(text: str, config: Config) -> TeamFault:
     """The fault of one component that a text describes as `world.faults` does.
 
     Raises:

@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 from quadriga.shared.config.sections import Config
 from quadriga.team.launch import Launch, ProcessSpec
 
+REALTIME_ROBOTS: Final = 2  # at most: a computer of two cores keeps up with no more
 OWN: Final = "robot"  # in place of a process: the agent of the robot that the seed draws
 
 
@@ -21,11 +22,13 @@ class Draw(NamedTuple):
         robot: whom the fault meets, if it meets a robot or its agent.
         tick: world time of the fault, ms.
         seed: of the world; further chance is drawn from it.
+        chosen: whether somebody has chosen the robot.
     """
 
     robot: str
     tick: int
     seed: int
+    chosen: bool = False
 
 
 def _say_nothing() -> None:
@@ -89,6 +92,7 @@ class Stage(NamedTuple):
 
 
 SetStage: TypeAlias = Callable[[Config, Draw, Path], AbstractContextManager[Stage]]
+Lasting: TypeAlias = Callable[[float], SetStage]
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +105,9 @@ class TeamFault:
         stage: prepares its walk: gets the configuration, what was drawn and the walk's folder.
             What it has set up it takes down on leaving.
         realtime: whether it is tried in real time, or in lock-step.
-        given: whom it meets and at which tick, ms; None: the seed draws both.
+        given: whom it meets and at which tick, ms; None: the seed draws both, of "" the robot.
+        lasting: the stage in which it lasts so many seconds; None: it lasts as its name says.
+        base: the name in the table of one that is given; "": its own.
     """
 
     name: str
@@ -109,6 +115,8 @@ class TeamFault:
     stage: SetStage
     realtime: bool = True
     given: tuple[str, int] | None = None
+    lasting: Lasting | None = None
+    base: str = ""
 
 
 def robot_of(process: str, draw: Draw) -> str:

@@ -63,21 +63,33 @@ def _stage(
     return stage
 
 
+def _link(kind: str, faults: LinkFaults, seconds: float | None, what: str) -> TeamFault:
+    def lasting(longer: float | None) -> SetStage:
+        return _stage(faults, longer, wired=False)
+
+    return TeamFault(
+        f"link-{kind}",
+        f"an agent's packets: {what}",
+        lasting(seconds),
+        lasting=lasting if seconds is None else None,
+    )
+
+
+def _radio(kind: str, faults: LinkFaults, seconds: float | None, what: str) -> TeamFault:
+    def lasting(longer: float | None) -> SetStage:
+        return _stage(faults, longer, wired=True, rto_min_ms=_RTO_MIN_MS)
+
+    return TeamFault(
+        f"radio-{kind}",
+        f"the same beside a cable to its robot: {what}",
+        lasting(seconds),
+        lasting=lasting if seconds is None else None,
+    )
+
+
 LINK_FAULTS: Final = (
-    *(
-        TeamFault(
-            f"link-{name}", f"an agent's packets: {what}", _stage(faults, seconds, wired=False)
-        )
-        for name, faults, seconds, what in _KINDS
-    ),
-    *(
-        TeamFault(
-            f"radio-{name}",
-            f"the same beside a cable to its robot: {what}",
-            _stage(faults, seconds, wired=True, rto_min_ms=_RTO_MIN_MS),
-        )
-        for name, faults, seconds, what in _KINDS
-    ),
+    *(_link(*kind) for kind in _KINDS),
+    *(_radio(*kind) for kind in _KINDS),
     TeamFault(
         "radio-loss-20-rto-200",
         "20 % lost, each way, and TCP repeats as late as systems have it",

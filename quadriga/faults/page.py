@@ -26,6 +26,10 @@ robots at most, since a computer must keep up. `quadriga fault --table --tries 2
 with all of them, goes on where an earlier call with the same `--out` was stopped, and writes rows
 with `--json`.
 
+With `--at S` a fault comes S seconds into the walk, and `ROBOT/PART KIND` in place of its name says
+whom it meets: `quadriga fault r2/agent killed --at 4`, `r2/link delay-50 --at 3 --for 1`,
+`operator frozen --at 3`.
+
 The recording of each walk has an event when the fault begins, and one when it ends, if it does:
 those of sensors and motors on `sim/event`, all others on `injected`, in the name of the launcher
 that makes them. The begin is told {LEAD_MS} ms before, so that it is recorded even where the

@@ -61,22 +61,29 @@ def _stage(process: str, signals: _Signals) -> SetStage:
     return stage
 
 
+def _paused(name: str, what: str, process: str) -> TeamFault:
+    def lasting(seconds: float) -> SetStage:
+        return _stage(process, ((signal.SIGSTOP, 0.0), (signal.SIGCONT, seconds)))
+
+    return TeamFault(name, what, _stage(process, _PAUSE), lasting=lasting)
+
+
 _PAUSED: Final = f"it stands still for {_PAUSE_S:g} s"
 _ROUTER_KILLED: Final = "the router is killed: nobody hears anybody"
 
 PROCESS_FAULTS: Final = (
     TeamFault("agent-killed", "an agent's process is killed", _stage(OWN, _KILL)),
     TeamFault("agent-frozen", "an agent's process stands still", _stage(OWN, _STOP)),
-    TeamFault("agent-paused", _PAUSED, _stage(OWN, _PAUSE)),
+    _paused("agent-paused", _PAUSED, OWN),
     TeamFault("operator-killed", "the operator's process is killed", _stage(OPERATOR, _KILL)),
     TeamFault("operator-frozen", "it stands still", _stage(OPERATOR, _STOP)),
-    TeamFault("operator-paused", _PAUSED, _stage(OPERATOR, _PAUSE)),
+    _paused("operator-paused", _PAUSED, OPERATOR),
     TeamFault("recorder-killed", "the recorder is killed", _stage(RECORDER, _KILL)),
     TeamFault("recorder-frozen", "behind a router it stands still", _stage(RECORDER, _STOP)),
-    TeamFault("recorder-paused", _PAUSED, _stage(RECORDER, _PAUSE)),
-    TeamFault("sim-paused", "the world stands still", _stage(SIM, _PAUSE)),
+    _paused("recorder-paused", _PAUSED, RECORDER),
+    _paused("sim-paused", "the world stands still", SIM),
     TeamFault("router-killed", _ROUTER_KILLED, _stage(ROUTER, _KILL)),
     TeamFault("router-frozen", "it stands still", _stage(ROUTER, _STOP)),
-    TeamFault("router-paused", _PAUSED, _stage(ROUTER, _PAUSE)),
+    _paused("router-paused", _PAUSED, ROUTER),
 )
 """In the order of the table."""

@@ -58,7 +58,10 @@ def run_fault_trial(
     """
     shutil.rmtree(folder, ignore_errors=True)  # a walk of an earlier call, which was interrupted
     folder.mkdir(parents=True)
-    draw = draw_fault(config, seed) if fault.given is None else Draw(*fault.given, seed)
+    draw = draw_fault(config, seed)
+    if fault.given is not None:
+        robot, tick = fault.given
+        draw = Draw(robot or draw.robot, tick, seed, chosen=bool(robot))
     with fault.stage(_walk_config(config, fault, draw), draw, folder) as stage:
         config = stage.config
         (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
@@ -104,7 +107,7 @@ class _FaultTrial:
             await_end(self._scene)
             return Moment(draw.robot, draw.tick)
         with Bus.open(self._config.bus, self._config.team.name, LAUNCHER, lambda: False) as bus:
-            teller = FaultTeller(bus, self._fault.name, self._stage)
+            teller = FaultTeller(bus, self._fault.base or self._fault.name, self._stage)
             go_first(alone=True)  # or, on a busy computer, the clock it has read is an old one
             try:
                 self._announce(teller)

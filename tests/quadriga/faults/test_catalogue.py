@@ -3,9 +3,9 @@ from pathlib import Path
 
 import pytest
 
-from quadriga.faults.campaign import REALTIME_ROBOTS, config_for
+from quadriga.faults.campaign import config_for
 from quadriga.faults.catalogue import BY_NAME, FAULTS, select_faults
-from quadriga.faults.fault import Draw, FaultScene, TeamFault
+from quadriga.faults.fault import REALTIME_ROBOTS, Draw, FaultScene, TeamFault
 from quadriga.faults.link_faults import LINK_FAULTS
 from quadriga.faults.trial import draw_fault
 from quadriga.shared.config.load import load
