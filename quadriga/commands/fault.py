@@ -59,15 +59,14 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     from rich.console import Console
 
     from quadriga.faults.campaign import run_fault_campaign
-    from quadriga.faults.catalogue import ALL, FAULTS, select_faults
+    from quadriga.faults.catalogue import ALL, build_meaning_tables, select_faults
     from quadriga.faults.table import build_team_fault_tables
     from quadriga.shared.errors import name_file_errors
-    from quadriga.tables import Table, print_tables
+    from quadriga.tables import print_tables
     from quadriga.team.run_folder import check_own_config, make_run_dir
 
     if arguments.list:
-        meanings = tuple((fault.name, fault.what) for fault in FAULTS)
-        print_tables([Table("Faults", ("fault", "what"), meanings)])
+        print_tables(build_meaning_tables())
         return 0
     if arguments.live:
         return _ask(arguments, config)

@@ -9,13 +9,14 @@ from quadriga.faults.clock_faults import CLOCK_FAULTS
 from quadriga.faults.component_faults import COMPONENT_FAULTS
 from quadriga.faults.fault import TeamFault
 from quadriga.faults.given import find_given_fault
-from quadriga.faults.link_faults import LINK_FAULTS
+from quadriga.faults.link_faults import LINK_FAULTS, LINK_WORDS, LINKS
 from quadriga.faults.load_faults import LOAD_FAULTS
 from quadriga.faults.process_faults import PROCESS_FAULTS
 from quadriga.faults.restart_faults import RESTART_FAULTS
 from quadriga.faults.security.attack_faults import ATTACK_FAULTS
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean
+from quadriga.tables import Table
 
 ALL: Final = "all"
 FAULTS: Final = (
@@ -29,6 +30,23 @@ FAULTS: Final = (
 )
 """In the order of the table."""
 BY_NAME: Final = {fault.name: fault for fault in FAULTS}
+
+
+def build_meaning_tables() -> tuple[Table, Table]:
+    """What each fault is, and which words a link fails in beside its names in the table."""
+    words = tuple(
+        (word, *(f"{part}-{kind}" for part in LINKS), BY_NAME[f"link-{kind}"].what)
+        for word, kind in LINK_WORDS.items()
+    )
+    return (
+        Table("What the faults are", ("fault", "what"), tuple((f.name, f.what) for f in FAULTS)),
+        Table(
+            "Words for links",
+            ("word", *(f"ROBOT/{part}" for part in LINKS), "what"),
+            words,
+            ["Sensors and motors fail in these words, too; no link can be stuck or wrong."],
+        ),
+    )
 
 
 def find_fault(name: str, config: Config) -> TeamFault:

@@ -11,10 +11,12 @@ from typing import Final
 
 from quadriga.faults.component_faults import given_component_fault
 from quadriga.faults.fault import REALTIME_ROBOTS, Draw, Lasting, Stage, TeamFault
+from quadriga.faults.link_faults import LINK_WORDS, LINKS
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.sim_server.world.faults.components import build_components
+from quadriga.sim_server.world.faults.fault import KINDS
 
 GRAMMAR: Final = "NAME or [ROBOT/]PART KIND, with --at S [--for S]"
 PARTS: Final = ("agent", "link", "radio", "clock", "certificate", "message")  # of a robot
@@ -43,7 +45,7 @@ def find_given_fault(text: str, config: Config, table: Mapping[str, TeamFault]) 
         _check_part(part, config)
         return given_component_fault(text, config)
     named = words[0] in table
-    name = words[0] if named else "-".join([part, *words[1:2]])
+    name = words[0] if named else _name_of(part, *words[1:2])
     times = words[1:] if named else words[2:]
     if of_robot:
         _check_robot(robot, config)
@@ -57,6 +59,22 @@ def find_given_fault(text: str, config: Config, table: Mapping[str, TeamFault]) 
     fault = table[name]
     found = replace(fault, name=text, base=name, given=(robot, round(1000 * start)))
     return _lasting(found, fault, duration[0]) if duration else found
+
+
+def _name_of(part: str, kind: str = "") -> str:
+    """The name that the table has for a kind of fault of a part; of links all words will do.
+
+    Raises:
+        ConfigError: a word for sensors and motors that means nothing for a link.
+    """
+    if part in LINKS and kind in LINK_WORDS:
+        return f"{part}-{LINK_WORDS[kind]}"
+    if part in LINKS and kind in KINDS:
+        cause = "a link carries packets: it has no value that could be stuck or wrong"
+        raise ConfigError(
+            "fault", f"{kind!r} of a {part}", f"one of {', '.join(LINK_WORDS)}", cause
+        )
+    return f"{part}-{kind}" if kind else part
 
 
 def _check_part(part: str, config: Config) -> None:
@@ -84,6 +102,8 @@ def _check_kind(
     if of_robot:
         kinds = [kind for kind in kinds if f"{part}-{kind}" not in _OF_NO_ROBOT]
     kinds = [kind for kind in kinds if kind]
+    if part in LINKS:
+        kinds = [*LINK_WORDS, *(kind for kind in kinds if kind not in LINK_WORDS)]
     if not kinds:
         hint = did_you_mean(name, table) or "`quadriga fault --list` lists them"
         raise ConfigError("fault", repr(" ".join(words[:2])), GRAMMAR, hint)

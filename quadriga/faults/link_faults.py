@@ -20,6 +20,7 @@ from quadriga.faults.network.layout import NetworkLayout
 from quadriga.faults.network.order import RadioOrder
 from quadriga.shared.config.sections import Config
 from quadriga.sim_server.native.link import LinkFaults
+from quadriga.sim_server.world.faults.fault import DELAYED, GARBAGE, INTERMITTENT, OFF, SLOW
 
 _GONE: Final = LinkFaults(loss=1.0)
 _RTO_MIN_MS: Final = 20
@@ -44,6 +45,17 @@ _KINDS: Final = (
     *((f"down-{ms}", _GONE, 1e-3 * ms, f"nothing arrives for {ms} ms") for ms in (100, 300, 1000)),
     ("partition", _GONE, None, "nothing arrives any more"),
 )
+
+# The words in which sensors and motors fail, those of PX4's failure injection, as far as they mean
+# something for a link, and which kind each is. A link has no value that could be stuck or wrong.
+LINK_WORDS: Final = {
+    OFF: "partition",
+    GARBAGE: "garbage",
+    SLOW: "loss-20-delay-50",  # TCP gets little through, and late
+    DELAYED: "delay-50",
+    INTERMITTENT: "loss-20",
+}
+LINKS: Final = ("link", "radio")
 
 
 def _stage(

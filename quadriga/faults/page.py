@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from quadriga.faults.catalogue import FAULTS
+from quadriga.faults.catalogue import build_meaning_tables
 from quadriga.faults.goals import build_goal_table
 from quadriga.faults.table import build_team_fault_tables
 from quadriga.faults.teller import LEAD_MS
 from quadriga.shared.config.load import load
-from quadriga.tables import Table
 from quadriga.team.run_folder import CONFIG
 from quadriga.team.trial_rows import read_rows
 
@@ -28,7 +27,7 @@ with `--json`.
 
 With `--at S` a fault comes S seconds into the walk, and `ROBOT/PART KIND` in place of its name says
 whom it meets: `quadriga fault r2/agent killed --at 4`, `r2/link delay-50 --at 3 --for 1`,
-`operator frozen --at 3`.
+`operator frozen --at 3`. Links take the words of sensors and motors, too, see the last table.
 
 The recording of each walk has an event when the fault begins, and one when it ends, if it does:
 those of sensors and motors on `sim/event`, all others on `injected`, in the name of the launcher
@@ -56,8 +55,7 @@ def to_markdown(published: Path = PUBLISHED) -> str:
         parts += [table.to_markdown(3).rstrip() for table in tables]
     if not folders:
         parts.append(_NONE)
-    meanings = tuple((fault.name, fault.what) for fault in FAULTS)
-    parts.append(Table("What the faults are", ("fault", "what"), meanings).to_markdown().rstrip())
+    parts += [table.to_markdown().rstrip() for table in build_meaning_tables()]
     return "\n\n".join(parts) + "\n"
 
 

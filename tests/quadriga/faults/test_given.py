@@ -10,8 +10,10 @@ import pytest
 from quadriga.commands.parser import main
 from quadriga.faults.catalogue import BY_NAME, find_fault, select_faults
 from quadriga.faults.fault import Draw
+from quadriga.faults.link_faults import LINK_WORDS, LINKS
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
+from quadriga.sim_server.world.faults.fault import KINDS
 
 
 @pytest.mark.parametrize(
@@ -23,6 +25,11 @@ from quadriga.shared.config.sections import Config
         ("operator frozen 3.5", "operator-frozen", ("", 3500)),
         ("r1/link delay-50 3", "link-delay-50", ("r1", 3000)),
         ("r1/radio down-300 3", "radio-down-300", ("r1", 3000)),
+        ("r1/link off 3", "link-partition", ("r1", 3000)),
+        ("r1/radio slow 3", "radio-loss-20-delay-50", ("r1", 3000)),
+        ("r1/link delayed 3", "link-delay-50", ("r1", 3000)),
+        ("r1/link intermittent 3", "link-loss-20", ("r1", 3000)),
+        ("r1/link garbage 3", "link-garbage", ("r1", 3000)),
         ("r1/message forged 3", "message-forged", ("r1", 3000)),
         ("disk full 2", "disk-full", ("", 2000)),
         ("flood 2", "flood", ("", 2000)),
@@ -38,7 +45,9 @@ def test_robot_and_moment_are_those_that_are_given(
     assert select_faults([text, "agent-killed"], Config()) == [BY_NAME["agent-killed"], fault]
 
 
-@pytest.mark.parametrize("text", ["r2/agent paused 4 1.5", "r2/link partition 4 1.5"])
+@pytest.mark.parametrize(
+    "text", ["r2/agent paused 4 1.5", "r2/link partition 4 1.5", "r2/link off 4 1.5"]
+)
 def test_what_stops_by_itself_may_last_as_long_as_somebody_says(text: str) -> None:
     fault = find_fault(text, Config())
     assert fault.lasting is not None
@@ -69,6 +78,9 @@ def test_of_a_chosen_robot_it_is_the_agent_whose_clock_goes_wrong(tmp_path: Path
         ("r2/agent killed", r"expected NAME or \[ROBOT/\]PART KIND, with --at S"),
         ("r2/agent killed --at 0", "got time '0'.*expected 0.001 … 3600 s"),
         ("r2/agent killed --at 3 --for 2", "--for: got 2 with agent-killed, expected --at alone"),
+        ("r2/link stuck --at 3", "got 'stuck' of a link, expected one of off, garbage.*no value"),
+        ("r2/radio wrong --at 3", "got 'wrong' of a radio, expected one of off, garbage"),
+        ("r2/link delayd --at 3", "got 'delayd' of r2/link.*did you mean 'delayed'"),
         ("agent-kiled --at 3", "did you mean 'agent-killed'"),
         ("r2/message replayed --at 3", "expected one of forged, malformed, oversized"),
         ("certificate-expires --at 3", "--at: got 3 with certificate-expires"),
@@ -81,3 +93,15 @@ def test_what_was_got_and_what_was_expected(
 ) -> None:
     assert main(["fault", *words.split()]) == 2
     assert re.search(error, capsys.readouterr().err)
+
+
+def test_every_word_of_a_link_is_a_fault_of_the_table_and_is_listed(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["fault", "--list"]) == 0
+    listed = capsys.readouterr().out
+    for word, kind in LINK_WORDS.items():
+        assert word in KINDS
+        for part in LINKS:
+            assert find_fault(f"r1/{part} {word} 3", Config()).base == f"{part}-{kind}"
+        assert re.search(rf"{word} .*link-{kind} .*radio-{kind}", listed)
