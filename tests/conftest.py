@@ -64,8 +64,13 @@ _REAL_TIME: Final = "runtime"
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What takes long comes first: then at the end no worker waits long for another one's file.
 
-    Between two files whose teams keep real time, one at a time, come two whose tests do not.
+    Between two files whose teams keep real time, one at a time, come two whose tests do not. Such a
+    test is run once more if it fails: a computer that others use may keep a team from its work for
+    longer than a robot can bear. The summary shows every test that was, and how it failed.
     """
+    for item in items:
+        if _alone.__name__ in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.flaky(reruns=1))
     here = Path(__file__).parent
     long = [here / name for name in _LONG]
     items.sort(key=lambda item: not any(map(item.path.is_relative_to, long)))
@@ -82,8 +87,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """How well the golden recording was reproduced, and which files take the time of a long run."""
+    """How well the golden recording was reproduced, what was run again, and what takes the time."""
     stats, waited = terminalreporter.stats, 0.0
+    for report in stats.get("rerun", ()):
+        terminalreporter.write_line(f"run once more: {report.nodeid}, since")
+        terminalreporter.write_line(report.longreprtext)
     seconds: dict[str, float] = defaultdict(float)
     for report in itertools.chain.from_iterable(stats.values()):
         if not isinstance(report, pytest.TestReport):
