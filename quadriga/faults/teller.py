@@ -9,7 +9,7 @@ from threading import Thread
 from typing import Final
 
 from quadriga.faults.fault import Stage
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import RECORDER
 from quadriga.shared.runtime.clock import monotonic
@@ -20,9 +20,10 @@ from quadriga.shared.wire.topics import CLOCK, INJECTED, RECEIVED
 
 # World time from the word to the fault, ms: by then it is on the disk, whoever is killed. It is
 # said before, so that nothing is sent between the reading of the clock and the fault itself.
-LEAD_MS: Final = 300
+LEAD_MS: Final = 1000
 _PATIENCE_S: Final = 10.0  # for a recorder that is started again to answer
 _ASK_S: Final = 0.5
+_CLOCK_S: Final = 1.0  # for the team's clock to be heard
 _OPENS_S: Final = 1.0  # from its first answer until it hears all
 _LOOK_S: Final = 0.02
 
@@ -81,23 +82,37 @@ class FaultTeller:
     def _tell_end(self, at: float, left: Flag) -> None:
         if left.wait(max(0.0, at - monotonic())):
             return  # the walk is over before
-        tick = self.read_clock()
-        if self._await_recorder(left):
-            self._tell(tick, codes.FAULT_ENDS, f"{self._name} is over")
+        over, shown = monotonic(), self.read_clock()
+        self._await_recorder(left)
+        self._tell(self._tick_at(over, shown, left), codes.FAULT_ENDS, f"{self._name} is over")
 
-    def _await_recorder(self, left: Flag) -> bool:
-        """Wait until the recorder hears; False if it does not come, or nobody is there any more."""
-        deadline, at_once = monotonic() + _PATIENCE_S, True
+    def _tick_at(self, moment: float, shown: int, left: Flag) -> int:
+        """World time at a moment, ms: where no clock was heard then, by that of this computer.
+
+        Args:
+            moment: by `monotonic`, s.
+            shown: what the team's clock had shown last, ms.
+            left: set once the walk is over.
+        """
+        deadline = monotonic() + _CLOCK_S
+        while self.read_clock() == shown and monotonic() < deadline and not left.is_set():
+            left.wait(_LOOK_S)
+        return max(shown, self.tick - round(1000 * (monotonic() - moment)))
+
+    def _await_recorder(self, left: Flag) -> None:
+        """Wait until the recorder hears; not for ever, as a busy one hears without a word."""
+        deadline = monotonic() + _PATIENCE_S
         while monotonic() < deadline and not left.is_set():
+            if RECORDER in self._bus.members_at(HERE):  # seen behind what it listens to
+                return
+            # One that has come later is no member of the team, and answers before it hears all.
             answers = self._bus.ask(f"{self._bus.team}/{RECORDER}/{RECEIVED}", _ASK_S)
             while not answers.over:
                 left.wait(_LOOK_S)
             if answers.take():
-                # One that was not there a moment ago answers before it hears all.
-                return at_once or not left.wait(_OPENS_S)
-            at_once = False
+                left.wait(_OPENS_S)
+                return
             left.wait(_LOOK_S)
-        return False
 
     def _tell(self, tick: int, code: str, detail: str) -> None:
         self._put(encode(Event.of(tick, code, self._stage.robot, detail)))

@@ -8,7 +8,7 @@ import pytest
 
 from quadriga.faults.fault import Stage
 from quadriga.faults.teller import FaultTeller
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import LAUNCHER, RECORDER, SIM
@@ -70,6 +70,7 @@ def hear(recorder: Bus, count: int) -> list[Event]:
 def test_a_fault_is_told_with_its_robot_its_tick_and_its_end(config: Config, sim: Bus) -> None:
     stage = Stage(config, robot="r2", detail="of r2, by +1 s", lasts=0.0)
     with open_recorder(config) as recorder, Bus.open(config.bus, "team", LAUNCHER) as bus:
+        recorder.declare(HERE)
         teller = FaultTeller(bus, "clock-step", stage)
         run_clock(sim, teller, 1700)
         teller.tell_begin(2000)
@@ -87,6 +88,21 @@ def test_who_records_only_afterwards_hears_that_it_is_over(config: Config, sim: 
         with teller.telling_end(monotonic()), open_recorder(config) as recorder:
             (ends,) = hear(recorder, 1)
     assert ends == Event.of(2500, codes.FAULT_ENDS, "", "recorder-restarted is over")
+
+
+def test_an_end_that_no_clock_has_told_is_where_the_walk_was_by_this_computers(
+    config: Config, sim: Bus
+) -> None:
+    with open_recorder(config) as recorder, Bus.open(config.bus, "team", LAUNCHER) as bus:
+        recorder.declare(HERE)
+        teller = FaultTeller(bus, "router-restarted", Stage(config, lasts=0.0))
+        run_clock(sim, teller, 2000)
+        struck = monotonic()
+        with teller.telling_end(struck):
+            sleep(0.3)
+            sim.publisher(CLOCK.key("team"))(encode(Clock(5000, 0)))
+            (ends,) = hear(recorder, 1)
+    assert 5000 - 1000 * (monotonic() - struck) <= ends.tick <= 5000 - 250
 
 
 @pytest.mark.parametrize("lasts", [None, 60.0])
