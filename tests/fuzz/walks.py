@@ -198,7 +198,8 @@ def _read_replay(recording: Recording) -> None:
     agent = Agent(config, "r1", None)
     log = read_agent_log(recording, config, agent, Inbox(config, "r1", agent.peers))
     comparison = Comparison(log)
-    for life in split_lives(log):
+    paced = config.world.mode == "realtime"
+    for life in split_lives(log, paced=paced, whole=recording.complete):
         inputs = RecordedInputs(config, agent, Inbox(config, "r1", agent.peers), life)
         steps = sum(1 for _ in islice(inputs.steps(), _MOST_STEPS))
         assert steps < _MOST_STEPS

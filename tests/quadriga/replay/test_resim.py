@@ -161,7 +161,7 @@ def test_what_is_not_lockstep_or_not_used_is_refused(
     assert status == 2
     assert "team.plants 'each', expected a walk in one simulated world" in output
     assert main(["resim", str(whole), "--seed", "4"]) == 2
-    assert "got world.seed" in capsys.readouterr().err
+    assert "got --seed, expected an option that it has" in capsys.readouterr().err
     assert main(["resim", str(tmp_path / "none.mcap")]) == 2
 
 
