@@ -9,7 +9,7 @@ import pytest
 
 from quadriga.commands.parser import main
 
-WAYS = ("silence", "page", "keyboard", "gamepad")
+WAYS = ("silence", "page", "keyboard", "estop", "gamepad")
 OPTIONS = (
     *("--robots", "1", "--planner", "none", "--tries", "1"),
     *("--set", "runtime.refuse_overload=false"),
@@ -22,9 +22,9 @@ def test_a_press_is_timed_once(tmp_path: Path, capsys: pytest.CaptureFixture[str
     words = ["bench-stop", *WAYS, *OPTIONS, "--json", str(file), "--out", str(folder)]
     assert main(words) == 0, capsys.readouterr().err
     figures = json.loads(file.read_text(encoding="utf-8"))
-    assert [figures[way]["stopped"] for way in WAYS] == [1, 1, 1, 1]
+    assert [figures[way]["stopped"] for way in WAYS] == [1] * len(WAYS)
     assert 0.0 < figures["page"]["p50_ms"] < 5000.0
     # It slows down for half a second, and 0.3 s of silence are waited for first.
     assert figures["silence"]["p50_ms"] > 800.0
     assert main([*words[:-4], "--out", str(folder)]) == 0
-    assert len((folder / "rows.jsonl").read_text(encoding="utf-8").splitlines()) == 4
+    assert len((folder / "rows.jsonl").read_text(encoding="utf-8").splitlines()) == len(WAYS)
