@@ -232,6 +232,8 @@ class World(Plant):
             # With these comparisons a state that is not a number counts as a fall too.
             may_tip = name in self._tipped or (name in self._stopped and math.isfinite(cosine))
             level, high = cosine >= _FALL_COSINE, above >= _FALL_HEIGHT
+            if name in self._lying and level and above >= _FALL_HEIGHT + _RISEN:
+                self._note_up(name)
             detail = f"tilt {math.acos(max(-1.0, cosine)):.2f} rad, height {above:.3f} m"
             if not ((level or may_tip) and (high or name in self._lying)):
                 self._fallen[i] = True

@@ -51,8 +51,9 @@ def test_a_standing_robot_is_led_down_and_then_damped() -> None:
     assert not world.fallen()
 
 
-def test_who_has_commands_again_follows_them_and_may_fall() -> None:
-    config = configured(1)
+@pytest.mark.parametrize("terrain", ["flat", "stairs"])  # of which the top is far above the robot
+def test_who_has_commands_again_follows_them_and_may_fall(terrain: str) -> None:
+    config = configured(1, terrain=terrain)
     world, lost = World(config), LostCommands(config)
     stand(world, 100)
     lose(world, lost, 200, {})
