@@ -33,6 +33,7 @@ KEYS: Final = {
     "wz": "reference.wz",
     "planner": "planner.kind",
     "controller": "team.controller",
+    "auto-resume": "team.auto_resume",
     "interface": "planner.interface",
     "estimator": "estimator.kind",
     "preset": "controller.preset",
@@ -112,15 +113,15 @@ def build_config_options(command: str, *, hidden: bool) -> argparse.ArgumentPars
 def _describe_key(name: str) -> Mapping[str, Any]:
     """Type, placeholder and help of the option of a key."""
     section, _, key = name.partition(".")
-    values = getattr(_DEFAULTS, section)
-    meta = type(values).__dataclass_fields__[key].metadata
-    default = getattr(values, key)
+    group = getattr(_DEFAULTS, section)
+    meta = type(group).__dataclass_fields__[key].metadata
+    default = getattr(group, key)
     unit = "" if meta["unit"] in ("-", "1") else f" [{meta['unit']}]"
-    return {
-        "type": type(default),
-        "metavar": "|".join([*meta["choices"], *(["…"] if meta["more"] else [])]) or "X",
-        "help": f"{meta['doc']}{unit} ({default})".replace("%", "%%"),
-    }
+    about = f"{meta['doc']}{unit} ({default})".replace("%", "%%")
+    if isinstance(default, bool):
+        return {"action": "store_const", "const": True, "help": about}
+    shown = "|".join([*meta["choices"], *(["…"] if meta["more"] else [])]) or "X"
+    return {"type": type(default), "metavar": shown, "help": about}
 
 
 def read_config(arguments: argparse.Namespace) -> tuple[Config, Given]:

@@ -9,7 +9,9 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
 
+from quadriga.shared.bus.reach import OPEN, try_endpoint
 from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError
 
 _PORT: Final = 7447  # Zenoh's own
 
@@ -22,8 +24,21 @@ def with_free_endpoint(config: Config, given: Mapping[str, Any]) -> Config:
     Args:
         config: the team's configuration.
         given: what of it was given explicitly, by section and key.
+
+    Raises:
+        ConfigError: somebody listens already at the one that was asked for: a team that would hear
+            another one's messages.
     """
-    if config.bus.mode != "peer" or "endpoint" in given.get("bus", {}):
+    if config.bus.mode != "peer":
+        return config
+    if "endpoint" in given.get("bus", {}):
+        endpoint = config.bus.endpoint
+        if try_endpoint(endpoint).code == OPEN:
+            cause = "another team walks there? without bus.endpoint each walk finds a place"
+            expected = "an endpoint of its own"
+            raise ConfigError(
+                "bus.endpoint", f"{endpoint}, where something listens", expected, cause
+            )
         return config
     return replace(config, bus=replace(config.bus, endpoint=free_endpoint()))
 

@@ -8,8 +8,9 @@ import socket
 import pytest
 
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
-from quadriga.shared.config.sections import BusConfig
-from quadriga.team.endpoint import free_endpoint
+from quadriga.shared.config.sections import BusConfig, Config
+from quadriga.shared.errors import ConfigError
+from quadriga.team.endpoint import free_endpoint, with_free_endpoint
 
 WAIT = 10.0  # s
 
@@ -29,3 +30,13 @@ def test_where_the_address_cannot_be_had_a_port_is(monkeypatch: pytest.MonkeyPat
         other.bind(("127.7.7.2", 7447))
         assert free_endpoint().startswith("tcp/127.0.0.1:")
     assert free_endpoint() == "tcp/127.7.7.2:7447"
+
+
+def test_no_team_walks_where_another_one_does() -> None:
+    config = Config(bus=BusConfig(endpoint=free_endpoint()))
+    given = {"bus": {"endpoint": config.bus.endpoint}}
+    assert with_free_endpoint(config, given) == config
+    with Bus.open(config.bus, "team", "sim"):
+        with pytest.raises(ConfigError, match="where something listens, expected an endpoint of"):
+            with_free_endpoint(config, given)
+        assert with_free_endpoint(config, {}).bus.endpoint != config.bus.endpoint
