@@ -43,7 +43,7 @@ def test_mistakes(capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
         below = there / "out"
         output = failed(capsys, file, "--to", form, "-o", below)
         assert f"--output: got {below}: Not a directory" in output
-    assert "got team.robots" in failed(capsys, file, "--to", "csv", "--robots", "3")
+    assert "got --robots" in failed(capsys, file, "--to", "csv", "--robots", "3")
     empty = tmp_path / "empty.mcap"
     with RecordingWriter(empty, build_metadata(Config(), "")):
         pass
