@@ -26,7 +26,6 @@ from quadriga.shared.wire.messages import Event, Reference, Status
 SILENCE_MS: Final = 500  # without a status, after which a robot is lost
 GRACE_MS: Final = 1000  # for which robots that walk again may begin one after the other
 _OF_ROBOTS: Final = frozenset((GONE, SILENT, BACK))
-_OF_ONESELF: Final = frozenset((LOWERED,))
 _OF_OPERATOR: Final = frozenset((OPERATOR_GONE, OPERATOR_BACK))
 _COMING_TO_REST: Final = (STAND, STOPPING)
 
@@ -139,7 +138,7 @@ def concerns_agents(event: Event) -> bool:
 
     Or that a robot has been led down: its agent may not know that its commands came too late.
     """
-    of_robot = event.code in _OF_ROBOTS or event.code in _OF_ONESELF
+    of_robot = event.code in _OF_ROBOTS or event.code == LOWERED
     return event.code in _OF_OPERATOR or (of_robot and bool(event.robot))
 
 
