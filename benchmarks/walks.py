@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 import threading
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
@@ -24,6 +25,7 @@ from quadriga.shared.wire.topics import TRUTH
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.team.operator import references_of
+from quadriga.team.run_folder import CONFIG
 
 
 def alone(config: Config, predictor: Predictor | None) -> dict[str, float]:
@@ -50,16 +52,26 @@ def alone(config: Config, predictor: Predictor | None) -> dict[str, float]:
     }
 
 
+Beside = Callable[[Path], AbstractContextManager[object]]  # of a run folder
+
+
 def over_the_bus(
-    config: Config, file: Path | None, predictor: Predictor | None, tell: Callable[[str], None]
+    config: Config,
+    file: Path | None,
+    predictor: Predictor | None,
+    tell: Callable[[str], None],
+    beside: Beside = nullcontext,
 ) -> dict[str, Any]:
     """Walk as `quadriga walk` does: real-time factor, µs of a tick, memory of each process.
+
+    `rtf_half` is the factor over the second half of the world time alone.
 
     Args:
         config: the team's configuration; its endpoint is replaced by a free one.
         file: of the predictor; None without a planner.
         predictor: the content of the file.
         tell: called with the progress of the walk.
+        beside: what is there beside the team; given the run folder, which has the configuration.
 
     Raises:
         ProcessError: a process failed or left too early.
@@ -68,10 +80,10 @@ def over_the_bus(
     sha256 = "" if predictor is None else predictor_sha256(predictor)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        (folder / "config.toml").write_text(to_toml(config), encoding="utf-8")
+        (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
         rows = process_table(config, folder, file, sha256)
         memory: dict[str, dict[str, float]] = {}
-        with Launch(rows, folder / "logs") as launch, _Watch(config) as watch:
+        with Launch(rows, folder / "logs") as launch, _Watch(config) as watch, beside(folder):
 
             def look() -> bool:
                 tell(f"{watch.seconds:.1f}/{config.world.seconds:g} s")
@@ -81,7 +93,13 @@ def over_the_bus(
 
             launch.watch(look)
     factor = watch.factor()
-    return {"rtf": factor, "tick_us": 1e3 / factor, "seconds": watch.seconds, "memory_mb": memory}
+    return {
+        "rtf": factor,
+        "rtf_half": watch.factor(0.5 * watch.seconds),
+        "tick_us": 1e3 / factor,
+        "seconds": watch.seconds,
+        "memory_mb": memory,
+    }
 
 
 def resident_mb(pid: int) -> float | None:
@@ -131,9 +149,10 @@ class _Watch:
         """World time of the newest ground truth."""
         return self._seen[-1][0] if self._seen else 0.0
 
-    def factor(self) -> float:
-        """World time over elapsed time."""
-        (world, clock), (world_end, clock_end) = self._seen[0], self._seen[-1]
+    def factor(self, since: float = 0.0) -> float:
+        """World time over elapsed time, from a world time on, s."""
+        seen = [look for look in self._seen if look[0] >= since]
+        (world, clock), (world_end, clock_end) = seen[0], seen[-1]
         return (world_end - world) / (clock_end - clock)
 
     def _listen(self) -> None:

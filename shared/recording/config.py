@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import lru_cache
 
 from quadriga.shared.config.later import with_older_values
 from quadriga.shared.config.load import build
@@ -23,15 +24,11 @@ def recorded_config(recording: Recording | Salvage) -> Config:
             does not know.
     """
     try:
-        sections = json.loads(recording.metadata.get("config_json", ""))
-    except (ValueError, RecursionError):  # the latter for what nests too deeply
-        sections = None
-    if not isinstance(sections, dict):
+        return _build(recording.metadata.get("config_json", ""))
+    except _NoConfigurationError:
         raise RecordingError(
             str(recording.path), "metadata without a configuration", "config_json in the metadata"
-        )
-    try:
-        return build(with_older_values(with_current_names(sections)))
+        ) from None
     except ConfigError as error:
         raise RecordingError(
             f"configuration of {recording.path}",
@@ -48,3 +45,18 @@ def recorded_config(recording: Recording | Salvage) -> Config:
             "sections of keys",
             "recorded by something else than quadriga",
         ) from None
+
+
+class _NoConfigurationError(Exception):
+    """The text is no table of sections."""
+
+
+@lru_cache(maxsize=8)  # every reader of a recording asks, and a configuration does not change
+def _build(text: str) -> Config:
+    try:
+        sections = json.loads(text)
+    except (ValueError, RecursionError):  # the latter for what nests too deeply
+        raise _NoConfigurationError from None
+    if not isinstance(sections, dict):
+        raise _NoConfigurationError
+    return build(with_older_values(with_current_names(sections)))
