@@ -12,16 +12,18 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.runtime.clock import Rate, monotonic
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Event
+from quadriga.shared.wire.messages import Event, Status
 from quadriga.shared.wire.topic import Topic
 from quadriga.shared.wire.topics import (
     AGENT_EVENT,
+    COMMAND,
     EVENT,
     INJECTED,
     MEASUREMENT,
     PLAN,
     POSTURE,
     REFERENCE,
+    STATE,
     STATUS,
     TRUTH,
 )
@@ -38,7 +40,7 @@ _QUIET_S: Final = 2.0  # without a message after which the heading says so
 _REPORT_S: Final = 1.0  # between two reports of the traffic
 _UNSEEN_S: Final = 0.15  # between two looks while nobody has the page open
 _POLITE: Final = 10  # added to the nice value: a team on the same machine comes first
-_NEWEST: Final = (POSTURE, TRUTH, PLAN, STATUS, REFERENCE)  # of which the newest message is enough
+_NEWEST: Final = (POSTURE, TRUTH, PLAN, REFERENCE)  # of which the newest message is enough
 
 
 class _Source(NamedTuple):
@@ -54,7 +56,8 @@ class _Feed:
     """What a team sends, taken in whenever somebody asks.
 
     Each message that is fetched from Zenoh costs 20 µs, so the thousand states a second of each
-    robot are not listened to: their postures do.
+    robot and as many commands are not listened to: for a picture postures do, and how many there
+    were the agents tell in their statuses.
 
     Attributes:
         gatherer: has the newest of all.
@@ -84,7 +87,7 @@ class _Feed:
             )
             most = 1 if newest_only else _KEPT
             fresh = source.newest.take(most)
-            tick = -1
+            tick, answered = -1, list[int]()
             for payload in fresh.payloads:
                 try:
                     message = decode(payload, source.topic.type)
@@ -96,7 +99,13 @@ class _Feed:
                     self.happenings = [*self.happenings[1 - _EVENTS :], (message.tick, text)]
                 else:
                     self.gatherer.take(message, source.robot)
+                if isinstance(message, Status):
+                    answered.append(len(message.tick_us))
             self.traffic.note(source.name, fresh.messages, tick, now)
+            if source.topic is STATUS:
+                # An agent answers each state that it takes in with one command.
+                for topic in (STATE, COMMAND):
+                    self.traffic.note_told(f"{source.robot}/{topic.name}", answered, now)
             any_came |= fresh.messages > 0
         return any_came
 
