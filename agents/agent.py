@@ -140,6 +140,7 @@ class Agent:
         self._damping = config.controller.damping
         self._max_failures = config.controller.max_failures
         self._auto_resume = config.team.auto_resume
+        self._whole_ms = round(1000 * config.team.resume_after)
 
     @property
     def peers(self) -> tuple[str, ...]:
@@ -314,7 +315,8 @@ class Agent:
             return mode, healing
         stand_ms, stance_ms = self._stand_ms, self._stance_ms
         ends = (state.tick - stand_ms) // stance_ms != (tick - stand_ms) // stance_ms
-        if ends and may_resume(healing, mode, tick, auto=self._auto_resume):
+        auto, whole_ms = self._auto_resume, self._whole_ms
+        if ends and may_resume(healing, mode, tick, auto=auto, whole_ms=whole_ms):
             return Mode(WALK, tick), replace(healing, resumed=tick)
         return step_mode(mode, tick, stand_ms, ends), healing
 

@@ -1,10 +1,11 @@
 """When a robot that stands because it lacked an input, was led down or stopped, may walk again.
 
-It goes on at the begin of a half cycle, once all its inputs have been whole for a second, if the
-operator has said so lately; after a loss also by itself, if the team is configured so. The second
-is counted from the begin of a half cycle, so that robots go on together which find their inputs
-whole a little apart. From then on they follow the commanded speed in a ramp. Falls, faults and
-emergency stops last until the operator releases them; then a robot gets up and stands.
+It goes on at the begin of a half cycle, once all its inputs have been whole for
+`team.resume_after`, if the operator has said so lately; after a loss also by itself, if the team is
+configured so. The time is counted from the begin of a half cycle, so that robots go on together
+which find their inputs whole a little apart. From then on they follow the commanded speed in a
+ramp. Falls, faults and emergency stops last until the operator releases them; then a robot gets up
+and stands.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from quadriga.agents.modes import COMMANDED, LOSSES, RISING, STAND, WALK, WHOLE_MS, Mode, rests
+from quadriga.agents.modes import COMMANDED, LOSSES, RISING, STAND, WALK, Mode, rests
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import HALTS, INPUT_LOST, RESUMED, RISES, STANDS_AGAIN, code_of
 from quadriga.shared.wire.messages import Event, Reference
@@ -74,13 +75,21 @@ def step_healing(
     return replace(healing, whole_since=since, word=heeded, stopped=stopped)
 
 
-def may_resume(healing: Healing, mode: Mode, tick: int, *, auto: bool) -> bool:
-    """Whether a robot in `mode` may walk again; `auto`: after a loss without the word."""
+def may_resume(healing: Healing, mode: Mode, tick: int, *, auto: bool, whole_ms: int) -> bool:
+    """Whether a robot may walk again.
+
+    Args:
+        healing: what it remembers.
+        mode: its mode.
+        tick: the present one.
+        auto: whether it goes on after a loss without the operator's word.
+        whole_ms: for how long its inputs must have been whole, ms.
+    """
     if mode.name != STAND or not rests(mode) or healing.whole_since < 0:
         return False
     told = healing.word >= 0 and tick - healing.word <= WORD_MS
     by_itself = auto and code_of(mode.reason) in LOSSES
-    return (by_itself or told) and tick - healing.whole_since >= WHOLE_MS
+    return (by_itself or told) and tick - healing.whole_since >= whole_ms
 
 
 def ramp(references: tuple[Reference, ...], healing: Healing, tick: int) -> tuple[Reference, ...]:

@@ -45,7 +45,6 @@ NOT_UP: Final = "not-up"  # it got up, and does not stand
 PRECEDENCE: Final = (ESTOP, DAMPING, STOPPING)  # of the stops of one tick, the gravest first
 REASON_MOST: Final = 200  # characters of a reason; beyond 4096 no status could be read
 SLOW_DOWN_MS: Final = 500  # of a safe stop: speed goes to zero while the trot goes on
-WHOLE_MS: Final = 1000  # for which lost inputs must be there again before a robot goes on
 
 
 @record

@@ -18,6 +18,7 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "team.plant": "mujoco",
         "team.plants": "one",
         "team.auto_resume": False,
+        "team.resume_after": 1.0,
         "team.controller": "",
         "bus.clock_timeout": 0.5,
         "bus.reconnect_timeout": 30.0,

@@ -33,8 +33,17 @@ class TeamConfig:
     auto_resume: bool = key(
         False,
         "-",
-        "robots that stand because an input was lost walk again once all have been whole for 1 s; "
-        "false: only once the operator says so (quadriga resume)",
+        "robots that stand because an input was lost walk again once all have been whole for "
+        "resume_after; false: only once the operator says so (quadriga resume)",
+    )
+    # More would outlast the operator's word, which is obeyed for 5 s.
+    resume_after: float = key(
+        1.0,
+        "s",
+        "how long all inputs of a robot that stands must have been whole before it walks again, by "
+        "itself or on the operator's word",
+        low=0.2,
+        high=4.0,
     )
     plant: str = key(
         SIMULATED,

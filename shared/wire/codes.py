@@ -83,7 +83,9 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         LOWERED: EventCode("fault", "a simulated robot without commands is led down: no fall"),
         INPUT_LOST: EventCode("fault", "an agent slows down and stands: it lacks an input"),
         HALTS: EventCode("fault", "an agent slows down and stands, as somebody has asked"),
-        RESUMED: EventCode("fault", "an agent walks again: its inputs have been whole for 1 s"),
+        RESUMED: EventCode(
+            "fault", "an agent walks again: its inputs have been whole for `team.resume_after`"
+        ),
         RISES: EventCode("fault", "an agent gets its robot up, which was led down or stopped"),
         STANDS_AGAIN: EventCode("fault", "an agent's robot stands that had been down"),
         LINK_BACK: EventCode("fault", "the link to the router was gone for a while"),

@@ -19,7 +19,7 @@ from quadriga.agents.healing import (
     step_healing,
 )
 from quadriga.agents.imu_bridge import BELIEVED_AFTER_MS
-from quadriga.agents.modes import COMMANDED, LOSSES, STAND, STOPPING, WALK, WHOLE_MS, Mode
+from quadriga.agents.modes import COMMANDED, LOSSES, STAND, STOPPING, WALK, Mode
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
 from quadriga.shared.wire.codes import HALTS, INPUT_LOST, RESUMED
@@ -28,6 +28,7 @@ from tests.agents.duet import CONFIG, asked, every_100_ms, simple_predictor
 from tests.agents.lone_robot import ALONE, Robot, tilted
 
 AUTO = replace(ALONE, team=replace(ALONE.team, auto_resume=True))
+WHOLE_MS = round(1000 * ALONE.team.resume_after)
 LOST = Mode(STAND, 1700, "reference-lost")
 
 
@@ -38,18 +39,20 @@ def healed(since: int, word: int = -1) -> Healing:
 @pytest.mark.parametrize("reason", sorted(LOSSES))
 def test_after_a_loss_it_may_go_on_once_all_has_been_whole_for_a_second(reason: str) -> None:
     mode = Mode(STAND, 1700, f"{reason}:r2")
-    assert not may_resume(healed(2000), mode, 1999 + WHOLE_MS, auto=True)
-    assert may_resume(healed(2000), mode, 2000 + WHOLE_MS, auto=True)
-    assert not may_resume(healed(2000), mode, 2000 + WHOLE_MS, auto=False)
-    assert may_resume(healed(2000, word=1900), mode, 2000 + WHOLE_MS, auto=False)
-    assert not may_resume(healed(2000, word=1900), mode, 1901 + WORD_MS, auto=False)
+    assert not may_resume(healed(2000), mode, 1999 + WHOLE_MS, auto=True, whole_ms=WHOLE_MS)
+    assert may_resume(healed(2000), mode, 2000 + WHOLE_MS, auto=True, whole_ms=WHOLE_MS)
+    assert not may_resume(healed(2000), mode, 2000 + WHOLE_MS, auto=False, whole_ms=WHOLE_MS)
+    assert may_resume(healed(2000, word=1900), mode, 2000 + WHOLE_MS, auto=False, whole_ms=WHOLE_MS)
+    assert not may_resume(
+        healed(2000, word=1900), mode, 1901 + WORD_MS, auto=False, whole_ms=WHOLE_MS
+    )
 
 
 @pytest.mark.parametrize("reason", sorted(COMMANDED))
 def test_after_a_stop_or_its_release_it_goes_on_only_when_told_to(reason: str) -> None:
     mode = Mode(STAND, 1700, f"{reason}:ann")
-    assert not may_resume(healed(2000), mode, 2000 + WHOLE_MS, auto=True)
-    assert may_resume(healed(2000, word=1900), mode, 2000 + WHOLE_MS, auto=False)
+    assert not may_resume(healed(2000), mode, 2000 + WHOLE_MS, auto=True, whole_ms=WHOLE_MS)
+    assert may_resume(healed(2000, word=1900), mode, 2000 + WHOLE_MS, auto=False, whole_ms=WHOLE_MS)
 
 
 @pytest.mark.parametrize(
@@ -65,7 +68,7 @@ def test_after_a_stop_or_its_release_it_goes_on_only_when_told_to(reason: str) -
     ],
 )
 def test_nothing_else_is_ever_healed(mode: Mode) -> None:
-    assert not may_resume(healed(10, word=10), mode, 10 + WHOLE_MS, auto=True)
+    assert not may_resume(healed(10, word=10), mode, 10 + WHOLE_MS, auto=True, whole_ms=WHOLE_MS)
 
 
 def test_what_is_whole_for_less_counts_from_the_begin_again() -> None:
@@ -136,6 +139,23 @@ def test_by_itself_only_if_it_is_configured_so_and_at_the_begin_of_a_half_cycle(
     assert robot.step().reason == ""
 
 
+@pytest.mark.parametrize(("seconds", "begins"), [(0.2, 2300), (2.0, 4100)])
+def test_so_long_after_its_inputs_are_back_as_is_configured(seconds: float, begins: int) -> None:
+    # The time is counted from 2.1 s, the next begin of a half cycle: 300 + k · 200.
+    for config, words in ((AUTO, {}), (ALONE, {"resume": Resume(2000, 0)})):
+        robot = stood(replace(config, team=replace(config.team, resume_after=seconds)))
+        assert modes(robot, begins + 1, **words) == {"stand": 2000, "walk": begins}
+
+
+def test_inputs_that_fail_again_within_that_time_keep_it_standing() -> None:
+    robot = stood(AUTO)
+    robot.run(2401)
+    robot.references = False
+    robot.run(3000)
+    robot.references = True
+    assert modes(robot, 4200) == {"stand": 3000, "walk": 4100}
+
+
 def test_on_the_operators_word() -> None:
     robot = stood(ALONE)
     assert modes(robot, 4000, resume=Resume(2000, 0)) == {"stand": 2000, "walk": 3100}
@@ -194,6 +214,12 @@ def test_a_word_while_all_is_well_is_forgotten() -> None:
     robot.run(2000)
     robot.references = True
     assert robot.run(4000).mode == "stand"
+
+
+def test_an_emergency_stop_is_for_good_however_soon_a_robot_may_go_on() -> None:
+    robot = stood(replace(AUTO, team=replace(AUTO.team, resume_after=0.2)))
+    assert robot.step(estop=EStop(2000, 0, "dog")).mode == "estop"
+    assert modes(robot, 3000, resume=Resume(2001, 0)) == {"estop": 2001}
 
 
 @pytest.mark.parametrize("auto", [False, True])
