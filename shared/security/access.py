@@ -42,6 +42,7 @@ ALLOWED: Final = "allowed"
 DENIED: Final = "denied"
 LARGE: Final = "large"  # what is put there is larger than permitted
 MANY: Final = "many"  # what is put there comes more often than permitted
+DEAF: Final = "deaf"  # the probe may subscribe to it, and yet hears nothing
 _PROBED: Final = (ALLOWED, LARGE, MANY)
 _OTHERS: Final = "others"  # with a certificate, but no rights
 _MOST_ROBOTS: Final = 10  # of a team, see `team.robots`
@@ -177,6 +178,8 @@ def _own_rules(rights: Rights, team: str) -> list[dict[str, Any]]:
     if rights.hears:
         rules.append(_rule(f"{name}-subscribes", ["declare_subscriber"], _IN, rights.hears))
         rules.append(_rule(f"{name}-hears", ["put"], _OUT, rights.hears))
+    if rights.identity.role == PROBE:
+        rules.append(_rule(f"{name}-deaf", ["declare_subscriber"], _IN, [f"{team}/{PROBE}/{DEAF}"]))
     return rules
 
 

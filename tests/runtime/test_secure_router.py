@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,12 +11,14 @@ from typing import Any
 import pytest
 
 from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import BusError, ConfigError
 from quadriga.team import rule_check
 from quadriga.team.router_rules import router_rules
 from quadriga.team.rule_check import check_rules
 from tests.runtime.conftest import Make, Team
 from tests.runtime.fortress import Fortress, make_fortress, serving
+from tests.runtime.holed_router import HOLES
 from tests.runtime.test_lockstep import payloads
 
 
@@ -87,8 +91,21 @@ def test_a_refusal_that_nobody_tells_is_an_error(
     fortress: Fortress, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(rule_check, "_WAIT", 0.3)
-    with pytest.raises(BusError, match="no word of what was refused on team/probe/denied"):
+    with pytest.raises(BusError, match="without a word: put on team/probe/denied, delete on"):
         check(fortress, router_rules(fortress.config))
+
+
+def test_one_kind_of_message_that_is_not_refused_is_an_error_that_names_it(
+    fortress: Fortress,
+) -> None:
+    file = fortress.folder / "config.toml"
+    file.write_text(to_toml(fortress.config), encoding="utf-8")
+    command = [sys.executable, "-m", "tests.runtime.holed_router", str(file)]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
+    for (kind, flow), named in HOLES.items():
+        (said,) = (line for line in run.stderr.splitlines() if line.startswith(f"{kind} {flow}: "))
+        assert "rules of the router: got " in said
+        assert named in said
 
 
 def test_a_router_does_not_guess_who_is_revoked(fortress: Fortress) -> None:
