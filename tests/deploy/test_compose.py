@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +73,14 @@ def test_the_file_is_as_the_compose_specification_wants_it() -> None:
     command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec"]
     done = subprocess.run([*command, FILE], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_image_carries_the_version_of_the_project() -> None:
+    project = tomllib.loads((TOP / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    name = f"quadriga:{project['version']}"
+    names = {resolve(found["image"]) for found in SERVICES.values()}
+    assert names == {name}
+    assert f"-t {name} ." in (TOP / "deploy/Dockerfile").read_text(encoding="utf-8")
 
 
 def test_the_schema_would_find_a_mistake(tmp_path: Path) -> None:
