@@ -11,6 +11,10 @@ from quadriga.shared.config.sections import Config
 def add(add_command: AddCommand) -> None:
     command = add_command("router", run, "the router between processes in client mode")
     command.add_argument("--listen", metavar="ENDPOINT", help="where (bus.endpoint)")
+    command.add_argument(
+        "--link", metavar="ENDPOINT", action="append", default=[],
+        help="another router of the team without certificates, to pass on to; may be repeated",
+    )  # fmt: skip
     command.add_argument("--once", action="store_true", help="leave when the team has walked")
 
 
@@ -18,5 +22,6 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Route until a signal comes or, with `--once`, until one walk is over."""
     from quadriga.team import router
 
-    router.run(config, arguments.listen or config.bus.endpoint, once=arguments.once)
+    listen = arguments.listen or config.bus.endpoint
+    router.run(config, listen, once=arguments.once, links=arguments.link)
     return 0

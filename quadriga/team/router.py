@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Final
 
 from quadriga.shared.bus.barrier import lead
 from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
+from quadriga.shared.bus.zenoh_settings import link_settings
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
@@ -22,7 +24,12 @@ _STAGES: Final = 3  # waits of the barrier: for the router, for everyone's prese
 
 
 def run(
-    config: Config, listen: str, *, once: bool, stopped: Callable[[], bool] | None = None
+    config: Config,
+    listen: str,
+    *,
+    once: bool,
+    links: Sequence[str] = (),
+    stopped: Callable[[], bool] | None = None,
 ) -> None:
     """Route until SIGINT or SIGTERM, or until one walk is over.
 
@@ -33,16 +40,21 @@ def run(
         config: the team's configuration.
         listen: the endpoint the others connect to.
         once: leave when the team of the configuration has walked and everyone has left.
+        links: endpoints of other routers that this one connects to, now or when they appear.
         stopped: asked often whether to stop; by default a flag that the two signals raise.
 
     Raises:
-        ConfigError: the endpoint is open to others, or a certificate is missing.
+        ConfigError: an endpoint is open to others, a certificate is missing, or routers are to be
+            linked that have certificates or leave after a walk.
         BusError: the endpoint cannot be opened, or its rules are not in force; or, with `once`, the
             team did not assemble.
     """
+    if once and links:
+        cause = "linked routers would wait for each other to leave"
+        raise ConfigError("--once", "with --link", "one of the two", cause)
     stopped = stopped or stop_on_signals()
     with ExitStack() as stack:
-        bus, tell = _open(stack, config, listen)
+        bus, tell = _open(stack, config, listen, links)
         take_priority(config.runtime.priority)  # every command waits for it
         print(f"routing at {listen}", file=sys.stderr, flush=True)
         if once:
@@ -52,11 +64,13 @@ def run(
             _pause(tell)
 
 
-def _open(stack: ExitStack, config: Config, listen: str) -> tuple[Bus, Callable[[], object]]:
+def _open(
+    stack: ExitStack, config: Config, listen: str, links: Sequence[str]
+) -> tuple[Bus, Callable[[], object]]:
     """The router's bus, and what tells what it has refused since it was called last."""
-    team = config.team.name
+    team, connecting = config.team.name, link_settings(config.bus, listen, links)
     if not is_tls(listen):
-        return stack.enter_context(Bus.route(listen, team, config.bus)), lambda: None
+        return stack.enter_context(Bus.route(listen, team, config.bus, connecting)), lambda: None
     rules, log = router_rules(config), RefusalLog()
     bus = stack.enter_context(Bus.route(listen, team, config.bus, rules))
     audit = Audit(bus, log, revoked_numbers(config))

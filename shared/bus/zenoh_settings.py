@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
 from quadriga.shared.config.endpoints import check_exposure, is_tls
 from quadriga.shared.config.sections import BusConfig
-from quadriga.shared.errors import BusError
+from quadriga.shared.errors import BusError, ConfigError
 from quadriga.shared.members import LEADS, ROUTER
 from quadriga.shared.security.tls import tls_files, tls_settings
 
 NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
 LEASE_MS: Final = 10_000  # of silence after which a link is given up: its process stands still
 RECEIVE_BUFFER: Final = 4 << 20  # bytes, of each link's socket
+# The others may start before the plant or the router: keep trying in the background.
+_RETRY: Final = {"period_init_ms": 20, "period_max_ms": 200, "period_increase_factor": 1.5}
 _COMMON: Final = {
     "transport/link/tx/lease": LEASE_MS,
     # Nobody is found by multicast, nothing goes through shared memory.
@@ -59,14 +61,9 @@ def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str
         "mode": bus.mode,
         "connect/endpoints": [] if hub else [bus.endpoint],
         "listen/endpoints": listen,
-        # The others may start before the plant or the router: keep trying in the background.
         "connect/exit_on_failure": False,
         "connect/timeout_ms": -1 if peer else 0,
-        "connect/retry": {
-            "period_init_ms": 20,
-            "period_max_ms": 200,
-            "period_increase_factor": 1.5,
-        },
+        "connect/retry": _RETRY,
         "scouting/gossip/enabled": peer,
         **_COMMON,
         **(tls_settings(tls_files(bus.certificates, name), listens=False) if secured else {}),
@@ -95,6 +92,28 @@ def router_settings(listen: str, bus: BusConfig, rules: Mapping[str, Any]) -> di
         **(tls_settings(tls_files(bus.certificates, ROUTER), listens=True) if secured else {}),
         **rules,
     }
+
+
+def link_settings(bus: BusConfig, listen: str, links: Sequence[str]) -> dict[str, Any]:
+    """What a router is told besides of the other routers that it connects to.
+
+    Args:
+        bus: the configuration.
+        listen: where it listens itself.
+        links: the endpoints of the others.
+
+    Raises:
+        ConfigError: one is open to others, or there are certificates: whoever is linked as a router
+            speaks for everybody behind it, so one stolen certificate would command all robots.
+    """
+    for endpoint in links:
+        check_exposure(replace(bus, mode="client"), "--link", endpoint)
+        if is_tls(endpoint) or is_tls(listen):
+            expected = "one router for all of a team with certificates"
+            cause = "the rules are for each process, and a router speaks for all behind it"
+            raise ConfigError("--link", f"{endpoint!r} of a router at {listen}", expected, cause)
+    retry = {"connect/exit_on_failure": False, "connect/timeout_ms": -1, "connect/retry": _RETRY}
+    return {"connect/endpoints": list(links), **retry} if links else {}
 
 
 def opening_error(settings: dict[str, Any], at: str, name: str, error: str) -> BusError:
