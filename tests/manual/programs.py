@@ -10,28 +10,25 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
+from benchmarks.__main__ import parse_options
 from quadriga.commands.command import Given
 from quadriga.commands.config_options import read_config
 from quadriga.commands.mistakes import check_words
 from quadriga.commands.parser import CommandLine, build_parser
-from quadriga.experiments.seeds import parse_seeds
-from quadriga.experiments.sweep import parse_sweep
-from quadriga.experiments.variants import parse_variants
-from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.places import SOURCE
+from tests.manual.named import check_named, check_places
 
 # Of the system, or of packages that pages tell how to install.
 _SYSTEM: Final = ". chown cp docker export grep head install ip journalctl ls podman scp ssh"
 _MORE: Final = "dask pip podman-compose pytest systemctl true useradd wait"
 _OTHERS: Final = frozenset((*_SYSTEM.split(), *_MORE.split()))
 _AROUND: Final = frozenset(("docker", "podman", "podman-compose"))
-# What these targets of the Makefile give ARGS to.
-_WITH_ARGS: Final[Mapping[str, tuple[str, ...]]] = {
-    "walk": ("walk",),
-    "figures": ("experiments",),
-    "acceptance": ("experiments",),
-}
+_IN_SERVICE: Final = frozenset(("exec", "run", "cp"))  # of `docker compose`
+_MAKEFILE: Final = (SOURCE / "Makefile").read_text(encoding="utf-8").replace("\\\n", " ")
+# A target's own command that is given ARGS.
+_WITH_ARGS: Final = re.compile(r"\$\(BIN\)/((?:quadriga|python) .*)\$\(ARGS\)")
+_PODMAN: Final = re.compile(r"quadriga_([a-z]\w*)_1\b")  # a container of `podman-compose`
 _PLUGINS: Final = SOURCE / "tests" / "plugins"
 _PLUGIN_KIND: Final = "balance"  # a planner that is installed only where a page is about it
 _BUILT_IN: Final = "decentralised"  # what stands for it
@@ -45,8 +42,9 @@ def check_command(words: Sequence[str]) -> None:
         QuadrigaError: a command of this project does not have such options or values.
     """
     program, *rest = words
-    if program in _AROUND and "quadriga" in words:  # `docker compose exec operator quadriga …`
-        check_command(words[words.index("quadriga") :])
+    check_places(" ".join(words))
+    if program in _AROUND:
+        _check_container(rest)
     elif "/" in program:
         check_command([Path(program).name, *rest])
     elif program == "sudo":
@@ -81,19 +79,9 @@ def read_command(words: Sequence[str]) -> tuple[str, Config, Given] | None:
     scenario = arguments.scenario
     if scenario is not None and scenario.endswith(".toml") and not Path(scenario).is_file():
         arguments.scenario = None
-    if arguments.command == "campaign":
-        _check_campaign(arguments.planners, arguments.seeds, arguments.sweep)
     config, given = read_config(arguments)
+    check_named(arguments, config)
     return arguments.command, config, given
-
-
-def _check_campaign(planners: Sequence[str], seeds: str | None, sweeps: Sequence[str]) -> None:
-    for variant in parse_variants(planners, None) if planners else ():
-        load(None, {**variant.keys, "identification.response": ""})
-    if seeds is not None:
-        parse_seeds("--seeds", seeds)
-    for sweep in sweeps:
-        parse_sweep(sweep)
 
 
 def _check_quadriga(words: Sequence[str]) -> None:
@@ -101,25 +89,75 @@ def _check_quadriga(words: Sequence[str]) -> None:
 
 
 def _check_make(words: Sequence[str]) -> None:
-    makefile = (SOURCE / "Makefile").read_text(encoding="utf-8")
-    targets = re.findall(r"^([a-z][\w/%.-]*):", makefile, re.MULTILINE)
+    targets = re.findall(r"^([a-z][\w/%.-]*):", _MAKEFILE, re.MULTILINE)
     for word in words:
         name, equals, value = word.partition("=")
         if equals:
             assert name in ("ARGS", "PYTHON", "VENV"), word
-            for target in set(words) & _WITH_ARGS.keys():
-                read_command([*_WITH_ARGS[target], *shlex.split(value)])
+            for target in words if name == "ARGS" else ():
+                if "=" not in target:
+                    _check_arguments(target, shlex.split(value))
         else:
             shapes = (re.escape(target).replace("%", ".+") for target in targets)
             assert any(re.fullmatch(shape, word) for shape in shapes), f"no target {word}"
 
 
+def _check_arguments(target: str, words: Sequence[str]) -> None:
+    """See that a target takes ARGS, and that the command it gives them to takes these."""
+    recipe = re.search(rf"^{re.escape(target)}:.*\n((?:\t.*\n)*)", _MAKEFILE, re.MULTILINE)
+    own = _WITH_ARGS.search(recipe[1]) if recipe else None
+    assert own is not None, f"no ARGS of {target}"
+    check_command([*shlex.split(own[1]), *words])
+
+
 def _check_python(words: Sequence[str]) -> None:
+    """Of a module that there is; it need not be imported to see which options stand in it."""
     if words[0] != "-m":
         return
-    module = words[1]
-    installed = any(_PLUGINS.glob(f"*/{module}"))  # by the page that types it
-    assert module == "venv" or installed or find_spec(module) is not None, f"no module {module}"
+    module, *rest = words[1:]
+    if module == "venv" or any(_PLUGINS.glob(f"*/{module}")):  # installed by the page that types it
+        return
+    if module == "benchmarks":
+        parse_options(rest)
+        return
+    spec = find_spec(module)
+    if spec is not None and spec.submodule_search_locations is not None:
+        spec = find_spec(f"{module}.__main__")
+    assert spec is not None, f"no module {module}"
+    if spec.origin is None or not Path(spec.origin).is_relative_to(SOURCE):
+        return
+    text = Path(spec.origin).read_text(encoding="utf-8")
+    for option in (word.partition("=")[0] for word in rest if word.startswith("-")):
+        assert f'"{option}"' in text, f"no option {option} of {module}"
+
+
+def _check_container(words: Sequence[str]) -> None:
+    """Of services that there are; what is typed behind one is given to its entry point."""
+    for name in _PODMAN.findall(" ".join(words)):
+        assert name in _services(), f"no service {name}"
+    verb = next((place for place, word in enumerate(words) if word in _IN_SERVICE), None)
+    if words[0] != "compose" or verb is None:
+        return
+    service, *rest = [word for word in words[verb + 1 :] if not word.startswith("--rm")]
+    service = service.partition(":")[0]
+    assert service in _services(), f"no service {service}"
+    if words[verb] == "exec":
+        check_command(rest)
+    elif words[verb] == "run":
+        check_command([*_services()[service], *rest])
+
+
+@cache
+def _services() -> Mapping[str, list[str]]:
+    """The entry point of each service without its options: `quadriga`, or a command of it."""
+    text = (SOURCE / "docker-compose.yml").read_text(encoding="utf-8")
+    _, _, text = text.partition("\nservices:\n")
+    parts = re.split(r"^  ([\w-]+):\n", text.partition("\nnetworks:")[0], flags=re.MULTILINE)
+    found = {}
+    for name, part in zip(parts[1::2], parts[2::2], strict=True):
+        own = re.search(r"entrypoint: \[quadriga, (\w+)", part)
+        found[name] = ["quadriga", own[1]] if own else ["quadriga"]
+    return found
 
 
 _CHECKS: Final[Mapping[str, Callable[[Sequence[str]], None]]] = {

@@ -1,0 +1,145 @@
+"""Whether what a command names is there: scenarios, experiments, faults, predictors, files."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Mapping
+from importlib.metadata import metadata
+from pathlib import Path
+from typing import Final
+
+from quadriga.commands import fault, record
+from quadriga.experiments.published.catalogue import list_names
+from quadriga.experiments.seeds import parse_seeds
+from quadriga.experiments.sweep import parse_sweep
+from quadriga.experiments.tuning.tuning_file import read_tuning
+from quadriga.experiments.variants import PREDICTORS, combine_with_predictors, parse_variants
+from quadriga.faults.catalogue import ALL, select_faults
+from quadriga.playback.timeline import parse_remap
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.runtime.places import SOURCE
+from quadriga.sim_server.world.faults.components import build_components
+from quadriga.sim_server.world.faults.fault import parse_faults, with_time
+from quadriga.stop_times.ways import WAYS
+from quadriga.team import scenarios
+
+# Folders of the checkout that pages name files of.
+_FOLDERS: Final = "agents|benchmarks|bridges|deploy|docs|plant|quadriga|shared|sim_server|tests"
+_PLACE: Final = re.compile(rf"(?:^|(?<=[\s=,:;'\"]))(?:{_FOLDERS})/[\w./@-]+|[\w-]+\.lock\b")
+_EXTRA: Final = re.compile(r"\.\[(\w+)\]")
+_BUILT: Final = "docs/_build"  # by `make docs`
+
+
+def check_places(text: str) -> None:
+    """See that the files of the checkout and the extras of the package that a text names are there.
+
+    Raises:
+        AssertionError: one is not.
+    """
+    for place in _PLACE.findall(text):
+        found = (SOURCE / place).exists() or place.startswith(_BUILT)
+        assert found, f"no file {place} in the checkout"
+    for extra in _EXTRA.findall(text):
+        assert extra in (metadata("quadriga").get_all("Provides-Extra") or ()), f"no extra {extra}"
+
+
+def check_named(arguments: argparse.Namespace, config: Config) -> None:
+    """See that what a command names is there, as the command itself does before it begins.
+
+    Raises:
+        ConfigError: something is not, or does not go together with the configuration.
+    """
+    robots = getattr(arguments, "robot", None) or ()
+    for robot in [robots] if isinstance(robots, str) else robots:
+        if robot not in (names := robot_names(config.team.robots)):
+            raise ConfigError("--robot", repr(robot), f"one of {', '.join(names)}")
+    if arguments.command in _CHECKS:
+        _CHECKS[arguments.command](arguments, config)
+
+
+def _check_campaign(arguments: argparse.Namespace, _config: Config) -> None:
+    names = _split(arguments.predictors)
+    variants = parse_variants(arguments.planners or ["none,distributed"], arguments.variants)
+    for variant in combine_with_predictors(variants, names):
+        load(None, {**variant.keys, "identification.response": ""})
+    for name in arguments.scenarios:
+        scenarios.path(name)
+    if arguments.seeds is not None:
+        parse_seeds("--seeds", arguments.seeds)
+    for sweep in arguments.sweep:
+        parse_sweep(sweep)
+
+
+def _check_experiments(arguments: argparse.Namespace, _config: Config) -> None:
+    for name in arguments.names:
+        if not name.endswith(".toml") and name not in list_names():
+            raise ConfigError("experiments", repr(name), f"one of {', '.join(list_names())}")
+    if arguments.seeds is not None:
+        parse_seeds("--seeds", arguments.seeds)
+
+
+def _check_fault(arguments: argparse.Namespace, config: Config) -> None:
+    if arguments.live:
+        text = " ".join([*arguments.names, *([str(arguments.span)] if arguments.span else [])])
+        components = tuple(build_components(config.robot))
+        parse_faults(with_time(text, 0), robot_names(config.team.robots), components)
+    elif not arguments.list:
+        select_faults([ALL] if arguments.table else fault._names_of(arguments), config)
+
+
+def _check_probe(arguments: argparse.Namespace, _config: Config) -> None:
+    for name in _split(arguments.predictors):
+        if name not in PREDICTORS:
+            raise ConfigError("--predictors", repr(name), f"names of {', '.join(PREDICTORS)}")
+
+
+def _check_play(arguments: argparse.Namespace, _config: Config) -> None:
+    for text in arguments.remap:
+        parse_remap(text)
+
+
+def _check_record(arguments: argparse.Namespace, _config: Config) -> None:
+    record._selection(arguments)
+
+
+def _check_tune(arguments: argparse.Namespace, _config: Config) -> None:
+    if arguments.file != Path("FILE"):  # in its place stands any
+        read_tuning(arguments.file)
+
+
+def _check_bench_stop(arguments: argparse.Namespace, _config: Config) -> None:
+    for way in arguments.ways:
+        if way not in WAYS:
+            raise ConfigError("way", repr(way), f"one of {', '.join(WAYS)}")
+
+
+def _check_sim(arguments: argparse.Namespace, config: Config) -> None:
+    if arguments.native and arguments.native != config.team.robot:
+        raise ConfigError("--as", repr(arguments.native), repr(config.team.robot))
+
+
+def _check_certs(arguments: argparse.Namespace, _config: Config) -> None:
+    if arguments.action != "renew" and bool(arguments.names) != (arguments.action == "revoke"):
+        raise ConfigError("NAME", " ".join(arguments.names), f"those that {arguments.action} takes")
+
+
+def _split(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+_CHECKS: Final[Mapping[str, Callable[[argparse.Namespace, Config], None]]] = {
+    "bench-stop": _check_bench_stop,
+    "campaign": _check_campaign,
+    "certs": _check_certs,
+    "experiments": _check_experiments,
+    "fault": _check_fault,
+    "play": _check_play,
+    "probe": _check_probe,
+    "record": _check_record,
+    "sim": _check_sim,
+    "tune": _check_tune,
+}
