@@ -23,6 +23,8 @@ _OTHERS: Final = ("_build", "results")  # folders of docs without pages of the m
 # Pages whose blocks are typed one after the other by tests of their own.
 RUN_ELSEWHERE: Final = frozenset(("docs/extending.md",))
 _FENCE: Final = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_ANY_FENCE: Final = re.compile(r"^```(\S*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_SPAN: Final = re.compile(r"`([^`]+)`")
 _SAID: Final = re.compile(r"<!-- (not run|short|excerpt):\s*(.*?)\s*-->\n+\Z")
 
 
@@ -68,6 +70,16 @@ def find_blocks(text: str, page: str) -> list[Block]:
         line = before.count("\n") + 2
         found.append(Block(page, line, match[1], match[2], marker, words))
     return found
+
+
+def find_texts(text: str) -> list[str]:
+    """What stands in the blocks of a page's text that are said to be of no language."""
+    return [body for language, body in _ANY_FENCE.findall(text) if language in ("", "text")]
+
+
+def find_spans(text: str) -> list[str]:
+    """What a page's prose shows as code, each on one line."""
+    return [" ".join(span.split()) for span in _SPAN.findall(_ANY_FENCE.sub("", text))]
 
 
 def all_blocks() -> list[Block]:

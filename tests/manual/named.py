@@ -34,6 +34,11 @@ _EXTRA: Final = re.compile(r"\.\[(\w+)\]")
 _BUILT: Final = "docs/_build"  # by `make docs`
 
 
+def is_place(text: str) -> bool:
+    """Whether a text is the name of a file or folder of the checkout, without a part left open."""
+    return _PLACE.fullmatch(text) is not None and "/NAME" not in text
+
+
 def check_places(text: str) -> None:
     """See that the files of the checkout and the extras of the package that a text names are there.
 

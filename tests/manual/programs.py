@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
-from benchmarks.__main__ import parse_options
 from quadriga.commands.command import Given
 from quadriga.commands.config_options import read_config
 from quadriga.commands.mistakes import check_words
@@ -28,6 +28,7 @@ _IN_SERVICE: Final = frozenset(("exec", "run", "cp"))  # of `docker compose`
 _MAKEFILE: Final = (SOURCE / "Makefile").read_text(encoding="utf-8").replace("\\\n", " ")
 # A target's own command that is given ARGS.
 _WITH_ARGS: Final = re.compile(r"\$\(BIN\)/((?:quadriga|python) .*)\$\(ARGS\)")
+_LEFT_OPEN: Final = re.compile(r"…|[\[\]|]|^[A-Z][A-Z_]*$")  # for the reader to fill in
 _PODMAN: Final = re.compile(r"quadriga_([a-z]\w*)_1\b")  # a container of `podman-compose`
 _PLUGINS: Final = SOURCE / "tests" / "plugins"
 _PLUGIN_KIND: Final = "balance"  # a planner that is installed only where a page is about it
@@ -53,6 +54,23 @@ def check_command(words: Sequence[str]) -> None:
         _CHECKS[program](rest)
     else:
         assert program in _OTHERS, f"no program {program} is known"
+
+
+def check_mention(words: Sequence[str]) -> None:
+    """See that a command that prose mentions can be typed, what it leaves out being added.
+
+    Raises:
+        AssertionError: there is no such target, module or file.
+        QuadrigaError: a command of this project does not have such options or values.
+    """
+    program, *rest = words
+    if any(_LEFT_OPEN.search(word) for word in words):
+        known = [word for word in rest if not _LEFT_OPEN.search(word)]
+        if program == "quadriga":
+            check_words(known, _parser().list_options())
+        return
+    with suppress(SystemExit):  # an argument that is needed is left out
+        check_command(words)
 
 
 @cache
@@ -116,9 +134,6 @@ def _check_python(words: Sequence[str]) -> None:
         return
     module, *rest = words[1:]
     if module == "venv" or any(_PLUGINS.glob(f"*/{module}")):  # installed by the page that types it
-        return
-    if module == "benchmarks":
-        parse_options(rest)
         return
     spec = find_spec(module)
     if spec is not None and spec.submodule_search_locations is not None:

@@ -8,10 +8,12 @@ import pytest
 
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.runtime.places import SOURCE
-from tests.manual.blocks import Block, all_blocks, find_blocks
-from tests.manual.programs import check_command
+from tests.manual.blocks import Block, all_blocks, find_blocks, find_spans, find_texts, list_pages
+from tests.manual.named import check_places, is_place
+from tests.manual.programs import check_command, check_mention
 from tests.manual.shell import split_commands
 
+OURS = ("quadriga ", "make ", "python -m ")
 BLOCKS = [block for block in all_blocks() if block.language == "sh"]
 
 
@@ -33,6 +35,37 @@ def wrong_commands(blocks: list[Block]) -> Iterator[str]:
 def test_each_command_can_be_typed() -> None:
     assert len(BLOCKS) > 60
     assert list(wrong_commands(BLOCKS)) == []
+
+
+def wrong_mentions(text: str) -> Iterator[str]:
+    """What is wrong with the commands and files that the prose of a page mentions, a line each."""
+    for span in find_spans(text):
+        try:
+            if is_place(span):
+                check_places(span)
+            elif span.startswith(OURS):
+                choice = "|" in span and " | " not in span  # of words, as in a usage line
+                for words in [span.split()] if choice else split_commands(span):
+                    check_mention(words)
+        except (QuadrigaError, AssertionError) as error:
+            yield f"{span}: {error}"
+
+
+def test_each_command_and_file_that_prose_mentions_is_there() -> None:
+    wrong = {page.name: list(wrong_mentions(page.read_text("utf-8"))) for page in list_pages()}
+    assert {name: lines for name, lines in wrong.items() if lines} == {}
+
+
+def test_what_prose_mentions_and_there_is_not_is_found() -> None:
+    text = "`quadriga walk --robts 3`, `quadriga wlak …`, `deploy/dekc.toml`, `quadriga info`"
+    assert len(list(wrong_mentions(text))) == 3
+
+
+def test_commands_stand_in_blocks_that_say_so() -> None:
+    """A block of no language is not looked at by any of these tests."""
+    for page in list_pages():
+        for text in find_texts(page.read_text("utf-8")):
+            assert not [line for line in text.splitlines() if line.startswith(OURS)], page.name
 
 
 @pytest.mark.parametrize(
@@ -60,7 +93,7 @@ def test_each_command_can_be_typed() -> None:
         ("quadriga config | grpe seed", "grpe"),
         ("make wlak", "no target wlak"),
         ("make walk ARGS='--robts 3'", "--robts"),
-        ("make bench ARGS=--quik", ""),
+        ("make bench ARGS=--quik", "no option --quik"),
         ("make lint ARGS=--fix", "no ARGS of lint"),
         ("python -m quadriga.nothing", ""),
         ("python -m tests.golden.renew --resaon x", "no option --resaon"),
