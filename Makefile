@@ -9,7 +9,7 @@ MANUAL := $(VENV)/.manual
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install tools walk prepared test test-containers image-lock lint fuzz fuzz-readers drops starts endurance format docs dist pages manual gallery figures clip acceptance bench bench-planner bench-recorder
+.PHONY: install tools walk prepared test test-containers image-lock lint fuzz fuzz-readers drops starts endurance format docs dist pages manual links gallery figures clip acceptance bench bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -114,6 +114,10 @@ dist: $(STAMP)
 manual: $(MANUAL)
 	$(BIN)/python -m sphinx --builder html --quiet --fail-on-warning docs docs/_build
 	@echo "the manual: docs/_build/index.html"
+
+# Whether the links of README and manual to elsewhere lead anywhere; it needs the internet.
+links: $(STAMP)
+	$(BIN)/python -m tests.manual.links
 
 # A clip of each scenario, from real walks; about twenty minutes, and more for each team that has not
 # walked here before. ARGS=NAME … draws some of them.

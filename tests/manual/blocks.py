@@ -15,6 +15,8 @@ from typing import Final
 from quadriga.shared.runtime.places import SOURCE
 
 DOCS: Final = SOURCE / "docs"
+_READ_ELSEWHERE: Final = ("CONTRIBUTING.md", "deploy/README.md", "deploy/laptop/README.md")
+OTHERS: Final = tuple(SOURCE / name for name in _READ_ELSEWHERE)  # pages beside the manual
 NOT_RUN: Final = "not run"
 SHORT: Final = "short"
 EXCERPT: Final = "excerpt"

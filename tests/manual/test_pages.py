@@ -9,10 +9,9 @@ from typing import Final
 import pytest
 
 from quadriga.shared.runtime.places import SOURCE
-from tests.manual.blocks import DOCS, list_pages
+from tests.manual.blocks import DOCS, OTHERS, list_pages
 
-_OTHERS: Final = ("CONTRIBUTING.md", "deploy/README.md", "deploy/laptop/README.md")
-PAGES: Final = [*list_pages(), *(SOURCE / name for name in _OTHERS)]
+PAGES: Final = [*list_pages(), *OTHERS]
 MOST_OF_CLIPS: Final = 6_000_000  # bytes, of the gallery
 _CODE: Final = re.compile(r"^```.*?^```|`[^`\n]*`", re.MULTILINE | re.DOTALL)
 _LINK: Final = re.compile(r"\]\(([^)\s]+)\)")
