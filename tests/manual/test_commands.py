@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterator
+from importlib import import_module
 
 import pytest
 
@@ -107,6 +109,16 @@ def test_a_command_that_there_is_not_is_found(line: str, error: str) -> None:
     found = list(wrong_commands([Block("page.md", 1, "sh", line)]))
     assert len(found) == 1
     assert error in found[0]
+
+
+def test_what_programs_that_are_not_run_import_is_there() -> None:
+    programs = [b for b in all_blocks() if b.language == "python" and b.marker == "not run"]
+    assert programs
+    for block in programs:
+        for node in ast.walk(ast.parse(block.text, block.name)):
+            if isinstance(node, ast.ImportFrom):
+                module = import_module(str(node.module))
+                assert [one.name for one in node.names if not hasattr(module, one.name)] == []
 
 
 def test_a_block_is_found_with_what_is_said_of_it() -> None:

@@ -18,6 +18,7 @@ from tests.manual.short_forms import run_live, run_short, run_with
 
 WAIT: Final = 60.0  # s, until a team walks
 RUN: Final = "RUN"  # what pages call a run folder
+CONFIG: Final = "team.toml"  # and the reader's configuration, here that by default
 ENDS: Final = ("stop",)  # the walk of the live team
 FILTERS: Final = frozenset(("grep", "head"))  # of what a command says; what they find is not judged
 BLOCKS: Final = [block for block in all_blocks() if block.page not in RUN_ELSEWHERE]
@@ -37,11 +38,13 @@ def commands_of(block: Block) -> list[list[str]]:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_the_blocks_of_a_page_run(
-    page: str, run_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    page: str, request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In one folder, programs with the names of those before: a block finds what others left."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / RUN).symlink_to(run_folder)
+    if any(RUN in block.text for block in TYPED if block.page == page):
+        (tmp_path / RUN).symlink_to(request.getfixturevalue("run_folder"))
+    (tmp_path / CONFIG).touch()
     (tmp_path / "deploy").symlink_to(SOURCE / "deploy")
     names: dict[str, Any] = {"__name__": "manual"}
     for block in TYPED:
