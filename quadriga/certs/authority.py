@@ -59,7 +59,7 @@ class Authority:
         try:
             self._certificate = load_certificate(pair.certificate)
             key = load_pem_private_key(pair.key, password=None)
-        except (*UNREADABLE, TypeError) as error:
+        except UNREADABLE as error:
             raise _unreadable("authority of the team", error) from None
         if not isinstance(key, ec.EllipticCurvePrivateKey):
             raise _unreadable("key of the team's authority", type(key).__name__)

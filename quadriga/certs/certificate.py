@@ -23,6 +23,7 @@ UNREADABLE: Final = (
     x509.InvalidVersion,
     x509.DuplicateExtension,
     x509.UnsupportedGeneralNameType,
+    TypeError,  # of a name whose text is bits
 )
 
 
@@ -70,7 +71,7 @@ def is_signed(path: Path, authority: Path) -> bool:
     """
     try:
         _load(path).verify_directly_issued_by(_load(authority))
-    except (*UNREADABLE, TypeError, InvalidSignature):  # another name, another key
+    except (*UNREADABLE, InvalidSignature):  # another name, another key
         return False
     return True
 

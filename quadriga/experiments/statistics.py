@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -42,6 +43,7 @@ class Pairs:
         return self.both + self.first + self.second + self.neither
 
 
+@cache
 def wilson(count: int, total: int) -> Bounds:
     """Wilson's score interval of a proportion: (0, 1) if nothing was counted."""
     if not total:

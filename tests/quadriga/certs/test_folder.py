@@ -153,6 +153,7 @@ def as_pem(content: bytes) -> bytes:
     [
         (b"\xa0\x03\x02\x01\x02", b"\xa0\x03\x02\x01\x15"),  # no version that there is
         (b"\x06\x03\x55\x1d\x0f", b"\x06\x03\x55\x1d\x13"),  # an extension twice
+        (b"\x0c\x08router.1", b"\x03\x08\x00outer.1"),  # a name of bits
     ],
 )
 def test_a_certificate_that_no_library_takes_is_damaged(
