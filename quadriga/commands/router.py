@@ -12,9 +12,12 @@ def add(add_command: AddCommand) -> None:
     command = add_command("router", run, "the router between processes in client mode")
     command.add_argument("--listen", metavar="ENDPOINT", help="where (bus.endpoint)")
     command.add_argument(
-        "--link", metavar="ENDPOINT", action="append", default=[],
+        "--link",
+        metavar="ENDPOINT",
+        action="append",
+        default=[],
         help="another router of the team without certificates, to pass on to; may be repeated",
-    )  # fmt: skip
+    )
     command.add_argument("--once", action="store_true", help="leave when the team has walked")
 
 
