@@ -25,7 +25,7 @@ from rich.console import Console
 from benchmarks.options import Options
 from benchmarks.parts import team
 from benchmarks.walks import over_the_bus
-from quadriga.shared.errors import QuadrigaError
+from quadriga.shared.errors import ProcessError, QuadrigaError
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.runtime.process_use import read_use
 from quadriga.shared.runtime.signals import interrupt_on_sigterm
@@ -50,8 +50,15 @@ class _Use:
     looks: list[tuple[float, float, int]] = field(default_factory=list)
 
     def since_settled(self) -> tuple[float, float]:
-        """Share of a core, and bytes a second, from when the page was complete on."""
+        """Share of a core, and bytes a second, from when the page was complete on.
+
+        Raises:
+            ProcessError: the walk was over by then.
+        """
         looks = [look for look in self.looks if look[0] > self.looks[0][0] + _SETTLED_S]
+        if len(looks) < 2:
+            expected = f"a walk that lasts {_SETTLED_S:g} s longer than it"
+            raise ProcessError("view", "a page that was complete too late", expected)
         (begun, cpu, received), (ended, cpu_then, received_then) = looks[0], looks[-1]
         return (cpu_then - cpu) / (ended - begun), (received_then - received) / (ended - begun)
 
@@ -65,6 +72,10 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=20.0, help="world time of a walk")
     parser.add_argument("--json", type=Path, metavar="FILE")
     given = parser.parse_args()
+    if given.pairs < 1:
+        parser.error(f"--pairs: got {given.pairs}, expected at least 1")
+    if given.json is not None and not given.json.parent.is_dir():
+        parser.error(f"--json: got {given.json}, expected a file in a folder that there is")
     interrupt_on_sigterm()
     console = Console(highlight=False)
     options = Options((), tuple(given.robots), given.seconds, given.planner, False, Path())
@@ -79,13 +90,13 @@ def main() -> int:
         return 2
     except KeyboardInterrupt:
         return _INTERRUPTED
+    print_tables([_table(rows)])
     figures = [_summary(rows, robots) for robots in options.robots]
+    for team_figures in figures:
+        console.print(_format_summary(team_figures), markup=False)
     if given.json is not None:
         text = json.dumps({"pairs": rows, "teams": figures}, indent=1)
         given.json.write_text(text + "\n", encoding="utf-8")
-    print_tables([_table(rows)])
-    for team_figures in figures:
-        console.print(_format_summary(team_figures), markup=False)
     return 0
 
 
