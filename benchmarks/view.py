@@ -38,7 +38,6 @@ from quadriga.view.port import free_port
 from quadriga.warm_up import warm_up
 
 _INTERRUPTED: Final = 130
-_SETTLED_S: Final = 2.0  # from the page's first bytes on; before that the view sends the meshes
 _LOOK_S: Final = 0.25
 _COLUMNS: Final = ("robots", "pair", "without", "with", "ratio", "view, of a core", "kB/s")
 
@@ -49,16 +48,15 @@ class _Use:
 
     looks: list[tuple[float, float, int]] = field(default_factory=list)
 
-    def since_settled(self) -> tuple[float, float]:
-        """Share of a core, and bytes a second, from when the page was complete on.
+    def of_second_half(self) -> tuple[float, float]:
+        """Share of a core, and bytes a second, over the half in which the page is complete.
 
         Raises:
-            ProcessError: the walk was over by then.
+            ProcessError: the walk was over before that.
         """
-        looks = [look for look in self.looks if look[0] > self.looks[0][0] + _SETTLED_S]
+        looks = self.looks[len(self.looks) // 2 :]
         if len(looks) < 2:
-            expected = f"a walk that lasts {_SETTLED_S:g} s longer than it"
-            raise ProcessError("view", "a page that was complete too late", expected)
+            raise ProcessError("its page", "nothing before the walk was over", "a longer walk")
         (begun, cpu, received), (ended, cpu_then, received_then) = looks[0], looks[-1]
         return (cpu_then - cpu) / (ended - begun), (received_then - received) / (ended - begun)
 
@@ -112,7 +110,7 @@ def _pairs(options: Options, robots: int, pairs: int, console: Console) -> list[
             with console.status(f"{robots} robots, pair {pair + 1} of {pairs}, {name} a view …"):
                 walked = over_the_bus(config, file, predictor, lambda _: None, **besides[name])
             factors[name] = walked["rtf_half"]  # the page is complete by then
-        core, received = use.since_settled()
+        core, received = use.of_second_half()
         rows.append({"robots": robots, "pair": pair, **factors, "core": core, "bytes_s": received})
     return rows
 
