@@ -16,6 +16,7 @@ from urllib.request import Request, urlopen
 from websockets.sync.client import connect
 
 from quadriga.shared.runtime.clock import monotonic, sleep
+from tests.permitted import permitted
 
 CHROMIUM: Final = shutil.which("chromium") or shutil.which("chromium-browser")
 WHY_NOT: Final = "no Chromium on this machine: apt-get install chromium"
@@ -148,9 +149,14 @@ class Browser:
 
 @contextmanager
 def browser(folder: Path) -> Iterator[Browser]:
-    """A browser within the block, its profile in `folder`."""
+    """A browser within the block, its profile in `folder`.
+
+    Where permitted it goes before ordinary processes, as on a computer of its own: beside tests
+    that compute, a page would be silent for seconds, and have the controls taken from it.
+    """
     assert CHROMIUM is not None, WHY_NOT
     command = [
+        *(("chrt", "--rr", "1") if permitted() else ()),
         CHROMIUM,
         "--headless=new",
         "--no-sandbox",

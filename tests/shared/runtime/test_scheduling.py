@@ -5,11 +5,15 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
+from pathlib import Path
+from typing import Final
 
 import pytest
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.runtime.scheduling import VARIABLE, valid_priority
+from quadriga.shared.runtime.scheduling import VARIABLE, valid_priority, weigh_session
+from tests.permitted import permitted
 
 _SCRIPT = """
 import os, sys, threading
@@ -38,11 +42,6 @@ def answer(priority: str, permission: str) -> tuple[list[str], str]:
         text=True,
     )
     return done.stdout.split(), done.stderr
-
-
-def permitted() -> bool:
-    probe = "import os; os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))"
-    return not subprocess.run([sys.executable, "-c", probe], capture_output=True).returncode
 
 
 @pytest.mark.skipif(not permitted(), reason="this user may not schedule in real time")
@@ -93,6 +92,33 @@ precede_ordinary(sys.argv[1])
 print(*{os.getpriority(os.PRIO_PROCESS, int(task)) for task in os.listdir("/proc/self/task")})
 print(os.sched_getscheduler(0) == os.SCHED_OTHER)
 """
+_GROUPED: Final = Path("/proc/self/autogroup")  # where sessions share the processors
+
+
+@pytest.mark.skipif(not _GROUPED.exists(), reason="this system does not group by session")
+@pytest.mark.skipif(not permitted(), reason="this user may not take precedence")
+@pytest.mark.parametrize("leads", [True, False])
+def test_precedence_holds_against_other_sessions_of_who_leads_its_own(leads: bool) -> None:
+    before = _GROUPED.read_text()
+    words = [sys.executable, "-c", f"{_NICE}print(open('{_GROUPED}').read())", "realtime"]
+    done = subprocess.run(
+        words, check=True, capture_output=True, text=True, start_new_session=leads
+    )
+    assert done.stdout.endswith("nice -15\n\n" if leads else f"{before}\n")
+
+
+@pytest.mark.skipif(not _GROUPED.exists(), reason="this system does not group by session")
+def test_a_process_started_in_a_session_of_its_own_keeps_its_niceness_among_all() -> None:
+    words = ["nice", "-n", "3", "sleep", "60"]
+    with subprocess.Popen(words, start_new_session=True) as process:
+        try:
+            of_session = Path(f"/proc/{process.pid}/autogroup")
+            while os.getpriority(os.PRIO_PROCESS, process.pid) != os.getpriority(0, 0) + 3:
+                time.sleep(0.01)
+            weigh_session(process.pid)
+            assert of_session.read_text().endswith(f"nice {os.getpriority(0, 0) + 3}\n")
+        finally:
+            process.kill()
 
 
 @pytest.mark.skipif(not permitted(), reason="this user may not take precedence")
