@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import re
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 import pytest
 
+from quadriga.agents.modes import LOSSES, STAND, WALK
 from quadriga.commands.parser import main
 from quadriga.recordings.check import check
 from quadriga.recordings.traces import read_traces
@@ -17,9 +18,9 @@ from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.codes import FALL, INPUT_LOST, LINK_BACK, LOWERED, RESUMED, STANDS_AGAIN
-from quadriga.shared.wire.messages import Event
-from quadriga.shared.wire.topics import AGENT_EVENT, EVENT, TRUTH, find_topic
+from quadriga.shared.wire.codes import FALL, LINK_BACK, LOWERED, STANDS_AGAIN, code_of
+from quadriga.shared.wire.messages import Event, Status
+from quadriga.shared.wire.topics import EVENT, STATUS, TRUTH, find_topic
 from quadriga.team.launch import Launch, router_row
 from tests.runtime.conftest import WAIT, Make, Team
 from tests.runtime.frozen import await_tick
@@ -27,27 +28,44 @@ from tests.runtime.frozen import await_tick
 pytestmark = pytest.mark.usefixtures("_alone", "_compiled")
 
 Watcher = Callable[..., Bus]
-News = tuple[str, str]  # robot, code of an event
+Told = tuple[str, str]  # robot, code of an event
+IsSo = Callable[[Status], bool]
 REAL = {
     "world__mode": "realtime",
     "world__seconds": 600.0,
     "team__auto_resume": True,
     "recorder__enabled": True,
 }
-ALL_WALK = {("r1", RESUMED), ("r2", RESUMED)}
+ROBOTS = ("r1", "r2")
 
 
-def await_news(bus: Bus, *wanted: News) -> None:
-    """Wait until all of these have been told, and nobody has fallen."""
-    missing, deadline = set(wanted), monotonic() + WAIT
-    while missing:
-        assert monotonic() < deadline, f"never told: {missing}"
+def await_news(bus: Bus, told: Told | None, robots: Collection[str], is_so: IsSo) -> None:
+    """Wait until that was told and each of these robots has been so, and nobody has fallen.
+
+    What a robot is it says again and again: on a busy machine one word of it may be missed, or
+    have been true for another reason before.
+    """
+    missing, deadline = set(robots), monotonic() + WAIT
+    while missing or told is not None:
+        assert monotonic() < deadline, f"never so: {missing or told}"
         packet = bus.get(1.0)
-        topic = None if packet is None else find_topic(packet[0])[0]
-        if packet is not None and topic is not None and topic.type is Event:
+        topic, robot = (None, "") if packet is None else find_topic(packet[0])
+        if packet is None or topic is None:
+            continue
+        if topic == EVENT:
             event = decode(packet[1], Event)
             assert event.code != FALL, event
-            missing.discard((event.robot, event.code))
+            told = None if (event.robot, event.code) == told else told
+        elif topic == STATUS and robot in missing and is_so(decode(packet[1], Status)):
+            missing.remove(robot)
+
+
+def walks(status: Status) -> bool:
+    return status.mode == WALK
+
+
+def stands_for_a_loss(status: Status) -> bool:
+    return status.mode == STAND and code_of(status.reason) in LOSSES
 
 
 def kill(running: Launch, name: str) -> None:
@@ -66,16 +84,16 @@ def test_an_agent_an_operator_and_a_recorder(
 ) -> None:
     team = make_team(**REAL)
     with team.launch(standing=False) as running:
-        bus = watcher(team, EVENT, AGENT_EVENT, TRUTH)
+        bus = watcher(team, EVENT, STATUS, TRUTH)
         await_tick(bus, 1500)
         kill(running, "r2")
-        await_news(bus, ("r1", INPUT_LOST), ("r2", LOWERED))
+        await_news(bus, ("r2", LOWERED), ["r1"], stands_for_a_loss)
         running.restart("r2")
-        await_news(bus, ("r2", STANDS_AGAIN), *ALL_WALK)
+        await_news(bus, None, ROBOTS, walks)
         kill(running, "operator")
-        await_news(bus, ("r1", INPUT_LOST), ("r2", INPUT_LOST))
+        await_news(bus, None, ROBOTS, stands_for_a_loss)
         running.restart("operator")
-        await_news(bus, *ALL_WALK)
+        await_news(bus, None, ROBOTS, walks)
         kill(running, "recorder")
         running.restart("recorder")
         await_file(team.folder / "run.2.mcap")
@@ -98,17 +116,21 @@ def check_files(team: Team, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_router_and_the_word_to_go_on(make_team: Make, watcher: Watcher) -> None:
-    team = make_team(bus__mode="client", **REAL | {"team__auto_resume": False})
+    """One robot: with two, the router's restart leaves a slow computer no time for commands."""
+    team = make_team(team__robots=1, bus__mode="client", **REAL | {"team__auto_resume": False})
     rows = (router_row(team.config, team.folder), *team.rows(standing=False))
     with Launch(rows, team.folder / "logs") as running:
         team.await_log("router", "routing at")
-        bus = watcher(team, EVENT, AGENT_EVENT, TRUTH)
+        bus = watcher(team, EVENT, STATUS, TRUTH)
         await_tick(bus, 1500)
         kill(running, "router")
         running.restart("router")
-        await_news(bus, ("r1", STANDS_AGAIN), ("r2", STANDS_AGAIN), ("", LINK_BACK))
-        assert main(["resume", "--config", str(team.folder / "config.toml")]) == 0
-        await_news(bus, *ALL_WALK)
+        await_news(bus, ("", LINK_BACK), ["r1"], stands_for_a_loss)
+        # On a busy machine not all may have said within its time that they walk.
+        deadline = monotonic() + WAIT
+        while main(["resume", "--config", str(team.folder / "config.toml")]) != 0:
+            assert monotonic() < deadline
+        await_news(bus, None, ["r1"], walks)
         running.watch(lambda: True)
-    told = {event.code for event in read_traces(team.recording()).events}
-    assert LINK_BACK in told, "one recording, with a gap in its midst"
+    told = {(event.robot, event.code) for event in read_traces(team.recording()).events}
+    assert told >= {("", LINK_BACK), ("r1", STANDS_AGAIN)}, "one recording, with a gap in its midst"
