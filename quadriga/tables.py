@@ -15,6 +15,7 @@ from quadriga.shared.robot.conventions import OUTPUTS
 from quadriga.table_layout import TablePart, is_prose, lay_out, least_widths, total
 
 NOTHING: Final = "–"
+_DEGREE: Final = "17.5 mrad are 1°."
 _WIDE: Final = 180  # characters a line may have where no terminal says how many there are
 # Unit of each output, and of each of `quadriga.recordings.traces.ERRORS`, and its factor from SI.
 UNITS: Final = {
@@ -60,12 +61,19 @@ class Table:
         rows = [tuple(printable(cell) for cell in row) for row in self.rows]
         layout = lay_out(self.columns, rows, width)
         first, *others = layout.parts
-        notes = [*([layout.note] if layout.note else []), *self.notes]
+        notes = [*([layout.note] if layout.note else []), *self._all_notes]
         return [
             _build_rich(first, self.title),
             *(_build_rich(part, "") for part in others),
             *(Text(note, style="dim") for note in notes),
         ]
+
+    @property
+    def _all_notes(self) -> tuple[str, ...]:
+        """The notes, and of a table with angles what a degree is in their unit."""
+        named = (*self.columns, *(row[0] for row in self.rows))
+        angles = any("mrad" in text for text in named)
+        return (*self.notes, *((_DEGREE,) if angles else ()))
 
     @property
     def least_width(self) -> int:
@@ -76,7 +84,7 @@ class Table:
         """With a heading of this level."""
         rule = [":--", *("--:" for _ in self.columns[1:])]
         lines = [_row(self.columns), f"| {' | '.join(rule)} |", *map(_row, self.rows)]
-        notes = [f"\n{note}" for note in self.notes]
+        notes = [f"\n{note}" for note in self._all_notes]
         return "\n".join([f"{'#' * level} {self.title}\n", *lines, *notes]) + "\n"
 
 

@@ -35,7 +35,7 @@ arrival of a report to the command that the agent made of it: the median of the 
 worst p99 and the worst of all; without bridges, the age of a command in whole milliseconds. "late
 %" is the share of ticks at which the motors followed a command of an earlier tick. "too slow" are
 walks in which the simulated robots kept less than 99 % of real time, which no real one does: they
-are left out of all else. 17.5 mrad are 1°, 17.5 mrad/s are 1 °/s."""
+are left out of all else."""
 _FAULT_NOTE: Final = """\
 Each fault came at a random moment 2 to 4 s into a walk, at one robot, and was tried until 20 tries
 counted. "no walk": a robot was stopped before the fault came, by its own bridge or by its

@@ -20,3 +20,17 @@ def test_a_row_of_columns_is_one_line_that_a_terminal_only_shows() -> None:
         "  a     x\N{REPLACEMENT CHARACTER}[31m y",
         "  long  z",
     ]
+
+
+@pytest.mark.parametrize(
+    ("heading", "first", "told"),
+    [("roll [mrad]", "r1", True), ("r1", "yaw rate mrad/s", True), ("vx [mm/s]", "r1", False)],
+)
+def test_a_table_with_angles_tells_what_a_degree_is(
+    heading: str, first: str, told: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = Table("Errors", ("robot", heading), ((first, "17.5"),), ("A note.",))
+    print_tables([table])
+    for text in (capsys.readouterr().out, table.to_markdown()):
+        assert ("17.5 mrad are 1°." in text) == told
+        assert "A note." in text
