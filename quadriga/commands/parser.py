@@ -17,7 +17,12 @@ from quadriga.commands.running import registered
 from quadriga.commands.version import ShowVersion
 from quadriga.shared.errors import ConfigError, ProcessError, QuadrigaError, system_reason
 from quadriga.shared.printable import printable, printable_line
-from quadriga.shared.runtime.signals import die_with_parent, interrupt_on_sigterm, kill_if_orphaned
+from quadriga.shared.runtime.signals import (
+    die_with_parent,
+    interrupt_on_sigterm,
+    kill_if_orphaned,
+    take_due_interrupt,
+)
 
 FAILED: Final = 1  # a robot fell or a process failed
 WRONG: Final = 2  # the command, the configuration or a file is wrong
@@ -65,15 +70,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     except QuadrigaError as error:
         return _complain(error, WRONG)
     except KeyboardInterrupt:
-        print("quadriga: interrupted", file=sys.stderr)
-        return INTERRUPTED
+        return _say_interrupted()
     except BrokenPipeError:  # of `quadriga config | head`
         sys.stdout = None
         return 0
     except OSError as error:  # a disk that is full, a folder that is read-only
         what, reason = error.filename or "a file or a connection", system_reason(error)
         return _complain(ConfigError(str(what), reason, "one that can be used"), WRONG)
+    except Exception:
+        if not take_due_interrupt():
+            raise
+        return _say_interrupted()
     return status
+
+
+def _say_interrupted() -> int:
+    print("quadriga: interrupted", file=sys.stderr)
+    return INTERRUPTED
 
 
 def _parse(parser: CommandLine, typed: Sequence[str]) -> argparse.Namespace:

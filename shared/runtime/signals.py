@@ -120,6 +120,17 @@ def interrupt_on_sigterm() -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
 
 
+def take_due_interrupt() -> bool:
+    """Whether an interrupt that came at a bad moment was still to be tried again; now it is not.
+
+    A library that loses one while it calls back may fail at once for want of what that should
+    have done, before the interrupt is tried again: its error is none.
+    """
+    due = signal.getitimer(signal.ITIMER_REAL)[0] > 0.0
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    return due
+
+
 def _interrupt(_number: int, frame: FrameType | None) -> None:
     """Raise KeyboardInterrupt, or try again in a while if a module is being imported."""
     while frame is not None:

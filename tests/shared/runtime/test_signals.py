@@ -174,6 +174,7 @@ def called():
 called()
 ready = True
 """
+FAILS_THEN = CALLS_BACK.replace("ready = True", "raise RuntimeError('what it should have done')")
 PROGRAM = """
 import sys
 folder, how = sys.argv[1:]
@@ -199,9 +200,13 @@ sys.exit(main())
 
 
 @pytest.mark.parametrize(
-    ("library", "how"), [(LIBRARY, "import"), (CALLS_BACK, "run")], ids=["import", "callback"]
+    ("library", "how", "gone_on"),
+    [(LIBRARY, "import", "gone on\n"), (CALLS_BACK, "run", "gone on\n"), (FAILS_THEN, "run", "")],
+    ids=["import", "callback", "callback that was needed"],
 )
-def test_an_interrupt_at_a_bad_moment_is_one_line(tmp_path: Path, library: str, how: str) -> None:
+def test_an_interrupt_at_a_bad_moment_is_one_line(
+    tmp_path: Path, library: str, how: str, gone_on: str
+) -> None:
     """As a library in C does, this one makes an error of its own of it, or Python loses it."""
     (tmp_path / "library.py").write_text(library, encoding="utf-8")
     done = subprocess.run(
@@ -212,4 +217,4 @@ def test_an_interrupt_at_a_bad_moment_is_one_line(tmp_path: Path, library: str, 
         check=False,
     )
     assert (done.returncode, done.stderr) == (130, "quadriga: interrupted\n")
-    assert done.stdout == "gone on\n"
+    assert done.stdout == gone_on
