@@ -22,7 +22,7 @@ from websockets.http11 import Request, Response
 
 from quadriga.drive.attend import Attendant
 from quadriga.drive.driver_words import MOST_BYTES
-from quadriga.shared.security.own_page import LOOPBACK, is_of_own_page
+from quadriga.shared.security.own_page import LOOPBACK, UNHEARD, is_of_own_page
 
 HOST: Final = "127.0.0.1"
 _PAGES: Final = MappingProxyType(
@@ -58,6 +58,7 @@ async def serve_page(attendant: Attendant, port: int, view: str) -> AsyncIterato
         max_queue=16,
         compression=None,
         ping_interval=None,
+        logger=UNHEARD,
     ) as server:
         page.port = next(iter(server.sockets)).getsockname()[1]
         yield f"http://{HOST}:{page.port}/?token={page.token}"

@@ -12,7 +12,7 @@ import websockets.asyncio.server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from quadriga.shared.security.own_page import LOOPBACK, is_of_own_page
+from quadriga.shared.security.own_page import LOOPBACK, UNHEARD, is_of_own_page
 from quadriga.view.port import HOST, PageAddress, check_port, taken_error
 
 _FORBIDDEN: Final = 403
@@ -81,7 +81,7 @@ def _refusing_foreigners(names: Collection[str]) -> Iterator[None]:
             answered: Response | None = process_request(connection, request)
             return answered
 
-        return usual(*args, process_request=answer, **options)
+        return usual(*args, process_request=answer, **options | {"logger": UNHEARD})
 
     module.serve = serve  # type: ignore[misc, assignment]
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from threading import Event as Flag
 from threading import Thread
 from typing import Any
 from urllib.error import HTTPError
+from urllib.parse import urlsplit
 from urllib.request import Request, urlopen
 
 import numpy as np
@@ -90,9 +92,11 @@ def drive(link: Connection, *, held: bool = True) -> None:
 
 
 def test_only_this_computers_own_page_with_its_token_is_served(
-    config: Config, buses: tuple[Bus, Bus], tmp_path: Path
+    config: Config, buses: tuple[Bus, Bus], tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     with serving(config, buses[1], tmp_path) as (server, path):
+        with socket.create_connection(("127.0.0.1", urlsplit(server.url).port)) as link:
+            link.sendall(b"GET / HT")  # a browser that has changed its mind
         page = urlopen(server.url).read().decode()
         assert 'data-src="http://127.0.0.1:8080"' in page
         script = server.url.partition("?")[0] + "drive.js"
@@ -114,6 +118,7 @@ def test_only_this_computers_own_page_with_its_token_is_served(
             with pytest.raises(InvalidStatus, match="403"):
                 connect(address(server, where).partition("?")[0])
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert not caplog.records, "a terminal would show them, with a traceback"
 
 
 def test_one_page_drives_another_cannot_and_who_is_gone_drives_no_more(

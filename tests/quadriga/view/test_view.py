@@ -41,8 +41,8 @@ from tests.quadriga.view.page import WAIT, Page, labelled, named, updates
 @contextmanager
 def viewing(*options: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """A view's process and its URL."""
-    command = [*QUADRIGA, "view", "--port", "0", *options]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    command, pipe = [*QUADRIGA, "view", "--port", "0", *options], subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True) as process:
         try:
             assert process.stdout is not None
             line = process.stdout.readline()
@@ -55,8 +55,8 @@ def viewing(*options: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
 def end(process: subprocess.Popen[str], number: signal.Signals) -> None:
     """Ask it to leave; it does so without an error and without a word more."""
     process.send_signal(number)
-    out, _ = process.communicate(timeout=WAIT)
-    assert (process.returncode, out) == (0, "")
+    assert process.communicate(timeout=WAIT) == ("", "")
+    assert process.returncode == 0
 
 
 def test_a_page_of_another_origin_is_refused() -> None:
@@ -71,6 +71,17 @@ def test_a_page_of_another_origin_is_refused() -> None:
                 Page(url, origin)
         with Page(url, url) as page:
             page.await_message(labelled("pause"))
+
+
+@pytest.mark.parametrize("sent", [b"", b"GET / HT", b"\x16\x03\x01\n\r\n\r\n"])
+def test_a_connection_without_a_request_is_nobodys_concern(sent: bytes) -> None:
+    """Browsers open some in advance and never use them; port scanners send what they like."""
+    with viewing(str(RECORDING)) as (process, url):
+        host, _, port = url.removeprefix("http://").strip("/").partition(":")
+        with socket.create_connection((host, int(port))) as link:
+            link.sendall(sent)
+            assert b"<html" in urlopen(url).read()
+            end(process, signal.SIGTERM)
 
 
 def test_a_recording_plays_and_pauses() -> None:
