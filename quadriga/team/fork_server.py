@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from quadriga.shared.runtime.installed import code_digest, package_versions
-from quadriga.shared.runtime.scheduling import weigh_session
 from quadriga.shared.runtime.signals import die_with_parent
 
 # What each command imports once it is called, by the command.
@@ -182,7 +181,6 @@ def _fork_all(order: ForkOrder, pids: list[int]) -> Fork | None:
 def _become(fork: Fork, prefix: int, go: int) -> NoReturn:
     """Be the fork's command once it may begin; end if nobody is left to say so."""
     os.setsid()
-    weigh_session()
     _redirect(fork.log)
     if not os.read(go, 1):
         os._exit(0)

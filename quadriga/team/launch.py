@@ -17,7 +17,7 @@ from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import LAST, LEADS, OPERATOR, RECORDER, ROUTER, SIM, Member, has_lead
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.runtime.scheduling import valid_priority, weigh_session
+from quadriga.shared.runtime.scheduling import valid_priority
 from quadriga.team.fork_server import Fork
 from quadriga.team.forked import ForkedProcess, expect_forks, start_forked
 
@@ -156,7 +156,6 @@ class Launch:
                 env=_environment(),
                 start_new_session=True,
             )
-        weigh_session(self._running[row.name].pid)
 
     def _log_of(self, row: ProcessSpec) -> Path:
         return self._logs / f"{row.name}.log"

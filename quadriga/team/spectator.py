@@ -12,7 +12,6 @@ from typing import Final
 from rich.console import Console
 
 from quadriga.shared.printable import printable_line
-from quadriga.shared.runtime.scheduling import weigh_session
 from quadriga.team.launch import QUADRIGA
 from quadriga.team.run_folder import CONFIG
 from quadriga.view.port import url_of
@@ -46,7 +45,6 @@ def view_beside(run_dir: Path, port: int | None, console: Console) -> Iterator[N
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
-    weigh_session(process.pid)
     console.print(f"view of the walk: {url_of(port)}", markup=False, highlight=False)
     try:
         yield

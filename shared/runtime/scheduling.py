@@ -18,7 +18,7 @@ VARIABLE: Final = "QUADRIGA_PRIORITY"  # of the environment: what holds instead 
 _PRIORITY: Final = 1  # of 99: before every ordinary process, after everything else of the system
 _FIRST: Final = 2  # likewise, before those that walk
 _NICE: Final = -15  # of -20 to 19: an ordinary process gets a thirtieth beside it
-_AUTOGROUP: Final = "/proc/{}/autogroup"  # "/autogroup-7 nice 0", see sched(7)
+_AUTOGROUP: Final = Path("/proc/self/autogroup")  # "/autogroup-7 nice 0", see sched(7)
 _left: Final = Event()  # set once this process has left its priority by itself
 
 
@@ -68,26 +68,21 @@ def precede_ordinary(priority: str) -> None:
         for thread in _threads():
             with suppress(OSError):
                 os.setpriority(os.PRIO_PROCESS, thread, _NICE)
-        weigh_session()
+        _weigh_session()
 
 
-def weigh_session(leader: int | None = None) -> None:
-    """Have a process's niceness hold against processes of other sessions, too.
+def _weigh_session() -> None:
+    """Have this process's niceness hold against processes of other sessions, too.
 
     Where Linux groups processes by session (`kernel.sched_autogroup_enabled`, for who is in no
     control group of its own), each session gets the same share of the processors, and a process's
-    niceness counts within its session alone. Here it becomes that of the session. A user without
-    the right, and a system that does not group so, are not refused.
-
-    Args:
-        leader: process id; None: this one. Nothing is done unless it leads its session: others
-            in there are not its own.
+    niceness counts within its session alone. Here it becomes that of the session, if this process
+    leads it: others in there are not its own.
     """
-    process = leader or os.getpid()
     with suppress(OSError):
-        if os.getsid(process) == process:
-            niceness = os.getpriority(os.PRIO_PROCESS, process)
-            Path(_AUTOGROUP.format(process)).write_text(str(niceness), encoding="ascii")
+        if os.getsid(0) == os.getpid():
+            niceness = os.getpriority(os.PRIO_PROCESS, 0)
+            _AUTOGROUP.write_text(str(niceness), encoding="ascii")
 
 
 def leave_priority() -> None:

@@ -11,9 +11,8 @@ from websockets.datastructures import Headers
 LOOPBACK: Final = frozenset({"127.0.0.1", "localhost"})
 # Where a page's server says what went wrong with a request, such as a browser's connection that it
 # opened in advance and never used: nowhere. A reader of the terminal would get a traceback.
-UNHEARD: Final = logging.getLogger(f"{__name__}.unheard")
+UNHEARD: Final = logging.Logger("unheard")  # known to nobody who configures loggers
 UNHEARD.addHandler(logging.NullHandler())
-UNHEARD.propagate = False
 
 
 def is_of_own_page(headers: Headers, names: Collection[str] = ()) -> bool:

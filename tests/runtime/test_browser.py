@@ -25,6 +25,8 @@ pytestmark = [
 Watcher = Callable[..., Bus]
 # On a busy machine a page may have been silent for too long: then it takes the controls again.
 STAYS_IN_CHARGE = "news && !news.driver && drive.say({kind: 'take'})"
+# Likewise a release may have come before all robots had said that they were stopped.
+IF_STILL_STOPPED = "document.querySelector('#reset button').click()"
 CLICK_IF_TAKEN = """
 news.driver === 'page 1' && (document.getElementById('take').click(), true)
 """
@@ -68,14 +70,17 @@ def asks(bus: Bus, page: Page, **least: float) -> None:
     await_message(bus, REFERENCE.key("team"), Reference, wanted)
 
 
-def is_in(bus: Bus, mode: str, reason: str = "", page: Page | None = None) -> None:
-    """Wait until the robot is in a mode for a reason that begins so; `page` drives meanwhile."""
+def is_in(
+    bus: Bus, mode: str, reason: str = "", page: Page | None = None, does: str = STAYS_IN_CHARGE
+) -> None:
+    """Wait until the robot is in a mode for a reason that begins so; `page` does that meanwhile."""
 
     def wanted(message: object) -> bool:
-        if page is not None:
-            page.evaluate(STAYS_IN_CHARGE)
         assert isinstance(message, Status)
-        return message.mode == mode and message.reason.startswith(reason)
+        found = message.mode == mode and message.reason.startswith(reason)
+        if page is not None and not found:
+            page.evaluate(does)
+        return found
 
     await_message(bus, STATUS.key("team", "r1"), Status, wanted)
 
@@ -153,7 +158,7 @@ def drive(team: Team, running: Launch, bus: Bus, chromium: Browser, folder: Path
         page.mouse("mouseReleased", page.point("#hold"))
         page.evaluate("document.getElementById('by').value = 'ann'")
         page.click("#reset button")
-        is_in(bus, "stand", "reset:ann")
+        is_in(bus, "stand", "reset:ann", page, IF_STILL_STOPPED)
         page.mouse("mousePressed", page.point("#hold"))
         page.evaluate("document.getElementById('go-on').click()")
         asks(bus, page, vx=0.2)

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Final
 
 import pytest
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.runtime.scheduling import VARIABLE, valid_priority, weigh_session
+from quadriga.shared.runtime.scheduling import VARIABLE, valid_priority
 from tests.permitted import permitted
 
 _SCRIPT = """
@@ -105,20 +104,6 @@ def test_precedence_holds_against_other_sessions_of_who_leads_its_own(leads: boo
         words, check=True, capture_output=True, text=True, start_new_session=leads
     )
     assert done.stdout.endswith("nice -15\n\n" if leads else f"{before}\n")
-
-
-@pytest.mark.skipif(not _GROUPED.exists(), reason="this system does not group by session")
-def test_a_process_started_in_a_session_of_its_own_keeps_its_niceness_among_all() -> None:
-    words = ["nice", "-n", "3", "sleep", "60"]
-    with subprocess.Popen(words, start_new_session=True) as process:
-        try:
-            of_session = Path(f"/proc/{process.pid}/autogroup")
-            while os.getpriority(os.PRIO_PROCESS, process.pid) != os.getpriority(0, 0) + 3:
-                time.sleep(0.01)
-            weigh_session(process.pid)
-            assert of_session.read_text().endswith(f"nice {os.getpriority(0, 0) + 3}\n")
-        finally:
-            process.kill()
 
 
 @pytest.mark.skipif(not permitted(), reason="this user may not take precedence")
