@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:  # a disk that is full, a folder that is read-only
         what, reason = error.filename or "a file or a connection", system_reason(error)
         return _complain(ConfigError(str(what), reason, "one that can be used"), WRONG)
-    except Exception:
+    except Exception:  # a compiler's, whose callback an interrupt has ended
         if not take_due_interrupt():
             raise
         return _say_interrupted()

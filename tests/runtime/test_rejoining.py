@@ -18,7 +18,15 @@ from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.codes import FALL, LINK_BACK, LOWERED, STANDS_AGAIN, code_of
+from quadriga.shared.wire.codes import (
+    FALL,
+    INPUT_LOST,
+    LINK_BACK,
+    LOWERED,
+    RESUMED,
+    STANDS_AGAIN,
+    code_of,
+)
 from quadriga.shared.wire.messages import Event, Status
 from quadriga.shared.wire.topics import EVENT, STATUS, TRUTH, find_topic
 from quadriga.team.launch import Launch, router_row
@@ -40,10 +48,10 @@ ROBOTS = ("r1", "r2")
 
 
 def await_news(bus: Bus, told: Told | None, robots: Collection[str], is_so: IsSo) -> None:
-    """Wait until that was told and each of these robots has been so, and nobody has fallen.
+    """Wait for an event, if one is given, and for a status of each of these robots; none may fall.
 
-    What a robot is it says again and again: on a busy machine one word of it may be missed, or
-    have been true for another reason before.
+    A robot sends its status again and again. Of its events a busy machine may miss one, or there
+    is none since the robot was in that state before.
     """
     missing, deadline = set(robots), monotonic() + WAIT
     while missing or told is not None:
@@ -108,6 +116,9 @@ def check_files(team: Team, capsys: pytest.CaptureFixture[str]) -> None:
     found = {finding.name: finding for finding in check(second)}
     assert found["continued"].first[0].got.endswith("of run.mcap")
     assert found["whole"].passed
+    told = {(event.robot, event.code) for event in read_traces(Recording(first)).events}
+    both = {(robot, code) for robot in ROBOTS for code in (INPUT_LOST, RESUMED)}
+    assert told >= {("r2", LOWERED), ("r2", STANDS_AGAIN), *both}
     capsys.readouterr()
     assert main(["replay", str(first), "--robot", "r2"]) == 2, "its recorder was killed"
     said = capsys.readouterr().out
