@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import itertools
 import os
-import resource
 from collections import defaultdict
 from collections.abc import Iterator
-from fcntl import LOCK_EX, flock
+from fcntl import LOCK_EX, LOCK_SH, LOCK_UN, flock
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -34,71 +33,73 @@ def _own_runtime_folder(tmp_path_factory: pytest.TempPathFactory) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def _ordinary() -> None:
-    """Two workers share the cores: who merely computes lets the other's team run, too."""
+    """Workers share the cores: what merely computes is not scheduled in real time."""
     os.environ[VARIABLE] = "ordinary"
-    if _may_hurry():
-        os.nice(_PATIENT)
 
 
-def _may_hurry() -> bool:
-    """Whether what was made slower may be made faster again."""
-    return os.geteuid() == 0 or resource.getrlimit(resource.RLIMIT_NICE)[0] >= _NICE_MOST
+@pytest.fixture(autouse=True)
+def _beside_others(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[IO[str], IO[str]]]:
+    """Tests run beside each other, but none beside one that has to be alone.
+
+    All hold the lock `running` together; who wants it for itself keeps the others at the `gate`.
+    """
+    folder = tmp_path_factory.getbasetemp().parent
+    with (folder / "gate.lock").open("w") as gate, (folder / "running.lock").open("w") as running:
+        flock(gate, LOCK_EX)
+        flock(running, LOCK_SH)
+        flock(gate, LOCK_UN)
+        yield gate, running
 
 
 @pytest.fixture
 def _alone(
-    tmp_path_factory: pytest.TempPathFactory,
+    _beside_others: tuple[IO[str], IO[str]],
     monkeypatch: pytest.MonkeyPatch,
     request: pytest.FixtureRequest,
-) -> Iterator[None]:
-    """One at a time of the tests whose team has to keep real time; it precedes all else."""
-    with (tmp_path_factory.getbasetemp().parent / "alone.lock").open("w") as file:
-        begun = monotonic()
-        flock(file, LOCK_EX)
-        request.node.user_properties.append((_WAITED, monotonic() - begun))
-        monkeypatch.delenv(VARIABLE)
-        if not _may_hurry():
-            yield
-            return
-        os.nice(-_PATIENT)
-        yield
-        os.nice(_PATIENT)
+) -> None:
+    """The team of such a test has to keep real time: no other test runs beside it."""
+    gate, running = _beside_others
+    begun = monotonic()
+    flock(running, LOCK_UN)  # or two that want to be alone would wait for each other
+    flock(gate, LOCK_EX)
+    flock(running, LOCK_EX)
+    request.node.user_properties.append((_WAITED, monotonic() - begun))
+    monkeypatch.delenv(VARIABLE)
 
 
-_PATIENT: Final = 10  # nicer are tests, and all they start, than those in real time
-_NICE_MOST: Final = 20  # of RLIMIT_NICE, where a niceness of 0 is permitted again
 _WAITED: Final = "waited"  # s, of a test for its turn to keep real time
 _LONG_RUN: Final = 300.0  # s of tests; of a shorter run nobody asks which files take long
 _SLOWEST: Final = 40  # files that are named
 
-# Folders whose tests start processes and take long, and the one whose teams keep real time.
-_LONG: Final = ("docs", "manual", "plugins", "quadriga/experiments", "deploy")
-_REAL_TIME: Final = "runtime"
+# Folders whose tests start processes and take long, and the one with tests that have to be alone.
+_FIRST: Final = ("docs", "manual", "plugins", "quadriga/experiments", "deploy")
+_LAST: Final = "runtime"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What takes long comes first: then at the end no worker waits long for another one's file.
+    """What takes long comes first, what has to be alone last: no worker waits long for the other.
 
-    Between two files whose teams keep real time, one at a time, come two whose tests do not. Such a
-    test is run once more if it fails: a computer that others use may keep a team from its work for
-    longer than a robot can bear. The summary shows every test that was, and how it failed.
+    A test whose team keeps real time is run once more if it fails: a computer that others use may
+    keep a team from its work for longer than a robot can bear. The summary shows every test that
+    was, and how it failed.
     """
     for item in items:
-        if _alone.__name__ in getattr(item, "fixturenames", ()):
+        if _has_to_be_alone(item):
             item.add_marker(pytest.mark.flaky(reruns=1))
     here = Path(__file__).parent
-    long = [here / name for name in _LONG]
-    items.sort(key=lambda item: not any(map(item.path.is_relative_to, long)))
-    files: dict[Path, list[pytest.Item]] = {}
-    for item in items:
-        files.setdefault(item.path, []).append(item)
-    real_time = [path for path in files if path.is_relative_to(here / _REAL_TIME)]
-    others = [path for path in files if path not in real_time]
-    order = []
-    for n, path in enumerate(real_time):
-        order += [path, *others[2 * n : 2 * n + 2]]
-    order += others[2 * len(real_time) :]
-    items[:] = [item for path in order for item in files[path]]
+    first, last = [here / name for name in _FIRST], here / _LAST
+    alone = {item.path for item in items if _has_to_be_alone(item)}
+    items.sort(
+        key=lambda item: (
+            item.path in alone,
+            item.path.is_relative_to(last),
+            not any(map(item.path.is_relative_to, first)),
+        )
+    )
+
+
+def _has_to_be_alone(item: pytest.Item) -> bool:
+    return _alone.__name__ in getattr(item, "fixturenames", ())
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -30,6 +30,8 @@ WAIT = 60.0  # s, more than anything here takes on a busy machine
 # Less than a team collects by default, which takes minutes; for all tests the same, so that they
 # collect but once.
 DATA = {"identification.seconds": 60.0}
+REAL_TIME = "realtime"
+SPEED = 0.35  # of teams in real time: a slow computer keeps up with two robots
 
 
 @dataclass(frozen=True)
@@ -40,10 +42,14 @@ class Team:
     folder: Path
 
     def rows(self, *, standing: bool = True) -> tuple[ProcessSpec, ...]:
-        """The launcher's table, with agents that merely stand if asked for."""
+        """The launcher's table, with agents that merely stand if asked for.
+
+        Real time is kept in slow motion.
+        """
         (self.folder / "config.toml").write_text(to_toml(self.config), encoding="utf-8")
         rows = process_table(self.config, self.folder, None, "")
-        return tuple(self._standing(row) if standing else row for row in rows)
+        rows = tuple(self._standing(row) if standing else row for row in rows)
+        return tuple(map(in_slow_motion, rows)) if self.config.world.mode == REAL_TIME else rows
 
     def _standing(self, row: ProcessSpec) -> ProcessSpec:
         if row.name not in robot_names(self.config.team.robots):
@@ -84,6 +90,13 @@ class Team:
         return Recording(self.folder / "run.mcap")
 
 
+def in_slow_motion(row: ProcessSpec) -> ProcessSpec:
+    """The process, which is of a module, by slow clocks."""
+    python, option, *words = row.command
+    assert option == "-m"
+    return replace(row, command=(python, "-m", "tests.runtime.slow_motion", str(SPEED), *words))
+
+
 Make = Callable[..., Team]
 
 
@@ -91,7 +104,7 @@ Make = Callable[..., Team]
 def make_team(tmp_path: Path, request: pytest.FixtureRequest) -> Make:
     """A function that makes a team of a test's own; keyword `section__key` sets a key.
 
-    Real time is kept by one test's team at a time.
+    Real time is kept by one test's team at a time, beside no other test.
     """
 
     def make(**keys: object) -> Team:
@@ -105,7 +118,7 @@ def make_team(tmp_path: Path, request: pytest.FixtureRequest) -> Make:
             "runtime.refuse_overload": False,  # robots that walk late will do
         }
         keys = {"world.mode": "lockstep"} | {n.replace("__", "."): v for n, v in keys.items()}
-        if keys["world.mode"] == "realtime":
+        if keys["world.mode"] == REAL_TIME:
             request.getfixturevalue("_alone")
         return Team(load(None, given | keys), tmp_path)
 

@@ -33,7 +33,7 @@ Watcher = Callable[..., Bus]
 
 
 @pytest.mark.usefixtures("_alone")
-@pytest.mark.parametrize(("mode", "robots"), [("lockstep", 2), ("realtime", 1)])
+@pytest.mark.parametrize(("mode", "robots"), [("lockstep", 1), ("realtime", 2)])
 def test_stopped_released_and_sent_on(
     make_team: Make, watcher: Watcher, capsys: pytest.CaptureFixture[str], mode: str, robots: int
 ) -> None:

@@ -1,0 +1,51 @@
+"""A module that runs in slow motion: `python -m tests.runtime.slow_motion SPEED MODULE …`.
+
+Robots fall, and rightly, where a computer is too slow for their team in real time. Slow motion
+leaves such a computer time for each tick: all clocks that this project reads run at a share `SPEED`
+of their speed, in all processes from the same origin. Those of Zenoh's own threads stay as they are.
+"""
+
+from __future__ import annotations
+
+import runpy
+import sys
+import time
+from typing import Final
+
+from quadriga.shared.runtime import clock
+
+_NS: Final = 1_000_000_000
+
+
+class SlowTime:
+    """In place of the module `time`, as far as `quadriga.shared.runtime.clock` asks it."""
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+
+    def monotonic_ns(self) -> int:
+        return round(self._speed * time.monotonic_ns())
+
+    def monotonic(self) -> float:
+        return self.monotonic_ns() / _NS
+
+    def time_ns(self) -> int:
+        return time.time_ns() - time.monotonic_ns() + self.monotonic_ns()
+
+    def thread_time_ns(self) -> int:
+        return round(self._speed * time.thread_time_ns())
+
+    def sleep(self, seconds: float) -> None:
+        time.sleep(seconds / self._speed)
+
+
+def main() -> None:
+    """Run the module with its arguments, by slow clocks."""
+    speed, module, *words = sys.argv[1:]
+    vars(clock)["time"] = SlowTime(float(speed))
+    sys.argv = [module, *words]
+    runpy.run_module(module, run_name="__main__", alter_sys=True)
+
+
+if __name__ == "__main__":
+    main()
