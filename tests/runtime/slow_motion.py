@@ -2,7 +2,7 @@
 
 Robots fall, and rightly, where a computer is too slow for their team in real time. Slow motion
 leaves such a computer time for each tick: all clocks that this project reads run at a share `SPEED`
-of their speed, in all processes from the same origin. Those of Zenoh's own threads stay as they are.
+of their speed, in all processes from the same origin. Those of Zenoh's own threads are as ever.
 """
 
 from __future__ import annotations

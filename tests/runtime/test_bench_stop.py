@@ -24,7 +24,8 @@ def test_a_press_is_timed_once(tmp_path: Path, capsys: pytest.CaptureFixture[str
     figures = json.loads(file.read_text(encoding="utf-8"))
     assert [figures[way]["stopped"] for way in WAYS] == [1] * len(WAYS)
     assert 0.0 < figures["page"]["p50_ms"] < 5000.0
-    # It slows down for half a second, and 0.3 s of silence are waited for first.
-    assert figures["silence"]["p50_ms"] > 800.0
+    # 0.3 s of silence are waited for, then it slows down for half a second. A world that was late
+    # makes up for up to 20 ms at a time, and is ahead of its own clock by so much.
+    assert figures["silence"]["p50_ms"] > 700.0
     assert main([*words[:-4], "--out", str(folder)]) == 0
     assert len((folder / "rows.jsonl").read_text(encoding="utf-8").splitlines()) == len(WAYS)

@@ -143,4 +143,6 @@ def test_a_router_and_the_word_to_go_on(make_team: Make, watcher: Watcher) -> No
         await_news(bus, None, ROBOTS, walks)
         running.watch(lambda: True)
     told = {(event.robot, event.code) for event in read_traces(team.recording()).events}
-    assert told >= {("", LINK_BACK), *((robot, STANDS_AGAIN) for robot in ROBOTS)}, "one recording, with a gap in its midst"
+    assert told >= {("", LINK_BACK), *((robot, STANDS_AGAIN) for robot in ROBOTS)}, (
+        "one recording, with a gap in its midst"
+    )

@@ -43,7 +43,7 @@ from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.what_if.what_if import Branch, WhatIf, answer_what_if
 from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
-from tests.runtime.conftest import DATA, WAIT
+from tests.runtime.conftest import DATA, REAL_TIME, WAIT, in_slow_motion
 from tests.runtime.frozen import PATIENCE, await_event, await_tick, freeze
 
 pytestmark = pytest.mark.usefixtures("_compiled")
@@ -63,7 +63,10 @@ def walked(folder: Path, disturb: Disturb | None = None, **keys: Any) -> Path:
     copy_predictor(predictor, folder)
     (folder / "config.toml").write_text(to_toml(config), encoding="utf-8")
     sha256 = predictor_sha256(load_predictor(predictor, config)[0])
-    with Launch(process_table(config, folder, predictor, sha256), folder / "logs") as running:
+    rows = process_table(config, folder, predictor, sha256)
+    if config.world.mode == REAL_TIME:
+        rows = tuple(map(in_slow_motion, rows))
+    with Launch(rows, folder / "logs") as running:
         if disturb is not None:
             disturb(running, config.bus.endpoint)
         running.watch(lambda: False)

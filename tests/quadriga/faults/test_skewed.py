@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +12,7 @@ import pytest
 
 from quadriga.faults import skewed
 from quadriga.faults.skewed import SkewedTime
+from quadriga.shared.runtime import clock
 from quadriga.shared.runtime.clock import wall_ns
 
 SECOND = 1_000_000_000
@@ -60,6 +63,16 @@ def test_sleep_is_by_the_clock_that_goes_wrong() -> None:
     clocks.set(0.0, 0.25)
     clocks.sleep(1.0)
     assert true.slept == pytest.approx(0.8)
+
+
+def test_all_that_the_project_asks_of_the_time_is_answered(monkeypatch: pytest.MonkeyPatch) -> None:
+    true = TrueClocks()
+    clocks = SkewedTime(true.monotonic_ns, true.time_ns, true.sleep)
+    monkeypatch.setattr(clock, "time", clocks)
+    asked = set(re.findall(r"\btime\.(\w+)", inspect.getsource(clock)))
+    assert asked >= {"monotonic_ns", "thread_time_ns"}
+    assert not [name for name in asked if not hasattr(clocks, name)]
+    assert clock.thread_ns() <= clock.thread_ns()
 
 
 def test_a_command_reads_the_clock_that_a_file_and_a_signal_set(tmp_path: Path) -> None:
