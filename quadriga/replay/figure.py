@@ -10,7 +10,7 @@ import numpy as np
 
 from quadriga.charts.draw import draw_panels
 from quadriga.charts.files import save_png
-from quadriga.charts.panels import Curve, Panel, PanelGrid
+from quadriga.charts.panels import BESIDE, Curve, Panel, PanelGrid
 from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.robot.conventions import JOINT_NAMES, OUTPUTS, Array, Leg
 from quadriga.shared.wire.messages import Command, Measurement, Message, Plan
@@ -26,6 +26,7 @@ _NAMES: Final = {
     "output": [f"{name} [{unit}]" for name, unit in zip(OUTPUTS, _UNITS, strict=True)],
     "torque": [f"{name.removesuffix('_joint')} [N·m]" for name in JOINT_NAMES],
 }
+_OF_OUTPUTS: Final = ("plan", "output")
 _TITLES: Final = {
     "force": "planned force",
     "plan": "planned output",
@@ -96,9 +97,11 @@ def _build_panels(curves: Curves, kind: str) -> tuple[Panel, Panel]:
         Curve(time, old[:, column], _RECORDED, shape),
         Curve(time, new[:, column], _RECOMPUTED, shape),
     ]
+    beside = BESIDE[column] if kind in _OF_OUTPUTS else None
     difference = new[:, column] - old[:, column]
     worst = int(np.abs(difference).argmax())
     rms = float(np.sqrt(np.mean(difference**2)))
     size = f"at most {abs(difference[worst]):.3g}, at {time[worst]:.2f} s; rms {rms:.3g}"
     apart = f"recomputed − recorded: {size}" if difference.any() else "the same"
-    return Panel(name, both), Panel(apart, [Curve(time, difference, _DIFFERENCE, shape)])
+    gap = Panel(apart, [Curve(time, difference, _DIFFERENCE, shape)], beside=beside)
+    return Panel(name, both, beside=beside), gap

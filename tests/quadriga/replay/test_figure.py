@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from quadriga.charts.panels import DEGREES, Panel
+from quadriga.replay import figure
 from quadriga.replay.figure import Curves, draw
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.wire.messages import Measurement
@@ -31,6 +33,24 @@ def test_the_component_that_has_changed_most_is_shown(tmp_path: Path) -> None:
     assert found.most_changed_component("output") == 2
     draw(found, "r1 of a/run.mcap: planner.mu=0.3", tmp_path / "a.png")
     assert (tmp_path / "a.png").stat().st_size > 10_000
+
+
+def test_angles_are_read_in_degrees_as_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Panel] = []
+    monkeypatch.setattr(figure, "draw_panels", lambda panels, *_, **__: drawn.extend(panels))
+    monkeypatch.setattr(figure, "save_png", lambda *_: None)
+    found = Curves(4)
+    stance = np.ones(4)
+    for tick in range(0, 1000, 10):
+        y, changed = np.zeros(6), np.array([0, 0, 0, 0.1, 0, 0])
+        messages = [Measurement(tick, 0, np.zeros(12), each, stance) for each in (y, changed)]
+        found.add(*messages)
+    draw(found, "roll", tmp_path / "a.png")
+    turned = [panel for panel in drawn if panel.beside is not None]
+    assert [panel.title for panel in turned][0] == "estimated output: roll [rad]"
+    assert [panel.beside for panel in turned] == [DEGREES, DEGREES]
 
 
 def test_a_figure_that_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from quadriga.recordings.summary import SUMMARY
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Event, Status
+from quadriga.team import run_report
 from quadriga.team.run_report import report_folder
 from tests.quadriga.conftest import WriteRun, run_config
 
@@ -27,6 +28,26 @@ def test_a_finished_walk_is_summed_up_and_drawn(write_run: WriteRun) -> None:
     assert (folder / SUMMARY).is_file()
     assert (folder / "trajectory.png").is_file()
     assert (folder / "report.html").stat().st_size > 50_000
+
+
+@pytest.mark.parametrize("slow", ["write_figures", "scene_of", "render"])
+def test_the_table_is_shown_before_anything_is_drawn(
+    write_run: WriteRun,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    slow: str,
+) -> None:
+    folder = write_run(run_config(1, 2.0), extra=event(codes.TIME_OVER, "", "end of world.seconds"))
+    shown = []
+
+    def interrupt(*_: object) -> None:
+        shown.append(capsys.readouterr().out)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run_report, slow, interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        report_folder(folder, pictures=True, console=Console())
+    assert "distance" in shown[0]
 
 
 def test_a_walk_that_was_cut_short_is_a_failure_but_summed_up(write_run: WriteRun) -> None:
