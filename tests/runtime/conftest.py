@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from benchmarks.slow_motion import in_slow_motion
 from quadriga.replay.outcome import format_outcome
 from quadriga.replay.team_replay import replay
 from quadriga.shared.bus.zenoh_bus import Bus
@@ -49,7 +50,9 @@ class Team:
         (self.folder / "config.toml").write_text(to_toml(self.config), encoding="utf-8")
         rows = process_table(self.config, self.folder, None, "")
         rows = tuple(self._standing(row) if standing else row for row in rows)
-        return tuple(map(in_slow_motion, rows)) if self.config.world.mode == REAL_TIME else rows
+        if self.config.world.mode == REAL_TIME:
+            return tuple(in_slow_motion(row, SPEED) for row in rows)
+        return rows
 
     def _standing(self, row: ProcessSpec) -> ProcessSpec:
         if row.name not in robot_names(self.config.team.robots):
@@ -88,13 +91,6 @@ class Team:
     def recording(self) -> Recording:
         """What was recorded."""
         return Recording(self.folder / "run.mcap")
-
-
-def in_slow_motion(row: ProcessSpec) -> ProcessSpec:
-    """The process, which is of a module, by slow clocks."""
-    python, option, *words = row.command
-    assert option == "-m"
-    return replace(row, command=(python, "-m", "tests.runtime.slow_motion", str(SPEED), *words))
 
 
 Make = Callable[..., Team]

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from benchmarks.slow_motion import in_slow_motion
 from quadriga.agents.planner.checked_predictor import load_checked as load_predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.commands.parser import main
@@ -43,7 +44,7 @@ from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.what_if.what_if import Branch, WhatIf, answer_what_if
 from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
-from tests.runtime.conftest import DATA, REAL_TIME, WAIT, in_slow_motion
+from tests.runtime.conftest import DATA, REAL_TIME, SPEED, WAIT
 from tests.runtime.frozen import PATIENCE, await_event, await_tick, freeze
 
 pytestmark = pytest.mark.usefixtures("_compiled")
@@ -65,7 +66,7 @@ def walked(folder: Path, disturb: Disturb | None = None, **keys: Any) -> Path:
     sha256 = predictor_sha256(load_predictor(predictor, config)[0])
     rows = process_table(config, folder, predictor, sha256)
     if config.world.mode == REAL_TIME:
-        rows = tuple(map(in_slow_motion, rows))
+        rows = tuple(in_slow_motion(row, SPEED) for row in rows)
     with Launch(rows, folder / "logs") as running:
         if disturb is not None:
             disturb(running, config.bus.endpoint)

@@ -49,7 +49,7 @@ def test_angles_are_read_in_degrees_as_well(
         found.add(*messages)
     draw(found, "roll", tmp_path / "a.png")
     turned = [panel for panel in drawn if panel.beside is not None]
-    assert [panel.title for panel in turned][0] == "estimated output: roll [rad]"
+    assert turned[0].title == "estimated output: roll [rad]"
     assert [panel.beside for panel in turned] == [DEGREES, DEGREES]
 
 

@@ -1,4 +1,4 @@
-"""A module that runs in slow motion: `python -m tests.runtime.slow_motion SPEED MODULE …`.
+"""A module that runs in slow motion: `python -m benchmarks.slow_motion SPEED MODULE …`.
 
 Robots fall, and rightly, where a computer is too slow for their team in real time. Slow motion
 leaves such a computer time for each tick: all clocks that this project reads run at a share `SPEED`
@@ -10,9 +10,13 @@ from __future__ import annotations
 import runpy
 import sys
 import time
-from typing import Final
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
 
 from quadriga.shared.runtime import clock
+
+if TYPE_CHECKING:
+    from quadriga.team.launch import ProcessSpec  # a process that runs so need not load it
 
 _NS: Final = 1_000_000_000
 
@@ -37,6 +41,18 @@ class SlowTime:
 
     def sleep(self, seconds: float) -> None:
         time.sleep(seconds / self._speed)
+
+
+def in_slow_motion(row: ProcessSpec, speed: float) -> ProcessSpec:
+    """The same process by slow clocks.
+
+    Args:
+        row: of the launcher's table; it runs a module.
+        speed: of the clocks, as a share of their own, at most 1.
+    """
+    python, option, *words = row.command
+    assert option == "-m", row.command
+    return replace(row, command=(python, "-m", __name__, str(speed), *words))
 
 
 def main() -> None:
