@@ -10,7 +10,6 @@ from __future__ import annotations
 import runpy
 import signal
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
@@ -25,7 +24,8 @@ class SkewedTime:
     """In place of the module `time`, as far as `quadriga.shared.runtime.clock` asks it.
 
     Args:
-        monotonic_ns, time_ns, sleep: those of the true clocks.
+        monotonic_ns, time_ns, sleep, thread_time_ns: those of the true clocks; the last one stays
+            true, as what was computed depends on no clock.
     """
 
     def __init__(
@@ -33,8 +33,10 @@ class SkewedTime:
         monotonic_ns: Callable[[], int],
         time_ns: Callable[[], int],
         sleep: Callable[[float], None],
+        thread_time_ns: Callable[[], int],
     ) -> None:
         self._monotonic_ns, self._time_ns, self._sleep = monotonic_ns, time_ns, sleep
+        self.thread_time_ns = thread_time_ns
         self._step_ns, self._rate = 0, 0.0
         self._gained_ns, self._since = 0, monotonic_ns()
 
@@ -52,9 +54,6 @@ class SkewedTime:
     def time_ns(self) -> int:
         return self._time_ns() + self._gained() + self._step_ns
 
-    def thread_time_ns(self) -> int:
-        return time.thread_time_ns()  # what was computed, whatever the clocks say
-
     def sleep(self, seconds: float) -> None:
         self._sleep(seconds / (1.0 + self._rate))
 
@@ -67,7 +66,9 @@ def main() -> None:
     file, module, *words = sys.argv[1:]
     names = vars(clock)
     true: Any = names["time"]
-    skewed = names["time"] = SkewedTime(true.monotonic_ns, true.time_ns, true.sleep)
+    skewed = names["time"] = SkewedTime(
+        true.monotonic_ns, true.time_ns, true.sleep, true.thread_time_ns
+    )
 
     def read(_number: int = 0, _frame: FrameType | None = None) -> None:
         step_s, rate = Path(file).read_text(encoding="ascii").split()

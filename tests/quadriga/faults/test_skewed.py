@@ -6,6 +6,7 @@ import inspect
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -36,7 +37,7 @@ class TrueClocks:
 
 def test_a_step_is_of_the_wall_clock_alone() -> None:
     true = TrueClocks()
-    clocks = SkewedTime(true.monotonic_ns, true.time_ns, true.sleep)
+    clocks = SkewedTime(true.monotonic_ns, true.time_ns, true.sleep, time.thread_time_ns)
     clocks.set(-3600.0, 0.0)
     assert clocks.monotonic_ns() == true.now
     assert clocks.time_ns() == true.time_ns() - 3600 * SECOND
@@ -44,7 +45,7 @@ def test_a_step_is_of_the_wall_clock_alone() -> None:
 
 def test_a_clock_that_runs_fast_is_ahead_the_more_the_later_it_is_and_never_jumps() -> None:
     true = TrueClocks()
-    clocks = SkewedTime(true.monotonic_ns, true.time_ns, true.sleep)
+    clocks = SkewedTime(true.monotonic_ns, true.time_ns, true.sleep, time.thread_time_ns)
     true.now += SECOND
     clocks.set(0.0, 0.5)
     assert clocks.monotonic_ns() == true.now
@@ -59,7 +60,7 @@ def test_a_clock_that_runs_fast_is_ahead_the_more_the_later_it_is_and_never_jump
 
 def test_sleep_is_by_the_clock_that_goes_wrong() -> None:
     true = TrueClocks()
-    clocks = SkewedTime(true.monotonic_ns, true.time_ns, true.sleep)
+    clocks = SkewedTime(true.monotonic_ns, true.time_ns, true.sleep, time.thread_time_ns)
     clocks.set(0.0, 0.25)
     clocks.sleep(1.0)
     assert true.slept == pytest.approx(0.8)
@@ -67,7 +68,7 @@ def test_sleep_is_by_the_clock_that_goes_wrong() -> None:
 
 def test_all_that_the_project_asks_of_the_time_is_answered(monkeypatch: pytest.MonkeyPatch) -> None:
     true = TrueClocks()
-    clocks = SkewedTime(true.monotonic_ns, true.time_ns, true.sleep)
+    clocks = SkewedTime(true.monotonic_ns, true.time_ns, true.sleep, time.thread_time_ns)
     monkeypatch.setattr(clock, "time", clocks)
     asked = set(re.findall(r"\btime\.(\w+)", inspect.getsource(clock)))
     assert asked >= {"monotonic_ns", "thread_time_ns"}
