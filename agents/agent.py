@@ -172,7 +172,7 @@ class Agent:
 
     def _why_rise(self, state: AgentState, inputs: Inputs) -> str:
         """Why the robot begins to get up at this tick; "": it does not."""
-        lowered = self._watch.is_led_down(inputs.events)
+        lowered = bool(inputs.events) and self._watch.is_led_down(inputs.events)
         return self._rising.why_now(
             state.mode, state.tick, inputs.state.tick, inputs.reset, inputs.estop, lowered=lowered
         )
@@ -276,7 +276,8 @@ class Agent:
         self, inputs: Inputs, course: Mode, team: Teammates, *, led: bool
     ) -> list[Stop]:
         """Stops that what arrived, or did not arrive, asks for."""
-        stops, estop = list[Stop](), inputs.estop
+        stops: list[Stop] = []
+        estop = inputs.estop
         if estop is not None:
             stops.append(Stop(ESTOP, with_detail(ESTOP, estop.reason)))
         if inputs.stop is not None:

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.encoder_bridge import joints_held, name_joints
+from quadriga.agents.encoder_bridge import ENCODERS, joints_held, name_joints
 from quadriga.agents.modes import ENCODER_LOST, IMU_LOST
 from quadriga.shared.robot.conventions import JOINT_NAMES, Array
 from quadriga.shared.runtime.record import record
@@ -37,6 +37,9 @@ class SensorLoss:
     now: bool
 
 
+_NOTHING: Final = SensorLoss("", (), now=False)
+
+
 class SensorLosses:
     """How long a robot can do without one of its sensors.
 
@@ -57,6 +60,8 @@ class SensorLosses:
             missing_ms: for how long no attitude has been believed.
             encoders: what is remembered of them, see `EncoderLayout`.
         """
+        if not (missing_ms or encoders[ENCODERS.longest]):
+            return _NOTHING
         lost, reason = joints_held(encoders, self._encoder_ms), ""
         if missing_ms > self._imu_ms:
             reason = IMU_LOST

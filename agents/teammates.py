@@ -104,6 +104,8 @@ class TeamWatch:
             tick: the present one.
             since: when the robot that watches began to walk.
         """
+        if not (known.lost or known.heard):  # as at every tick of lock-step without a loss
+            return ()
         return tuple(
             name
             for name in self.names
