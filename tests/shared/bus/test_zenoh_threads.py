@@ -15,20 +15,28 @@ from quadriga.shared.config.load import load
 from quadriga.team.endpoint import free_endpoint
 
 PROGRAM = """
-import os, sys
+import os, sys, time
 from pathlib import Path
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.load import load
 
-endpoint, who = sys.argv[1:]
+endpoint, who, threads = sys.argv[1:]
 config = load(None, {"bus.endpoint": endpoint}).bus
 opened = Bus.route(endpoint, "team") if who == "router" else Bus.open(config, "team", who)
 with opened:
     opened.declare(HERE)
     opened.wait_for(HERE, {"r1"}, 20.0, lambda: False)
-    # Those that receive begin with the first link; Zenoh names them rx-0, rx-1, …
-    names = [(task / "comm").read_text() for task in Path("/proc/self/task").iterdir()]
-    print(sum(name.startswith("rx-") for name in names), os.environ.get("ZENOH_RUNTIME"))
+    # Those that receive begin with the first link; Zenoh names them rx-0, rx-1, … A thread bears
+    # its name once it has run: the second is for one too many, the rest for one that is late.
+    time.sleep(1.0)
+    deadline = time.monotonic() + 20.0
+    while True:
+        names = [(task / "comm").read_text() for task in Path("/proc/self/task").iterdir()]
+        found = sum(name.startswith("rx-") for name in names)
+        if found >= int(threads) or time.monotonic() > deadline:
+            break
+        time.sleep(0.05)
+    print(found, os.environ.get("ZENOH_RUNTIME"))
 """
 
 
@@ -44,7 +52,7 @@ def test_how_many_threads_receive(who: str, given: str | None, threads: int) -> 
     environment = {name: text for name, text in os.environ.items() if name != "ZENOH_RUNTIME"}
     if given is not None:
         environment["ZENOH_RUNTIME"] = given
-    command = [sys.executable, "-c", PROGRAM, endpoint, who]
+    command = [sys.executable, "-c", PROGRAM, endpoint, who, str(threads)]
     config = load(None, {"bus.endpoint": endpoint}).bus
     if who == "router":
         config = replace(config, mode="client")
