@@ -19,7 +19,7 @@ from quadriga.shared.bus.presence import Presence
 from quadriga.shared.bus.router_wait import RouterWait
 from quadriga.shared.bus.trust import check_trust
 from quadriga.shared.bus.zenoh_settings import member_settings, opening_error, router_settings
-from quadriga.shared.bus.zenoh_threads import one_thread_receives
+from quadriga.shared.bus.zenoh_threads import one_thread_receives, staying_attached
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import ROUTER
@@ -206,20 +206,19 @@ class Bus:
         """Packets that were dropped so far because this process did not take them in."""
         return self._inbox.dropped
 
-    def collect(self, key: str) -> Callable[[], list[Arrival]]:
-        """Keep what others publish on `key` apart from the inbox, each with when it arrived.
+    def collect(self, *keys: str) -> Callable[[], list[Arrival]]:
+        """Keep what others publish on `keys` apart from the inbox, each with when it arrived.
 
-        That is noted by the thread that receives it, so it does not matter when it is looked at.
-
-        Returns:
-            A function that gives all that have arrived since it was called last, oldest first.
+        That is noted by the thread that receives it, so it does not matter when it is looked at:
+        the function returned gives all that have come since it was called last, oldest first.
         """
         kept: SimpleQueue[Arrival] = SimpleQueue()
 
         def keep(sample: zenoh.Sample) -> None:
             kept.put((monotonic_ns(), str(sample.key_expr), sample.payload.to_bytes()))
 
-        self._hear(key, _direct(keep))
+        for key in keys:
+            self._hear(key, _direct(keep))
         return lambda: [kept.get_nowait() for _ in range(kept.qsize())]
 
     def keep_newest(self, key: str, most: int) -> Newest:
@@ -386,7 +385,7 @@ def _packet(sample: zenoh.Sample) -> Packet:
 
 def _direct(call: Callable[[Any], None]) -> Any:
     """A Zenoh callback in the receiving thread: a mailbox needs no thread of its own."""
-    return zenoh.handlers.Callback(call, indirect=False)
+    return zenoh.handlers.Callback(staying_attached(call), indirect=False)
 
 
 def _open(settings: dict[str, Any], name: str) -> zenoh.Session:

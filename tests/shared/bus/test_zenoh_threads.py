@@ -1,4 +1,4 @@
-"""A member of a team receives in one thread, a router in as many as Zenoh has."""
+"""A member of a team receives in one thread, which stays known to Python; a router in more."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from threading import local
 
 import pytest
 
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.load import load
+from quadriga.shared.runtime.clock import sleep
 from quadriga.team.endpoint import free_endpoint
 
 PROGRAM = """
@@ -63,3 +65,24 @@ def test_how_many_threads_receive(who: str, given: str | None, threads: int) -> 
         other.declare(HERE)
         said, _ = process.communicate(timeout=60.0)
     assert said == f"{threads} {given}\n"
+
+
+def test_the_thread_that_receives_stays_known_to_python() -> None:
+    """What is local to a thread lives as long as Python's state of it."""
+    config, known = load(None, {"bus.endpoint": free_endpoint()}).bus, local()
+
+    def count() -> bytes:
+        known.calls = getattr(known, "calls", 0) + 1
+        return b"%d" % known.calls
+
+    with Bus.open(config, "team", "sim") as sim, Bus.open(config, "team", "r1") as r1:
+        sim.answer("team/calls", count)
+        sim.declare(HERE)
+        assert r1.wait_for(HERE, {"sim"}, 20.0, lambda: False)
+        told = []
+        for _ in range(3):
+            answers = r1.ask("team/calls", 20.0)
+            while not answers.over:
+                sleep(0.001)
+            told += [payload for _, _, payload in answers.take()]
+    assert told == [b"1", b"2", b"3"]
