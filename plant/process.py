@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext
 from typing import Final
 
 from quadriga.plant.end import TOLD_TO_STOP, End
@@ -18,7 +18,7 @@ from quadriga.shared.bus.barrier import await_agents, meet, start_together
 from quadriga.shared.bus.lead_watch import Loss, loss_error
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import BRIDGED, Config
-from quadriga.shared.errors import MessageError, ProcessError
+from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import plant_name
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import sleep
@@ -26,9 +26,7 @@ from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 from quadriga.shared.runtime.signals import interruptible, stop_on_signals
 from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import LiveFault
-from quadriga.shared.wire.topics import COMMAND, LIVE_FAULT
+from quadriga.shared.wire.topics import COMMAND
 
 _PAUSE: Final = 0.002  # s, between two looks of a simulated robot's plant that waits
 
@@ -69,7 +67,7 @@ def run(
         pace = team_pace(bus, config, robot, is_robot=plant.is_robot)
         with interruptible(stopped):
             server = PlantServer(config, plant, bus, time, name)
-        server.faults, server.words = _faults(bus), words
+        server.words = words
         if not meet(bus, config, stopped):
             return
         end_collection()
@@ -108,20 +106,6 @@ def _start(server: PlantServer, pace: TeamPace | None, stopped: Callable[[], boo
     if pace is None:
         return start_together(bus, config, stopped, pause)
     return pace.start(pause or _pause, stopped)
-
-
-def _faults(bus: Bus) -> Callable[[], list[str]]:
-    """A function that gives the faults that somebody has asked for since it was called last."""
-    take = bus.collect(LIVE_FAULT.key(bus.team))
-
-    def asked() -> list[str]:
-        found = list[str]()
-        for _, _, payload in take():
-            with suppress(MessageError):
-                found.append(decode(payload, LiveFault).fault)
-        return found
-
-    return asked
 
 
 def _pause() -> None:

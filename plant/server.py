@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from quadriga.plant.commands import CommandBox
@@ -48,7 +48,6 @@ class PlantServer:
     Attributes:
         words: gives what people have said since it was called last. A robot sees to an emergency
             stop itself.
-        faults: gives the faults that somebody has asked for since it was called last.
         commands: the newest command of every robot of the plant.
         silent: robots that are not waited for.
         operator_gone: whether the operator has left, in real time.
@@ -67,7 +66,6 @@ class PlantServer:
         self.late_ms: dict[str, int] = {}
         self._lost, self._lowered = LostCommands(config), frozenset[str]()
         self.words: Callable[[], Words] = lambda: NO_WORDS
-        self.faults: Callable[[], Sequence[str]] = tuple
         self._estopped = -1  # tick of the last answer to the emergency stop in force; −1: none is
         self._stop = ""  # why somebody has asked the team to stop, and the walk to end
         # What is said may come twice; a release may end no stop that was pressed meanwhile.
@@ -180,9 +178,11 @@ class PlantServer:
     def step(self, commands: Mapping[str, Command]) -> End | None:
         """Advance the plant by one tick; why the walk ends, if it does."""
         self._report_invalid()
-        self._hear(self.words())
-        for fault in self.faults():
-            self._inject(fault)
+        words = self.words()
+        if words is not NO_WORDS:
+            self._hear(words)
+            for fault in words.faults:
+                self._inject(fault)
         for event in self.plant.step(self._final_commands(commands)):
             if event.robot or self.time.drives:  # what concerns all is announced once
                 self._send(event)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from typing import Final, NamedTuple, TypeVar
+from typing import Final, NamedTuple
 
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.zenoh_bus import Arrival, Bus
 from quadriga.shared.errors import MessageError
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import EStop, Message, Reset, SafeStop
-from quadriga.shared.wire.topics import ESTOP, RESET, STOP, Topic
+from quadriga.shared.wire.messages import EStop, LiveFault, Message, Reset, SafeStop
+from quadriga.shared.wire.topics import ESTOP, LIVE_FAULT, RESET, STOP
 
-M = TypeVar("M", bound=Message)
 _UNREADABLE: Final = "unreadable"
+_KINDS: Final = {ESTOP: EStop, RESET: Reset, STOP: SafeStop, LIVE_FAULT: LiveFault}
 
 
 class Words(NamedTuple):
@@ -23,46 +23,59 @@ class Words(NamedTuple):
         estop: why the team's emergency stop was pressed; "" if it was not.
         reset: the operator's release of one.
         stop: somebody's wish that the team slow down and stand.
+        faults: faults of sensors and motors that somebody has asked for.
     """
 
     estop: str = ""
     reset: Reset | None = None
     stop: SafeStop | None = None
+    faults: tuple[str, ...] = ()
 
 
 NO_WORDS: Final = Words()
 
 
 def listen_to_words(bus: Bus) -> Callable[[], Words]:
-    """A function that gives what people have said since it was called last."""
-    estop, reset = listen_to_estops(bus), _last_of(bus, RESET, Reset)
-    stop = _last_of(bus, STOP, SafeStop)
-    return lambda: Words(estop(), reset(), stop())
+    """A function that gives what people have said since it was called last.
+
+    It is called at every tick and has nearly always nothing to tell, so it looks in one place.
+    """
+    kinds = {topic.key(bus.team): kind for topic, kind in _KINDS.items()}
+    take = bus.collect(*kinds)
+
+    def said() -> Words:
+        arrived = take()
+        return _sort(kinds, arrived) if arrived else NO_WORDS
+
+    return said
 
 
 def listen_to_estops(bus: Bus) -> Callable[[], str]:
     """A function that tells why the emergency stop was pressed; "" until it is."""
     take = bus.collect(ESTOP.key(bus.team))
-
-    def reason() -> str:
-        for _, _, payload in take():
-            try:
-                return decode(payload, EStop).reason or ESTOP.name
-            except MessageError:
-                return _UNREADABLE  # somebody wanted to stop the team
-        return ""
-
-    return reason
+    return lambda: next((_reason_of(payload) for _, _, payload in take()), "")
 
 
-def _last_of(bus: Bus, topic: Topic, kind: type[M]) -> Callable[[], M | None]:
-    take = bus.collect(topic.key(bus.team))
+def _sort(kinds: Mapping[str, type[Message]], arrived: Iterable[Arrival]) -> Words:
+    words = NO_WORDS
+    for _, key, payload in arrived:
+        if kinds[key] is EStop:
+            words = words._replace(estop=words.estop or _reason_of(payload))
+            continue
+        with suppress(MessageError):
+            message = decode(payload, kinds[key])
+            if isinstance(message, Reset):
+                words = words._replace(reset=message)
+            elif isinstance(message, SafeStop):
+                words = words._replace(stop=message)
+            elif isinstance(message, LiveFault):
+                words = words._replace(faults=(*words.faults, message.fault))
+    return words
 
-    def last() -> M | None:
-        found: M | None = None
-        for _, _, payload in take():
-            with suppress(MessageError):
-                found = decode(payload, kind)
-        return found
 
-    return last
+def _reason_of(payload: bytes) -> str:
+    """Why an emergency stop was pressed, never ""."""
+    try:
+        return decode(payload, EStop).reason or ESTOP.name
+    except MessageError:
+        return _UNREADABLE  # somebody wanted to stop the team

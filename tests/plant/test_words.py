@@ -10,11 +10,12 @@ from quadriga.shared.config.load import load
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import EStop, Message, Reset, SafeStop
-from quadriga.shared.wire.topics import ESTOP, RESET, STOP, Topic
+from quadriga.shared.wire.messages import EStop, LiveFault, Message, Reset, SafeStop
+from quadriga.shared.wire.topics import ESTOP, LIVE_FAULT, RESET, STOP, Topic
 from quadriga.team.endpoint import free_endpoint
 
 FIRST, LAST = Reset(1, 0, "ann"), Reset(2, 0, "bob")
+GONE, STUCK = LiveFault(1, 0, "r1/imu off"), LiveFault(2, 0, "r2/FL_calf stuck")
 LUNCH = SafeStop(1, 0, "lunch", True)
 
 
@@ -26,9 +27,10 @@ LUNCH = SafeStop(1, 0, "lunch", True)
         (ESTOP, [b"stop!"], Words("unreadable")),
         (RESET, [FIRST, LAST, b"no"], Words(reset=LAST)),
         (STOP, [LUNCH], Words(stop=LUNCH)),
+        (LIVE_FAULT, [GONE, b"no", STUCK], Words(faults=(GONE.fault, STUCK.fault))),
     ],
 )
-def test_an_unreadable_stop_is_one_and_an_unreadable_release_is_none(
+def test_an_unreadable_stop_is_one_and_nothing_else_that_is_unreadable(
     topic: Topic, payloads: list[Message | bytes], heard: Words
 ) -> None:
     config = load(None, {"bus.endpoint": free_endpoint()})
