@@ -168,7 +168,11 @@ class Agent:
 
     def gets_up(self, state: AgentState, inputs: Inputs) -> bool:
         """Whether the robot, which has been down, gets up in the step of these arguments."""
-        return state.rise is not None or bool(self._why_rise(state, inputs))
+        if state.rise is not None:
+            return True
+        # Who answered the tick before has not been down since, unless somebody says so.
+        said = inputs.reset is not None or bool(inputs.events)
+        return (said or inputs.state.tick - state.tick > 1) and bool(self._why_rise(state, inputs))
 
     def _why_rise(self, state: AgentState, inputs: Inputs) -> str:
         """Why the robot begins to get up at this tick; "": it does not."""

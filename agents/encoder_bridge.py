@@ -84,6 +84,11 @@ class EncoderBridge:
     def __init__(self, robot: RobotSpec) -> None:
         self._lower = np.array(robot.lower) - _BEYOND
         self._upper = np.array(robot.upper) + _BEYOND
+        # What a pause and a failure take is compiled, or loaded, now and not when they happen.
+        nothing = State.from_row(0, 0, np.full(max(c.stop for c in State.CUTS.values()), np.nan))
+        row, _ = self.step(None, nothing, 1e-3)
+        self.step(row, nothing, 2.0 * _PAUSE)
+        self.step(row, nothing, 1e-3)
 
     def step(self, before: Array | None, state: State, dt: float) -> tuple[Array, State]:
         """What is remembered after a tick, and its state with what is believed of the encoders.

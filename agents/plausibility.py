@@ -13,6 +13,7 @@ import numpy as np
 from quadriga.shared.config.sections import Config, ReferenceConfig
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import Reference, State
 
 # Times the robot's weight, each component of each foot's force: a leg that stands carries 1.7 times
@@ -78,9 +79,16 @@ def measured_limits(robot: RobotSpec) -> Array:
     return np.concatenate([np.broadcast_to(most[name], size) for name, size in sizes.items()])
 
 
-def is_measurable(state: State, most: Array) -> bool:
-    """Whether all numbers of a state keep to `measured_limits`."""
-    return not np.greater(np.abs(state.row), most).any()
+@compiled
+def is_measurable(row: Array, most: Array) -> bool:
+    """Whether all numbers of a state, `State.row`, keep to `measured_limits`, or are none.
+
+    In numpy's operations this takes five times as long: each goes through much code.
+    """
+    within = True
+    for index in range(len(most)):
+        within = within and not abs(row[index]) > most[index]
+    return within
 
 
 def is_within_limits(reference: Reference) -> bool:

@@ -112,6 +112,7 @@ class Inbox:
         self._gate = state_gate(config)
         self._slew = ReferenceSlew(config)
         self._measurable = measured_limits(config.robot)
+        is_measurable(self._measurable, self._measurable)  # compiled, or loaded, now
         self._state: State | None = None
         self._sample_end: State | None = None  # older than `_state`
         self._words: dict[Topic, Any] = {}  # the last of each
@@ -285,7 +286,7 @@ def _is_believable(message: Message, robot: str, measurable: Array) -> bool:
     this robot and its orientation of unit length. An IMU may fail, see `agents.imu_bridge`.
     """
     if isinstance(message, State):
-        return is_measurable(message, measurable)
+        return is_measurable(message.row, measurable)
     if isinstance(message, Truth):
         names, quats = message.robots, message.base_quat_wxyz
         if robot not in names or len(names) != len(quats):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -208,3 +210,16 @@ def test_the_first_reading_is_believed() -> None:
     state = be_off(standing(0))
     _, believed = BRIDGE.step(None, state, DT)
     assert believed is state
+
+
+def test_what_a_failure_takes_is_loaded_before_one() -> None:
+    program = (
+        "from quadriga.agents import encoder_bridge as bridge\n"
+        "from quadriga.shared.robot.a1 import A1\n"
+        "of_failures = bridge._hold, bridge._begin_anew\n"
+        "print([len(function.signatures) for function in of_failures])\n"
+        "bridge.EncoderBridge(A1)\n"
+        "print([len(function.signatures) for function in of_failures])\n"
+    )
+    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert said.stdout.split("\n")[:2] == ["[0, 0]", "[1, 1]"], said.stderr
