@@ -25,8 +25,10 @@ def run() -> int:
     gc.set_threshold(_FEW_COLLECTIONS)
     from quadriga.shared.errors import QuadrigaError
     from quadriga.shared.printable import printable_line
+    from quadriga.shared.runtime.opengl import do_without_opengl
     from quadriga.shared.runtime.scheduling import go_first
 
+    do_without_opengl()
     if sys.argv[1:2] == [_STOP]:  # what it imports must not wait for those that it stops
         go_first()
         from quadriga.drive.quick_stop import stop_quickly

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -11,6 +10,7 @@ from typing import Final
 
 from quadriga.pictures import software_frames
 from quadriga.pictures.frames import CLIP, SHEET
+from quadriga.shared.runtime.opengl import environment_to_draw
 
 _TIMEOUT: Final = 120.0  # s
 
@@ -40,7 +40,7 @@ def _draw_offscreen(run_dir: Path, say: Callable[[str], None]) -> str:
     try:
         done = subprocess.run(
             command,
-            env={"MUJOCO_GL": "egl"} | os.environ,
+            env=environment_to_draw(),
             capture_output=True,
             text=True,
             errors="replace",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -114,6 +116,18 @@ def test_without_opengl_the_same_robots_and_one_line(
     assert_robots_are_where_they_were(picture, run, 0)
     with Image.open(run / "walk.webp") as clip:
         assert getattr(clip, "n_frames", 1) == 7
+
+
+def test_a_choice_of_opengl_that_there_is_not_ends_no_command(
+    write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "nonsense")
+    run = write_run(run_config(1, 0.5))
+    command = [sys.executable, "-m", "quadriga", "report", str(run)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.stderr.startswith("quadriga: the walk: got an end at 0.5 s"), "all else is done"
+    assert "invalid value for environment variable MUJOCO_GL: nonsense" in done.stdout + done.stderr
+    assert (run / "walk.png").is_file()
 
 
 def assert_robots_are_where_they_were(picture: Image.Image, run: Path, tick: int) -> None:
