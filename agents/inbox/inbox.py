@@ -7,9 +7,9 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Final
 
-from quadriga.agents.inbox.reference_slew import ReferenceSlew
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.planning.operator_references import AHEAD_MS
+from quadriga.agents.planning.reference_slew import ReferenceSlew
 from quadriga.agents.plausibility import (
     is_measurable,
     is_orientation,

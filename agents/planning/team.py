@@ -9,6 +9,7 @@ from typing import Final
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.team_planner import TeamPlanner
 from quadriga.agents.planning.operator_references import AHEAD_MS, remember_references
+from quadriga.agents.planning.reference_slew import ReferenceSlew
 from quadriga.agents.planning.window import build_planner_inputs
 from quadriga.agents.plausibility import is_plausible
 from quadriga.agents.time_grid import first_step, step_ms
@@ -63,6 +64,7 @@ class Central:
         self._config, self._planner, self._clock_ns = config, planner, clock_ns
         self._names, self._step_ms = robot_names(config.team.robots), step_ms(config)
         self._kept = config.planner.T_ini + config.planner.applied
+        self._slew = ReferenceSlew(config)
 
     def due(self, state: CentralState) -> int | None:
         """The newest planning step that all robots' windows allow and that is not planned yet.
@@ -94,6 +96,8 @@ class Central:
     ) -> CentralState:
         """Add what has arrived; what is repeated, late or of no robot here is passed over.
 
+        References are approached as agents do, see `ReferenceSlew`.
+
         Refused and counted is what nobody can mean, and what is far ahead of the team's time, which
         is the median of its robots' newest samples: behind it all that is real would be late.
         After a silence of all the team's time goes on when most have spoken again.
@@ -115,7 +119,9 @@ class Central:
         now = max((self._newest(windows, name) for name in windows), default=0)
         arrived = tuple(references)
         timely = tuple(item for item in arrived if item.tick <= now + AHEAD_MS)
-        known = remember_references(state.references, timely, now)
+        known = state.references
+        for item in timely:
+            known = remember_references(known, (self._slew.limit_after(known, item),), now)
         return replace(
             state,
             windows=windows,

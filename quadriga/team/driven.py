@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from quadriga.agents.inbox.reference_slew import most_change
+from quadriga.agents.planning.reference_slew import most_change
 from quadriga.drive.controls import DriveControls, now_ms
 from quadriga.drive.steering import GO_ON, STOP, LastWord, steer
 from quadriga.drive.wish import NAMES, Wish, approach, standing

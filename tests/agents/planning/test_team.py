@@ -11,11 +11,12 @@ import pytest
 from quadriga.agents.gait import scheduled_stance
 from quadriga.agents.modes import DAMPING, STOPPING, Mode
 from quadriga.agents.planner.team_planner import build_centralised
+from quadriga.agents.planning.reference_slew import ReferenceSlew
 from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
-from quadriga.shared.wire.messages import Measurement
+from quadriga.shared.wire.messages import Measurement, Reference
 from tests.a1 import nominal_forces
 from tests.agents.duet import asked, every_100_ms, fingerprint, simple_predictor
 
@@ -125,6 +126,16 @@ def test_a_sample_of_a_time_far_ahead_is_refused_and_makes_none_late(name: str, 
     made, usual = (CENTRAL.step(which)[1] for which in (state, heard(360)))
     assert fingerprint(made) == fingerprint(usual)
     assert heard(370, start=state).refused == 1
+
+
+def test_a_reference_that_jumps_is_approached_as_agents_do() -> None:
+    slew, state, given = ReferenceSlew(CONFIG), CentralState(), list[Reference]()
+    for k in range(4):
+        asked = Reference(100 * k, 0, 1.2 * (-1) ** k, 0.0, 0.0, 0.26)
+        given.append(slew.limit(asked))
+        state = CENTRAL.remember(state, (), [asked])
+    assert state.references == tuple(given)
+    assert given[1].vx > 0.0
 
 
 @pytest.mark.parametrize("robots", [1, 2, 3, 4])

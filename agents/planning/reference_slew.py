@@ -41,11 +41,14 @@ class ReferenceSlew:
 
         The first is believed: an agent may have been started while the team walks.
         """
-        before = next((r for r in reversed(self._known) if r.tick <= reference.tick), None)
-        if before is not None:
-            reference = self._approach(before, reference)
+        reference = self.limit_after(self._known, reference)
         self._known = remember_references(self._known, (reference,), reference.tick)
         return reference
+
+    def limit_after(self, known: tuple[Reference, ...], reference: Reference) -> Reference:
+        """Likewise, where those that are `known` came before it."""
+        before = next((r for r in reversed(known) if r.tick <= reference.tick), None)
+        return reference if before is None else self._approach(before, reference)
 
     def _approach(self, before: Reference, asked: Reference) -> Reference:
         epochs = max(1.0, (asked.tick - before.tick) / REFERENCE_EPOCH_MS)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from quadriga.agents.inbox.inbox import Inbox
-from quadriga.agents.inbox.reference_slew import ReferenceSlew, most_change
 from quadriga.agents.planning.interface import Expected
+from quadriga.agents.planning.reference_slew import ReferenceSlew, most_change
 from quadriga.shared.config.load import load
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Reference
