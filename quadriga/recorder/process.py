@@ -22,11 +22,13 @@ from quadriga.shared.errors import ProcessError, RecordingError, system_reason
 from quadriga.shared.members import RECORDER, has_lead
 from quadriga.shared.recording.admission import LARGEST, Admission
 from quadriga.shared.recording.writer import END
-from quadriga.shared.runtime.clock import sleep
+from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.scheduling import precede_ordinary, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.topics import EVENT
 
+_HEARD: Final = 3.0  # s wall, in which a team that walks is heard of
+_LOOK: Final = 0.02  # s wall between two looks for it
 _SETTLE: Final = 0.2  # s wall, in which the presence of all who are there becomes known
 MEMBER: Final = "member"
 LATE: Final = "late"
@@ -87,7 +89,7 @@ def run(
     paths = [path]
     try:
         with Bus.open(config.bus, config.team.name, RECORDER, stopped) as bus:
-            path, before = choose_path(path, lambda: _walks(bus), say)
+            path, before = choose_path(path, lambda: _walks(bus, stopped), say)
             about = build_metadata(config, predictor_sha256) | selection.metadata()
             about |= {CONTINUES: before.name} if before else {}
             with _open_parts(config, path, about, selection, keys) as parts:
@@ -113,10 +115,14 @@ def run(
         ) from None
 
 
-def _walks(bus: Bus) -> bool:
-    """Whether the team walks, as far as it is known after a moment."""
-    sleep(_SETTLE)
-    return has_lead(bus.members_at(READY))
+def _walks(bus: Bus, stopped: Callable[[], bool]) -> bool:
+    """Whether the team walks; that nobody is heard of it takes a busy computer a while to know."""
+    deadline = monotonic() + _HEARD
+    while not has_lead(bus.members_at(READY)):
+        if stopped() or monotonic() > deadline:
+            return False
+        sleep(_LOOK)
+    return True
 
 
 def _open_parts(
