@@ -30,7 +30,7 @@ from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.messages import Refusal
 from quadriga.shared.wire.topics import CLOCK, REFUSED
 
-_MOST: Final = 20  # kinds of refusal that are told at once; a flood of keys must not flood us
+_MOST: Final = 20  # refusals that are told at once; a flood of keys must not flood us
 _LONGEST: Final = 200  # characters of a key
 
 
@@ -54,6 +54,22 @@ class RefusalLog:
         found = self._parser.take(lines)
         if found:
             self._found.put(found)
+
+
+def condense(found: Counter[Refused]) -> list[tuple[Refused, int]]:
+    """What is told of refusals: the most frequent as they are, the keys of the rest in one.
+
+    So whoever sends on many keys is named, too.
+    """
+    kinds = found.most_common()
+    of_sender: dict[Refused, Counter[str]] = {}
+    for refused, count in kinds[_MOST:]:
+        of_sender.setdefault(refused._replace(key=""), Counter())[refused.key] += count
+    rest = [
+        (sender._replace(key=f"{len(keys)} more keys"), keys.total())
+        for sender, keys in of_sender.items()
+    ]
+    return kinds[:_MOST] + sorted(rest, key=lambda told: -told[1])[:_MOST]
 
 
 class Audit:
@@ -81,11 +97,13 @@ class Audit:
         found: Counter[Refused] = Counter()
         for refused, count in self._log.take().items():
             found[self._name_sender(refused)] += count
-        for refused, count in found.most_common(_MOST):
+        told = condense(found)
+        for refused, count in told:
             self._memory.note(refused, count, monotonic())
             self._tell(refused, count)
-        if len(found) > _MOST:
-            print(f"refused: {len(found) - _MOST} more kinds", file=sys.stderr, flush=True)
+        untold = found.total() - sum(count for _, count in told)
+        if untold:
+            print(f"refused: {untold} times of more senders", file=sys.stderr, flush=True)
         return list(found)
 
     def _tell(self, refused: Refused, count: int) -> None:
