@@ -10,7 +10,7 @@ from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import FALL
 
 _BEFORE_MS, _AFTER_MS = 1000, 300  # of a fall
-_MOST: Final = 3  # falls that are shown
+_MOST: Final = 10  # falls that are shown, one of each robot of the largest team
 _TOGETHER_MS: Final = 300  # falls so near to each other are one
 _STRIDES: Final = 4
 _LAST_STEPS_MS: Final = 1000  # before the end of a walk, which may be out of the ordinary

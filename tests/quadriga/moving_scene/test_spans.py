@@ -20,12 +20,19 @@ def test_the_second_before_each_fall_and_falls_together_once() -> None:
         entry(4600, "r3"),
         entry(9000, "r1"),
     ]
-    spans = choose_spans(timeline, 0, 4700, 400)
+    spans = choose_spans(timeline, 0, 9100, 400)
     assert spans == (
         Span(0, 700, "r1 falls at 0.40 s"),
         Span(3000, 4300, "r2, r1 falls at 4.00 s"),
-        Span(3600, 4700, "r3 falls at 4.60 s"),
+        Span(3600, 4900, "r3 falls at 4.60 s"),
+        Span(8000, 9100, "r1 falls at 9.00 s"),
     )
+
+
+def test_no_more_falls_than_the_largest_team_has_robots() -> None:
+    timeline = [entry(1000 * k, f"r{k}") for k in range(1, 13)]
+    spans = choose_spans(timeline, 0, 20_000, 400)
+    assert [span.title for span in spans] == [f"r{k} falls at {k}.00 s" for k in range(1, 11)]
 
 
 def test_without_a_fall_some_strides_before_the_last_second() -> None:
