@@ -9,7 +9,7 @@ MANUAL := $(VENV)/.manual
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install tools walk prepared test test-containers image-lock lint fuzz fuzz-readers drops starts endurance format docs dist pages manual links gallery figures clip acceptance bench bench-planner bench-recorder
+.PHONY: install tools walk prepared test test-containers image-lock lint fuzz fuzz-readers drops starts endurance format docs dist pages manual links gallery figures clip acceptance bench bench-against bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -155,6 +155,11 @@ acceptance: $(STAMP)
 # as many more for each team that has not walked here before (ten robots: much more).
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks $(ARGS)
+
+# Whether this checkout is faster than an earlier commit, both in turns; half an hour. For example
+# make bench-against ARGS=HEAD~10
+bench-against: $(STAMP)
+	$(BIN)/python -m benchmarks.against $(ARGS)
 
 # What a plan costs, as the paper writes it and as it is solved here; about ten minutes, and five
 # more for a team of five that has not walked here before.
