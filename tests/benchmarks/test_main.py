@@ -61,7 +61,7 @@ def test_plants_whose_clocks_are_far_apart_begin_ticks_together(tmp_path: Path) 
     """On a machine however busy: where clocks were not brought together it would be 1000 s."""
     page, found = run(tmp_path / "b.json", "clock")
     (row,) = found["parts"]["clock"]["rows"]
-    assert row["ticks"] == 1500
+    assert 1000 < row["ticks"] <= 1500, "a plant that is kept from its work passes over ticks"
     assert 0.0 < row["median_us"] < 1e5
     assert row["gap_ms"][0] > 0.0
     assert "two plants" in page
