@@ -83,7 +83,7 @@ def measured_limits(robot: RobotSpec) -> Array:
 def is_measurable(row: Array, most: Array) -> bool:
     """Whether all numbers of a state, `State.row`, keep to `measured_limits`, or are none.
 
-    In numpy's operations this takes five times as long: each goes through much code.
+    In numpy's operations this takes seven times as long: each goes through much code.
     """
     within = True
     for index in range(len(most)):

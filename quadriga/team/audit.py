@@ -59,7 +59,8 @@ class RefusalLog:
 def condense(found: Counter[Refused]) -> list[tuple[Refused, int]]:
     """What is told of refusals: the most frequent as they are, the keys of the rest in one.
 
-    So whoever sends on many keys is named, too.
+    So who hides behind another's many keys is named, too. Of more than 20 such senders, who have
+    sessions of their own, the rest is only counted.
     """
     kinds = found.most_common()
     of_sender: dict[Refused, Counter[str]] = {}

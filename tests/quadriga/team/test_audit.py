@@ -1,4 +1,4 @@
-"""Every sender whose messages a router refuses is named, however many keys they are on."""
+"""Senders whose messages a router refuses are named, however many keys another one uses."""
 
 from __future__ import annotations
 
