@@ -14,6 +14,11 @@ from quadriga.shared.runtime.jit_cache import compiled_folder, is_switched_off
 
 _DONE: Final = "rehearsed"  # a file beside the machine code of all that an agent runs
 
+_ROBOTS: Final = 2  # the fewest of which one has a peer, whose terms are compiled, too
+# Outputs that hardly respond to forces that cost nothing: the best forces are beyond all limits.
+_RESPONSE: Final = 1e-5  # of each output to each force, m/s or rad/s per N
+_CHEAP: Final = (1e-9, 1e-9, 1e-9)
+
 
 def warm_up(config: Config, console: Console) -> None:
     """Rehearse an agent once, unless this code has been compiled on this machine before.
@@ -24,7 +29,7 @@ def warm_up(config: Config, console: Console) -> None:
     if is_switched_off() or _is_compiled(folder):
         return
     with console.status("compiling the agents (the first time only)"):
-        _rehearse_lone_agent(config)
+        _rehearse_agent(config)
     if folder is not None:
         (folder / _DONE).touch()
 
@@ -32,22 +37,22 @@ def warm_up(config: Config, console: Console) -> None:
 def load_compiled() -> None:
     """Load what has been compiled, and compile nothing: what this process forks then has it."""
     if not is_switched_off() and _is_compiled(compiled_folder()):
-        _rehearse_lone_agent(Config())
+        _rehearse_agent(Config())
 
 
 def _is_compiled(folder: Path | None) -> bool:
     return folder is not None and (folder / _DONE).exists()
 
 
-def _rehearse_lone_agent(config: Config) -> None:
-    """Everything that one agent does, with a predictor that predicts nothing."""
+def _rehearse_agent(config: Config) -> None:
+    """Everything that an agent with a peer does, limits of its planner's QP included."""
     from quadriga.agents.agent import Agent
     from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
     from quadriga.agents.rehearsal import rehearse
     from quadriga.shared.robot.conventions import N_OUTPUTS
 
-    planner = replace(config.planner, kind="distributed", exchanges=0)
-    alone = replace(config, team=replace(config.team, robots=1), planner=planner)
-    meta = PredictorMeta.of(alone)
-    nothing = Predictor(meta, np.zeros((1, 1, 1, N_OUTPUTS * meta.N, meta.width)))
-    rehearse(alone, Agent(alone, "r1", nothing))
+    planner = replace(config.planner, kind="distributed", exchanges=0, R=_CHEAP)
+    pair = replace(config, team=replace(config.team, robots=_ROBOTS), planner=planner)
+    meta = PredictorMeta.of(pair)
+    G = np.full((meta.phases, _ROBOTS, _ROBOTS, N_OUTPUTS * meta.N, meta.width), _RESPONSE)
+    rehearse(pair, Agent(pair, "r1", Predictor(meta, G)))
