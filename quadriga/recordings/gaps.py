@@ -22,14 +22,19 @@ from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Status
 from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, STATE, TRUTH, Topic
 
+Span = tuple[float, float]  # ticks from the first up to before the second
+
 _UNKNOWN: Final[Mapping[str, Sequence[Status]]] = MappingProxyType({})
 _ALWAYS: Final = ((0.0, math.inf),)
 
-Span = tuple[float, float]  # ticks from the first up to before the second
+_NONE_PASSED: Final[Mapping[str, Sequence[Span]]] = MappingProxyType({})
 
 
 def missing_ticks(
-    config: Config, ticks: Mapping[str, Ticks], statuses: Mapping[str, Sequence[Status]] = _UNKNOWN
+    config: Config,
+    ticks: Mapping[str, Ticks],
+    statuses: Mapping[str, Sequence[Status]] = _UNKNOWN,
+    passed_over: Mapping[str, Sequence[Span]] = _NONE_PASSED,
 ) -> dict[str, int]:
     """Number of missing ticks by key.
 
@@ -39,12 +44,14 @@ def missing_ticks(
     that gets up measures nothing, and one that does not walk plans nothing: where its statuses say
     so, nothing is expected until it has begun again. After its last plan none is. A robot without
     measurements or plans lacks all from the end of the initial stand on; of a controller of one's
-    own no measurements are expected.
+    own no measurements are expected. Of ticks that an agent, late in real time, says it passed
+    over no command is.
 
     Args:
         config: the configuration of the run.
         ticks: recorded ticks by key.
         statuses: of each robot, if they are known.
+        passed_over: ticks that each robot's agent says it passed over.
     """
     team, names = config.team.name, robot_names(config.team.robots)
     period = periods(config)
@@ -53,16 +60,16 @@ def missing_ticks(
     # No later than the configured end: a forged tick must not ask for years of messages.
     end = min(newest, end_of_world(config))
 
-    def count(key: str, topic: Topic, first: int, last: int) -> int:
-        return _count_missing(_recorded_ticks(ticks, key), first, period[topic.name], last)
+    def absent(key: str, topic: Topic) -> Ticks:
+        return _find_missing(_recorded_ticks(ticks, key), 0, period[topic.name], end)
 
     missing = dict[str, int]()
     if config.team.one_world:
-        missing[TRUTH.key(team)] = count(TRUTH.key(team), TRUTH, 0, end)
+        missing[TRUTH.key(team)] = len(absent(TRUTH.key(team), TRUTH))
     for name in names:
-        for topic in (STATE, COMMAND):
-            key = topic.key(team, name)
-            missing[key] = count(key, topic, 0, end)
+        missing[STATE.key(team, name)] = len(absent(STATE.key(team, name), STATE))
+        unanswered = absent(key := COMMAND.key(team, name), COMMAND)
+        missing[key] = _count_outside(unanswered, passed_over.get(name, ()))
         if not config.team.controller:
             key = MEASUREMENT.key(team, name)
             missing[key] = _count_missing_within(
@@ -125,14 +132,24 @@ def _count_missing_within(
         found = recorded[(recorded >= begin) & (recorded < end)]
         if len(found) or not len(recorded):
             begun = int(found.min()) if len(found) else max(first, int(begin))
-            missing += _count_missing(found, begun, period, int(min(end, last)))
+            missing += len(_find_missing(found, begun, period, int(min(end, last))))
     return missing
 
 
-def _count_missing(recorded: Ticks, first: int, period: int, last: int) -> int:
+def _find_missing(recorded: Ticks, first: int, period: int, last: int) -> Ticks:
     """Ticks of `first`, `first + period`, … up to `last − period` that were not found."""
     expected = np.arange(first, last - period + 1, period)
-    return int(np.isin(expected, recorded, invert=True).sum())
+    return expected[np.isin(expected, recorded, invert=True)]
+
+
+def _count_outside(ticks: Ticks, spans: Sequence[Span]) -> int:
+    """How many of some ticks are within no span."""
+    if not spans:
+        return len(ticks)
+    begins, ends = np.array(sorted(spans)).T
+    latest = np.maximum.accumulate(ends)  # of all that begin no later
+    place = np.searchsorted(begins, ticks, side="right") - 1
+    return int(((place < 0) | (ticks >= latest[place])).sum())
 
 
 def _recorded_ticks(ticks: Mapping[str, Ticks], key: str) -> Ticks:

@@ -237,7 +237,7 @@ def _spread(status: Status, name: str) -> dict[str, float]:
 
 
 def _traffic(traces: Traces) -> dict[str, Any]:
-    gaps = missing_ticks(traces.config, traces.ticks, traces.statuses)
+    gaps = missing_ticks(traces.config, traces.ticks, traces.statuses, traces.passed_over)
     team, nothing = traces.config.team.name, np.zeros(0, dtype=np.int64)
     states = [traces.ticks.get(STATE.key(team, robot), nothing) for robot in traces.robots]
     ticks = np.concatenate(states)

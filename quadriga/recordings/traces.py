@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 
 from quadriga.recordings.events import merge_events, teller_of, tellers
+from quadriga.recordings.gaps import Span
 from quadriga.recordings.truth import Ticks, TruthTrace, build_truth_trace, stack, ticks_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
@@ -21,6 +23,7 @@ from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import OUTPUTS, Array, robot_names
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import (
+    Consumed,
     Event,
     Measurement,
     Message,
@@ -31,7 +34,8 @@ from quadriga.shared.wire.messages import (
 )
 from quadriga.shared.wire.topics import COMMAND, INPUTS, STATE, Topic, find_topic
 
-# Up to 1 kHz each: only their ticks are read.
+# Up to 1 kHz each: only their ticks are read. What an agent took in is read of walks in real time,
+# where it says which ticks the agent passed over.
 _TIMED_ONLY: Final = (STATE.name, COMMAND.name, INPUTS.name)
 # What a walk is judged by: the outputs by the world's truth, the height over the terrain under the
 # hips, and the height over the stance feet, by the robot's own measurement: what it is asked to
@@ -63,6 +67,8 @@ class Traces:
         ticks: ticks by key, in the order of the recording.
         log_times: log times of the first and the last state, ns, and None without states.
         references: ticks (R,) and values vx, vy, wz, height (R, 4), sorted.
+        passed_over: ticks that each robot's agent, late in real time, says it passed over: spans
+            from their first up to before their second.
         plants: what each robot's plant, in real time, says of itself (`quadriga.plant.deadlines`);
             one world says the same of all its robots.
         notes: what the recorder noted at the end, see `Recording.notes`.
@@ -82,6 +88,7 @@ class Traces:
     plans: Mapping[str, tuple[Plan, ...]]
     statuses: Mapping[str, tuple[Status, ...]]
     events: tuple[Event, ...]
+    passed_over: Mapping[str, tuple[Span, ...]] = field(default_factory=dict)
     plants: Mapping[str, tuple[Status, ...]] = field(default_factory=dict)
     notes: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
@@ -101,21 +108,19 @@ def read_traces(
     """
     config = recorded_config(recording)
     robots = robot_names(config.team.robots)
+    timed = _TIMED_ONLY if config.world.mode == "lockstep" else _TIMED_ONLY[:2]
     counts, invalid = Counter[str](), Counter[str]()
     ticks: defaultdict[str, list[int]] = defaultdict(list)
     decoded: defaultdict[tuple[type[Message], str], list[Any]] = defaultdict(list)
-    rows: dict[str, Any] = {}
+    place = cache(find_topic)
     log_times: tuple[int, int] | None = None
     for key, tick, log_time, payload in recording.entries(names, keys):
         counts[key] += 1
-        row = rows.get(key)
-        if row is None:
-            row = rows[key] = find_topic(key)
-        topic, robot = row
+        topic, robot = place(key)
         if topic is None or tick < 0:
             invalid[key] += 1
             continue
-        if topic.name not in _TIMED_ONLY:
+        if topic.name not in timed:
             message = _decode_valid(payload, topic, config)
             if message is None:
                 invalid[key] += 1
@@ -140,6 +145,7 @@ def read_traces(
         plans={robot: tuple(decoded[Plan, robot]) for robot in robots},
         statuses={name: tuple(decoded[Status, name]) for name in (*robots, PLANNER)},
         events=merge_events(decoded[Event, ""], [decoded[Event, who] for who in tellers(robots)]),
+        passed_over={robot: _spans_passed_over(decoded[Consumed, robot]) for robot in robots},
         plants={
             robot: tuple(decoded[Status, SIM] or decoded[Status, plant_name(robot)])
             for robot in robots
@@ -245,6 +251,10 @@ def _references(messages: Sequence[Reference]) -> tuple[Ticks, Array]:
 
 def _measurements(messages: Sequence[Measurement]) -> MeasurementTrace:
     return MeasurementTrace(ticks_of(messages), stack(messages, "y", 6))
+
+
+def _spans_passed_over(messages: Sequence[Consumed]) -> tuple[Span, ...]:
+    return tuple((m.tick - m.passed, m.tick) for m in messages if m.passed > 0)
 
 
 def times_of(statuses: Sequence[Status], field: str) -> Array:

@@ -121,7 +121,7 @@ def judge(folder: Path, *, rejoins: bool) -> None:
     # Nobody waits for the killed one: its states may come in bursts, of which a router drops some.
     expect(all(finding.passed for finding in findings if finding.name != "gaps"), said)
     traces = read_traces(Recording(run / "run.mcap"))
-    missing = missing_ticks(traces.config, traces.ticks, traces.statuses)
+    missing = missing_ticks(traces.config, traces.ticks, traces.statuses, traces.passed_over)
     own = f"{traces.config.team.name}/{KILLED}/"
     lost = {key: count for key, count in missing.items() if count and not key.startswith(own)}
     expect(not lost, f"the recording lacks {lost}")

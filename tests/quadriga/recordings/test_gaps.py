@@ -52,6 +52,19 @@ def test_a_robot_of_which_nothing_came_lacks_everything() -> None:
     assert missing["team/r1/state"] == 0
 
 
+def test_of_ticks_that_an_agent_passed_over_no_command_is_expected() -> None:
+    ticks = whole(10)
+    ticks["team/r1/command"] = np.delete(np.arange(1000), [0, 7, 8, 9, 500, 900])
+    spans = [(900, 902), (0, 1), (7, 10), (-5, -1), (7, 8)]
+    key = "team/r1/command"
+    assert missing_ticks(configured(), ticks)[key] == 6
+    assert missing_ticks(configured(), ticks, passed_over={"r2": spans})[key] == 6
+    assert missing_ticks(configured(), ticks, passed_over={"r1": spans})[key] == 1
+    assert missing_ticks(configured(), ticks, passed_over={"r1": [(0, 1000)]})[key] == 0
+    del ticks["team/r1/command"]
+    assert missing_ticks(configured(), ticks, passed_over={"r1": [(0, 5)]})[key] == 994
+
+
 def says(tick: int, mode: str) -> Status:
     return Status(tick, 0, mode, "", "", {}, {}, np.zeros(0), np.zeros(0))
 

@@ -141,6 +141,22 @@ def test_every_lost_message_is_a_gap(write_run: WriteRun) -> None:
     }
 
 
+@pytest.mark.parametrize("mode", ["realtime", "lockstep"])
+def test_a_late_agent_that_passes_over_a_tick_in_real_time_loses_nothing(
+    write_run: WriteRun, mode: str
+) -> None:
+    config = run_config(2, 1.0)
+    config = replace(config, world=replace(config.world, mode=mode))
+    unanswered = {("team/r1/command", 41), ("team/r1/command", 42), ("team/r1/command", 50)}
+    run = write_run(
+        config,
+        change=lambda k, m: None if (k, m.tick) in unanswered else m,
+        extra=[("team/r1/inputs", msg.Consumed(43, 0, 0, 2, (), ()))],
+    )
+    expected = 1 if mode == "realtime" else 3
+    assert summarise(run)["gaps_per_topic"]["team/r1/command"] == expected
+
+
 def test_a_silent_robot_is_all_gaps(write_run: WriteRun) -> None:
     config = run_config(2, 1.0)
     run = write_run(config, change=lambda k, m: None if k == "team/r2/command" else m)
