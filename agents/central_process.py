@@ -97,7 +97,7 @@ class _CentralShell:
     def work(self, stopped: Callable[[], bool]) -> None:
         """Plan whenever a step is due until the walk is over."""
         state, since = CentralState(), monotonic()
-        while not (stopped() or self._ended):
+        while not (stopped() or self._lead.is_over(announced=self._ended)):
             packet = self._bus.get(POLL)
             if packet is None:
                 self._lead.look(state.step * step_ms(self._config))

@@ -137,7 +137,7 @@ class AgentShell(Generic[S]):
     def walk(self, stopped: Callable[[], bool]) -> None:
         """Answer every state until the walk is over."""
         memory = self._agent.initial()
-        while not (stopped() or self._inbox.ended):
+        while not (stopped() or self._lead.is_over(announced=self._inbox.ended)):
             self._receive(0.0 if self._inbox.has_state else POLL)
             state = self._inbox.pop_state()
             if state is not None:

@@ -133,7 +133,7 @@ class _Operator:
                 self._put(encode(self._at(EPOCH_MS * epoch)))
                 epoch += 1
                 continue
-            if time.over:
+            if self._watch.is_over(announced=time.over):
                 return
             self._bus.declare(READY)
             self._follow()
@@ -161,12 +161,13 @@ class TeamTicks:
         last: tick of the end of the walk.
 
     Attributes:
-        over: whether the walk is over.
+        over: whether the end has been announced, and time has not gone on since.
     """
 
     def __init__(self, bus: Bus, last: int) -> None:
         self._bus, self._last = bus, last
         self._gate = TickGate(_GAP_MS, last)
+        self._end = 0  # tick that was announced
         self.over = False
 
     @property
@@ -196,16 +197,16 @@ class TeamTicks:
                     self._take_event(decode(payload, Event))
             except MessageError:
                 continue  # not for the operator to count: the recorder keeps it
-            if self.over:
-                break
         return True
 
     def _take_tick(self, tick: int) -> None:
-        if tick <= self._last:
-            self._gate.take(tick)
+        if self.over and tick <= self._end:
+            return
+        if tick <= self._last and self._gate.take(tick):
+            self.over = False
 
     def _take_event(self, event: Event) -> None:
         """The end, if the team can have come to its tick."""
         if event.kind == "stop" and event.tick <= min(self._last, self.tick + _GAP_MS):
             self._take_tick(event.tick - 1)
-            self.over = True
+            self._end, self.over = event.tick, True

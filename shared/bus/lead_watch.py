@@ -137,6 +137,20 @@ class LeadWatch:
     def __init__(self, bus: Bus, config: Config) -> None:
         self._watch = LossWatch(lambda: find_loss(bus, config), config, LAST_WORDS)
         self._name, self._walks = bus.name, False
+        self._bus, self._config = bus, config
+        self._silent_since: float | None = None  # since the end was announced
+
+    def is_over(self, *, announced: bool) -> bool:
+        """Whether the walk is over: its end was announced, and did come.
+
+        Whoever reaches the bus may announce one. A team whose time goes on has not ended.
+        """
+        if not announced:
+            return False
+        now = monotonic()
+        if self._silent_since is None:
+            self._silent_since = now
+        return now - self._silent_since >= LAST_WORDS or bool(find_loss(self._bus, self._config))
 
     def look(self, tick: int) -> None:
         """See whether the others are there; called while nothing arrives.
@@ -153,6 +167,7 @@ class LeadWatch:
 
     def hear(self) -> None:
         """Something has arrived: the team walks, and who was gone is back."""
+        self._silent_since = None
         if not self._walks:
             self._walks = True
             say(f"{self._name}: the team walks")

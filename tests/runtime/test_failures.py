@@ -10,13 +10,14 @@ from dataclasses import replace
 
 import pytest
 
+from quadriga.recordings.summary import summarise
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import EStop, Event, Status
-from quadriga.shared.wire.topics import EVENT
+from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.messages import Clock, EStop, Event, Status
+from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT
 from quadriga.team import launch
 from tests.runtime.conftest import BEGUN, WAIT, Make, run_alone
 from tests.runtime.frozen import PATIENCE, TEAM, await_tick, freeze
@@ -106,6 +107,34 @@ def test_a_stopped_sim_server_ends_the_walk_for_all(
         os.kill(running.pids["sim"], number)
         running.watch(never)  # all leave by themselves, with exit status 0
     assert team.log("sim").splitlines()[-1].endswith("signal  signal")
+
+
+@pytest.mark.usefixtures("_compiled")
+def test_an_end_that_somebody_else_announces_ends_nothing(
+    make_team: Make, watcher: Watcher
+) -> None:
+    """Without certificates whoever reaches the team's bus may say so, and of a tick that is right.
+
+    Nobody leaves while time goes on, and the operator goes on asking.
+    """
+    team = make_team(world__seconds=4.0, gait__stand_ms=500, recorder__enabled=True)
+    with team.launch(standing=False) as running:
+        bus = watcher(team, CLOCK)
+        say = bus.publisher(EVENT.key("team"))
+        said, deadline = list[int](), monotonic() + WAIT
+        while len(said) < 20 and monotonic() < deadline:
+            packet = bus.get(1.0)
+            tick = decode(packet[1], Clock).tick if packet is not None else 0
+            if tick >= 1000 + 100 * len(said):
+                say(encode(Event.of(tick, "signal", "", "forged")))
+                said.append(tick)
+        running.watch(never)
+    summary = summarise(team.folder)
+    assert len(said) == 20
+    assert summary["end"].startswith("end of world.seconds")
+    assert (summary["fallen"], summary["stop_reasons"], summary["gaps"]) == ([], {}, 0)
+    ticks = [entry.tick for entry in team.recording().entries({COMMAND.name})]
+    assert max(ticks) >= 3999
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

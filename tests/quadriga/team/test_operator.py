@@ -118,6 +118,15 @@ def test_a_time_that_the_team_cannot_have_come_to_is_not_followed(tick: int) -> 
     assert time.tick == 0, "however often it is said"
 
 
+def test_an_end_that_time_goes_on_after_was_none() -> None:
+    time = followed(Clock(0, 0), stop_at(100), Clock(90, 0), Clock(100, 0))
+    assert (time.tick, time.over) == (99, True)
+    time = followed(Clock(0, 0), stop_at(100), Clock(110, 0))
+    assert (time.tick, time.over) == (110, False)
+    time = followed(Clock(0, 0), stop_at(100), Clock(110, 0), stop_at(120))
+    assert (time.tick, time.over) == (119, True)
+
+
 def test_an_operator_who_missed_something_catches_up() -> None:
     time = followed(Clock(0, 0), Clock(4000, 0), Clock(4010, 0), stop_at(4200))
     assert (time.tick, time.over) == (4199, True)

@@ -75,6 +75,32 @@ def test_who_drives_time_is_missed_after_its_last_words() -> None:
     assert after >= 0.2
 
 
+def test_a_walk_is_over_once_who_announced_its_end_is_gone() -> None:
+    config = load(None, {"bus.endpoint": free_endpoint()})
+    with together(config) as (sim, r1):
+        watch = LeadWatch(r1, config)
+        assert not watch.is_over(announced=False)
+        assert not watch.is_over(announced=True)
+        sim.close()
+        wait_until(lambda: not r1.members_at(HERE))
+        assert watch.is_over(announced=True)
+        assert not watch.is_over(announced=False), "then it is missed"
+
+
+def test_a_walk_that_goes_on_is_not_over_whatever_is_announced() -> None:
+    config = load(None, {"bus.endpoint": free_endpoint()})
+    with together(config) as (_, r1):
+        watch = LeadWatch(r1, config)
+        begun = monotonic()
+        while monotonic() < begun + 0.6:
+            assert not watch.is_over(announced=True)
+            sleep(0.02)
+            watch.hear()
+        begun = monotonic()
+        wait_until(lambda: watch.is_over(announced=True))
+        assert monotonic() - begun >= 0.2
+
+
 def test_a_link_that_is_gone_is_named_and_not_those_behind_it() -> None:
     config = load(None, {"bus.endpoint": free_endpoint()})
     router = Bus.route(config.bus.endpoint, "team")
