@@ -39,6 +39,7 @@ _EVERY_S: Final = 10.0
 _SETTLED: Final = 0.1  # share of the walk after which memory must not grow any more
 _MOST: Final = 0.05  # share by which it may
 _INTERRUPTED: Final = 130
+_PASSED: Final = "states_passed_over"
 _STAND_MS: Final = 9000  # at first: robots that have stood so long know how fast their yaw drifts
 
 Samples = dict[str, list[tuple[float, float]]]  # by process: s since the start, MB
@@ -98,6 +99,8 @@ def endure(config: Config, out: Path | None, console: Console, speed: float = 1.
     console.print(f"fell: {fallen}; lost messages: {lost}; end: {summary['end']}", markup=False)
     parts = (f"{key} {count}" for key, count in summary["gaps_per_topic"].items() if count)
     console.print(f"lost by topic: {', '.join(parts) or 'none'}", markup=False)
+    passed = (f"{name} {c.get(_PASSED, 0)}" for name, c in summary["counters"].items())
+    console.print(f"ticks passed over by late agents: {', '.join(passed)}", markup=False)
     console.print(f"walked {summary['distance']:.0f} m; folder: {folder}", markup=False)
     return int(bool(summary["fallen"]) or lost > 0 or max(growth.values(), default=0.0) > _MOST)
 
