@@ -56,7 +56,7 @@ def check_cost(robot: str, cost_ms: float, agents: int, cores: int) -> None:
     Raises:
         ProcessError: they cannot; the message says what a tick costs and what there is for it.
     """
-    has = _TICK_MS * min(1.0, cores / agents)
+    has = _share_ms(agents, cores)
     if cost_ms <= has:
         return
     shared = f"{agents} agents on {cores} cores" if agents > 1 else "one agent"
@@ -68,8 +68,15 @@ def check_cost(robot: str, cost_ms: float, agents: int, cores: int) -> None:
     )
 
 
+def _share_ms(agents: int, cores: int) -> float:
+    """Processor time that there is for a tick of one of some agents: it is one thread's work."""
+    return _TICK_MS * min(1.0, cores / agents)
+
+
 def rehearse_in_time(config: Config, agent: Agent, *, refuse: bool) -> None:
     """Rehearse, and refuse a walk in real time on a computer that cannot keep up.
+
+    A first rehearsal may have compiled what no walk has needed before. So a second one decides.
 
     Args:
         config: the team's configuration.
@@ -79,8 +86,16 @@ def rehearse_in_time(config: Config, agent: Agent, *, refuse: bool) -> None:
     Raises:
         ProcessError: see `check_cost`.
     """
+    cost_ms = _measure(config, agent)
+    if refuse and config.world.mode == "realtime" and config.runtime.refuse_overload:
+        agents, cores = config.team.robots if is_loopback(config.bus.endpoint) else 1, count_cores()
+        if cost_ms > _share_ms(agents, cores):
+            cost_ms = _measure(config, agent)
+        check_cost(agent.robot, cost_ms, agents, cores)
+
+
+def _measure(config: Config, agent: Agent) -> float:
+    """Processor time of a tick in a rehearsal, ms."""
     cost = TickCost(thread_ns)
     rehearse(config, agent, cost.note)
-    if refuse and config.world.mode == "realtime" and config.runtime.refuse_overload:
-        agents = config.team.robots if is_loopback(config.bus.endpoint) else 1
-        check_cost(agent.robot, cost.mean_ms, agents, count_cores())
+    return cost.mean_ms

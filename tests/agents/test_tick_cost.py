@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import count
 
 import pytest
@@ -62,3 +63,27 @@ def test_a_rehearsal_measures(
         return
     with pytest.raises(ProcessError, match=r"got 2\.00 ms .* at most 1\.00 ms, of one agent"):
         rehearse_in_time(config, agent, refuse=not rejoins)
+
+
+def test_what_is_compiled_in_the_first_rehearsal_refuses_nobody(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It may be in the last ticks, where the planner first meets a limit."""
+    config = load(None, {"team.robots": 1, "planner.kind": "none", "world.mode": "realtime"})
+    rehearsals, taken = list[int](), 0
+
+    def rehearse_once(config: object, agent: object, note: Callable[[], None]) -> None:
+        nonlocal taken
+        rehearsals.append(taken)
+        for tick in range(300):
+            taken += 200_000
+            if len(rehearsals) == 1 and tick == 290:
+                taken += 700_000_000
+            note()
+
+    monkeypatch.setattr(tick_cost, "rehearse", rehearse_once)
+    monkeypatch.setattr(tick_cost, "thread_ns", lambda: taken)
+    rehearse_in_time(config, Agent(config, "r1", None), refuse=True)
+    assert len(rehearsals) == 2
+    rehearse_in_time(config, Agent(config, "r1", None), refuse=True)
+    assert len(rehearsals) == 3, "who is fast enough rehearses once"
