@@ -20,7 +20,7 @@ from math import inf
 from pathlib import Path
 from typing import Any, Final
 
-from tests.fuzz.run import Limits, Tally, fuzz
+from tests.fuzz.run import Limits, fuzz
 from tests.fuzz.targets import KINDS, targets
 
 _IN_MEMORY: Final = "/dev/shm"  # where there is one, so that no disk slows the reading of files
@@ -36,13 +36,15 @@ def main(words: Sequence[str]) -> int:
     memory = _IN_MEMORY if os.access(_IN_MEMORY, os.W_OK) else None
     with tempfile.TemporaryDirectory(dir=memory) as folder, targets(Path(folder)) as build:
         for name in arguments.only or KINDS:
-            tally = fuzz(build(name), arguments.inputs, arguments.seed, arguments.seconds)
+            tally = fuzz(
+                build(name), arguments.inputs, arguments.seed, arguments.seconds, arguments.first
+            )
             print(f"{name}: {tally}", flush=True)
             complaints = tally.complaints(limits)
             for line in complaints:
                 print(f"{name}: {line}", file=sys.stderr, flush=True)
             wrong += len(complaints)
-            figures[name] = _figures(tally, complaints)
+            figures[name] = {"first": arguments.first, **asdict(tally), "complaints": complaints}
             if arguments.json is not None:
                 _write(arguments.json, arguments.seed, limits, figures)
     return 1 if wrong else 0
@@ -51,6 +53,7 @@ def main(words: Sequence[str]) -> int:
 def _parse(words: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
     parser.add_argument("--inputs", type=int, default=100_000, help="of each kind")
+    parser.add_argument("--first", type=int, default=0, help="number of the first of them")
     parser.add_argument("--seconds", type=float, default=inf, help="for each kind, at most")
     parser.add_argument("--only", action="append", choices=KINDS, help="a kind; may be repeated")
     parser.add_argument("--seed", type=int, default=0)
@@ -69,10 +72,6 @@ def _bound_memory() -> None:
     """Have what asks for more memory than anything here needs be refused by the system."""
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY, hard))
-
-
-def _figures(tally: Tally, complaints: tuple[str, ...]) -> Mapping[str, Any]:
-    return {**asdict(tally), "complaints": complaints}
 
 
 def _write(path: Path, seed: int, limits: Limits, figures: Mapping[str, Any]) -> None:

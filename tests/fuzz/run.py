@@ -99,15 +99,18 @@ class Tally:
         return tuple(found)
 
 
-def fuzz(target: Target, inputs: int, seed: int, seconds: float = inf) -> Tally:
-    """Read inputs until they, or so many seconds, are over; each depends on its number alone."""
+def fuzz(target: Target, inputs: int, seed: int, seconds: float = inf, first: int = 0) -> Tally:
+    """Read inputs from number `first` on until they, or so many seconds, are over.
+
+    Each depends on its number alone. So several processes can share them.
+    """
     _forget_peak()
     begun = monotonic()
     before = peak = _peak_mb()
     refused = longest = slowest = greediest = read = 0
     slowest_ms = 0.0
     findings: dict[str, str] = {}
-    for number in range(inputs):
+    for number in range(first, first + inputs):
         if monotonic() - begun > seconds:
             break
         read += 1
