@@ -31,10 +31,9 @@ def _print_recorded(arguments: argparse.Namespace) -> int:
     from quadriga.recordings.listen import entries_from_file
     from quadriga.recordings.rates import Rates
     from quadriga.recordings.readable import config_or_default, open_readable
-    from quadriga.shared.config.timing import periods
 
     source, _ = open_readable(arguments.file)
-    rates = Rates(periods(config_or_default(source)))
+    rates = Rates(config_or_default(source))
     try:
         for entry in entries_from_file(arguments.file, arguments.keys):
             rates.add(entry)
@@ -46,11 +45,10 @@ def _print_recorded(arguments: argparse.Namespace) -> int:
 def _print_live(arguments: argparse.Namespace, config: Config) -> int:
     from quadriga.recordings.listen import entries_from_bus
     from quadriga.recordings.rates import Rates
-    from quadriga.shared.config.timing import periods
 
     if arguments.count < 0 or not arguments.every > 0.0:
         raise ConfigError("-n, --every", f"{arguments.count}, {arguments.every:g}", "more than 0")
-    rates, printed, begun = Rates(periods(config)), 0, monotonic()
+    rates, printed, begun = Rates(config), 0, monotonic()
     with (
         stop_flag() as stopped,
         closing(entries_from_bus(config, "hz", arguments.keys, stopped, say)) as entries,

@@ -98,6 +98,12 @@ class Parts:
         """How many were written to all files."""
         return self._messages + self._writer.messages
 
+    def pass_over(self, key: str, count: int) -> None:
+        """Of a key's missing messages `count` were never sent."""
+        track = self._writer.tracks.get(key)
+        if track is not None:
+            track.pass_over(count)
+
     def count_lost(self) -> dict[str, int]:
         """By key, messages that did not come, of all files."""
         return dict(sorted((self._lost + Counter(lost_by_key(self._writer.tracks))).items()))

@@ -16,6 +16,7 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER, plant_name
 from quadriga.shared.recording.admission import OVERSIZED
 from quadriga.shared.recording.mcap_chunk import name_of
+from quadriga.shared.recording.passed_over import PassedOver
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.runtime.scheduling import take_priority
@@ -59,6 +60,7 @@ class Session:
         self._flushed = self._begun = monotonic()
         self._ended = self._seen = self._announced = self._drops = False
         self._hurries = config.world.mode == "lockstep"  # then it does from the start
+        self._passed_over = PassedOver(config)
         self._losses = LossWatch(lambda: find_loss(bus, config), config, grace=0.0)
 
     def record(self, *, late: bool, seen: bool) -> None:
@@ -142,6 +144,8 @@ class Session:
                     write(key, payload, now)
                 if key == self._event_key:
                     self._note_event(payload)
+                elif passed := self._passed_over.find(key, payload):
+                    self._parts.pass_over(*passed)
             self._tend()
         self._tend()
         return bool(packets)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.timing import periods
 from quadriga.shared.recording.mcap_chunk import ChunkEntry, name_of
+from quadriga.shared.recording.passed_over import PassedOver
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.tables import NOTHING, align_columns, format_number
 
@@ -63,11 +65,11 @@ class Rates:
     """The rate of every key.
 
     Args:
-        periods: by a topic's name, ms between its messages.
+        config: the team's configuration.
     """
 
-    def __init__(self, periods: Mapping[str, int]) -> None:
-        self._periods = periods
+    def __init__(self, config: Config) -> None:
+        self._periods, self._passed_over = periods(config), PassedOver(config)
         self._rates: dict[str, KeyRate] = {}
         self._tracks: dict[str, TickTrack] = {}
 
@@ -78,6 +80,9 @@ class Rates:
             track = TickTrack(self._periods.get(name_of(entry.key), 0))
             self._tracks[entry.key] = track
         track.note(entry.tick)
+        passed = self._passed_over.find(entry.key, entry.payload)
+        if passed is not None and passed[0] in self._tracks:
+            self._tracks[passed[0]].pass_over(passed[1])
         rate = self._rates.get(entry.key)
         if rate is None:
             at = entry.tick, entry.log_time_ns

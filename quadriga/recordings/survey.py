@@ -13,6 +13,7 @@ from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.mcap_chunk import ChunkEntry, name_of
+from quadriga.shared.recording.passed_over import PassedOver
 from quadriga.shared.recording.salvage import Damage
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.wire.codec import decode
@@ -81,7 +82,7 @@ def survey(path: Path) -> Survey:
         config: Config | None = recorded_config(source)
     except RecordingError as wrong:
         config, error = None, error or wrong
-    found = _read(source.entries(), periods(config or Config()))
+    found = _read(source.entries(), config or Config())
     return Survey(
         path=path,
         size=path.stat().st_size,
@@ -99,7 +100,8 @@ def type_of(key: str) -> str:
     return _TYPES.get(name_of(key), "–")
 
 
-def _read(entries: Iterator[ChunkEntry], every: Mapping[str, int]) -> dict[str, Any]:
+def _read(entries: Iterator[ChunkEntry], config: Config) -> dict[str, Any]:
+    every, passed_over = periods(config), PassedOver(config)
     tracks: dict[str, TickTrack] = {}
     kinds: dict[str, type[Message] | None] = {}
     first = last = invalid = 0
@@ -113,6 +115,9 @@ def _read(entries: Iterator[ChunkEntry], every: Mapping[str, int]) -> dict[str, 
         track.note(tick)
         first = min(first, log_time) if first else log_time
         last = max(last, log_time)
+        passed = passed_over.find(key, payload)
+        if passed is not None and passed[0] in tracks:
+            tracks[passed[0]].pass_over(passed[1])
         kind = kinds[key]
         if kind is None:
             continue

@@ -12,7 +12,6 @@ import numpy as np
 from quadriga.recordings.late_commands import late_shares
 from quadriga.recordings.rates import RateFigures, Rates
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import LEADS
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
@@ -46,7 +45,7 @@ class StatusFold:
 
     def __init__(self, config: Config) -> None:
         self._team = config.team.name
-        self._rates = Rates(periods(config))
+        self._rates = Rates(config)
         self._told: dict[str, _Told] = {}
         self._events: deque[str] = deque(maxlen=_EVENTS)
         self._counted: dict[str, dict[str, int]] = {}  # by plant, at the last look
@@ -104,7 +103,7 @@ class StatusFold:
 
     def _lost_lately(self, topics: Sequence[RateFigures]) -> dict[str, int]:
         """By key the messages that were lost between the last look and this one."""
-        lost = {of.key: of.lost - self._lost.get(of.key, 0) for of in topics}
+        lost = {of.key: max(0, of.lost - self._lost.get(of.key, 0)) for of in topics}
         self._lost = {of.key: of.lost for of in topics}
         return {key: count for key, count in lost.items() if count}
 

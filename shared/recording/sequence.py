@@ -19,7 +19,8 @@ class TickTrack:
         count: messages.
         first, last: ticks of the first and the newest message, −1 before them; one out of order,
             or far ahead, counts as the newest once the next message goes on from it.
-        lost: messages that are missing between them, by the topic's period.
+        lost: messages that are missing between them, by the topic's period, without those that
+            are known not to have been sent.
         gaps: where, at most the first thousand.
     """
 
@@ -52,6 +53,10 @@ class TickTrack:
             self._go_on(tick)
         else:
             self._odd = tick
+
+    def pass_over(self, count: int) -> None:
+        """Of the missing messages `count` were never sent, so they are not lost."""
+        self.lost = max(0, self.lost - count)
 
     def _go_on(self, tick: int) -> None:
         step = tick - self.last

@@ -37,7 +37,6 @@ from quadriga.report.run import build_run
 from quadriga.report.troubles import find_troubles
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.mcap_file import McapFile
@@ -164,7 +163,7 @@ def _read_traces(recording: Recording) -> None:
 
 def _read_exports(recording: Recording, folder: Path) -> None:
     path = recording.path
-    rates = Rates(periods(recorded_config(recording)))
+    rates = Rates(recorded_config(recording))
     with suppress(QuadrigaError):
         for entry in entries_from_file(path, ["**"]):
             rates.add(entry)

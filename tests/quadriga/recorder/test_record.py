@@ -25,7 +25,7 @@ from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import LOST, SINCE
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Plan, Reference
+from quadriga.shared.wire.messages import Command, Consumed, Plan, Reference
 from quadriga.team.endpoint import free_endpoint
 from tests.listening import WAIT, await_listener, await_recorded
 from tests.shared.recording.test_reader import state
@@ -119,6 +119,26 @@ def test_joining_late_says_what_it_missed_and_counts_what_is_lost(
     recording.require_whole()
     assert recording.notes[LOST] == {"band/r1/state": "11"}
     assert recording.notes[SINCE] == {"band/r1/state": "4000"}
+
+
+def test_commands_of_ticks_that_an_agent_passed_over_are_not_lost(
+    config: Config, start: Start, world: Bus, tmp_path: Path
+) -> None:
+    """It tells so after the command that comes next; one more command did not come."""
+    timed = replace(config, world=replace(config.world, mode="realtime"))
+    recorder = start(world, of=timed)
+    with Bus.open(config.bus, "band", "r1") as agent:
+        await_listener(agent, "band/r1/command")
+        commands, inputs = (agent.publisher(f"band/r1/{name}") for name in ("command", "inputs"))
+        for tick in (*range(50), *range(53, 80), *range(81, 100)):
+            commands(encode(Command(tick, 10**6 * tick, *np.zeros((5, 12)))))
+            if tick == 53:
+                inputs(encode(Consumed(53, 53 * 10**6, 0, 3, (), ())))
+        out, _ = ended(recorder, world, tmp_path, 97)
+    assert "97 messages, 1 lost" in out
+    assert Recording(tmp_path / "run.mcap").notes[LOST] == {"band/r1/command": "1"}
+    found = survey(tmp_path / "run.mcap")
+    assert found.tracks["band/r1/command"].lost == 1
 
 
 def test_who_hears_late_that_the_team_walks_joins_late_all_the_same(

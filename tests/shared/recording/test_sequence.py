@@ -60,3 +60,14 @@ def test_a_file_goes_on_where_the_one_before_ended() -> None:
     track = TickTrack(10, before=90)
     track.note(120)
     assert (track.lost, track.gaps, track.first) == (2, [(90, 120)], 120)
+
+
+def test_what_was_never_sent_is_not_lost() -> None:
+    track = TickTrack(1)
+    for tick in (0, 4, 7):
+        track.note(tick)
+    assert track.lost == 5
+    track.pass_over(3)
+    assert track.lost == 2
+    track.pass_over(1 << 40)
+    assert track.lost == 0
