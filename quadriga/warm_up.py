@@ -15,9 +15,7 @@ from quadriga.shared.runtime.jit_cache import compiled_folder, is_switched_off
 _DONE: Final = "rehearsed"  # a file beside the machine code of all that an agent runs
 
 _ROBOTS: Final = 2  # the fewest of which one has a peer, whose terms are compiled, too
-# Outputs that hardly respond to forces that cost nothing: the best forces are beyond all limits.
-_RESPONSE: Final = 1e-5  # of each output to each force, m/s or rad/s per N
-_CHEAP: Final = (1e-9, 1e-9, 1e-9)
+_PULL: Final = 1e6  # of the planner's cost on each force: the best forces are beyond their limits
 
 
 def warm_up(config: Config, console: Console) -> None:
@@ -45,14 +43,21 @@ def _is_compiled(folder: Path | None) -> bool:
 
 
 def _rehearse_agent(config: Config) -> None:
-    """Everything that an agent with a peer does, limits of its planner's QP included."""
+    """Everything that an agent with a peer does, with a predictor that predicts nothing."""
     from quadriga.agents.agent import Agent
+    from quadriga.agents.planner.planner_qp import build_problem
+    from quadriga.agents.planner.qp_solver import SOLVERS
     from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
     from quadriga.agents.rehearsal import rehearse
+    from quadriga.agents.time_grid import first_step, horizon_stance
     from quadriga.shared.robot.conventions import N_OUTPUTS
 
-    planner = replace(config.planner, kind="distributed", exchanges=0, R=_CHEAP)
+    planner = replace(config.planner, kind="distributed", exchanges=0)
     pair = replace(config, team=replace(config.team, robots=_ROBOTS), planner=planner)
     meta = PredictorMeta.of(pair)
-    G = np.full((meta.phases, _ROBOTS, _ROBOTS, N_OUTPUTS * meta.N, meta.width), _RESPONSE)
-    rehearse(pair, Agent(pair, "r1", Predictor(meta, G)))
+    nothing = np.zeros((meta.phases, _ROBOTS, _ROBOTS, N_OUTPUTS * meta.N, meta.width))
+    rehearse(pair, Agent(pair, "r1", Predictor(meta, nothing)))
+    # What predicts nothing never asks for forces beyond their limits.
+    stance = horizon_stance(pair, 0, first_step(pair))
+    problem = build_problem(planner, pair.robot.weight, nothing[0, 0, 0, :, meta.past :], stance)
+    SOLVERS[planner.solver](problem).solve(np.full(len(problem.H), _PULL))
