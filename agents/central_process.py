@@ -92,12 +92,12 @@ class _CentralShell:
         self._references: list[Reference] = []
         self._measurements: list[tuple[str, Measurement]] = []
         self._counters: Counter[str] = Counter()
-        self._ended = False
+        self._end: int | None = None  # tick for which the end of the walk is announced
 
     def work(self, stopped: Callable[[], bool]) -> None:
         """Plan whenever a step is due until the walk is over."""
         state, since = CentralState(), monotonic()
-        while not (stopped() or self._lead.is_over(announced=self._ended)):
+        while not (stopped() or self._lead.is_over(announced=self._end is not None)):
             packet = self._bus.get(POLL)
             if packet is None:
                 self._lead.look(state.step * step_ms(self._config))
@@ -128,9 +128,14 @@ class _CentralShell:
         robot = self._robots.get(key)
         try:
             if robot is not None:
-                self._measurements.append((robot, decode(payload, Measurement)))
+                sample = decode(payload, Measurement)
+                self._measurements.append((robot, sample))
+                if self._end is not None and sample.tick > self._end:
+                    self._end = None
             elif key.endswith(EVENT.name):
-                self._ended = self._ended or decode(payload, Event).kind == "stop"
+                event = decode(payload, Event)
+                if event.kind == "stop":
+                    self._end = event.tick
             else:
                 reference = decode(payload, Reference)
                 if not is_within_limits(reference):

@@ -74,7 +74,6 @@ class Inbox:
         refused: whether a valid message that is no state was refused: too many were held, or it
             is of a time too far ahead.
         misfits: states since the newest one that were not newer, or too far ahead.
-        ended: whether the world has announced the end of the walk.
     """
 
     def __init__(self, config: Config, robot: str, peers: Sequence[str]) -> None:
@@ -101,7 +100,8 @@ class Inbox:
             self.topics[MEASUREMENT.key(team, peer)] = (MEASUREMENT, peer)
         self.counters: Counter[str] = Counter()
         self.received: Counter[Source] = Counter()
-        self.refused = self.ended = False
+        self.refused = False
+        self._end: int | None = None  # tick for which the end of the walk is announced
         self.misfits = 0
         self._newest: dict[Source, Order] = {}
         self._held: dict[str, list[tuple[str, Any]]] = {}  # sender and message by topic
@@ -160,7 +160,8 @@ class Inbox:
             if topic is RESET:
                 self._released = message
         elif isinstance(message, Event):
-            self.ended = self.ended or message.kind == "stop"
+            if message.kind == "stop":
+                self._end = min(message.tick, max(self._gate.newest, 0) + AHEAD_MS)
             if concerns_agents(message) and len(self._events) < _HELD:
                 self._events.append(message)
         else:
@@ -185,10 +186,17 @@ class Inbox:
         if passed is not None:
             self.counters["states_passed_over"] += 1
         self._state, self.misfits = state, 0
+        if self._end is not None and state.tick > self._end:
+            self._end = None
 
     def trust_state(self, tick: int) -> None:
         """Believe the state of `tick`, however far ahead: a replay knows that it was answered."""
         self._gate.trust(tick)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the end of the walk has been announced, and time has not gone on since."""
+        return self._end is not None
 
     @property
     def has_state(self) -> bool:
