@@ -52,7 +52,7 @@ def measure(robots: int, ticks: int = 2000) -> dict[str, Any]:
 
 def _world(config: Config, place: str, ticks: int) -> dict[str, dict[str, float]]:
     names, team = robot_names(config.team.robots), config.team.name
-    state = _state()
+    state = state_bytes()
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
         listener.settimeout(_PATIENCE)
         listener.bind(place)
@@ -99,7 +99,7 @@ def _spread(times: list[int]) -> dict[str, float]:
 
 
 def _bus_robot(config: Config, name: str, ended: Event) -> None:
-    team, command = config.team.name, _command()
+    team, command = config.team.name, command_bytes()
     with Bus.open(config.bus, team, name) as bus:
         bus.subscribe(STATE.key(team, name))
         put = bus.publisher(COMMAND.key(team, name))
@@ -111,7 +111,7 @@ def _bus_robot(config: Config, name: str, ended: Event) -> None:
 
 
 def _socket_robot(config: Config, place: str) -> None:
-    command, deadline = _command(), monotonic() + _PATIENCE
+    command, deadline = command_bytes(), monotonic() + _PATIENCE
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as link:
         while True:
             try:
@@ -126,11 +126,13 @@ def _socket_robot(config: Config, place: str) -> None:
             link.send(command)
 
 
-def _state() -> bytes:
+def state_bytes() -> bytes:
+    """A state, as the world sends it."""
     rows = (np.zeros(count) for count in (12, 12, 12, 4, 3, 3, 4))
     return encode(State(0, 0, *rows))
 
 
-def _command() -> bytes:
+def command_bytes() -> bytes:
+    """A command, as a robot answers."""
     rows = np.zeros((5, N_JOINTS))
     return encode(Command(0, 0, *rows))

@@ -28,6 +28,7 @@ from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.colours import robot_rgb
 from quadriga.shared.robot.conventions import Array, robot_names
+from quadriga.sim_server.terrain.relief import Stones
 
 _FORCE_SCALE: Final = 0.005  # m per N
 _FORCE_RADIUS: Final = 0.008  # m
@@ -88,7 +89,9 @@ def frames(poses: Poses, quality: tuple[int, int], meshes: LinkMeshes) -> Iterat
             team.physics.light_xpos[0, :2] = view.target[:2]
             camera.lookat[:], camera.distance = view.target, view.distance
             renderer.update_scene(team.physics, camera)
-            relief.draw(renderer.scene, poses.centre()[k], poses.radius() + _STREWN)
+            room = renderer.scene.maxgeom - renderer.scene.ngeom
+            centre, reach = poses.centre()[k, :2], poses.radius() + _STREWN
+            add_stones(renderer.scene, relief.stones_near(centre, room, reach))
             _add_forces(renderer.scene, team.feet(), poses.grf[k])
             picture = Image.fromarray(renderer.render())
             write_names(picture, team.names, team.trunks(), view)
@@ -106,6 +109,17 @@ def _light(model: Any, height: float) -> None:
     model.vis.headlight.ambient[:] = 0.45
     model.vis.headlight.diffuse[:] = 0.4
     model.vis.map.shadowscale = 0.3
+
+
+def add_stones(scene: Any, stones: Stones) -> None:
+    """Loose stones, of which there must be no more than the scene has room for."""
+    turn = np.zeros(9)
+    for pose, half, rgb in zip(*stones, strict=True):
+        geom, kind = scene.geoms[scene.ngeom], mujoco.mjtGeom.mjGEOM_ELLIPSOID
+        mujoco.mju_quat2Mat(turn, pose[3:])
+        rgba = np.array([*rgb, 1.0], dtype=np.float32)
+        mujoco.mjv_initGeom(geom, kind, half, pose[:3], turn, rgba)
+        scene.ngeom += 1
 
 
 def _add_forces(scene: Any, feet: Array, grf: Array) -> None:

@@ -7,16 +7,19 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.shared.robot.conventions import Array
+from quadriga.sim_server.terrain.relief import Relief
 from quadriga.view.ground import read_boxes, read_surface
 from quadriga.view.scene_colours import to_linear
 from quadriga.view.team_shape import TeamShape
 
 _PLANE: Final = (-0.004, 60.0)  # m: height, under all that lies on the ground; edge
 _EARTH: Final = (168, 152, 120)
+_STONES: Final = 6000  # at most, of those that lie loose: more would make a page slow
+_STRIDE: Final = 0.3  # m, by which the team has moved before others are shown
 
 
 def add_ground(scene: Any, shape: TeamShape) -> None:
-    """The plane and what lies on it, loose stones aside."""
+    """The plane and what lies fast on it."""
     height, edge = _PLANE
     scene.add_grid(
         "/team/plane",
@@ -38,6 +41,42 @@ def add_ground(scene: Any, shape: TeamShape) -> None:
         scene.add_mesh_simple(
             "/team/surface", surface.vertices, surface.faces, color=_EARTH, flat_shading=True
         )
+
+
+class StoneLayer:
+    """The loose stones around the team, as they lay before the walk."""
+
+    def __init__(self, scene: Any, relief: Relief) -> None:
+        """Show those around the place where the team starts, if there are any."""
+        from trimesh.creation import icosphere
+
+        self._relief, self._centre = relief, np.zeros(2)
+        stones = relief.stones_near(self._centre, _STONES)
+        if not len(stones.poses):
+            self._batch = None
+            return
+        ball = icosphere(0)
+        self._batch = scene.add_batched_meshes_simple(
+            "/team/stones",
+            np.asarray(ball.vertices),
+            np.asarray(ball.faces),
+            batched_wxyzs=stones.poses[:, 3:],
+            batched_positions=stones.poses[:, :3],
+            batched_scales=stones.halves,
+            batched_colors=to_linear(255.0 * stones.colours),
+            lod="off",
+        )
+
+    def follow(self, centre: Array) -> None:
+        """Show those around a place, shape (2,), m, once the team has come so far."""
+        if self._batch is None or np.linalg.norm(centre - self._centre) < _STRIDE:
+            return
+        self._centre = centre
+        stones = self._relief.stones_near(centre, _STONES)
+        self._batch.batched_positions = stones.poses[:, :3]
+        self._batch.batched_wxyzs = stones.poses[:, 3:]
+        self._batch.batched_scales = stones.halves
+        self._batch.batched_colors = to_linear(255.0 * stones.colours)
 
 
 def add_boxes(

@@ -16,7 +16,7 @@ from quadriga.view.picture import Picture
 from quadriga.view.scene_colours import rgb_of, to_linear
 from quadriga.view.skeleton import rotate
 from quadriga.view.team_shape import TeamShape
-from quadriga.view.viser_ground import add_boxes, add_ground
+from quadriga.view.viser_ground import StoneLayer, add_boxes, add_ground
 
 NEWTON: Final = 0.003  # m of arrow per N
 LEAST: Final = 2.0  # N; a smaller force is not drawn
@@ -49,6 +49,7 @@ class ViewScene:
         self.follows = True
         self._root = scene.add_frame("/team", show_axes=False)
         add_ground(scene, shape)
+        self._stones = StoneLayer(scene, shape.terrain.relief)
         self._groups: list[tuple[list[int], Any]] = [
             (list(group.links), self._add_group(f"/team/links/{k}", group))
             for k, group in enumerate(group_meshes(meshes, shape.skeleton.links))
@@ -84,6 +85,7 @@ class ViewScene:
         with self._server.atomic():
             x, y, _ = picture.centre.tolist() if self.follows else (0.0, 0.0, 0.0)
             self._root.position = (-x, -y, 0.0)
+            self._stones.follow(picture.centre[:2])
             for links, handle in self._groups:
                 handle.batched_positions = picture.link_positions[:, links].reshape(-1, 3)
                 handle.batched_wxyzs = picture.link_quats[:, links].reshape(-1, 4)

@@ -22,9 +22,11 @@ _COMMON: Final = {
     # Nobody is found by multicast, nothing goes through shared memory.
     "scouting/multicast/enabled": False,
     "transport/shared_memory/enabled": False,
-    # Messages that may wait for a link in real time before they are dropped. With Zenoh's 2 a
-    # recorder on a busy machine loses one in a thousand. Words of people and events have a queue of
-    # their own, which is empty nearly always.
+    # Batches that may wait for a link in real time before messages are dropped; with Zenoh's 2 a
+    # recorder on a busy machine loses one in a thousand. A batch takes up to 64 kB, unless it is
+    # sent at once (`express`): then it is one message, and 16 of them wait where the thread that
+    # sends has not run for 10 ms. Words of people and events have a queue of their own, which is
+    # empty nearly always.
     "transport/link/tx/queue/size/data": 16,
     "transport/link/tx/queue/size/real_time": 16,
     # Linux counts far more bytes of small messages than they have. Its own buffer is full after

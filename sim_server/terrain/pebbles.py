@@ -14,7 +14,7 @@ from quadriga.shared.robot.conventions import N_LEGS, Array
 from quadriga.sim_server.terrain.contact import STONE_CONTACT
 from quadriga.sim_server.terrain.course import Course, Rectangle
 from quadriga.sim_server.terrain.loose import LooseStones
-from quadriga.sim_server.terrain.relief import Relief
+from quadriga.sim_server.terrain.relief import Relief, Stones
 
 _SIZES: Final = (0.5, 0.67, 0.83, 1.0)  # of the largest
 _AXES: Final = (1.3, 1.1, 1.0)  # half axes of a stone over half its height
@@ -26,10 +26,7 @@ _PER_LEG: Final = 10  # stones that can move, of all sizes
 _SOLREF: Final = (0.004, 1.0)  # s, damping ratio
 _SOLIMP: Final = (0.99, 0.999, 0.001, 0.5, 2.0)
 _PARKED: Final = 500.0  # m, height of those not in use
-_RGBA: Final = (
-    (0.52, 0.50, 0.47, 1.0), (0.60, 0.56, 0.50, 1.0), (0.44, 0.43, 0.42, 1.0),
-    (0.56, 0.49, 0.42, 1.0),
-)  # fmt: skip
+_RGB: Final = ((0.52, 0.50, 0.47), (0.60, 0.56, 0.50), (0.44, 0.43, 0.42), (0.56, 0.49, 0.42))
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +73,7 @@ class Pebbles(Relief):
                 friction=[friction, 0.005, _ROLLING],
                 solref=_SOLREF,
                 solimp=_SOLIMP,
-                rgba=_RGBA[i],
+                rgba=[*_RGB[i], 1.0],
                 **STONE_CONTACT,
             )
 
@@ -84,22 +81,15 @@ class Pebbles(Relief):
         """Lend the bodies of a compiled world to stones near feet."""
         return LooseStones(self, self.parking_poses(robots), model, physics, foot_radius)
 
-    def draw(self, scene: mujoco.MjvScene, centre: Array, reach: float) -> None:
-        """Add the stones around a place to a picture, as they lay at the start."""
-        away = np.linalg.norm(self.pose[:, :2] - centre[:2], axis=1)
-        nearest = np.argsort(away, kind="stable")[: scene.maxgeom - scene.ngeom]
-        for k in nearest[away[nearest] <= reach].tolist():
-            turn = np.zeros(9)
-            mujoco.mju_quat2Mat(turn, self.pose[k, 3:])
-            mujoco.mjv_initGeom(
-                scene.geoms[scene.ngeom],
-                mujoco.mjtGeom.mjGEOM_ELLIPSOID,
-                self.half[self.size[k]],
-                self.pose[k, :3],
-                turn,
-                np.array(_RGBA[k % len(_RGBA)], dtype=np.float32),
-            )
-            scene.ngeom += 1
+    def stones_near(self, centre: Array, most: int, reach: float = np.inf) -> Stones:
+        """The stones around a place, the nearest first."""
+        away = np.linalg.norm(self.pose[:, :2] - centre, axis=1)
+        near = np.flatnonzero(away <= reach)
+        if most < len(near):  # of a long way's million stones only the nearest are put in order
+            near = near[np.argpartition(away[near], most)[:most]]
+        nearest = near[np.argsort(away[near], kind="stable")]
+        colours = np.array(_RGB)[nearest % len(_RGB)]
+        return Stones(self.pose[nearest], self.half[self.size[nearest]], colours)
 
 
 def build_pebbles(course: Course, world: WorldConfig, random: np.random.Generator) -> Pebbles:

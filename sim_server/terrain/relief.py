@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Final, Protocol
+from typing import Any, ClassVar, Final, NamedTuple, Protocol
 
 import mujoco
 import numpy as np
@@ -21,6 +21,20 @@ class MovingBodies(Protocol):
         Args:
             feet: centres of all feet, shape (f, 3), m, world.
         """
+
+
+class Stones(NamedTuple):
+    """Loose stones as they lay before the walk.
+
+    Attributes:
+        poses: centre and attitude wxyz of each, shape (k, 7), m, world.
+        halves: half axes of each, shape (k, 3), m.
+        colours: RGB of each, 0 … 1, shape (k, 3).
+    """
+
+    poses: Array
+    halves: Array
+    colours: Array
 
 
 class Relief:
@@ -70,11 +84,12 @@ class Relief:
         """
         return None
 
-    def draw(self, scene: mujoco.MjvScene, centre: Array, reach: float) -> None:
-        """Add what the model does not show to a picture.
+    def stones_near(self, centre: Array, most: int, reach: float = np.inf) -> Stones:
+        """The loose stones around a place, the nearest first.
 
         Args:
-            scene: the picture.
-            centre: what it shows, shape (3,), m, world.
-            reach: how far around that, m.
+            centre: of the place, shape (2,), m, world.
+            most: how many at most.
+            reach: how far from there, m.
         """
+        return Stones(np.zeros((0, 7)), np.zeros((0, 3)), np.zeros((0, 3)))

@@ -279,19 +279,6 @@ def test_an_emergency_stop_and_the_end_are_never_held_back() -> None:
     assert box.ended
 
 
-@pytest.mark.parametrize("announced", [3, 7, 2**41])
-def test_an_announced_end_is_forgotten_once_time_goes_on(announced: int) -> None:
-    """A stranger may announce one, of any time: afterwards a pause of the team is no end."""
-    box = arrivals()
-    feed(box, ("r2/state", standing(5)), ("sim/event", Event(announced, 7, "stop", "", "", "end")))
-    assert box.ended
-    box.pop_state()
-    for tick in range(6, 1100):
-        feed(box, ("r2/state", standing(tick)))
-        box.pop_state()
-    assert not box.ended
-
-
 def test_a_flood_is_bounded_and_counted() -> None:
     box = arrivals()
     feed(box, ("r2/state", standing(19_999)), ("r2/state", standing(20_000)))

@@ -16,12 +16,15 @@ from quadriga.view.compose import compose
 from quadriga.view.ground import read_boxes, read_surface
 from quadriga.view.mesh_groups import group_meshes
 from quadriga.view.picture import RobotAccount
+from quadriga.view.port import PageAddress
 from quadriga.view.readings import read_accounts
 from quadriga.view.recorded import RecordedRun
 from quadriga.view.scene_colours import to_linear
 from quadriga.view.team_shape import build_team_shape
 from quadriga.view.traffic import KeyTraffic
+from quadriga.view.viser_ground import StoneLayer
 from quadriga.view.viser_scene import NEWTON, arrows_of
+from quadriga.view.viser_server import open_server
 
 
 def terrain(kind: str, **keys: object) -> Terrain:
@@ -50,6 +53,21 @@ def test_a_surface_follows_the_heights() -> None:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert (normals[:, 2] > 0.0).all()  # seen from above
     assert not len(read_boxes(ground).positions)
+
+
+def test_loose_stones_around_the_team_are_shown_wherever_it_goes() -> None:
+    relief = terrain("pebbles").relief
+    with open_server(PageAddress(0), "stones") as server:
+        layer = StoneLayer(server.scene, relief)
+        batch = layer._batch
+        assert batch is not None
+        for x in (0.0, 0.1, 2.0):
+            layer.follow(np.array([x, 0.2]))
+            near = relief.stones_near(np.array([x, 0.2]) if x > 1.0 else np.zeros(2), 6000)
+            assert batch.batched_positions == pytest.approx(near.poses[:, :3], abs=1e-6)
+            assert batch.batched_scales == pytest.approx(near.halves, abs=1e-6)
+        assert len(near.poses) > 500
+        assert StoneLayer(server.scene, terrain("boxes").relief)._batch is None
 
 
 @pytest.mark.parametrize("kind", ["a1", "go2"])

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from quadriga.pictures.mujoco_frames import add_stones
 from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
 from quadriga.shared.wire.codec import encode
 from quadriga.sim_server.terrain.loose import LooseStones
@@ -129,12 +130,17 @@ def test_equal_seeds_give_equal_stones_and_bytes() -> None:
 def test_the_stones_around_a_place_are_drawn_the_nearest_first(room: int) -> None:
     pebbles, model = parts(strewn())[0], strewn().team.model
     scene = mujoco.MjvScene(model, maxgeom=room)
-    centre = np.array([2.0, 0.1, 0.3])
-    pebbles.draw(scene, centre, 0.5)
-    away = np.sort(np.linalg.norm(pebbles.pose[:, :2] - centre[:2], axis=1))
+    centre = np.array([2.0, 0.1])
+    stones = pebbles.stones_near(centre, room, 0.5)
+    add_stones(scene, stones)
+    away = np.sort(np.linalg.norm(pebbles.pose[:, :2] - centre, axis=1))
     count = min(room, int((away <= 0.5).sum()))
     drawn = np.array([scene.geoms[i].pos for i in range(scene.ngeom)])
     assert len(drawn) == count > 10
     np.testing.assert_allclose(
-        np.linalg.norm(drawn[:, :2] - centre[:2], axis=1), away[:count], atol=1e-6
+        np.linalg.norm(drawn[:, :2] - centre, axis=1), away[:count], atol=1e-6
     )
+    np.testing.assert_allclose(
+        [scene.geoms[i].size for i in range(count)], stones.halves, rtol=1e-6
+    )
+    assert (stones.poses[:, 2] == stones.halves[:, 2]).all(), "each lies on the ground"
