@@ -171,7 +171,7 @@ class Bus:
         control = zenoh.CongestionControl
         publisher = self._session.declare_publisher(
             key,
-            express=urgent,  # a batch of one is one of 16 that may wait for a link
+            express=urgent or not droppable,  # see `_COMMON` of the settings
             congestion_control=control.DROP if droppable or urgent else control.BLOCK,
             priority=zenoh.Priority.REAL_TIME if urgent else zenoh.Priority.DATA,
         )

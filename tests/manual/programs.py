@@ -21,7 +21,7 @@ from tests.manual.named import check_named, check_places
 
 # Of the system, or of packages that pages tell how to install.
 _SYSTEM: Final = ". chown cp docker export grep head install ip journalctl ls podman scp ssh"
-_MORE: Final = "dask pip podman-compose pytest systemctl true useradd wait"
+_MORE: Final = "git cmake dask pip podman-compose pytest systemctl true useradd wait"
 _OTHERS: Final = frozenset((*_SYSTEM.split(), *_MORE.split()))
 _AROUND: Final = frozenset(("docker", "podman", "podman-compose"))
 _IN_SERVICE: Final = frozenset(("exec", "run", "cp"))  # of `docker compose`

@@ -134,6 +134,7 @@ def test_a_router_and_the_word_to_go_on(make_team: Make, watcher: Watcher) -> No
         bus = watcher(team, EVENT, STATUS, TRUTH)
         await_tick(bus, 1500)
         kill(running, "router")
+        sleep(1.0)  # a fast machine has it back before anybody stands
         running.restart("router")
         await_news(bus, ("", LINK_BACK), ROBOTS, stands_for_a_loss)
         # On a busy machine not all may have said within its time that they walk.

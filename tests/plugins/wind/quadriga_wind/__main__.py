@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from quadriga.shared.bus.zenoh_bus import POLL, Bus
+from quadriga.shared.bus.barrier import lead
+from quadriga.shared.bus.zenoh_bus import HERE, POLL, Bus
 from quadriga.shared.config.load import load
+from quadriga.shared.members import has_lead
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.envelope import envelope
@@ -31,7 +33,8 @@ def main(file: Path) -> int:
         put = bus.publisher(WIND.key(team))
         bus.subscribe(TRUTH.key(team))
         bus.subscribe(EVENT.key(team))
-        while True:
+        bus.wait_for(HERE, [lead(config)], config.bus.barrier_timeout, lambda: False)
+        while has_lead(bus.members_at(HERE)):
             key, payload = bus.get(POLL) or ("", b"")
             if key == EVENT.key(team) and decode(payload, Event).kind == "stop":
                 return 0
@@ -40,6 +43,7 @@ def main(file: Path) -> int:
                 gust = np.array([2.0 + np.sin(1e-3 * tick), 0.0, 0.0])
                 put(encode(Wind(tick, stamp_ns, gust, "mast")))
                 next_tick = tick - tick % WIND.period_ms + WIND.period_ms
+    return 0
 
 
 if __name__ == "__main__":
