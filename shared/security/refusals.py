@@ -3,6 +3,10 @@
 Zenoh tells its verdict on a message and, in the next line of the same thread, that it has dropped
 it. Verdicts alone are no refusal: most say what is permitted, or what would be refused. They name
 the session of a sender; the common name of its certificate comes from the link.
+
+A message to somebody who has just left is dropped too, without a verdict. That is no refusal, and
+must not be told of the message before: sizes are limited only as messages come in, so what is
+permitted to go out is never too large, nor is a query or a reply that has been passed on.
 """
 
 from __future__ import annotations
@@ -23,10 +27,11 @@ REASONS: Final = (DENIED, REVOKED, LARGE, OFTEN, EXPIRED, UNTRUSTED, FULL)
 
 # What must be logged so that refusals can be told from it.
 LEVELS: Final = (
-    "error,zenoh::net::routing::interceptor=trace,"
+    "error,zenoh::net::routing::interceptor=trace,zenoh::net::routing::dispatcher::queries=trace,"
     "zenoh_transport::unicast::manager=trace,zenoh_link_tls=debug,zenoh_link_commons=warn"
 )
 _DROPPED: Final = "Msg intercepted!"
+_PASSED_ON: Final = "::dispatcher::queries"  # in lines of a query or a reply that has come in
 _NO_SESSION: Final = "Denying new transport"
 _NO_LINK: Final = ". Hint: increase the system open file limit"  # of whatever failed
 _ACCEPTS: Final = "Accepted TLS connection"
@@ -93,6 +98,9 @@ class RefusalParser:
     def _take(self, line: str) -> Refused | None:
         if "::interceptor" in line:
             return self._take_message(line)
+        if _PASSED_ON in line:
+            self._verdicts.pop(_thread_of(line), None)
+            return None
         accepted = _ACCEPTED.search(line)
         if accepted:
             self._note_link(accepted["address"], accepted["name"])
@@ -113,15 +121,21 @@ class RefusalParser:
             del self._links[next(iter(self._links))]
 
     def _take_message(self, line: str) -> Refused | None:
-        thread = _THREAD.search(line)
-        at = thread[1] if thread else ""
+        at = _thread_of(line)
         if _DROPPED in line:
             return self._verdicts.pop(at, None)
         if verdict := _VERDICT.search(line):
-            self._verdicts[at] = _of_verdict(verdict)
+            self._verdicts.pop(at, None)
+            if verdict["un"] or verdict["flow"] == "in":
+                self._verdicts[at] = _of_verdict(verdict)
         elif often := _OFTEN.search(line):
             self._verdicts[at] = Refused(often["session"], "put", often["key"], OFTEN)
         return None
+
+
+def _thread_of(line: str) -> str:
+    thread = _THREAD.search(line)
+    return thread[1] if thread else ""
 
 
 def _of_verdict(verdict: re.Match[str]) -> Refused:

@@ -63,6 +63,20 @@ def test_who_may_send_it_but_is_dropped_has_sent_too_much() -> None:
     assert take(line(8, cached), dropped(8)) == {Refused(ONE, "put", "team/r2/command", "large"): 1}
 
 
+def test_what_is_sent_to_somebody_who_has_just_left_is_not_refused() -> None:
+    """Zenoh drops it without a verdict, right after the message to another receiver, or ahead."""
+    queries = "zenoh::net::routing::dispatcher::queries"
+    came = verdict(8, ONE, "authorized to Query (ingress)", "team/*/received")
+    routed = line(8, "south:0:client/29a8f12d:1:4 Route query for res team/*/received", queries)
+    out = verdict(8, TWO, "authorized to Query (egress)", "team/*/received")
+    assert take(came, routed, out, dropped(8)) == {}
+    assert take(came, routed, dropped(8)) == {}
+    assert take(verdict(8, TWO, "authorized to Put (egress)", "team/r1/state"), dropped(8)) == {}
+    assert take(came, dropped(8)) == {Refused(ONE, "query", "team/*/received", "large"): 1}
+    denied = verdict(8, TWO, "unauthorized to Put (egress)", "team/r1/state")
+    assert take(denied, dropped(8)) == {Refused(TWO, "hear", "team/r1/state", "denied"): 1}
+
+
 def test_what_comes_too_often_names_the_beginning_of_a_session() -> None:
     text = (
         "Message dropped by the downsampling interceptor: Push(team/r2/command) "
