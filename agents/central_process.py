@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from quadriga.agents.announced_end import AnnouncedEnd
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.planner.team_planner import TeamPlanner
 from quadriga.agents.planning.interface import REFUSED
@@ -92,15 +93,16 @@ class _CentralShell:
         self._references: list[Reference] = []
         self._measurements: list[tuple[str, Measurement]] = []
         self._counters: Counter[str] = Counter()
-        self._end: int | None = None  # tick for which the end of the walk is announced
+        self._end = AnnouncedEnd()
+        self._tick = 0  # of the last plans
 
     def work(self, stopped: Callable[[], bool]) -> None:
         """Plan whenever a step is due until the walk is over."""
         state, since = CentralState(), monotonic()
-        while not (stopped() or self._lead.is_over(announced=self._end is not None)):
+        while not (stopped() or self._lead.is_over(announced=self._end.awaited)):
             packet = self._bus.get(POLL)
             if packet is None:
-                self._lead.look(state.step * step_ms(self._config))
+                self._lead.look(self._tick)
             else:
                 self._lead.hear()
             for key, payload in (packet, *self._bus.drain()) if packet else ():
@@ -112,6 +114,7 @@ class _CentralShell:
                 since = monotonic()
             elif self._reference_known(state, due) or monotonic() - since > self._patience:
                 state, outputs = self._central.step(state)
+                self._tick = state.step * step_ms(self._config)
                 self._publish(state, outputs)
 
     @property
@@ -130,12 +133,11 @@ class _CentralShell:
             if robot is not None:
                 sample = decode(payload, Measurement)
                 self._measurements.append((robot, sample))
-                if self._end is not None and sample.tick > self._end:
-                    self._end = None
+                self._end.pass_tick(sample.tick)
             elif key.endswith(EVENT.name):
                 event = decode(payload, Event)
                 if event.kind == "stop":
-                    self._end = event.tick
+                    self._end.announce(event.tick, self._tick)
             else:
                 reference = decode(payload, Reference)
                 if not is_within_limits(reference):

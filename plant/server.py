@@ -103,20 +103,23 @@ class PlantServer:
         """
         plant = self.plant
         self._take_early()
-        if self.time.drives and plant.tick % self._periods[CLOCK.name] == 0:
-            self._put_clock(encode(Clock(plant.tick, plant.tick * 1_000_000)))
-        if self.time.alone and plant.tick % self._periods[TRUTH.name] == 0:
-            truth = plant.truth()
-            if truth is not None:
-                self._put_truth(encode(truth))
-        is_seen = plant.tick % POSTURE.period_ms == 0
+        # States come first: agents wait for them, and in real time they have a millisecond.
+        seen: list[tuple[str, bytes]] = []
         for name, state in plant.states().items():
             # Other plants wait for every state in lock-step: theirs may not be lost.
             droppable = name in self.silent and self.time.alone
             put = self._put_silent if droppable else self._put_state
             payload = encode(state)
             put[name](payload)
-            if is_seen:
+            seen.append((name, payload))
+        if self.time.drives and plant.tick % self._periods[CLOCK.name] == 0:
+            self._put_clock(encode(Clock(plant.tick, plant.tick * 1_000_000)))
+        if self.time.alone and plant.tick % self._periods[TRUTH.name] == 0:
+            truth = plant.truth()
+            if truth is not None:
+                self._put_truth(encode(truth))
+        if plant.tick % POSTURE.period_ms == 0:
+            for name, payload in seen:
                 self._put_posture[name](payload)
         self._published = plant.tick
         plant.settle()

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Final
 
+from quadriga.agents.announced_end import AnnouncedEnd
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.planning.operator_references import AHEAD_MS
 from quadriga.agents.planning.reference_slew import ReferenceSlew
@@ -101,7 +102,7 @@ class Inbox:
         self.counters: Counter[str] = Counter()
         self.received: Counter[Source] = Counter()
         self.refused = False
-        self._end: int | None = None  # tick for which the end of the walk is announced
+        self._end = AnnouncedEnd()
         self.misfits = 0
         self._newest: dict[Source, Order] = {}
         self._held: dict[str, list[tuple[str, Any]]] = {}  # sender and message by topic
@@ -161,7 +162,7 @@ class Inbox:
                 self._released = message
         elif isinstance(message, Event):
             if message.kind == "stop":
-                self._end = min(message.tick, max(self._gate.newest, 0) + AHEAD_MS)
+                self._end.announce(message.tick, self._gate.newest)
             if concerns_agents(message) and len(self._events) < _HELD:
                 self._events.append(message)
         else:
@@ -186,8 +187,7 @@ class Inbox:
         if passed is not None:
             self.counters["states_passed_over"] += 1
         self._state, self.misfits = state, 0
-        if self._end is not None and state.tick > self._end:
-            self._end = None
+        self._end.pass_tick(state.tick)
 
     def trust_state(self, tick: int) -> None:
         """Believe the state of `tick`, however far ahead: a replay knows that it was answered."""
@@ -196,7 +196,7 @@ class Inbox:
     @property
     def ended(self) -> bool:
         """Whether the end of the walk has been announced, and time has not gone on since."""
-        return self._end is not None
+        return self._end.awaited
 
     @property
     def has_state(self) -> bool:

@@ -16,7 +16,7 @@ def add(add_command: AddCommand) -> None:
         "bench-stop", run, "stop a team that is driven again and again, in each way, and time it"
     )
     option = command.add_argument
-    option("ways", nargs="*", metavar="WAY", help="page keyboard estop gamepad silence (all)")
+    option("ways", nargs="*", metavar="WAY", help="page keyboard estop armed gamepad silence (all)")
     option("--tries", type=int, default=100, metavar="K", help="of each way (%(default)s)")
     option("--json", type=Path, metavar="FILE", help="write the figures of each way there")
     option("--out", type=Path, metavar="DIR", help="folder to write to (runs/<date>-<time>)")

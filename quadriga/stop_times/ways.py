@@ -18,12 +18,14 @@ from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
 from quadriga.stop_times.page_driver import PageDriver
 from quadriga.team.launch import QUADRIGA
+from quadriga.team.run_folder import CONFIG
 from quadriga.team.spectator import end_process
 
 Press = Callable[[], int]  # presses; `monotonic_ns` at the press
 Way = Callable[[PageDriver, str, Path], AbstractContextManager[Press]]  # of a team, in a folder
 _READY_S: Final = 30.0  # for a program to listen to its keys
 _SHOWN: Final = "STOP"  # what it says of its keys or buttons, once it listens to them
+_ARMED: Final = "armed: Enter stops"  # what an emergency stop says once all would hear it
 # Keys come from a terminal that is the program's own, not merely its standard input.
 _IN_TERMINAL: Final = (
     "import fcntl, os, sys, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
@@ -64,6 +66,32 @@ def by_estop(_page: PageDriver, _team: str, folder: Path) -> Iterator[Press]:
 
 
 @contextmanager
+def by_armed_estop(_page: PageDriver, _team: str, folder: Path) -> Iterator[Press]:
+    """The Enter key of `quadriga estop --armed`, which ends with the stop; so each has its own."""
+    running: list[subprocess.Popen[bytes]] = []
+
+    def press() -> int:
+        path = folder / f"armed-{len(running)}.log"
+        words = ("--reason", "bench", "--armed", "--config", str(folder / CONFIG))
+        with path.open("wb") as log:
+            running.append(
+                process := subprocess.Popen(
+                    (*QUADRIGA, "estop", *words), stdin=subprocess.PIPE, stdout=log, stderr=log
+                )
+            )
+        _await_words("quadriga estop", process, path, _ARMED)
+        assert process.stdin is not None  # it is a pipe
+        with process.stdin:
+            return _write(process.stdin.fileno(), b"\n")
+
+    try:
+        yield press
+    finally:
+        for process in running:
+            end_process(process)
+
+
+@contextmanager
 def by_keyboard(_page: PageDriver, team: str, folder: Path) -> Iterator[Press]:
     """The key of `quadriga drive --keyboard`, in a terminal of its own."""
     terminal, inside = pty.openpty()
@@ -95,6 +123,7 @@ WAYS: Final[Mapping[str, Way]] = MappingProxyType(
         "page": by_page,
         "keyboard": by_keyboard,
         "estop": by_estop,
+        "armed": by_armed_estop,
         "gamepad": by_gamepad,
         "silence": by_silence,
     }
@@ -124,12 +153,17 @@ def _driving(
             stderr=log,
         )
     try:
-        deadline = monotonic() + _READY_S
-        while _SHOWN not in path.read_text(encoding="utf-8", errors="replace"):
-            if process.poll() is not None or monotonic() > deadline:
-                said = path.read_text(encoding="utf-8", errors="replace").strip()
-                raise ProcessError("quadriga drive", said[-200:] or "nothing said", "to listen")
-            sleep(0.05)
+        _await_words("quadriga drive", process, path, _SHOWN)
         yield
     finally:
         end_process(process)
+
+
+def _await_words(name: str, process: subprocess.Popen[bytes], path: Path, words: str) -> None:
+    """Wait until a program has said something, which is in a file."""
+    deadline = monotonic() + _READY_S
+    while words not in path.read_text(encoding="utf-8", errors="replace"):
+        if process.poll() is not None or monotonic() > deadline:
+            said = path.read_text(encoding="utf-8", errors="replace").strip()
+            raise ProcessError(name, said[-200:] or "nothing said", f"to say {words!r}")
+        sleep(0.05)

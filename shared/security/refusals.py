@@ -6,7 +6,9 @@ the session of a sender; the common name of its certificate comes from the link.
 
 A message to somebody who has just left is dropped too, without a verdict. That is no refusal, and
 must not be told of the message before: sizes are limited only as messages come in, so what is
-permitted to go out is never too large, nor is a query or a reply that has been passed on.
+permitted to go out is never too large, nor is a query or a reply that has been passed on. (Zenoh
+would tell that of puts too, in one more line for each: without it a put whose first receiver has
+just left is told as large.)
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import pytest
 
 from quadriga.commands.parser import main
 
-WAYS = ("silence", "page", "keyboard", "estop", "gamepad")
+WAYS = ("silence", "page", "keyboard", "estop", "armed", "gamepad")
 OPTIONS = (
     *("--robots", "1", "--planner", "none", "--tries", "1"),
     *("--set", "runtime.refuse_overload=false"),

@@ -225,7 +225,8 @@ def test_a_walk_that_is_told_to_stop_leaves_no_plant_behind(make_team: Make) -> 
             assert monotonic() < deadline
             sleep(0.05)
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        assert len(children) == 5, "two plants, two agents, the operator"
+        commands = [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in children]
+        assert len(commands) == 5, f"two plants, two agents, the operator, but {commands}"
         process.terminate()
         assert process.wait(WAIT) == 130
     assert not [pid for pid in children if os.path.exists(f"/proc/{pid}")]

@@ -13,6 +13,7 @@ import numpy as np
 from quadriga.shared.bus.barrier import lead
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, Bus
 from quadriga.shared.config.load import load
+from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.members import has_lead
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.wire.codec import decode, encode
@@ -47,4 +48,7 @@ def main(file: Path) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[-1])))
+    try:
+        sys.exit(main(Path(sys.argv[-1])))
+    except QuadrigaError as error:
+        sys.exit(f"quadriga_wind: {error}")
