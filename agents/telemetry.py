@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from quadriga.agents.modes import WALK
 from quadriga.agents.step_io import Outputs
 from quadriga.shared.runtime.histogram import Histogram
 from quadriga.shared.wire.messages import Status
@@ -34,7 +35,7 @@ class Telemetry:
         self._planner_ms: list[float] = []
         self._tick_us: list[float] = []
         self._last = -PERIOD_MS
-        self._ages_ms: dict[str, float] = {}  # each as it was last
+        self._ages_ms: dict[str, float] = {}  # each as it was last in this walk
 
     def note_step(self, outputs: Outputs, tick_ns: int) -> None:
         """Add one tick.
@@ -46,6 +47,8 @@ class Telemetry:
         self._tick_us.append(1e-3 * tick_ns)
         if self._paced and tick_ns > _TICK_MS * 1e6:
             self._missed += 1
+        if outputs.mode != WALK:
+            self._ages_ms.clear()  # a plan that ended the walk is none that the next one uses
         self._ages_ms.update(outputs.ages_ms)
         if outputs.planner_ns is not None:
             self._planner_ms.append(1e-6 * outputs.planner_ns)

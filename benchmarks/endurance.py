@@ -18,7 +18,7 @@ from typing import Final
 
 from rich.console import Console
 
-from benchmarks.slow_motion import in_slow_motion
+from benchmarks.slow_motion import in_slow_motion, read_speed
 from benchmarks.walks import resident_mb
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.recordings.summary import summarise
@@ -52,7 +52,7 @@ def main() -> int:
     parser.add_argument("--robots", type=int, default=2)
     parser.add_argument("--planner", default="distributed")
     parser.add_argument("--seed", type=int, default=0, help="of the world")
-    parser.add_argument("--speed", type=_read_speed, default=1.0, help="of the clocks, at most 1")
+    parser.add_argument("--speed", type=read_speed, default=1.0, help="of the clocks, at most 1")
     parser.add_argument("--out", type=Path, metavar="DIR", help="run folder (runs/<date>-<time>)")
     given = parser.parse_args()
     interrupt_on_sigterm()
@@ -72,13 +72,6 @@ def main() -> int:
         return 2
     except KeyboardInterrupt:
         return _INTERRUPTED
-
-
-def _read_speed(text: str) -> float:
-    speed = float(text)
-    if not 0.0 < speed <= 1.0:
-        raise argparse.ArgumentTypeError(f"got {text}, expected a share above 0 and at most 1")
-    return speed
 
 
 def endure(config: Config, out: Path | None, console: Console, speed: float = 1.0) -> int:

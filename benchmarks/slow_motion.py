@@ -7,6 +7,7 @@ of their speed, in all processes from the same origin. Those of Zenoh's own thre
 
 from __future__ import annotations
 
+import argparse
 import runpy
 import sys
 import time
@@ -53,6 +54,21 @@ def in_slow_motion(row: ProcessSpec, speed: float) -> ProcessSpec:
     python, option, *words = row.command
     assert option == "-m", row.command
     return replace(row, command=(python, "-m", __name__, str(speed), *words))
+
+
+def read_speed(text: str) -> float:
+    """The speed of a command line.
+
+    Raises:
+        argparse.ArgumentTypeError: it is no share above 0 and at most 1.
+    """
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = 0.0
+    if not 0.0 < speed <= 1.0:
+        raise argparse.ArgumentTypeError(f"got {text}, expected a share above 0 and at most 1")
+    return speed
 
 
 def main() -> None:

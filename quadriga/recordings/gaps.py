@@ -20,7 +20,7 @@ from quadriga.shared.config.timing import periods
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Status
-from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, STATE, TRUTH, Topic
+from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, SAMPLE_MS, STATE, TRUTH, Topic
 
 Span = tuple[float, float]  # ticks from the first up to before the second
 
@@ -45,7 +45,8 @@ def missing_ticks(
     so, nothing is expected until it has begun again. After its last plan none is. A robot without
     measurements or plans lacks all from the end of the initial stand on; of a controller of one's
     own no measurements are expected. Of ticks that an agent, late in real time, says it passed
-    over no command is.
+    over no command is, of samples that ended in them or fell into them no measurement, and of
+    windows that lack such a sample no plan.
 
     Args:
         config: the configuration of the run.
@@ -68,8 +69,10 @@ def missing_ticks(
         missing[TRUTH.key(team)] = len(absent(TRUTH.key(team), TRUTH))
     for name in names:
         missing[STATE.key(team, name)] = len(absent(STATE.key(team, name), STATE))
+        passed = passed_over.get(name, ())
         unanswered = absent(key := COMMAND.key(team, name), COMMAND)
-        missing[key] = _count_outside(unanswered, passed_over.get(name, ()))
+        missing[key] = _count_outside(unanswered, passed)
+        unsampled = _without_sample(passed)
         if not config.team.controller:
             key = MEASUREMENT.key(team, name)
             missing[key] = _count_missing_within(
@@ -78,6 +81,7 @@ def missing_ticks(
                 config.gait.stand_ms,
                 period[MEASUREMENT.name],
                 end,
+                unsampled,
             )
         if find_kind(config.planner.kind).publishes:
             key = PLAN.key(team, name)
@@ -88,6 +92,7 @@ def missing_ticks(
                 config.gait.stand_ms,
                 period[PLAN.name],
                 min(int(plans.max()), end) if len(plans) else end,
+                _without_window(unsampled, config.planner.T_ini),
             )
     return dict(sorted(missing.items()))
 
@@ -120,10 +125,30 @@ def _find_spans(statuses: Iterable[Status], holds: Callable[[str], bool]) -> tup
     return tuple(spans) if said else _ALWAYS
 
 
+def _without_sample(passed_over: Iterable[Span]) -> tuple[Span, ...]:
+    """When no sample is made: its last tick was passed over, or all of it before that."""
+    return tuple((a, b + 1 if b - a >= SAMPLE_MS else b) for a, b in passed_over)
+
+
+def _without_window(unsampled: Iterable[Span], T_ini: int) -> tuple[Span, ...]:
+    """When no plan is made: one of the last T_ini samples was not."""
+    spans = []
+    for a, b in unsampled:
+        first, last = (SAMPLE_MS * math.floor(x / SAMPLE_MS) for x in (a + SAMPLE_MS - 1, b - 1))
+        if first <= last:
+            spans.append((first, last + SAMPLE_MS * (T_ini - 1) + 1))
+    return tuple(spans)
+
+
 def _count_missing_within(
-    spans: Iterable[Span], recorded: Ticks, first: int, period: int, last: int
+    spans: Iterable[Span],
+    recorded: Ticks,
+    first: int,
+    period: int,
+    last: int,
+    unmade: Sequence[Span],
 ) -> int:
-    """Ticks that were not found, in each span from the first that was on.
+    """Ticks that were not found and are not in `unmade`, in each span from the first found on.
 
     If none was found at all, those from `first` on are expected.
     """
@@ -132,7 +157,8 @@ def _count_missing_within(
         found = recorded[(recorded >= begin) & (recorded < end)]
         if len(found) or not len(recorded):
             begun = int(found.min()) if len(found) else max(first, int(begin))
-            missing += len(_find_missing(found, begun, period, int(min(end, last))))
+            absent = _find_missing(found, begun, period, int(min(end, last)))
+            missing += _count_outside(absent, unmade)
     return missing
 
 

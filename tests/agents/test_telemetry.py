@@ -48,6 +48,20 @@ def test_an_age_told_between_two_status_messages_is_not_lost() -> None:
     assert status.ages_ms == {"plan.r1": 40.0, "reference": 3.0}
 
 
+def test_a_walk_tells_no_age_of_a_plan_of_the_walk_before() -> None:
+    telemetry = Telemetry("kalman")
+    lost = replace(outputs("stop"), ages_ms={"plan.r1": 400.0, "reference": 3.0})
+    telemetry.note_step(lost, 0)
+    told = telemetry.status(0, lost, {})
+    assert told is not None
+    assert told.ages_ms["plan.r1"] == 400.0
+    telemetry.note_step(outputs("stand"), 0)
+    telemetry.note_step(outputs("walk"), 0)
+    status = telemetry.status(100, outputs("walk"), {})
+    assert status is not None
+    assert status.ages_ms == {"reference": 3.0}
+
+
 def test_after_a_gap_in_the_ticks_the_next_is_due_on_the_grid() -> None:
     telemetry = Telemetry("truth")
     due = [tick for tick in (0, 99, 257, 299, 300) if telemetry.status(tick, outputs("walk"), {})]

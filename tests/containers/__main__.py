@@ -9,12 +9,15 @@ should, 1 if not, 2 if there is no engine.
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from benchmarks import slow_motion
+from benchmarks.slow_motion import read_speed
 from quadriga.recordings.check import check, format_findings
 from quadriga.recordings.gaps import missing_ticks
 from quadriga.recordings.traces import read_traces
@@ -45,7 +48,7 @@ seconds = {seconds}
 seconds = 60.0
 """
 _PATIENCE: Final = 240.0  # s, far more than any step takes on a busy machine
-_LOOK: Final = 1.0  # s
+_LOOK: Final = 1.0  # s; each look starts processes beside those that walk, so few look at once
 _BEGUN = monotonic()
 
 
@@ -73,17 +76,32 @@ def wait_until(condition: Callable[[], str], what: str) -> None:
 
 
 def unwell(team: Containers) -> str:
-    """Which services are not healthy, and why."""
-    found = [name for name in SERVICES if not team.is_healthy(name)]
-    return "; ".join(f"{name}: {team.health(name)}" for name in found)
+    """The first service that is not healthy, and why."""
+    found = next((name for name in SERVICES if not team.is_healthy(name)), None)
+    return f"{found}: {team.health(found)}" if found else ""
 
 
 def unaware(team: Containers) -> str:
-    """Who of those that walk does not say yet that it cannot hear the killed one."""
+    """The first of those that walk that does not say yet that it cannot hear the killed one."""
     names = [name for name in SERVICES if name not in (KILLED, "router", "doctor")]
-    return "; ".join(
-        f"{name}: {text}" for name in names if f"hear {KILLED}" not in (text := team.health(name))
-    )
+    said = ((name, team.health(name)) for name in names)
+    return next((f"{name}: {text}" for name, text in said if f"hear {KILLED}" not in text), "")
+
+
+def write_slow_motion(path: Path, speed: float) -> Path:
+    """Write a Compose file that lets all services run by slow clocks.
+
+    Args:
+        path: of the file.
+        speed: of the clocks, as a share of their own.
+    """
+    inside = "/slow_motion.py"
+    service = {
+        "entrypoint": ["python3", inside, str(speed), "quadriga"],
+        "volumes": [f"{slow_motion.__file__}:{inside}:ro"],
+    }
+    path.write_text(json.dumps({"services": dict.fromkeys(SERVICES, service)}), encoding="utf-8")
+    return path
 
 
 def walk(team: Containers, folder: Path, *, rejoins: bool) -> None:
@@ -103,10 +121,9 @@ def walk(team: Containers, folder: Path, *, rejoins: bool) -> None:
             lambda: KILLED if team.state(KILLED)[0] else "", f"{KILLED} was not let in again"
         )
         expect("a team that walks already" in team.log(KILLED), team.log(KILLED))
-    wait_until(
-        lambda: ", ".join(name for name in SERVICES if team.state(name)[0]),
-        "the walk is over, all services have left",
-    )
+    for name in SERVICES:
+        team.wait(name, _PATIENCE)
+    say("the walk is over, all services have left")
     statuses = {name: team.state(name)[1] for name in SERVICES if name != KILLED}
     expect(not any(statuses[name] for name in statuses if name != "recorder"), f"{statuses}")
     team.copy("recorder", "/work/runs", folder)
@@ -143,6 +160,12 @@ def main() -> int:
         "--rejoin", action="store_true", help="in real time, a restarted agent walks on"
     )
     parser.add_argument("--seconds", type=float, default=40.0, help="of the walk")
+    parser.add_argument(
+        "--speed",
+        type=read_speed,
+        default=1.0,
+        help="of the clocks, for a slow computer; at most 1",
+    )
     arguments = parser.parse_args()
     interrupt_on_sigterm()  # whoever ends it leaves nothing behind either
     engine = find_engine()
@@ -159,7 +182,10 @@ def main() -> int:
         (folder / "team.toml").write_text(text, encoding="utf-8")
         (folder / "runs").mkdir()
         variables = {"TEAM": str(folder / "team.toml"), "TEAM_SIZE": str(ROBOTS)}
-        team, status = Containers(engine, variables), 1
+        slower: tuple[Path, ...] = ()
+        if arguments.speed < 1.0:
+            slower = (write_slow_motion(folder / "slow.json", arguments.speed),)
+        team, status = Containers(engine, variables, slower), 1
         try:
             walk(team, folder / "runs", rejoins=arguments.rejoin)
             status = 0

@@ -57,11 +57,17 @@ class Containers:
     Args:
         engine: what runs them.
         variables: what docker-compose.yml is told by the environment.
+        more: Compose files whose keys go before its.
     """
 
-    def __init__(self, engine: Engine, variables: Mapping[str, str]) -> None:
+    def __init__(
+        self, engine: Engine, variables: Mapping[str, str], more: tuple[Path, ...] = ()
+    ) -> None:
         self._engine = engine
+        files = ("docker-compose.yml", *(str(path) for path in more))
+        self._files = [word for name in files for word in ("-f", name)]
         self._environment = {**os.environ, "IMAGE": IMAGE, **variables}
+        self._names: dict[str, str] = {}
 
     def build(self) -> None:
         """Build the image; BUILD_OPTIONS of the environment are the engine's own."""
@@ -137,8 +143,21 @@ class Containers:
         """Copy a folder's content out of a service's container."""
         self._run("cp", f"{self.container(service)}:{source}/.", str(target))
 
+    def wait(self, service: str, timeout: float) -> None:
+        """Wait until a service's container has ended.
+
+        Raises:
+            CommandError: it runs still after `timeout` seconds.
+        """
+        self._call([self._engine.name, "wait", self.container(service)], timeout=timeout)
+
     def container(self, service: str) -> str:
         """The name of a service's container."""
+        if service not in self._names:
+            self._names[service] = self._find(service)
+        return self._names[service]
+
+    def _find(self, service: str) -> str:
         labels = {"project": PROJECT, "service": service}
         filters = [
             word
@@ -148,26 +167,32 @@ class Containers:
         return self._run("ps", "-a", *filters, "--format", "{{.Names}}").split()[0]
 
     def _compose(self, *words: str) -> str:
-        return self._call([*self._engine.compose, "-p", PROJECT, *words])
+        return self._call([*self._engine.compose, *self._files, "-p", PROJECT, *words])
 
     def _run(self, *words: str, shown: bool = False) -> str:
         return self._call([self._engine.name, *words], shown=shown)
 
-    def _call(self, command: list[str], *, shown: bool = False) -> str:
+    def _call(
+        self, command: list[str], *, shown: bool = False, timeout: float | None = None
+    ) -> str:
         """Run a command in the top folder; what it says.
 
         Raises:
-            CommandError: it failed.
+            CommandError: it failed, or took longer than `timeout` seconds.
         """
-        done = subprocess.run(
-            command,
-            cwd=TOP,
-            env=self._environment,
-            stdout=sys.stderr if shown else subprocess.PIPE,
-            stderr=None if shown else subprocess.PIPE,
-            text=True,
-            check=False,
-        )
+        try:
+            done = subprocess.run(
+                command,
+                cwd=TOP,
+                env=self._environment,
+                stdout=sys.stderr if shown else subprocess.PIPE,
+                stderr=None if shown else subprocess.PIPE,
+                text=True,
+                check=False,
+                timeout=timeout,
+            )
+        except subprocess.TimeoutExpired:
+            raise CommandError(f"{shlex.join(command)}: not done after {timeout:g} s") from None
         if done.returncode:
             said = f"{done.stdout or ''}{done.stderr or ''}"[-_LAST:]
             raise CommandError(f"{shlex.join(command)}: exit status {done.returncode}\n{said}")

@@ -5,10 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from quadriga.agents.planner.checked_predictor import load_checked
 from quadriga.recordings.gaps import missing_ticks, repeated_ticks
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.messages import Status
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.wire.codec import decode
+from quadriga.shared.wire.messages import Measurement, Plan, Status
+from tests.golden import scenario
+from tests.golden.rerun import rerun
 
 
 def configured(**keys: object) -> Config:
@@ -103,3 +108,37 @@ def test_a_controller_of_ones_own_measures_nothing_for_others() -> None:
     ticks["team/sim/truth"] = whole(10)["team/sim/truth"]
     missing = missing_ticks(configured(team__controller="walk"), ticks)
     assert missing == {"team/sim/truth": 0, "team/r1/state": 0, "team/r1/command": 0}
+
+
+@pytest.mark.parametrize(
+    "passed",
+    [
+        [(200, 201)],
+        [(201, 209)],
+        [(200, 210)],
+        [(199, 210)],
+        [(195, 225), (301, 310)],
+        [(240, 241)],
+    ],
+)
+def test_what_an_agent_cannot_make_of_the_ticks_it_passed_over_is_not_lost(
+    passed: list[tuple[int, int]],
+) -> None:
+    """The golden walk, heard by an agent that passes over ticks."""
+    config, own = scenario.config(), "team/r1/"
+    entries = list(Recording(scenario.RECORDING).entries())
+    never = {tick for span in passed for tick in range(*span)}
+    heard = [e for e in entries if e.key != f"{own}state" or e.tick not in never]
+    sent = rerun(heard, config, "r1", load_checked(scenario.PREDICTOR, config)[0])
+    made = {f"{own}measurement": Measurement, f"{own}plan": Plan}
+    ticks = {
+        key: np.array([decode(payload, kind).tick for name, payload in sent if name == key])
+        for key, kind in made.items()
+    }
+    ticks[f"{own}state"] = np.arange(600)
+    missing = missing_ticks(config, ticks, passed_over={"r1": passed})
+    assert [missing[key] for key in made] == [0, 0]
+    for key in made:
+        for place in range(1, len(ticks[key]) - 1):
+            less = ticks | {key: np.delete(ticks[key], place)}
+            assert missing_ticks(config, less, passed_over={"r1": passed})[key] == 1
