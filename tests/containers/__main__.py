@@ -48,7 +48,7 @@ seconds = {seconds}
 seconds = 60.0
 """
 _PATIENCE: Final = 240.0  # s, far more than any step takes on a busy machine
-_LOOK: Final = 1.0  # s; each look starts processes beside those that walk, so few look at once
+_LOOK: Final = 2.0  # s; each look starts processes beside those that walk, so few look at once
 _BEGUN = monotonic()
 
 
