@@ -10,7 +10,7 @@ from threading import get_ident
 from typing import Final, TypeVar
 
 _VARIABLE: Final = "ZENOH_RUNTIME"  # read by Zenoh when a process opens its first session
-_ONE_RECEIVES: Final = "(rx: (worker_threads: 1))"
+_ONE_RECEIVES: Final = "(rx: (worker_threads: 1), acc: (handover: rx), net: (handover: rx))"
 
 _attached: Final[set[int]] = set()  # the threads that keep their state
 Item = TypeVar("Item")
@@ -18,11 +18,12 @@ Item = TypeVar("Item")
 
 @contextmanager
 def one_thread_receives() -> Iterator[None]:
-    """Within the block a session is opened that receives in one thread, where Zenoh has two.
+    """Within the block a session is opened that receives in one thread, where Zenoh has four.
 
     Every message is handed over to Python, which one thread at a time can do: two threads wake each
-    other up and wait for each other. Whoever has set the variable decides; processes that this one
-    starts, a router perhaps, do not inherit it.
+    other up and wait for each other. Zenoh lets two more, which open and accept links, wait for
+    what comes over these, and wake those that receive. Whoever has set the variable decides;
+    processes that this one starts, a router perhaps, do not inherit it.
     """
     if _VARIABLE in os.environ:
         yield

@@ -23,20 +23,24 @@ from pathlib import Path
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.load import load
 
-endpoint, who, threads = sys.argv[1:]
+endpoint, who, wanted = sys.argv[1:]
 config = load(None, {"bus.endpoint": endpoint}).bus
 opened = Bus.route(endpoint, "team") if who == "router" else Bus.open(config, "team", who)
 with opened:
     opened.declare(HERE)
     opened.wait_for(HERE, {"r1"}, 20.0, lambda: False)
-    # Those that receive begin with the first link; Zenoh names them rx-0, rx-1, … A thread bears
-    # its name once it has run: the second is for one too many, the rest for one that is late.
+    # Those that receive begin with the first link. Zenoh names threads by their work and a number,
+    # rx-0 for example, and a thread bears its name once it has run: the second is for one too many,
+    # the rest for one that is late.
     time.sleep(1.0)
     deadline = time.monotonic() + 20.0
     while True:
-        names = [(task / "comm").read_text() for task in Path("/proc/self/task").iterdir()]
-        found = sum(name.startswith("rx-") for name in names)
-        if found >= int(threads) or time.monotonic() > deadline:
+        names = [(task / "comm").read_text().strip() for task in Path("/proc/self/task").iterdir()]
+        kinds = {name.partition("-")[0] for name in names if "-" in name} & {"acc", "net", "rx"}
+        found = ",".join(sorted(kinds))
+        if found != "rx":  # there, one more may wait for what blocks
+            found += f" {sum(name.startswith('rx-') for name in names)}"
+        if found == wanted or time.monotonic() > deadline:
             break
         time.sleep(0.05)
     print(found, os.environ.get("ZENOH_RUNTIME"))
@@ -48,14 +52,18 @@ with opened:
 )
 @pytest.mark.parametrize(
     ("who", "given", "threads"),
-    [("sim", None, 1), ("router", None, 2), ("sim", "(rx: (worker_threads: 3))", 3)],
+    [
+        ("sim", None, "rx"),
+        ("router", None, "acc,net,rx 2"),
+        ("sim", "(rx: (worker_threads: 3))", "acc,net,rx 3"),
+    ],
 )
-def test_how_many_threads_receive(who: str, given: str | None, threads: int) -> None:
+def test_which_threads_receive(who: str, given: str | None, threads: str) -> None:
     endpoint = free_endpoint()
     environment = {name: text for name, text in os.environ.items() if name != "ZENOH_RUNTIME"}
     if given is not None:
         environment["ZENOH_RUNTIME"] = given
-    command = [sys.executable, "-c", PROGRAM, endpoint, who, str(threads)]
+    command = [sys.executable, "-c", PROGRAM, endpoint, who, threads]
     config = load(None, {"bus.endpoint": endpoint}).bus
     if who == "router":
         config = replace(config, mode="client")
