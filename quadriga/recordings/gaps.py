@@ -72,29 +72,41 @@ def missing_ticks(
         passed = passed_over.get(name, ())
         unanswered = absent(key := COMMAND.key(team, name), COMMAND)
         missing[key] = _count_outside(unanswered, passed)
-        unsampled = _without_sample(passed)
-        if not config.team.controller:
-            key = MEASUREMENT.key(team, name)
-            missing[key] = _count_missing_within(
-                _find_spans(statuses.get(name, ()), lambda mode: mode != RISING),
-                _recorded_ticks(ticks, key),
-                config.gait.stand_ms,
-                period[MEASUREMENT.name],
-                end,
-                unsampled,
-            )
-        if find_kind(config.planner.kind).publishes:
-            key = PLAN.key(team, name)
-            plans = _recorded_ticks(ticks, key)
-            missing[key] = _count_missing_within(
-                _find_spans(statuses.get(name, ()), lambda mode: mode == WALK),
-                plans,
-                config.gait.stand_ms,
-                period[PLAN.name],
-                min(int(plans.max()), end) if len(plans) else end,
-                _without_window(unsampled, config.planner.T_ini),
-            )
+        said = statuses.get(name, ())
+        missing |= _missing_of_walk(config, name, ticks, said, _without_sample(passed), end)
     return dict(sorted(missing.items()))
+
+
+def _missing_of_walk(
+    config: Config,
+    name: str,
+    ticks: Mapping[str, Ticks],
+    statuses: Sequence[Status],
+    unsampled: Sequence[Span],
+    end: int,
+) -> dict[str, int]:
+    """Missing measurements and plans of a robot by key, see `missing_ticks`.
+
+    Args:
+        config: the configuration of the run.
+        name: the robot's.
+        ticks: recorded ticks by key.
+        statuses: the robot's.
+        unsampled: when no sample is made.
+        end: the last tick at which something is expected.
+    """
+    team, stand_ms, missing = config.team.name, config.gait.stand_ms, dict[str, int]()
+    if not config.team.controller:
+        spans = _find_spans(statuses, lambda mode: mode != RISING)
+        found = _recorded_ticks(ticks, key := MEASUREMENT.key(team, name))
+        missing[key] = _count_missing_within(spans, found, stand_ms, SAMPLE_MS, end, unsampled)
+    if find_kind(config.planner.kind).publishes:
+        spans = _find_spans(statuses, lambda mode: mode == WALK)
+        found = _recorded_ticks(ticks, key := PLAN.key(team, name))
+        period, last = periods(config)[PLAN.name], min(int(found.max()), end) if len(found) else end
+        unplanned = _without_window(unsampled, config.planner.T_ini)
+        missing[key] = _count_missing_within(spans, found, stand_ms, period, last, unplanned)
+    return missing
 
 
 def end_of_world(config: Config) -> int:
