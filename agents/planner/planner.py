@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces, nominal_table
 from quadriga.agents.modes import PEER_LOST
+from quadriga.agents.planner.compiled_step import CompiledStep, OwnWindow, past_deviations
 from quadriga.agents.planner.cooperation import (
     build_team_problem,
     is_cooperative,
@@ -17,15 +18,14 @@ from quadriga.agents.planner.cooperation import (
     stay_near_last,
 )
 from quadriga.agents.planner.damping import kept_by_agent
-from quadriga.agents.planner.free_step import FreeStep, OwnWindow, past_deviations
 from quadriga.agents.planner.neighbours import PeerSelection
+from quadriga.agents.planner.optimality import Residuals
 from quadriga.agents.planner.peer_terms import Peers, PeerTerms
 from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem, unpack
 from quadriga.agents.planner.qp_solver import (
     NOMINAL,
     SOLVED,
     SOLVERS,
-    Residuals,
     SolvedQp,
     Solver,
     no_solution,
@@ -118,12 +118,16 @@ class PlanResult:
 
 @record
 class _Setup:
-    """Set-up of one step of the gait's cycle; nominal forces of the horizon, (N, 12), N."""
+    """Set-up of one step of the gait's cycle; nominal forces of the horizon, (N, 12), N.
+
+    `none` are no deviations of the QP's forces, (nv,), N.
+    """
 
     problem: PlannerProblem
     solver: Solver
     nominal: Array
-    free: FreeStep | None
+    compiled: CompiledStep | None
+    none: Array
 
 
 class Planner:
@@ -176,8 +180,8 @@ class Planner:
             G_ii: replaces the predictor's own block; the step is then set up anew.
         """
         setup = self._setup(inputs.step, G_ii)
-        if setup.free is not None and not peers.lost:
-            result = _plan_freely(setup.free, inputs, peers)
+        if setup.compiled is not None and not peers.lost:
+            result = self._plan_compiled(setup, setup.compiled, state, inputs, peers)
             if result is not None:
                 return PlannerState(inputs.step, result.du, result.y, state.solves + 1), result
         # Any number may be measured; one that overflows shows in the result.
@@ -198,10 +202,36 @@ class Planner:
         with np.errstate(over="ignore", invalid="ignore"):
             return self._solve(setup, state, inputs, peers, _free_response(setup, inputs, peers))
 
+    def _plan_compiled(
+        self,
+        setup: _Setup,
+        step: CompiledStep,
+        state: PlannerState,
+        inputs: PlannerInputs,
+        peers: PeerTerms,
+    ) -> PlanResult | None:
+        """The plan unless a solver or a fallback has to make it."""
+        own = OwnWindow(
+            inputs.u_ini,
+            inputs.y_ini,
+            inputs.stance_ini,
+            inputs.y_base_ini,
+            inputs.y_base,
+            inputs.y_des,
+        )
+        last = self._last(setup.problem, state, inputs.step) if self._kept else setup.none
+        plan = step.plan(own, peers.effect, last)
+        if plan is None:
+            return None
+        u, du, y, y_nominal, residuals, iterations = plan
+        return PlanResult(
+            SOLVED, u, du, y, y_nominal, peers.used, peers.lost, residuals, iterations
+        )
+
     def _plan_by_solver(
         self, setup: _Setup, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
     ) -> tuple[PlannerState, PlanResult]:
-        """The plan where bounds are active, or the fallback where there is none."""
+        """The plan by a solver, or the fallback where there is none."""
         problem = setup.problem
         y_free = _free_response(setup, inputs, peers)
         if peers.lost:
@@ -320,26 +350,9 @@ class Planner:
             )
         solver = SOLVERS[self._config.planner.solver](problem)
         nominal = nominal_forces(stance, weight)
-        plain = not self._cooperative and not self._kept
-        closed = solver.closed_form if plain else None
-        free = None if closed is None else FreeStep(problem, closed, nominal, nominal_table(weight))
-        return _Setup(problem, solver, nominal, free)
-
-
-def _plan_freely(free: FreeStep, inputs: PlannerInputs, peers: PeerTerms) -> PlanResult | None:
-    """The plan if no bound is active at the optimum."""
-    own = OwnWindow(
-        inputs.u_ini,
-        inputs.y_ini,
-        inputs.stance_ini,
-        inputs.y_base_ini,
-        inputs.y_base,
-        inputs.y_des,
-    )
-    plan = free.plan(own, peers.effect)
-    if plan is None:
-        return None
-    return PlanResult(SOLVED, *plan, peers.used, peers.lost, free.residuals, 0)
+        qp, table = None if self._cooperative else solver.compiled, nominal_table(weight)
+        made = None if qp is None else CompiledStep(problem, qp, nominal, table, self._kept)
+        return _Setup(problem, solver, nominal, made, np.zeros(len(problem.columns)))
 
 
 def _free_response(setup: _Setup, inputs: PlannerInputs, peers: PeerTerms) -> Array:

@@ -13,9 +13,16 @@ import numpy as np
 import osqp
 from scipy import linalg, sparse
 
+from quadriga.agents.planner.foot_limits import (
+    FAILED,
+    ForceQp,
+    has_foot_limits,
+    minimise_freely,
+    minimise_within,
+)
+from quadriga.agents.planner.optimality import MAX_STATIONARITY, Residuals, is_optimal, residuals
 from quadriga.agents.planner.planner_qp import PlannerProblem
 from quadriga.shared.robot.conventions import Array
-from quadriga.shared.runtime.jit import compiled
 
 SOLVED: Final = "solved"
 NOMINAL: Final = "nominal"  # code of a plan's status: no solution, hence the nominal forces
@@ -28,25 +35,6 @@ _OSQP_INFEASIBLE: Final = (
     osqp.SolverStatus.OSQP_PRIMAL_INFEASIBLE,
     osqp.SolverStatus.OSQP_PRIMAL_INFEASIBLE_INACCURATE,
 )
-# An answer with larger residuals is not used, whatever status the solver reports.
-_MAX_VIOLATION: Final = 1e-5  # N
-_MAX_STATIONARITY: Final = 1e-5  # relative to the terms of the gradient
-
-
-@dataclass(frozen=True, slots=True)
-class Residuals:
-    """How well the Karush-Kuhn-Tucker conditions hold.
-
-    Attributes:
-        stationarity: ‖H v + f + λ_box + Aᵀ λ_A‖∞ over the largest of its terms (at least 1); for
-            the closed form an upper bound of it.
-        primal: largest violation of a bound [N].
-        complementarity: largest |λ · distance to its bound|, over the same terms [N].
-    """
-
-    stationarity: float
-    primal: float
-    complementarity: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,15 +67,15 @@ class SolvedQp:
 
 
 @dataclass(frozen=True, slots=True)
-class ClosedForm:
-    """The optimum while no bound is active: x = −H⁻¹ f.
+class CompiledQp:
+    """A QP that limits forces alone, for compiled functions.
 
     Attributes:
-        minus_inverse: −H⁻¹, (nv, nv).
-        residuals: bounds of its residuals for any f.
+        qp: what does not depend on f.
+        residuals: of −H⁻¹ f, which is the optimum while no bound is active: bounds for any f.
     """
 
-    minus_inverse: Array
+    qp: ForceQp
     residuals: Residuals
 
 
@@ -97,8 +85,8 @@ class Solver(Protocol):
     def __init__(self, problem: PlannerProblem) -> None: ...
 
     @property
-    def closed_form(self) -> ClosedForm | None:
-        """The closed form, equal to `solve` wherever its x keeps to the bounds, if there is one."""
+    def compiled(self) -> CompiledQp | None:
+        """The QP for compiled code, which gives the answers of `solve`; None where it cannot."""
         ...
 
     def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> QpSolution:
@@ -113,15 +101,21 @@ class Solver(Protocol):
 
 
 class DaqpSolver:
-    """The closed form while no bound is active, else a dense dual active set: exact.
+    """The closed form while no bound is active, then `minimise_within`, else DAQP.
 
-    Every solve starts from the empty active set, so that equal data give equal bits.
+    All are exact, and no solve knows of the ones before it, so that equal data give equal bits.
+    DAQP, a dense dual active set, solves what bounds outputs and what the second leaves.
     """
 
     def __init__(self, problem: PlannerProblem) -> None:
         self._problem = problem
         inverse = linalg.inv(problem.H)
-        self._closed = ClosedForm(-inverse, Residuals(_inversion_error(problem.H, inverse), 0, 0))
+        bounds = np.ascontiguousarray(problem.lower), np.ascontiguousarray(problem.upper)
+        qp = ForceQp(np.ascontiguousarray(problem.H), -inverse, *bounds, problem.slope)
+        exact = Residuals(_inversion_error(problem.H, inverse), 0, 0)
+        limits_feet = not len(problem.bounded) and has_foot_limits(*bounds, problem.slope)
+        usable = limits_feet and exact.stationarity <= MAX_STATIONARITY
+        self._compiled = CompiledQp(qp, exact) if usable else None
         self._free = np.zeros(len(problem.upper))
         self._free.setflags(write=False)
         self._cold = np.zeros(len(problem.upper), dtype=np.int32)
@@ -135,12 +129,13 @@ class DaqpSolver:
             np.maximum(problem.lower, -_FAR),
             self._cold,
         )
+        # DAQP's first solve loads its code, which must not fall into a walk.
+        self.solve(np.zeros(len(problem.H)), problem.lower, problem.upper)
 
     @property
-    def closed_form(self) -> ClosedForm | None:
-        exact = self._closed.residuals.stationarity <= _MAX_STATIONARITY
-        usable = exact and self._ready >= 0 and not len(self._problem.bounded)
-        return self._closed if usable else None
+    def compiled(self) -> CompiledQp | None:
+        """See `Solver`."""
+        return self._compiled
 
     def solve(self, f: Array, lower: Array | None = None, upper: Array | None = None) -> QpSolution:
         """See `Solver`."""
@@ -148,13 +143,16 @@ class DaqpSolver:
             return no_solution(self._problem, _DAQP_STATUS.get(self._ready, "failed"))
         if not math.isfinite(f @ f):
             return no_solution(self._problem, "not-finite")
+        if self._compiled is not None and lower is None and upper is None:
+            x, inside = minimise_freely(self._compiled.qp, f)
+            if inside:
+                return QpSolution(SOLVED, x, self._free, self._compiled.residuals, 0)
+            found = minimise_within(self._compiled.qp, f, x)
+            if found.solutions != FAILED and is_optimal(found.primal, found.stationarity):
+                proof = Residuals(found.stationarity, found.primal, found.complementarity)
+                return QpSolution(SOLVED, found.v, found.multipliers, proof, found.solutions)
         low = self._problem.lower if lower is None else lower
         high = self._problem.upper if upper is None else upper
-        closed = self.closed_form
-        if closed is not None:
-            x, inside = minimise_freely(closed.minus_inverse, f, low, high, self._problem.slope)
-            if inside:
-                return QpSolution(SOLVED, x, self._free, closed.residuals, 0)
         if upper is None:
             self._model.update(f=f, sense=self._cold)
         else:
@@ -175,7 +173,7 @@ class OsqpSolver:
         self._A = sparse.csc_matrix(np.vstack([np.eye(len(problem.H)), problem.A]))
 
     @property
-    def closed_form(self) -> ClosedForm | None:
+    def compiled(self) -> CompiledQp | None:
         """See `Solver`; None, so that OSQP gives every answer, as in the paper."""
         return None
 
@@ -205,21 +203,6 @@ class OsqpSolver:
         status = "infeasible" if info.status_val in _OSQP_INFEASIBLE else info.status
         status = status.replace(" ", "-")
         return judge(self._problem, f, result.x, result.y, status, int(info.iter), low, high)
-
-
-@compiled
-def minimise_freely(
-    minus_inverse: Array, f: Array, lower: Array, upper: Array, slope: float
-) -> tuple[Array, bool]:
-    """The unconstrained minimiser x, and whether box and pyramid hold at it."""
-    x = minus_inverse @ f
-    inside = True
-    for i in range(len(x)):
-        inside = inside and lower[i] <= x[i] <= upper[i]
-    for foot in range(len(x) // 3):
-        limit = upper[len(x) + 4 * foot] + slope * x[3 * foot + 2]
-        inside = inside and abs(x[3 * foot]) <= limit and abs(x[3 * foot + 1]) <= limit
-    return x, inside
 
 
 def _inversion_error(H: Array, inverse: Array) -> float:
@@ -255,48 +238,6 @@ def judge(
     if status != SOLVED:
         return no_solution(problem, status)
     checked = residuals(problem, f, v, multipliers, lower, upper)
-    if not (checked.primal <= _MAX_VIOLATION and checked.stationarity <= _MAX_STATIONARITY):
+    if not is_optimal(checked.primal, checked.stationarity):
         return replace(no_solution(problem, "inaccurate"), residuals=checked)
     return QpSolution(SOLVED, v, multipliers, checked, iterations)
-
-
-def residuals(
-    problem: PlannerProblem,
-    f: Array,
-    v: Array,
-    multipliers: Array,
-    lower: Array | None = None,
-    upper: Array | None = None,
-) -> Residuals:
-    """Karush-Kuhn-Tucker residuals; positive multipliers belong to upper bounds."""
-    low = problem.lower if lower is None else lower
-    high = problem.upper if upper is None else upper
-    values = np.concatenate([v, problem.A @ v])
-    pull = problem.A.T @ multipliers[len(v) :]
-    return Residuals(*_largest(problem.H @ v, f, pull, values, multipliers, low, high))
-
-
-@compiled
-def _largest(
-    Hv: Array, f: Array, pull: Array, values: Array, multipliers: Array, low: Array, high: Array
-) -> tuple[float, float, float]:
-    """The figures of `Residuals` from H v, Aᵀ λ_A and [v; A v]; NaN if a number is."""
-    off = bent = asked = pulled = beyond = loose = 0.0
-    for i in range(len(Hv)):
-        total = multipliers[i] + pull[i]
-        off = _worse(off, abs(Hv[i] + f[i] + total))
-        bent, asked = _worse(bent, abs(Hv[i])), _worse(asked, abs(f[i]))
-        pulled = _worse(pulled, abs(total))
-    for i in range(len(values)):
-        beyond = _worse(_worse(beyond, values[i] - high[i]), low[i] - values[i])
-        if multipliers[i] != 0.0:
-            bound = high[i] if multipliers[i] > 0.0 else low[i]
-            loose = _worse(loose, abs(multipliers[i] * (values[i] - bound)))
-    scale = max(1.0, bent, asked, pulled)
-    return off / scale, beyond, loose / scale
-
-
-@compiled
-def _worse(a: float, b: float) -> float:
-    """The larger of two numbers, NaN if one is."""
-    return b if b > a or b != b else a

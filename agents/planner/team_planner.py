@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces
 from quadriga.agents.planner.deepc_qp import build_model, select
+from quadriga.agents.planner.optimality import Residuals
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.planner_qp import (
     NO_BOUNDS,
@@ -20,7 +21,7 @@ from quadriga.agents.planner.planner_qp import (
     stance_columns,
     unpack,
 )
-from quadriga.agents.planner.qp_solver import NOMINAL, SOLVED, SOLVERS, Residuals, Solver
+from quadriga.agents.planner.qp_solver import NOMINAL, SOLVED, SOLVERS, Solver
 from quadriga.agents.predictor.deepc import reduce
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.predictor import Predictor, check_sizes

@@ -133,7 +133,12 @@ class PlannerConfig:
         "the plan fades out as the state leaves this range of the data",
         low=1e-6,
     )
-    solver: str = key("daqp", "-", "QP solver of the planner", choices=("daqp", "osqp"))
+    solver: str = key(
+        "daqp",
+        "-",
+        "solver of the QP; daqp: the closed form, Newton's method at limits of forces, else DAQP",
+        choices=("daqp", "osqp"),
+    )
     max_peer_age: int = key(
         3, "planning steps", "a peer's plan older than this is no longer shifted", low=1, high=25
     )

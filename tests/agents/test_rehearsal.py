@@ -11,7 +11,7 @@ import pytest
 
 from quadriga.agents.agent import Agent
 from quadriga.agents.modes import WALK
-from quadriga.agents.planner import qp_solver
+from quadriga.agents.planner.compiled_step import CompiledPlan, CompiledStep
 from quadriga.agents.rehearsal import rehearse
 from quadriga.shared.config.sections import Config, TeamConfig
 from tests.agents.duet import simple_predictor
@@ -35,19 +35,20 @@ print(len(first))
 
 def test_limits_of_both_qps_are_met(monkeypatch: pytest.MonkeyPatch) -> None:
     """Their first solve would otherwise load code in mid-walk: 40 ms."""
-    judged: list[int] = []
-    judge = qp_solver.judge
+    iterations: list[int] = []
+    plan = CompiledStep.plan
 
-    def counting(*arguments: Any) -> qp_solver.QpSolution:
-        answer = judge(*arguments)
-        judged.append(answer.iterations)
-        return answer
+    def counting(*arguments: Any) -> CompiledPlan | None:
+        made = plan(*arguments)
+        assert made is not None
+        iterations.append(made.iterations)
+        return made
 
-    monkeypatch.setattr(qp_solver, "judge", counting)
+    monkeypatch.setattr(CompiledStep, "plan", counting)
     state = rehearse(ALONE, Agent(ALONE, "r1", simple_predictor(ALONE)))
     assert state.mode.name == WALK
     assert state.counters["qp_constrained"] > 0
-    assert max(judged) > 0
+    assert max(iterations) > 0
 
 
 @pytest.mark.parametrize(

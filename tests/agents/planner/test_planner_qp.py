@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import optimize
 
+from quadriga.agents.planner.optimality import residuals
 from quadriga.agents.planner.planner_qp import PlannerProblem, unpack
-from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS, Solver, judge, residuals
+from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS, Solver, judge
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.robot.conventions import Array

@@ -11,8 +11,8 @@ import pytest
 
 from quadriga.agents.gait import scheduled_stance
 from quadriga.agents.modes import STAND, STOPPING, WALK, Mode
+from quadriga.agents.planner.optimality import Residuals
 from quadriga.agents.planner.planner import PlanResult
-from quadriga.agents.planner.qp_solver import Residuals
 from quadriga.agents.planning.fade import plan_message
 from quadriga.agents.planning.interface import PlanningInputs, PlanningOutputs
 from quadriga.agents.planning.local import LocalPlanning

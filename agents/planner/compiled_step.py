@@ -1,4 +1,4 @@
-"""A planning step whose optimum lies on no bound, as most do, computed in one compiled call.
+"""A planning step that limits forces alone, computed in one compiled call.
 
 The processor's caches are lost between two steps, so a step takes mostly the time to load its code
 and data. The arithmetic is that of `Planner.step` with a solver.
@@ -11,8 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quadriga.agents.planner.foot_limits import FAILED, ForceQp, minimise_freely, minimise_within
+from quadriga.agents.planner.optimality import Residuals, is_optimal
 from quadriga.agents.planner.planner_qp import PlannerProblem
-from quadriga.agents.planner.qp_solver import ClosedForm, minimise_freely
+from quadriga.agents.planner.qp_solver import CompiledQp
 from quadriga.agents.plausibility import OUTPUT_MAX
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.jit import compiled
@@ -30,8 +32,9 @@ class OwnWindow(NamedTuple):
 
 
 class _Prediction(NamedTuple):
-    """y = Y_past past + effect + Y_v v, v in `columns` of the forces."""
+    """y = Y_past past + effect + Y_v v, v in `columns` of the forces, and f = gradient · error."""
 
+    gradient: Array
     Y_past: Array
     Y_v: Array
     columns: NDArray[np.int64]
@@ -39,74 +42,91 @@ class _Prediction(NamedTuple):
     nominal_table: Array  # forces by stance pattern, (16, 12), N
 
 
-class _Minimiser(NamedTuple):
-    """v = −H⁻¹ G_uᵀ Q̄ (y_free − y_des), valid inside the box and the friction pyramid."""
+class CompiledPlan(NamedTuple):
+    """The plan of a step.
 
-    gradient: Array
-    minus_inverse: Array
-    lower: Array
-    upper: Array
-    slope: float
-
-
-class FreePlan(NamedTuple):
-    """u, du, (N, 12), and y, y_nominal, (N, 6), of `PlanResult`."""
+    Attributes:
+        u, du: (N, 12), see `PlanResult`.
+        y, y_nominal: (N, 6).
+        residuals: of the QP's solution.
+        iterations: QPs solved on faces of the limits; 0 where no limit is active.
+    """
 
     u: Array
     du: Array
     y: Array
     y_nominal: Array
+    residuals: Residuals
+    iterations: int
 
 
-class FreeStep:
+class CompiledStep:
     """The set-up of one stance pattern of the horizon, N samples long.
 
     Args:
         problem: the QP; no bound of it depends on the free response.
-        closed: its closed form.
+        compiled_qp: the same for compiled code.
         nominal: nominal forces of the horizon, (N, 12), N.
         table: `nominal_table` of the robot.
+        kept: share of its last plan that the plan keeps.
     """
 
     def __init__(
-        self, problem: PlannerProblem, closed: ClosedForm, nominal: Array, table: Array
+        self,
+        problem: PlannerProblem,
+        compiled_qp: CompiledQp,
+        nominal: Array,
+        table: Array,
+        kept: float = 0.0,
     ) -> None:
-        self.residuals = closed.residuals
+        self._free_residuals, self._qp, self._kept = compiled_qp.residuals, compiled_qp.qp, kept
         condensed = problem.condensed
         self._prediction = _Prediction(
-            condensed.Y_past, condensed.Y_v, problem.columns, nominal, table
-        )
-        self._minimiser = _Minimiser(
-            problem.gradient, closed.minus_inverse, problem.lower, problem.upper, problem.slope
+            problem.gradient, condensed.Y_past, condensed.Y_v, problem.columns, nominal, table
         )
 
-    def plan(self, own: OwnWindow, effect: Array | float) -> FreePlan | None:
-        """The plan; None where a bound is active or an output is implausible.
+    def plan(self, own: OwnWindow, effect: Array | float, last: Array) -> CompiledPlan | None:
+        """The plan; None where the QP is not solved or an output is implausible.
 
         Args:
             own: the agent's own data for the step.
             effect: of the peers on its outputs, see `PeerTerms`.
+            last: deviations of the QP's forces in the last plan, (nv,), N.
         """
         if not isinstance(effect, np.ndarray):  # one type: machine code is made for each
             effect = np.full(len(self._prediction.Y_past), effect)
-        forces, outputs, usable = _free_step(own, effect, self._prediction, self._minimiser)
-        return FreePlan(forces[0], forces[1], outputs[0], outputs[1]) if usable else None
+        forces, outputs, proof, solutions = _step(
+            own, effect, last, self._kept, self._prediction, self._qp
+        )
+        if solutions == FAILED:
+            return None
+        residuals = Residuals(*proof) if solutions else self._free_residuals
+        return CompiledPlan(forces[0], forces[1], outputs[0], outputs[1], residuals, solutions)
 
 
 @compiled
-def _free_step(
-    own: OwnWindow, effect: Array, prediction: _Prediction, minimiser: _Minimiser
-) -> tuple[Array, Array, bool]:
-    """Forces u and du, (2, N, 12); outputs y and y_nominal, (2, N, 6); is the plan usable?"""
+def _step(
+    own: OwnWindow, effect: Array, last: Array, kept: float, prediction: _Prediction, qp: ForceQp
+) -> tuple[Array, Array, tuple[float, float, float], int]:
+    """Forces u and du, (2, N, 12); outputs y and y_nominal, (2, N, 6); residuals; solutions."""
     # Unpacked before the loops: each access to a tuple in a loop costs a reference count.
     u_ini, y_ini, stance_ini, y_base_ini, y_base, y_des = own
-    Y_past, Y_v, columns, nominal, nominal_table = prediction
-    gradient, minus_inverse, lower, upper, slope = minimiser
+    gradient, Y_past, Y_v, columns, nominal, nominal_table = prediction
     N = len(y_des)
     past = past_deviations(u_ini, y_ini, stance_ini, y_base_ini, nominal_table)
     y_free = Y_past @ past + effect
-    error = y_free - (y_des - y_base).ravel()
-    x, usable = minimise_freely(minus_inverse, gradient @ error, lower, upper, slope)
+    f = gradient @ (y_free - (y_des - y_base).ravel())
+    x, inside = minimise_freely(qp, f)
+    proof, solutions = (0.0, 0.0, 0.0), 0
+    if not inside:
+        solutions = FAILED
+        if np.isfinite(np.dot(f, f)):
+            found = minimise_within(qp, f, x)
+            x, proof = found.v, (found.stationarity, found.primal, found.complementarity)
+            if is_optimal(found.primal, found.stationarity):
+                solutions = found.solutions
+    if kept:
+        x = (1.0 - kept) * x + kept * last
     forces, outputs = np.zeros((2, N, N_FORCES)), np.empty((2, N, N_OUTPUTS))
     du = forces[1].ravel()
     for i in range(len(columns)):
@@ -116,8 +136,8 @@ def _free_step(
     outputs[1] = y_base + y_free.reshape(N, N_OUTPUTS)
     for output in outputs.flat:
         if not abs(output) <= OUTPUT_MAX:
-            usable = False
-    return forces, outputs, usable
+            solutions = FAILED
+    return forces, outputs, proof, solutions
 
 
 @compiled
