@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from fcntl import LOCK_EX, LOCK_SH, LOCK_UN, flock
 from pathlib import Path
 from typing import IO, Final
@@ -67,6 +67,28 @@ def _alone(
     monkeypatch.delenv(VARIABLE)
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item: pytest.Item) -> Generator[None, object, object]:
+    """What a test and the processes that it waited for computed is told beside how long it took."""
+    _begun[item.nodeid] = _computed()
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, object, object]:
+    result = yield
+    item.user_properties.append((_COMPUTED, _computed() - _begun.pop(item.nodeid)))
+    return result
+
+
+def _computed() -> float:
+    """Seconds of processor time of this worker and of those of its processes that have ended."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+_begun: dict[str, float] = {}
+_COMPUTED: Final = "computed"  # s, of a test
 _WAITED: Final = "waited"  # s, of a test for its turn to keep real time
 _LONG_RUN: Final = 300.0  # s of tests; of a shorter run nobody asks which files take long
 _SLOWEST: Final = 40  # files that are named
@@ -105,6 +127,7 @@ def _has_to_be_alone(item: pytest.Item) -> bool:
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """How well the golden recording was reproduced, what was run again, and what takes the time."""
     stats, waited = terminalreporter.stats, 0.0
+    computed: dict[str, float] = defaultdict(float)
     for report in stats.get("rerun", ()):
         terminalreporter.write_line(f"run once more: {report.nodeid}, since")
         terminalreporter.write_line(report.longreprtext)
@@ -112,17 +135,22 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     for report in itertools.chain.from_iterable(stats.values()):
         if not isinstance(report, pytest.TestReport):
             continue
-        seconds[report.nodeid.partition("::")[0]] += report.duration
+        file = report.nodeid.partition("::")[0]
+        seconds[file] += report.duration
         for name, told in report.user_properties if report.when == "teardown" else ():
             if name == _WAITED and isinstance(told, float):
                 waited += told
+            if name == _COMPUTED and isinstance(told, float):
+                computed[file] += told
             if name == "golden":
                 terminalreporter.write_line(f"golden recording, {told}")
     total = sum(seconds.values())
     if total >= _LONG_RUN:
-        slowest = sorted(seconds.items(), key=lambda item: -item[1])[:_SLOWEST]
-        shares = ", ".join(f"{file} {time:.0f}" for file, time in slowest)
         terminalreporter.write_line(
-            f"{total:.0f} s of tests, {waited:.0f} of them waits for a turn"
+            f"{total:.0f} s of tests, {waited:.0f} of them waits for a turn; "
+            f"{sum(computed.values()):.0f} s of processor time"
         )
-        terminalreporter.write_line(shares)
+        for what, shares in (("", seconds), ("processor time: ", computed)):
+            most = sorted(shares.items(), key=lambda item: -item[1])[:_SLOWEST]
+            told = ", ".join(f"{file} {time:.0f}" for file, time in most)
+            terminalreporter.write_line(what + told)
