@@ -26,8 +26,8 @@ from quadriga.shared.runtime.jit import compiled
 
 _MOST: Final = 12  # solutions on faces; a cycle ends here
 # S over the diagonal of H⁻¹. With 0.5 to 0.7 none of 813 plans at limits cycled, of teams of 1 to 5
-# that were pushed by 150 to 350 N; with 1.0 there were 12 that did, with 0.3 132. With 0.7, on other
-# seeds, it was one of 3686; the others took 3 solutions, 8 at most.
+# that were pushed by 150 to 350 N; with 1.0 there were 12 that did, with 0.3 132. On other seeds,
+# with 0.7, it was one of 3686; the others took 1 to 8 solutions, mostly 3 or 4.
 _STEP: Final = 0.7
 _CLOSE: Final = 1e-9  # N, of v from its projection: optimal but for rounding
 FAILED: Final = -1  # instead of the number of solutions
