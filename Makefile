@@ -42,11 +42,11 @@ prepared: $(TOOLS)
 	$(BIN)/python -m compileall -q quadriga agents bridges plant shared sim_server tests
 	$(BIN)/quadriga prepare --robots 2 --set identification.seconds=60
 
-# Four workers keep two cores busy: most tests wait for processes most of their time.
+# Three workers: most tests wait for processes most of their time. A fourth only slows the others.
 # Files are taken in the order of tests/conftest.py. Whoever tests is not started again after a test
 # that hung, which would hang again.
 test: prepared
-	$(BIN)/python -m pytest --numprocesses 4 --dist loadfile --no-loadscope-reorder \
+	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder \
 		--max-worker-restart 0 $(ARGS)
 
 lint: $(TOOLS)
