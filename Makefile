@@ -42,7 +42,7 @@ prepared: $(TOOLS)
 	$(BIN)/python -m compileall -q quadriga agents bridges plant shared sim_server tests
 	$(BIN)/quadriga prepare --robots 2 --set identification.seconds=60
 
-# Three workers: most tests wait for processes most of their time. A fourth only slows the others.
+# Three workers on two cores: most tests wait for processes most of their time.
 # Files are taken in the order of tests/conftest.py. Whoever tests is not started again after a test
 # that hung, which would hang again.
 test: prepared

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.planner.optimality import largest_residuals
+from quadriga.agents.planner.row_solve import solve, subtract
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
@@ -246,7 +247,7 @@ def _pull_back(minus_inverse: Array, free: Array, faces: _Faces, count: int) -> 
             k += 1
     # The rows are the negative normals, and so is the inverse: their product is positive definite.
     gram = _gram(minus_inverse, rows, places, -1.0)
-    _solve(gram, off)
+    solve(gram, off)
     gradient = np.zeros(nv)
     for k in range(count):
         for axis in range(3):
@@ -278,7 +279,7 @@ def _move_along(H: Array, f: Array, faces: _Faces, count: int) -> tuple[Array, A
                     rows[k, j] = tilt[foot + j]
                     w[k] -= tilt[foot + j] * gradient[foot + j]
             k += 1
-    _solve(_gram(H, rows, places, 1.0), w)
+    solve(_gram(H, rows, places, 1.0), w)
     moved = np.zeros(nv)
     for k in range(count):
         for axis in range(3):
@@ -296,48 +297,11 @@ def _gram(K: Array, rows: Array, places: NDArray[np.int64], sign: float) -> Arra
         for axis in range(3):
             if rows[a, axis] != 0.0:
                 begin = places[a]
-                _subtract(row[begin:], -sign * rows[a, axis], K[begin + axis, begin:])
+                subtract(row[begin:], -sign * rows[a, axis], K[begin + axis, begin:])
         for b in range(a, count):
             at = places[b]
             gram[a, b] = rows[b, 0] * row[at] + rows[b, 1] * row[at + 1] + rows[b, 2] * row[at + 2]
     return gram
-
-
-@compiled
-def _solve(S: Array, x: Array) -> None:
-    """Replace x, (k,), by S⁻¹ x, and the upper triangle of S, (k, k), by its factor U, S = Uᵀ U.
-
-    NaN where S is not positive definite. Loops over rows give the same bits on every processor.
-    """
-    count = len(x)
-    for b in range(count):
-        row = S[b, b:]
-        fours = b - b % 4
-        for a in range(0, fours, 4):  # the row is loaded and stored once for four
-            row0, row1, row2, row3 = S[a, b:], S[a + 1, b:], S[a + 2, b:], S[a + 3, b:]
-            s0, s1, s2, s3 = row0[0], row1[0], row2[0], row3[0]
-            for j in range(len(row)):
-                row[j] -= s0 * row0[j] + s1 * row1[j] + s2 * row2[j] + s3 * row3[j]
-        for a in range(fours, b):
-            _subtract(row, S[a, b], S[a, b:])
-        pivot = np.sqrt(row[0]) if row[0] > 0.0 else np.nan
-        for j in range(len(row)):
-            row[j] /= pivot
-        x[b] /= pivot
-        _subtract(x[b + 1 :], x[b], row[1:])
-    for b in range(count - 1, -1, -1):
-        rest, row = x[b + 1 :], S[b, b + 1 :]
-        total = x[b]
-        for j in range(len(rest)):
-            total -= row[j] * rest[j]
-        x[b] = total / S[b, b]
-
-
-@compiled
-def _subtract(row: Array, factor: float, other: Array) -> None:
-    """Subtract factor · other. Shapes (k,)."""
-    for j in range(len(row)):
-        row[j] -= factor * other[j]
 
 
 @compiled

@@ -65,6 +65,12 @@ class PlannerInputs:
     y_des: Array
     weight: float
 
+    def window(self) -> OwnWindow:
+        """The same for the compiled step."""
+        return OwnWindow(
+            self.u_ini, self.y_ini, self.stance_ini, self.y_base_ini, self.y_base, self.y_des
+        )
+
     def past(self) -> Array:
         """Deviations [u_ini; y_ini]. Shape (18 T_ini,)."""
         du = self.u_ini - nominal_forces(self.stance_ini, self.weight)
@@ -211,16 +217,8 @@ class Planner:
         peers: PeerTerms,
     ) -> PlanResult | None:
         """The plan unless a solver or a fallback has to make it."""
-        own = OwnWindow(
-            inputs.u_ini,
-            inputs.y_ini,
-            inputs.stance_ini,
-            inputs.y_base_ini,
-            inputs.y_base,
-            inputs.y_des,
-        )
         last = self._last(setup.problem, state, inputs.step) if self._kept else setup.none
-        plan = step.plan(own, peers.effect, last)
+        plan = step.plan(inputs.window(), peers.effect, last)
         if plan is None:
             return None
         u, du, y, y_nominal, residuals, iterations = plan

@@ -51,17 +51,6 @@ def inputs_of(seed: int, size: float) -> PlannerInputs:
     )
 
 
-def own_window(inputs: PlannerInputs) -> OwnWindow:
-    return OwnWindow(
-        inputs.u_ini,
-        inputs.y_ini,
-        inputs.stance_ini,
-        inputs.y_base_ini,
-        inputs.y_base,
-        inputs.y_des,
-    )
-
-
 def still(y_base: Array, y_des: Array) -> OwnWindow:
     """A window without any deviation."""
     zero, stance = np.zeros((T_INI, 6)), STANCE[:T_INI]
@@ -76,7 +65,7 @@ def test_both_ways_lead_to_the_same_plan(step: CompiledStep, seed: int, size: fl
     y_free = PROBLEM.condensed.Y_past @ inputs.past() + effect
     f = PROBLEM.gradient @ (y_free - (inputs.y_des - inputs.y_base).ravel())
     solution = SOLVER.solve(f)
-    plan = step.plan(own_window(inputs), effect, NONE)
+    plan = step.plan(inputs.window(), effect, NONE)
     assert solution.status == SOLVED
     assert plan is not None
     assert plan.iterations == solution.iterations
@@ -123,7 +112,7 @@ def test_a_number_that_is_not_finite_is_left_to_the_solver(step: CompiledStep) -
     inputs = inputs_of(1, 0.01)
     for bad in (np.nan, np.inf):
         effect = np.full(6 * N, bad)
-        assert step.plan(own_window(inputs), effect, NONE) is None
+        assert step.plan(inputs.window(), effect, NONE) is None
 
 
 def test_outputs_that_no_robot_reaches_are_no_plan(step: CompiledStep) -> None:
