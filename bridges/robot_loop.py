@@ -119,7 +119,7 @@ class RobotLoop:
             CheckError: the robot is not as it must be.
         """
         driver, rate, reports = self._driver, Rate(TICK), list[RobotReport]()
-        before, malformed = driver.counters["received"], driver.counters["malformed"]
+        malformed = driver.counters["malformed"]
         for ms in range(_FIND_MS):
             if stopped():
                 return False
@@ -129,6 +129,9 @@ class RobotLoop:
             if ms % _INTRODUCE_MS == 0:
                 driver.introduce()
             rate.wait()
+        while self.receive():  # what came before this second
+            pass
+        before = driver.counters["received"]
         for _ in range(_LOOK_MS):
             if stopped():
                 return False
