@@ -49,6 +49,7 @@ def test_the_robots_own_controller_lies_down_once_lets_go_and_commands_arrive(
     desk.driver.take_over()
     assert (desk.robot.controller, desk.driver.released) == ("", "normal")
     assert executed(desk) == [rpc.STAND_DOWN, rpc.RELEASE_MODE]
+    assert not desk.robot._motions, "it was asked once"
     targets = holding(config_of("go2"), mode=np.full(12, ON, np.uint8), tau=np.arange(12.0))
 
     def arrived() -> bool:
