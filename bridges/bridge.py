@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 
 from quadriga.bridges.guard import Guard
@@ -15,27 +16,38 @@ from quadriga.shared.errors import ConfigError
 from quadriga.shared.printable import printable_line
 
 
-def build_bridge(config: Config, names: tuple[str, ...], *, armed: bool = False) -> RobotPlant:
-    """The plant of a robot behind its bridge; a `PlantFactory`.
+def build_bridge(
+    config: Config,
+    names: tuple[str, ...],
+    *,
+    armed: bool = False,
+    stopped: Callable[[], bool] = bool,
+) -> RobotPlant:
+    """The plant of a robot behind its bridge, which has looked at it; a `PlantFactory`.
 
     Args:
         config: the team's configuration.
         names: one robot.
         armed: whether it may be commanded.
+        stopped: asked often whether to look no longer.
 
     Raises:
         ConfigError: more than one robot, or no address or interface that can be used.
         BridgeError: the way to the robot cannot be opened.
+        CheckError: the robot is not as it must be.
     """
     if len(names) != 1:
         raise ConfigError("team.plants", f"a plant of {', '.join(names)}", "'each'")
     kind, bridge = config.team.robot, bridge_of(config, names[0])
     driver = open_driver(kind, bridge)
-    guard = None
-    if armed:
-        guard = Guard(kind, bridge)
-        driver.own_guards = 1
-    return RobotPlant(config, names[0], driver, guard=guard, say=_say)
+    guard = Guard(kind, bridge) if armed else None
+    plant = RobotPlant(config, names[0], driver, guard=guard, say=_say)
+    try:
+        plant.look(stopped)
+    except BaseException:
+        plant.finish()
+        raise
+    return plant
 
 
 def build_joint_tester(config: Config, name: str) -> JointTester:
@@ -47,7 +59,6 @@ def build_joint_tester(config: Config, name: str) -> JointTester:
     """
     kind, bridge = config.team.robot, bridge_of(config, name)
     driver, guard = open_driver(kind, bridge), Guard(kind, bridge)
-    driver.own_guards = 1
     return JointTester(config, name, driver, guard, _say)
 
 

@@ -52,6 +52,7 @@ def check_reports(
     *,
     received: int = 0,
     hung: bool = False,
+    cause: str = "",
 ) -> list[Finding]:
     """Everything that the first reports of a robot that lies or hangs still can tell.
 
@@ -63,6 +64,7 @@ def check_reports(
         robot: that it should be.
         received: reports that came: a busy computer looks at the newest of several.
         hung: whether it hangs: then its feet may be at any height.
+        cause: why fewer came than should, if that is known.
     """
     wanted, received = 1000.0 * seconds / period_ms, max(received, len(reports))
     findings = [
@@ -71,7 +73,7 @@ def check_reports(
             f"{received} in {seconds:g} s",
             f"at least {config.report_share * wanted:.0f}",
             received >= config.report_share * wanted,
-            "cable, address, port or interface; is the robot on?",
+            cause or "cable, address, port or interface; is the robot on?",
         )
     ]
     if not reports:

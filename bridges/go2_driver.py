@@ -6,6 +6,9 @@ import json
 from collections import Counter
 from typing import Any, Final
 
+import numpy as np
+
+from quadriga.bridges.driver import count_malformed
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import BridgeError, ConfigError
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
@@ -14,10 +17,12 @@ from quadriga.shared.unitree.dds import DdsParticipant, StructReader, StructWrit
 from quadriga.shared.unitree.packets import ON, MotorTargets, PacketError, RobotReport
 from quadriga.shared.unitree.rpc import RpcEnd, RpcMessage
 
-_ANSWER: Final = 2.0  # s, for the robot to answer a call
-_LETTING_GO: Final = 15.0  # s, for its controller to let go of the motors
+_ANSWER: Final = 4.0  # s, for the robot to be found and to answer a query
+_LETTING_GO: Final = 15.0  # s, for its controller to do what it is asked to
 _LOOK: Final = 0.01  # s
-_FOUND: Final = 2.0  # s, for two sides of a service to find each other
+_AGAIN: Final = 0.5  # s, between two queries
+_WATCHED: Final = 0.3  # s, for which nobody else may write commands
+_STILL_S, _STILL = 1.0, 0.2  # s for which joints are slower, rad/s, when a robot has lain down
 
 
 class Go2Driver:
@@ -43,12 +48,14 @@ class Go2Driver:
         commands = self._participant.struct_topic(go2.COMMAND_TOPIC, go2.COMMAND_TYPE, go2.COMMAND)
         reports = self._participant.struct_topic(go2.REPORT_TOPIC, go2.REPORT_TYPE, go2.REPORT)
         self._reports = StructReader(self._participant, reports, go2.REPORT.itemsize)
-        # It reads nothing; the library tells it of everybody who writes commands.
-        self._witness = StructReader(self._participant, commands, go2.COMMAND.itemsize)
+        # Healthy robots have writers of commands that never write: what they write is counted.
+        self._witness = StructReader(
+            self._participant, commands, go2.COMMAND.itemsize, of_others=True
+        )
         self._commands_topic = commands
         self._commands: StructWriter | None = None
         self.period_ms = config.period_ms or self.packets_ms
-        self.own_guards, self.released = 0, ""
+        self.malformed = self.released = ""
         if guards:
             self._open_commands()
         self._switcher = RpcEnd(self._participant, rpc.MOTION_SWITCHER, serves=False)
@@ -61,11 +68,14 @@ class Go2Driver:
         while (packet := self._reports.take()) is not None:
             try:
                 newest = go2.GO2.decode_report(packet)
-            except PacketError:
-                self.counters["malformed"] += 1
+            except PacketError as error:
+                self.malformed = count_malformed(self.counters, error)
                 continue
             self.counters["received"] += 1
         return newest
+
+    def introduce(self) -> None:
+        """Nothing to do: a Go2 reports to all."""
 
     def send(self, targets: MotorTargets) -> None:
         """See `RobotDriver`. There is no writer of commands before `take_over`."""
@@ -73,9 +83,14 @@ class Go2Driver:
         self.counters["sent" if sent else "unsent"] += 1
 
     def other_writers(self) -> int:
-        """How many others write commands, but for this bridge's guard."""
-        own = self.own_guards + (self._commands is not None)
-        return max(0, self._participant.writers_seen_by(self._witness.handle) - own)
+        """How many others have written commands since the last call."""
+        return len(self._writers())
+
+    def _writers(self) -> set[int]:
+        writers = set[int]()
+        while self._witness.take() is not None:
+            writers.add(self._witness.writer)
+        return writers
 
     def give_back(self, controller: str) -> None:
         """Have one of the robot's own controllers take the motors, until it says that it has.
@@ -86,36 +101,81 @@ class Go2Driver:
         Raises:
             BridgeError: it does not.
         """
-        self._call(self._switcher, rpc.SELECT_MODE, {"name": controller})
-        deadline = monotonic() + _LETTING_GO
-        while (name := self._motion_mode()) != controller:
-            if monotonic() > deadline:
-                expected = f"{controller!r}, which it is asked for"
-                raise BridgeError("the robot's own controller", repr(name), expected)
-            sleep(0.5)
+        self._call(self._switcher, rpc.SELECT_MODE, {"name": controller}, _LETTING_GO)
+        self._await_mode(controller)
 
     def take_over(self) -> None:
         """Ask the motion controller to lie down and let go, until the robot says that it has.
 
         Raises:
-            BridgeError: it does not answer or does not let go, or someone else writes commands.
+            BridgeError: it does not answer, lie down or let go, or someone else writes commands.
+                It may have let go if `released` names it.
         """
-        deadline = monotonic() + _LETTING_GO
-        while name := self._motion_mode():
-            if monotonic() > deadline:
-                cause = "switch it off in the app; is the firmware old?"
-                raise BridgeError("the robot's own controller", name, "to let go", cause)
+        name = self._motion_mode()
+        self._refuse_writers(name)
+        if name:
+            self._lie_down(name)
             self.released = name
-            self._call(self._sport, rpc.STAND_DOWN, {})
-            self._call(self._switcher, rpc.RELEASE_MODE, {})
-            sleep(0.5)
-        if others := self.other_writers():
-            cause = "its own controller, or another bridge on the same network"
-            raise BridgeError("rt/lowcmd", f"{others} others who write it", "nobody else", cause)
+            self._call(self._switcher, rpc.RELEASE_MODE, {}, _LETTING_GO)
+            self._await_mode("")
+            sleep(_WATCHED)  # for its last commands
+            self.other_writers()
+            self._refuse_writers("")
         self._open_commands()
+
+    def _refuse_writers(self, controller: str) -> None:
+        """Look whether anybody writes commands but the robot's own controller, if it has one.
+
+        Raises:
+            BridgeError: somebody does.
+        """
+        seen, deadline = set[int](), monotonic() + _WATCHED
+        while monotonic() < deadline:
+            seen |= self._writers()
+            sleep(_LOOK)
+        if len(seen) > bool(controller):
+            got = f"{len(seen)} others who write it"
+            expected = f"its own controller {controller!r} alone" if controller else "nobody else"
+            raise BridgeError("rt/lowcmd", got, expected, "another bridge, or an app?")
+
+    def _lie_down(self, controller: str) -> None:
+        """Have the robot's own controller lie down, and wait until it lies.
+
+        Raises:
+            BridgeError: it does not.
+        """
+        self._call(self._sport, rpc.API_VERSION, {}, _ANSWER, is_query=True)
+        self._call(self._sport, rpc.STAND_DOWN, {}, _LETTING_GO)
+        now = still = monotonic()
+        deadline = now + _LETTING_GO
+        while now - still < _STILL_S:
+            report = self.receive()
+            if report is not None and not np.abs(report.dq).max() < _STILL:
+                still = now
+            if now > deadline:
+                what = f"the robot's own controller {controller!r}"
+                raise BridgeError(
+                    what, "joints that move", "to lie down", "switch it off in the app"
+                )
+            sleep(_LOOK)
+            now = monotonic()
 
     def _open_commands(self) -> None:
         self._commands = StructWriter(self._participant, self._commands_topic, go2.COMMAND.itemsize)
+
+    def _await_mode(self, controller: str) -> None:
+        """Wait until this controller is in charge, or none if it is "".
+
+        Raises:
+            BridgeError: another one is.
+        """
+        deadline = monotonic() + _LETTING_GO
+        while (name := self._motion_mode()) != controller:
+            if monotonic() > deadline:
+                expected = f"{controller!r}, which it is asked for" if controller else "to let go"
+                cause = "" if controller else "switch it off in the app; is the firmware old?"
+                raise BridgeError("the robot's own controller", repr(name), expected, cause)
+            sleep(_AGAIN)
 
     def _motion_mode(self) -> str:
         """Name of the controller that is in charge; "" if none is.
@@ -123,29 +183,47 @@ class Go2Driver:
         Raises:
             BridgeError: no answer, or none that can be read.
         """
-        answer = self._call(self._switcher, rpc.CHECK_MODE, {})
-        what = "the robot's motion switcher"
-        if answer is None:
-            raise BridgeError(what, f"no answer in {_ANSWER:g} s", "an answer", "is it a Go2 EDU?")
+        answer = self._call(self._switcher, rpc.CHECK_MODE, {}, _ANSWER, is_query=True)
         try:
             return str(json.loads(answer.text)["name"])
         except (ValueError, KeyError, TypeError):
-            got = f"code {answer.code}, {answer.text!r}"
+            what, got = "the robot's motion switcher", f"code {answer.code}, {answer.text!r}"
             raise BridgeError(what, got, "the name of a controller", "firmware?") from None
 
-    def _call(self, service: RpcEnd, api: int, parameters: dict[str, Any]) -> RpcMessage | None:
-        """The response to a call, which is repeated until both sides are linked; None: too late."""
-        begun, asked = monotonic(), -1.0
+    def _call(
+        self,
+        service: RpcEnd,
+        api: int,
+        parameters: dict[str, Any],
+        seconds: float,
+        *,
+        is_query: bool = False,
+    ) -> RpcMessage:
+        """The response to a call.
+
+        The robot does what it is asked as often as it is asked. So it is asked once, when both
+        sides are linked; a query alone is repeated.
+
+        Raises:
+            BridgeError: there is none in time, or it is a refusal of what is no query.
+        """
+        begun, asked = monotonic(), 0.0
         number = monotonic_ns()
-        while (passed := monotonic() - begun) < _FOUND + _ANSWER:
-            if passed - asked > 0.5:
+        while (now := monotonic()) - begun < seconds:
+            if service.is_linked and (not asked or (is_query and now - asked > _AGAIN)):
                 service.send(RpcMessage(number, api, json.dumps(parameters)))
-                asked = passed
+                asked = now
             for message in service.receive():
-                if message.id == number:
+                if message.id != number:
+                    continue
+                if message.code == rpc.OK or is_query:
                     return message
+                what, got = f"the robot's {service.service}", f"code {message.code}"
+                raise BridgeError(what, got, f"to do what call {api} asks for")
             sleep(_LOOK)
-        return None
+        got = f"no answer in {seconds:g} s" if asked else f"nobody there in {seconds:g} s"
+        what, cause = f"the robot's {service.service}", "is it a Go2 EDU? is the firmware old?"
+        raise BridgeError(what, got, f"an answer to call {api}", cause)
 
     def close(self) -> None:
         """Leave the network, and have the robot know it."""

@@ -95,6 +95,7 @@ def watch(driver: RobotDriver, config: BridgeConfig, pipe: int) -> None:
             return
         if not heard:  # its end is closed: it has died
             break
+    os.close(pipe)  # a bridge that is there again learns that its guard has acted
     nowhere = np.zeros(N_JOINTS)
     rate = Rate(0.001 * driver.period_ms)
     for targets, ms in (

@@ -11,7 +11,7 @@ from typing import Final
 class BridgeMode(StrEnum):
     """What a bridge does with its robot."""
 
-    DRY = "dry"  # nothing is ever sent
+    DRY = "dry"  # no motor is ever enabled
     LIMP = "limp"  # motors off
     STANDING_UP = "standing-up"
     STANDING = "standing"

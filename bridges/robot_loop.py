@@ -22,7 +22,9 @@ from quadriga.shared.wire.messages import Command, Status
 
 TICK: Final = 1e-3  # s
 SLACK_MS: Final = 3000  # beyond what a motion takes
-_LOOK_MS: Final = 1000  # of reports that are checked before anything is sent
+_LOOK_MS: Final = 1000  # of reports that are checked before the robot is commanded
+_FIND_MS: Final = 3000  # for the first of them to come
+_INTRODUCE_MS: Final = 500  # between two packets to a robot that is silent
 _ANSWER_BIN: Final = 0.05  # ms
 _LEAVE_MS: Final = 100  # of packets at the end, that one of them arrives
 
@@ -42,14 +44,14 @@ class Answer(NamedTuple):
 
 
 class RobotLoop:
-    """One robot, and who decides what it does. Nothing is sent before `take_charge`.
+    """One robot, and who decides what it does. No motor is enabled before `take_charge`.
 
     Args:
         config: the team's configuration.
         name: of the robot.
         driver: the way to it.
         guard: brings the robot to rest when this process dies or hangs; None: a dry run, in which
-            nothing is ever sent.
+            no motor is ever enabled.
         say: tells the operator what happens.
         clock: one that never goes back, s.
 
@@ -105,38 +107,53 @@ class RobotLoop:
         seconds = self._config.bridge.stand_s if motion is None else motion.seconds
         return round(1000.0 * seconds) + SLACK_MS
 
-    def look(self, stopped: Callable[[], bool], *, hung: bool = False) -> list[RobotReport]:
-        """A second of reports, checked; none if `stopped()` came first.
+    def look(self, stopped: Callable[[], bool], *, hung: bool = False, tells: bool = True) -> bool:
+        """Check a second of reports; False if `stopped()` came first.
 
         Args:
             stopped: asked often whether to stop.
             hung: whether the robot hangs, and does not lie.
+            tells: whether the operator is told what was found.
 
         Raises:
             CheckError: the robot is not as it must be.
         """
-        rate, reports = Rate(TICK), list[RobotReport]()
-        before = self._driver.counters["received"]
+        driver, rate, reports = self._driver, Rate(TICK), list[RobotReport]()
+        malformed = driver.counters["malformed"]
+        for ms in range(_FIND_MS):
+            if stopped():
+                return False
+            self._begin_turn()
+            if self.receive():
+                break
+            if ms % _INTRODUCE_MS == 0:
+                driver.introduce()
+            rate.wait()
+        while self.receive():  # what came before this second
+            pass
+        before = driver.counters["received"]
         for _ in range(_LOOK_MS):
             if stopped():
-                return []
+                return False
             self._begin_turn()
             if self.receive():
                 reports += [] if self.report is None else [self.report]
             rate.wait()
+        malformed = driver.counters["malformed"] - malformed
         findings = check_reports(
             reports,
             _LOOK_MS / 1000,
-            self._driver.packets_ms,
+            driver.packets_ms,
             self._config.bridge,
             self._config.robot,
-            received=self._driver.counters["received"] - before,
+            received=driver.counters["received"] - before,
             hung=hung,
+            cause=f"{malformed} malformed, the last one {driver.malformed}" if malformed else "",
         )
-        for finding in findings:
+        for finding in findings if tells else ():
             self._say(f"{finding.name}: {finding.got}{'' if finding.ok else '  <- not right'}")
         refuse_failed(self._name, findings)
-        return reports
+        return True
 
     def take_charge(self) -> None:
         """Have the robot's own controller let go of the motors, and answer for them.
@@ -144,12 +161,14 @@ class RobotLoop:
         Raises:
             BridgeError: it does not let go.
         """
-        self._driver.take_over()
-        if released := self._driver.released:
-            self._say(
-                f"{self._name}: its own controller {released!r} has let go of the motors; "
-                f"--restore {released} gives them back"
-            )
+        try:
+            self._driver.take_over()
+        finally:
+            if released := self._driver.released:
+                self._say(
+                    f"{self._name}: its own controller {released!r} was asked to let go of the "
+                    f"motors; --restore {released} gives them back"
+                )
         self._in_charge = True
         self._stall()
 

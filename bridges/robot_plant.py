@@ -34,14 +34,14 @@ _STEADY_MS: Final = 300  # of standing, before the feet are calibrated
 
 
 class RobotPlant(Plant):
-    """See `Plant`. Nothing is sent before `prepare`, and never unless it is armed.
+    """See `Plant`. No motor is enabled before `prepare`, and never unless it is armed.
 
     Args:
         config: the team's configuration.
         name: of the robot.
         driver: the way to it.
         guard: brings the robot to rest when this process dies or hangs; None: a dry run, in which
-            nothing is ever sent.
+            no motor is ever enabled.
         say: tells the operator what happens.
         now: a clock that never goes back, s.
 
@@ -77,6 +77,14 @@ class RobotPlant(Plant):
         """What the supervisor lets the robot do now."""
         return self._loop.mode
 
+    def look(self, stopped: Callable[[], bool]) -> None:
+        """Check the robot's reports before the team is there, and tell the operator.
+
+        Raises:
+            CheckError: the robot is not as it must be.
+        """
+        self._loop.look(stopped)
+
     def prepare(self, stopped: Callable[[], bool]) -> bool:
         """Look at the robot's reports, and get it to stand if it may be commanded.
 
@@ -85,10 +93,10 @@ class RobotPlant(Plant):
             BridgeError: its own controller does not let go of the motors.
         """
         name = self.names[0]
-        if not self._loop.look(stopped):
+        if not self._loop.look(stopped, tells=False):
             return False
         if not self._armed:
-            self._say(f"{name}: dry run, nothing is sent; --armed commands the robot")
+            self._say(f"{name}: dry run, no motor is enabled; --armed commands the robot")
             return True
         self._loop.take_charge()
         return (

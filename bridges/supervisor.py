@@ -76,7 +76,7 @@ class SupervisorInputs:
         command: the agent's newest; None before the first.
         command_age: ms.
         wish: of the team.
-        writers: how many others command the robot's motors.
+        writers: how many others have commanded the robot's motors since the step before.
         stall: ms since the step before, by the clock.
         guarded: whether the bridge's guard is there.
         estop: why the team's emergency stop was pressed; "" if it was not.
@@ -201,14 +201,15 @@ class Supervisor:
             return with_detail("estop", inputs.estop)
         if are_pressed(report.remote, self._stop_buttons):
             return with_detail("remote", config.stop_buttons)
-        if inputs.writers:
-            return with_detail("second-writer", f"{inputs.writers} others command the motors")
+        # Once the guard has damped the motors, it is who else has commanded them.
+        if inputs.stall > config.damp_ms and mode is not BridgeMode.LIMP:
+            return with_detail("bridge-late", f"{inputs.stall} ms")
         if not inputs.guarded:
             return "guard-gone"
+        if inputs.writers:
+            return with_detail("second-writer", f"{inputs.writers} others command the motors")
         if mode is BridgeMode.LIMP:
             return ""
-        if inputs.stall > config.damp_ms:  # by then the guard has damped the motors
-            return with_detail("bridge-late", f"{inputs.stall} ms")
         if inputs.report_age > config.report_max_ms:
             return with_detail("report-late", f"{inputs.report_age} ms")
         if mode is BridgeMode.WALKING and inputs.command_age > config.damp_ms:

@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from typing import Final
 
+import numpy as np
+
+from quadriga.bridges.driver import count_malformed
+from quadriga.bridges.postures import passive
 from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.unitree.packets import SERVO, MotorTargets, PacketError, RobotReport
 from quadriga.shared.unitree.udp import CODECS, UdpCodec
 from quadriga.shared.unitree.udp_port import Address, UdpPort, parse_address
@@ -25,8 +30,8 @@ class UdpDriver:
         guards: whether it only ever sends, from any port.
 
     Raises:
-        ConfigError: an address does not parse.
-        BridgeError: the port is taken.
+        ConfigError: an address does not parse or resolve.
+        BridgeError: the port is taken, or the address is not of this machine.
     """
 
     servo, packets_ms = SERVO, 1
@@ -39,7 +44,7 @@ class UdpDriver:
         self._tick: int | None = None
         self._older = 0
         self.period_ms = config.period_ms or self.packets_ms
-        self.own_guards, self.released = 0, ""
+        self.malformed = self.released = ""
         self.counters: Counter[str] = Counter()
 
     def receive(self) -> RobotReport | None:
@@ -48,8 +53,8 @@ class UdpDriver:
         for packet, _ in self._port.drain():
             try:
                 report = self._codec.decode_report(packet)
-            except PacketError:
-                self.counters["malformed"] += 1
+            except PacketError as error:
+                self.malformed = count_malformed(self.counters, error)
                 continue
             if self._is_newer(report.tick):
                 newest = report
@@ -69,6 +74,10 @@ class UdpDriver:
                     return False
         self._tick, self._older = tick, 0
         return True
+
+    def introduce(self) -> None:
+        """See `RobotDriver`: these robots may learn from it where to send reports."""
+        self.send(passive(np.zeros(N_JOINTS)))
 
     def send(self, targets: MotorTargets) -> None:
         """See `RobotDriver`."""

@@ -17,7 +17,7 @@ def add(add_command: AddCommand) -> None:
         "--driver", choices=("a1", "go1", "go2"), help="kind of robot: must be that of the team"
     )
     command.add_argument(
-        "--armed", action="store_true", help="command the robot; without, nothing is ever sent"
+        "--armed", action="store_true", help="command the robot; without, no motor is enabled"
     )
     command.add_argument(
         "--test-joints",
@@ -36,6 +36,7 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     from quadriga.bridges.bridge import build_bridge
     from quadriga.plant import process
     from quadriga.shared.robot.conventions import robot_names
+    from quadriga.shared.runtime.signals import stop_on_signals
 
     team, names = config.team, robot_names(config.team.robots)
     if arguments.robot not in names:
@@ -55,7 +56,9 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
         return _restore(config, arguments.robot, arguments.restore)
     if arguments.test_joints:
         return _test_joints(config, arguments.robot)
-    process.run(config, partial(build_bridge, armed=arguments.armed), arguments.robot)
+    stopped = stop_on_signals()
+    build = partial(build_bridge, armed=arguments.armed, stopped=stopped)
+    process.run(config, build, arguments.robot, stopped)
     return 0
 
 

@@ -25,7 +25,7 @@ def add(add_command: AddCommand) -> None:
     command.add_argument(
         "--armed",
         action="store_true",
-        help="bridges command their robots (team.plant 'robots'); without, nothing is ever sent",
+        help="bridges command their robots (team.plant 'robots'); without, no motor is enabled",
     )
     command.add_argument(
         "--drive",

@@ -48,7 +48,8 @@ def take_priority(priority: str) -> bool:
         _schedule(os.SCHED_RR, _PRIORITY)
     except OSError as error:
         print(
-            f"no real-time scheduling ({error.strerror}): this process runs as an ordinary one",
+            f"no real-time scheduling ({error.strerror}): this process runs as an ordinary one; "
+            "`USER - rtprio 1` in /etc/security/limits.d, or LimitRTPRIO=1 in its unit, permits it",
             file=sys.stderr,
         )
         return False

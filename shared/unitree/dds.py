@@ -38,6 +38,8 @@ _LOOPBACK: Final = (
     '</MaxAutoParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers>'
 )
 _NUMBERS: Final = 0x7FFFFFFF  # of domains within a process
+_KEEP_LAST, _NOT_MINE = 0, 1  # DDS_HISTORY_KEEP_LAST, DDS_IGNORELOCAL_PARTICIPANT
+_KEPT: Final = 128  # samples of a reader: a quarter of a second of a robot's reports
 
 
 class _Serialised(c.Structure):
@@ -91,6 +93,10 @@ _ARGUMENTS: Final = {
     "dds_take": (c.c_int32, c.c_void_p, c.c_void_p, c.c_size_t, c.c_uint32),
     "dds_write": (c.c_int32, c.c_void_p),
     "dds_delete": (c.c_int32,),
+    "dds_create_qos": (),
+    "dds_delete_qos": (c.c_void_p,),
+    "dds_qset_history": (c.c_void_p, c.c_int, c.c_int32),
+    "dds_qset_ignorelocal": (c.c_void_p, c.c_int),
     "dds_get_matched_publications": (c.c_int32, c.c_void_p, c.c_size_t),
     "dds_get_matched_subscriptions": (c.c_int32, c.c_void_p, c.c_size_t),
 }
@@ -111,6 +117,7 @@ def load_library() -> Any:
             for name, types in _ARGUMENTS.items():
                 function = getattr(library, name)
                 function.argtypes, function.restype = types, c.c_int32
+            library.dds_create_qos.restype = c.c_void_p
             return library
     raise ConfigError(
         "the driver of the Go2", "no CycloneDDS", "its library", "pip install -e '.[go2]'"
@@ -222,9 +229,18 @@ class DdsParticipant:
         ops = operations(layout)
         return self.topic(name, typename, layout.itemsize, layout.alignment, ops)
 
-    def reader(self, topic: int) -> int:
-        """A reader: best effort, keeps the last sample."""
-        made = self.library.dds_create_reader(self.handle, topic, None, None)
+    def reader(self, topic: int, *, of_others: bool = False) -> int:
+        """A reader: best effort, keeps the last samples.
+
+        Args:
+            topic: that it reads.
+            of_others: whether it reads nothing that this participant writes.
+        """
+        qos = self.library.dds_create_qos()
+        self.library.dds_qset_history(qos, _KEEP_LAST, _KEPT)
+        self.library.dds_qset_ignorelocal(qos, _NOT_MINE if of_others else 0)
+        made = self.library.dds_create_reader(self.handle, topic, qos, None)
+        self.library.dds_delete_qos(qos)
         return self._check(made, "DDS reader")
 
     def writer(self, topic: int) -> int:
@@ -263,20 +279,29 @@ class DdsParticipant:
 
 
 class StructReader:
-    """Takes samples that are structs of numbers."""
+    """Takes samples that are structs of numbers; its arguments as those of `reader`."""
 
-    def __init__(self, participant: DdsParticipant, topic: int, size: int) -> None:
-        self._library, self.handle = participant.library, participant.reader(topic)
+    def __init__(
+        self, participant: DdsParticipant, topic: int, size: int, *, of_others: bool = False
+    ) -> None:
+        self._library = participant.library
+        self.handle = participant.reader(topic, of_others=of_others)
         self._sample = c.create_string_buffer(size)
         self._samples = (c.c_void_p * 1)(c.addressof(self._sample))
         self._info = SampleInfo()
 
     def take(self) -> bytes | None:
-        """The newest sample; None if there is none since the last call."""
-        taken = self._library.dds_take(
-            self.handle, c.addressof(self._samples), c.addressof(self._info), 1, 1
-        )
-        return self._sample.raw if taken > 0 and self._info.valid_data else None
+        """The oldest sample that has not been taken; None if there is none."""
+        where = c.addressof(self._samples), c.addressof(self._info)
+        while self._library.dds_take(self.handle, *where, 1, 1) > 0:
+            if self._info.valid_data:  # else a writer has left
+                return self._sample.raw
+        return None
+
+    @property
+    def writer(self) -> int:
+        """Who wrote the sample that was taken last, a number of this participant's."""
+        return int(self._info.publication)
 
 
 class StructWriter:

@@ -20,7 +20,6 @@ from quadriga.shared.unitree.packets import (
     ON,
     Battery,
     MotorTargets,
-    PacketError,
     RobotReport,
     check_crc,
     check_finite,
@@ -51,16 +50,16 @@ _MOTOR_COMMAND: Final = _struct([
 ])  # fmt: skip
 _MOTOR_STATE: Final = _struct([
     ("mode", "u1"), ("q", "f4"), ("dq", "f4"), ("ddq", "f4"), ("tau", "f4"), ("q_raw", "f4"),
-    ("dq_raw", "f4"), ("ddq_raw", "f4"), ("temperature", "u1"), ("lost", "u4"),
+    ("dq_raw", "f4"), ("ddq_raw", "f4"), ("temperature", "i1"), ("lost", "u4"),
     ("reserve", "u4", 2),
 ])  # fmt: skip
 _IMU: Final = _struct([
     ("quaternion", "f4", 4), ("gyro", "f4", 3), ("accel", "f4", 3), ("rpy", "f4", 3),
-    ("temperature", "u1"),
+    ("temperature", "i1"),
 ])  # fmt: skip
 _BATTERY: Final = _struct([
     ("version_high", "u1"), ("version_low", "u1"), ("status", "u1"), ("charge", "u1"),
-    ("current_ma", "i4"), ("cycle", "u2"), ("battery_ntc", "u1", 2), ("board_ntc", "u1", 2),
+    ("current_ma", "i4"), ("cycle", "u2"), ("battery_ntc", "i1", 2), ("board_ntc", "i1", 2),
     ("cells_mv", "u2", 15),
 ])  # fmt: skip
 COMMAND: Final = _struct([
@@ -71,7 +70,7 @@ COMMAND: Final = _struct([
 REPORT: Final = _struct([
     *_START, ("imu", _IMU), ("motor", _MOTOR_STATE, _MOTORS), ("battery", _BATTERY),
     ("foot", "i2", 4), ("foot_estimate", "i2", 4), ("tick", "u4"), ("remote", "u1", 40),
-    ("bit_flag", "u1"), ("adc_reel", "f4"), ("ntc1", "u1"), ("ntc2", "u1"), ("power_v", "f4"),
+    ("bit_flag", "u1"), ("adc_reel", "f4"), ("ntc1", "i1"), ("ntc2", "i1"), ("power_v", "f4"),
     ("power_a", "f4"), ("fan_frequency", "u2", 4), ("reserve", "u4"), ("crc", "u4"),
 ])  # fmt: skip
 
@@ -106,6 +105,7 @@ class Go2Codec:
         self._modes = Fields(REPORT, motor__mode=joints)
         self._temperatures = Fields(REPORT, motor__temperature=joints, imu__temperature=None)
         self._blank_command, self._blank_report = _blank(COMMAND), _blank(REPORT)
+        self._blank_command["level"] = _LOW_LEVEL  # which the robot leaves 0 in its reports
         motors = self._blank_command["motor"]
         motors["mode"], motors["q"], motors["dq"] = ON, NO_ANGLE, NO_RATE  # of those it lacks
 
@@ -132,7 +132,7 @@ class Go2Codec:
         self._feet.write(raw, (np.clip(np.rint(r.foot), _INT16.min, _INT16.max),))
         self._lost.write(raw, (r.lost,))
         self._modes.write(raw, (r.mode,))
-        degrees = np.clip((*r.temperature, r.imu_temperature), 0, 255)
+        degrees = np.clip((*r.temperature, r.imu_temperature), -128, 127)
         self._temperatures.write(raw, (degrees,))
         fields = raw.view(REPORT)[0]
         fields["tick"] = report.tick & 0xFFFFFFFF
@@ -175,7 +175,7 @@ class Go2Codec:
 
 def _blank(layout: np.dtype[np.void]) -> Any:
     packet = np.zeros((), layout)
-    packet["head"], packet["level"] = tuple(_HEAD), _LOW_LEVEL
+    packet["head"] = tuple(_HEAD)
     return packet
 
 
@@ -188,14 +188,10 @@ def _open(packet: bytes, layout: np.dtype[np.void], what: str) -> Raw:
     """The bytes of a packet of this layout that is whole.
 
     Raises:
-        PacketError: another length or head, damaged, or not of the low level.
+        PacketError: another length, or damaged.
     """
     check_size(packet, layout.itemsize, what)
-    if packet[:2] != _HEAD:
-        raise PacketError(f"{what}: head", packet[:2].hex(), "feef")
-    if packet[2] != _LOW_LEVEL:
-        raise PacketError(f"{what}: level", f"{packet[2]:#x}", f"{_LOW_LEVEL:#x}")
-    check_crc(int.from_bytes(packet[-4:], "little"), crc32(packet[:-4]), what)
+    check_crc(int.from_bytes(packet[-4:], "little"), crc32(packet[:-4]), what, packet[2])
     return np.frombuffer(packet, np.uint8)
 
 

@@ -28,6 +28,11 @@ FOOT_PLACES: Final = np.array([1, 0, 3, 2])
 class PacketError(QuadrigaError):
     """Bytes are not a packet of this robot, or a command holds what no packet can carry."""
 
+    @property
+    def reason(self) -> str:
+        """What is wrong, in a word: the size or the crc of a packet, or a field of a command."""
+        return self.name.rpartition(": ")[2]
+
 
 @dataclass(frozen=True, slots=True)
 class Battery:
@@ -157,14 +162,19 @@ def check_size(packet: bytes, size: int, what: str) -> None:
         PacketError: it is shorter or longer.
     """
     if len(packet) != size:
-        raise PacketError(what, f"{len(packet)} bytes", f"{size}", "another robot or firmware?")
+        got = f"{len(packet)} bytes"
+        raise PacketError(f"{what}: size", got, f"{size}", "another robot or firmware?")
 
 
-def check_crc(got: int, computed: int, what: str) -> None:
+def check_crc(got: int, computed: int, what: str, level: int) -> None:
     """Refuse a packet with a check sum that is not its own.
+
+    Robots and other people's programs fill in the head and the level of a packet as they like: a
+    Go2 leaves the level 0. So these decide nothing.
 
     Raises:
         PacketError: they differ.
     """
     if got != computed:
-        raise PacketError(what, f"check sum {got:08x}", f"{computed:08x}", "damaged on its way?")
+        cause = f"damaged on its way? its level is {level:#04x}"
+        raise PacketError(f"{what}: crc", f"{got:08x}", f"{computed:08x}", cause)

@@ -14,6 +14,7 @@ from quadriga.shared.unitree.dds import DdsParticipant, SampleInfo, bytes_at, nu
 MOTION_SWITCHER: Final = "motion_switcher"
 SPORT: Final = "sport"
 CHECK_MODE, RELEASE_MODE, SELECT_MODE = 1001, 1003, 1002  # of the motion switcher
+API_VERSION: Final = 1  # of every service
 STAND_DOWN: Final = 1005  # of sport
 OK: Final = 0
 UNKNOWN: Final = 3203  # there is no such call
@@ -94,10 +95,13 @@ class RpcEnd:
         participant: of the domain.
         service: its name.
         serves: whether this is the end that responds.
+
+    Attributes:
+        service: its name.
     """
 
     def __init__(self, participant: DdsParticipant, service: str, *, serves: bool) -> None:
-        self._library = participant.library
+        self._participant, self._library, self.service = participant, participant.library, service
         topics = {
             kind: participant.topic(
                 f"rt/api/{service}/{kind}", typename, c.sizeof(layout), c.alignment(layout), ops
@@ -116,6 +120,12 @@ class RpcEnd:
         self._sample: Any = _RpcRequest() if serves else _RpcResponse()
         self._samples = (c.c_void_p * 1)(c.addressof(self._sample))
         self._info = SampleInfo()
+
+    @property
+    def is_linked(self) -> bool:
+        """Whether somebody is at the other end: what is sent before is lost."""
+        seen = self._participant
+        return bool(seen.readers_seen_by(self._writer) and seen.writers_seen_by(self._reader))
 
     def send(self, message: RpcMessage) -> bool:
         """Send; whether the library took it."""

@@ -22,7 +22,6 @@ from quadriga.shared.unitree.packets import (
     SERVO,
     Battery,
     MotorTargets,
-    PacketError,
     RobotReport,
     check_crc,
     check_finite,
@@ -175,18 +174,12 @@ class UdpCodec:
         """The bytes of a packet of this layout that is whole.
 
         Raises:
-            PacketError: another length, another head, damaged, or not of the low level.
+            PacketError: another length, or damaged.
         """
         what = f"{what} of the {self._name}"
         check_size(packet, layout.itemsize, what)
-        if self._has_head and packet[:2] != _HEAD:
-            raise PacketError(f"{what}: head", packet[:2].hex(), "feef")
-        level = packet[2] if self._has_head else packet[0]
-        if level != _LOW_LEVEL:
-            cause = "the robot's own controller is still in charge"
-            raise PacketError(f"{what}: level", f"{level:#x}", f"{_LOW_LEVEL:#x}", cause)
-        got = int.from_bytes(packet[-4:], "little")
-        check_crc(got, crc32(packet[: _covered(len(packet))]), what)
+        got, level = int.from_bytes(packet[-4:], "little"), packet[2 if self._has_head else 0]
+        check_crc(got, crc32(packet[: _covered(len(packet))]), what, level)
         return np.frombuffer(packet, np.uint8)
 
 

@@ -45,18 +45,14 @@ def _open_board(kind: str, bridge: BridgeConfig, index: int, seed: Sequence[int]
         # Robots on one loopback, which real ones are not, have domains of their own.
         domain = bridge.domain + (index if interface == LOOPBACK else 0)
         return Go2Robot(domain, interface, seed)
-    here, listener = (
-        parse_address(
-            getattr(bridge, key).replace("{number}", number), f"bridge.{key}", Address("", 0)
-        )
-        for key in ("endpoint", "listen")
-    )
-    if not here.port or not listener.port:
+    text = bridge.endpoint.replace("{number}", number)
+    here = parse_address(text, "bridge.endpoint", Address("", 0))
+    if not here.port:
         raise ConfigError(
-            "bridge.endpoint, bridge.listen",
+            "bridge.endpoint",
             "nothing",
             "HOST:PORT",
             "a simulated robot is not at the address of a real one: "
             "deploy/desk.toml has addresses on this machine",
         )
-    return UdpRobot(CODECS[kind], here, listener, seed)
+    return UdpRobot(CODECS[kind], here, seed)

@@ -54,8 +54,8 @@ def run(
     Lines on the standard input are orders, see `orders`.
 
     Args:
-        config: the team's configuration; `bridge.endpoint` and `bridge.listen`, or
-            `bridge.interface` and `bridge.domain`, say where each robot is.
+        config: the team's configuration; `bridge.endpoint`, or `bridge.interface`
+            and `bridge.domain`, say where each robot is.
         task: what else; by default nothing.
         stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
 

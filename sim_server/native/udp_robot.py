@@ -1,4 +1,4 @@
-"""A simulated A1 or Go1 on the network: it reports all the time and obeys the last command."""
+"""A simulated A1 or Go1 on the network: it reports and obeys once it has had a command."""
 
 from __future__ import annotations
 
@@ -12,12 +12,11 @@ from quadriga.sim_server.native.link import Parcel
 
 
 class UdpRobot(Board):
-    """One robot's board. It answers whoever commanded it last.
+    """One robot's board. It reports to whoever commanded it last, and to nobody before.
 
     Args:
         codec: of its packets.
         here: where it takes commands.
-        listener: where it sends reports until somebody commands it.
         seed: of its chance.
 
     Raises:
@@ -26,15 +25,13 @@ class UdpRobot(Board):
 
     period_ms = 1
 
-    def __init__(
-        self, codec: UdpCodec, here: Address, listener: Address, seed: Sequence[int] = (0,)
-    ) -> None:
+    def __init__(self, codec: UdpCodec, here: Address, seed: Sequence[int] = (0,)) -> None:
         super().__init__(codec, SERVO, seed, keeps_size=False)
         self._here, self._port = here, UdpPort(here)
-        self._first_listener = self._listener = listener
+        self._listener: Address | None = None
 
     def _send(self, packet: bytes) -> None:
-        self._port.send(packet, self._listener)
+        self._port.send(packet, self._listener)  # to nobody, nothing
 
     def _take(self) -> Iterator[Parcel]:
         return (Parcel(packet, sender) for packet, sender in self._port.drain())
@@ -48,7 +45,7 @@ class UdpRobot(Board):
 
     def _boot(self) -> None:
         super()._boot()
-        self._listener = self._first_listener
+        self._listener = None
 
     def _close(self) -> None:
         self._port.close()

@@ -2,128 +2,118 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
 from quadriga.bridges.go2_driver import Go2Driver
+from quadriga.bridges.robot_loop import RobotLoop
 from quadriga.shared.config.bridge import BridgeConfig
-from quadriga.shared.config.load import load
 from quadriga.shared.errors import BridgeError, ConfigError
-from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.unitree import go2
-from quadriga.shared.unitree.dds import StructWriter
+from quadriga.shared.runtime.clock import sleep
+from quadriga.shared.unitree import rpc
 from quadriga.shared.unitree.packets import ON
-from quadriga.shared.wire.messages import Command
-from quadriga.sim_server.native.go2_robot import Go2Robot
-from quadriga.sim_server.world.world import World
 from tests.bridges.robots import config_of, holding
-
-DOMAIN = 192  # of no other test
-WAIT = 10.0  # s
-
-
-class LivingRobot:
-    """A board that reports and obeys in a thread of its own; a domain of its own participant."""
-
-    def __init__(self) -> None:
-        self.robot = Go2Robot(DOMAIN, "lo")
-        self._state = World(load(overrides={"team.robots": 1})).states()["r1"]
-        self._over = threading.Event()
-        self.command: Command | None = None
-        self._thread = threading.Thread(target=self._run)
-        self._thread.start()
-
-    def _run(self) -> None:
-        while not self._over.is_set():
-            self.robot.report(self._state, np.zeros(12))
-            self.command = self.robot.obey()
-            sleep(0.002)
-
-    def close(self) -> None:
-        self._over.set()
-        self._thread.join()
-        self.robot.close()
+from tests.sim_server.native.test_go2_robot import Desk, hasten, wait_until
 
 
 @pytest.fixture
-def living() -> Iterator[LivingRobot]:
-    made = LivingRobot()
+def desk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
+    hasten(monkeypatch)
+    made = Desk(192)  # a domain of no other test
     yield made
     made.close()
+    assert made.robot.malformed == 0
 
 
-@pytest.fixture
-def driver(living: LivingRobot) -> Iterator[Go2Driver]:
-    made = Go2Driver(BridgeConfig(interface="lo", domain=DOMAIN))
-    yield made
-    made.close()
-    assert living.robot.malformed == 0
+def executed(desk: Desk) -> list[int]:
+    """What the robot has done of what it was asked for, but for questions."""
+    return [api for api in desk.robot.executed if api != rpc.API_VERSION]
 
 
-def wait_until(happens: Callable[[], bool]) -> None:
-    deadline = monotonic() + WAIT
-    while not happens():
-        assert monotonic() < deadline
-        sleep(0.001)
-
-
-def test_before_it_takes_over_nothing_is_written(living: LivingRobot, driver: Go2Driver) -> None:
-    wait_until(lambda: driver.receive() is not None)
-    driver.send(holding(config_of("go2"), mode=np.full(12, ON, np.uint8)))
-    assert driver.counters["unsent"] == 1
+def test_before_it_takes_over_nothing_is_written(desk: Desk) -> None:
+    wait_until(lambda: desk.driver.receive() is not None)
+    desk.driver.send(holding(config_of("go2"), mode=np.full(12, ON, np.uint8)))
+    assert desk.driver.counters["unsent"] == 1
     sleep(0.05)
-    assert living.robot.received == 0
-    assert living.robot.controller == "normal"
+    assert desk.robot.received == 0
+    assert desk.robot.controller == "normal"
 
 
-def test_the_robots_own_controller_lets_go_and_commands_arrive(
-    living: LivingRobot, driver: Go2Driver
+def test_the_robots_own_controller_lies_down_once_lets_go_and_commands_arrive(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    driver.take_over()
-    assert (living.robot.controller, driver.released) == ("", "normal")
+    """It writes commands until it has let go, and stays an idle writer of them."""
+    monkeypatch.setattr("quadriga.sim_server.native.go2_robot._MOTION_MS", 700)
+    desk.driver.take_over()
+    assert (desk.robot.controller, desk.driver.released) == ("", "normal")
+    assert executed(desk) == [rpc.STAND_DOWN, rpc.RELEASE_MODE]
+    assert not desk.robot._motions, "it was asked once"
     targets = holding(config_of("go2"), mode=np.full(12, ON, np.uint8), tau=np.arange(12.0))
 
     def arrived() -> bool:
-        driver.send(targets)
-        return living.command is not None
+        desk.driver.send(targets)
+        return desk.command is not None
 
     wait_until(arrived)
-    assert living.command is not None
-    np.testing.assert_allclose(living.command.tau, np.arange(12.0))
-    assert driver.other_writers() == 0
-    driver.give_back(driver.released)
-    assert living.robot.controller == "normal"
-    wait_until(lambda: living.command is None)
+    assert desk.command is not None
+    np.testing.assert_allclose(desk.command.tau, np.arange(12.0))
+    assert desk.driver.other_writers() == 0
+    desk.driver.give_back(desk.driver.released)
+    assert desk.robot.controller == "normal"
+    wait_until(lambda: desk.command is None)
 
 
 def test_a_controller_that_the_robot_does_not_have_is_named(
-    driver: Go2Driver, monkeypatch: pytest.MonkeyPatch
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("quadriga.bridges.go2_driver._LETTING_GO", 0.2)
+    monkeypatch.setattr("quadriga.bridges.go2_driver._LETTING_GO", 0.5)
     expected = r"own controller: got 'normal', expected 'dance', which it is asked for"
     with pytest.raises(BridgeError, match=expected):
-        driver.give_back("dance")
+        desk.driver.give_back("dance")
 
 
-def test_a_second_writer_is_seen_and_refused(living: LivingRobot, driver: Go2Driver) -> None:
-    participant = living.robot._participant
-    topic = participant.struct_topic(go2.COMMAND_TOPIC, go2.COMMAND_TYPE, go2.COMMAND)
-    StructWriter(participant, topic, go2.COMMAND.itemsize)
-    wait_until(lambda: driver.other_writers() == 1)
-    with pytest.raises(BridgeError, match="rt/lowcmd: got 1 others who write it, expected nobody"):
-        driver.take_over()
+def test_a_second_writer_is_refused_before_the_robots_own_controller_lets_go(desk: Desk) -> None:
+    desk.do(lambda: desk.robot.intrude(there=True))
+    wait_until(lambda: desk.driver.other_writers() == 2)
+    expected = "rt/lowcmd: got 2 others who write it, expected its own controller 'normal' alone"
+    with pytest.raises(BridgeError, match=expected):
+        desk.driver.take_over()
+    assert (desk.robot.controller, desk.driver.released, executed(desk)) == ("normal", "", [])
 
 
-def test_a_controller_that_does_not_let_go_is_named(
-    living: LivingRobot, driver: Go2Driver, monkeypatch: pytest.MonkeyPatch
+def test_of_a_takeover_that_fails_later_the_operator_learns_whom_to_give_the_motors_back_to(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("quadriga.bridges.go2_driver._LETTING_GO", 0.2)
-    living.robot.lets_go = False
-    with pytest.raises(BridgeError, match="own controller: got normal, expected to let go"):
-        driver.take_over()
+    await_mode = desk.driver._await_mode
+
+    def intrude(controller: str) -> None:
+        await_mode(controller)
+        desk.do(lambda: desk.robot.intrude(there=True))
+
+    monkeypatch.setattr(desk.driver, "_await_mode", intrude)
+    said = list[str]()
+    loop = RobotLoop(config_of("go2"), "r1", desk.driver, guard=None, say=said.append)
+    with pytest.raises(BridgeError, match="rt/lowcmd: got 1 others who write it, expected nobody"):
+        loop.take_charge()
+    assert ["--restore normal" in line for line in said] == [True]
+
+
+@pytest.mark.parametrize("lies_down", [False, True])
+def test_a_controller_that_does_not_lie_down_or_let_go_is_named(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch, lies_down: bool
+) -> None:
+    wait_until(lambda: desk.driver.receive() is not None)
+    monkeypatch.setattr("quadriga.bridges.go2_driver._LETTING_GO", 0.5)
+    if not lies_down:
+        monkeypatch.setattr("quadriga.sim_server.native.go2_robot._MOTION_MS", 60_000)
+    desk.robot.lets_go = False
+    expected = "controller: got 'normal', expected to let" if lies_down else "sport: got no answer"
+    with pytest.raises(BridgeError, match=expected):
+        desk.driver.take_over()
+    assert executed(desk) == ([rpc.STAND_DOWN, rpc.RELEASE_MODE] if lies_down else [])
+    assert desk.driver.released == ("normal" if lies_down else "")
 
 
 def test_without_an_interface_there_is_one_clear_error() -> None:

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from quadriga.bridges.bridge import build_bridge
 from quadriga.bridges.foot_calibration import FootScales
 from quadriga.bridges.guard import Guard
 from quadriga.bridges.modes import BridgeMode
@@ -20,7 +21,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError
 from quadriga.shared.runtime.clock import sleep
-from quadriga.shared.unitree.packets import SERVO, MotorTargets, RobotReport
+from quadriga.shared.unitree.packets import OFF, SERVO, MotorTargets, RobotReport
 from quadriga.shared.unitree.udp import A1
 from quadriga.shared.unitree.udp_port import Address, UdpPort
 from quadriga.shared.wire.messages import Command
@@ -29,13 +30,14 @@ from tests.bridges.test_udp_driver import HOST, free_port
 
 
 class Board:
-    """Sends one and the same posture a thousand times a second, and keeps what it gets."""
+    """Sends one and the same posture to whom it has heard, and keeps what it gets."""
 
     def __init__(self, report: RobotReport) -> None:
         here, listen = Address(HOST, free_port()), Address(HOST, free_port())
-        self._port = UdpPort(here, listen)
+        self._port = UdpPort(here)
+        self._listener: Address | None = None
         self._report, self._over = report, threading.Event()
-        self.commands: list[bytes] = []
+        self.commands: list[MotorTargets] = []
         self.keys = {
             "team.robots": 1,
             "team.plant": "robots",
@@ -52,8 +54,10 @@ class Board:
         tick = 0
         while not self._over.is_set():
             tick += 1
-            self._port.send(A1.encode_report(replace(self._report, tick=tick)))
-            self.commands += [packet for packet, _ in self._port.drain()]
+            self._port.send(A1.encode_report(replace(self._report, tick=tick)), self._listener)
+            for packet, sender in self._port.drain():
+                self.commands.append(A1.decode_command(packet))
+                self._listener = sender
             sleep(0.0003)  # rather too many than too few
 
     def close(self) -> None:
@@ -81,7 +85,8 @@ def bridge_to(board: Board, said: list[str], *, armed: bool = False) -> Iterator
         plant.finish()
 
 
-def test_a_dry_run_sends_no_packet_whatever_the_agent_asks_for(board: Board) -> None:
+def test_a_dry_run_enables_no_motor_whatever_the_agent_asks_for(board: Board) -> None:
+    """Its robot says nothing before it has had a packet: it gets one, and no other."""
     said: list[str] = []
     command = Command(0, 0, *np.full((5, 12), 3.0))
     states = 0
@@ -91,32 +96,38 @@ def test_a_dry_run_sends_no_packet_whatever_the_agent_asks_for(board: Board) -> 
             states += len(plant.states())
             plant.step({"r1": command})
             sleep(0.001)
-    assert board.commands == []
+    assert [set(command.mode.tolist()) for command in board.commands] == [{OFF}]
     assert plant.mode is BridgeMode.DRY
     assert states > 50
-    assert "r1: dry run, nothing is sent; --armed commands the robot" in said
+    assert "r1: dry run, no motor is enabled; --armed commands the robot" in said
 
 
-def test_a_robot_that_is_not_as_it_must_be_gets_no_packet() -> None:
-    """This one reports that it lies on its back."""
+def test_a_robot_that_is_not_as_it_must_be_gets_no_command() -> None:
+    """This one reports that it lies on its back, and its bridge looks before its team is there."""
     lying = standing(config_of(), quat_wxyz=tilted(3.1), accel=np.array([0.0, 0.0, -9.81]))
     board = Board(lying)
     try:
-        with (
-            bridge_to(board, [], armed=True) as plant,
-            pytest.raises(CheckError, match=r"robot r1: posture: got tilted by 3\.10 rad"),
-        ):
-            plant.prepare(lambda: False)
+        with pytest.raises(CheckError, match=r"robot r1: posture: got tilted by 3\.10 rad"):
+            build_bridge(load(overrides=board.keys), ("r1",), armed=True)
     finally:
         board.close()
-    assert board.commands == []
+    assert [set(command.mode.tolist()) for command in board.commands] == [{OFF}]
+
+
+def test_a_bridge_that_was_silent_learns_at_once_that_its_guard_has_acted() -> None:
+    guard = Guard("a1", replace(config_of().bridge, damp_ms=20, passive_s=0.5))
+    assert guard.beat()
+    sleep(0.2)
+    assert not guard.beat()
+    assert guard._process.poll() is None, "it damps the motors"
+    guard.dismiss()
 
 
 class Script:
     """A driver whose robot speaks at given milliseconds of the bridge."""
 
     servo, packets_ms, period_ms = SERVO, 2, 2
-    own_guards, released = 0, ""
+    malformed = released = ""
 
     def __init__(self, speaks: Iterator[bool]) -> None:
         self._speaks, self._tick, self._spoken = speaks, 0, False
@@ -133,6 +144,8 @@ class Script:
     def receive(self) -> RobotReport | None:
         spoken, self._spoken = self._spoken, False
         return standing(config_of(), tick=self._tick) if spoken else None
+
+    def introduce(self) -> None: ...
 
     def send(self, targets: MotorTargets) -> None:
         raise AssertionError("a dry run")

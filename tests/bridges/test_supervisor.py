@@ -169,7 +169,13 @@ def test_an_emergency_stop_of_the_team_stops_a_robot_in_every_state(mode: Bridge
 
 
 @pytest.mark.parametrize(
-    ("fields", "reason"), [({"report_age": 51}, "report-late"), ({"writers": 1}, "second-writer")]
+    ("fields", "reason"),
+    [
+        ({"report_age": 51}, "report-late"),
+        ({"writers": 1}, "second-writer"),
+        ({"writers": 1, "stall": 51}, "bridge-late"),  # it is the guard
+        ({"writers": 1, "guarded": False}, "guard-gone"),
+    ],
 )
 def test_a_lost_robot_or_another_writer_stops_it(fields: dict[str, Any], reason: str) -> None:
     state, _ = step(in_mode(BridgeMode.STANDING), at(**fields))

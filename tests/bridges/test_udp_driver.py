@@ -9,9 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from quadriga.bridges.robot_loop import RobotLoop
 from quadriga.bridges.udp_driver import UdpDriver
 from quadriga.shared.config.bridge import BridgeConfig
-from quadriga.shared.errors import BridgeError, ConfigError
+from quadriga.shared.errors import BridgeError, CheckError, ConfigError
 from quadriga.shared.unitree.packets import OFF, SERVO, RobotReport
 from quadriga.shared.unitree.udp import A1, GO1
 from quadriga.shared.unitree.udp_port import Address, UdpPort
@@ -71,7 +72,24 @@ def test_repeated_older_and_damaged_packets_are_noticed_and_not_used(link: Link)
     link.robot.send(b"garbage")
     link.robot.send(GO1.encode_report(standing(config_of("go1"))))
     assert received(link) is None
-    assert link.driver.counters == {"received": 1, "repeated": 1, "older": 1, "malformed": 2}
+    assert link.driver.counters == {"received": 1, "repeated": 1, "older": 1} | {
+        "malformed": 2,
+        "malformed_size": 2,
+    }
+    assert "got 807 bytes, expected 771" in link.driver.malformed
+
+
+def test_a_robot_whose_packets_are_all_malformed_is_refused_with_their_reason(
+    link: Link, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("_FIND_MS", "_LOOK_MS"):
+        monkeypatch.setattr(f"quadriga.bridges.robot_loop.{name}", 20)
+    loop = RobotLoop(config_of(), "r1", link.driver, guard=None, say=list[str]().append)
+    for _ in range(3):
+        link.robot.send(b"garbage")
+    expected = r"reports: got 0 .*\(3 malformed, the last one report of the A1: size: got 7 bytes"
+    with pytest.raises(CheckError, match=expected):
+        loop.look(lambda: False)
 
 
 def test_the_counter_may_wrap_and_a_restarted_robot_is_followed(link: Link) -> None:
@@ -104,8 +122,14 @@ def test_what_is_sent_arrives_as_a_command(link: Link) -> None:
 def test_a_port_in_use_and_a_wrong_address_are_one_clear_error(link: Link) -> None:
     with pytest.raises(BridgeError, match=r"UDP port \d+ of 127.0.0.1: got Address already in use"):
         UdpDriver("a1", link.config)
-    with pytest.raises(ConfigError, match=r"bridge.endpoint: got 'robot', expected HOST:PORT"):
-        UdpDriver("a1", replace(link.config, endpoint="robot"))
+    for endpoint, listen, said in (
+        ("robot", "", "bridge.endpoint: got 'robot', expected HOST:PORT"),
+        ("a.invalid:1", "", "bridge.endpoint: got 'a.invalid:1': .*, expected a host"),
+        (f"{70 * 'a'}:1", "", "expected a host that has an IPv4 address"),
+        ("", "192.0.2.7:1", "of 192.0.2.7: .*, expected an address of this machine"),
+    ):
+        with pytest.raises((BridgeError, ConfigError), match=said):
+            UdpDriver("a1", replace(link.config, endpoint=endpoint, listen=listen))
 
 
 def test_a_robot_that_is_off_costs_no_exception(link: Link) -> None:

@@ -81,6 +81,7 @@ def test_without_the_right_it_runs_all_the_same() -> None:
     found, message = answer("realtime", "deny")
     assert found == ["False", "False", "False", "True"]
     assert message.startswith("no real-time scheduling (Operation not permitted)")
+    assert "`USER - rtprio 1` in /etc/security/limits.d" in message
 
 
 _NICE = """

@@ -34,9 +34,9 @@ def any_report(draw: st.DrawFn) -> RobotReport:
         tau=random.uniform(-60.0, 60.0, 12),
         foot=random.integers(-300, 3000, 4).astype(float),
         mode=random.integers(0, 16, 12).astype(np.uint8),
-        temperature=random.integers(0, 100, 12).astype(float),
+        temperature=random.integers(-40, 100, 12).astype(float),
         lost=random.integers(0, 1000, 12),
-        imu_temperature=int(random.integers(0, 100)),
+        imu_temperature=int(random.integers(-40, 100)),
         remote=random.bytes(40),
         battery=Battery(int(random.integers(0, 101)), float(random.integers(-9000, 9000)) / 1000),
     )

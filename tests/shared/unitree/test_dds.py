@@ -77,6 +77,20 @@ def test_what_is_written_is_read_to_the_byte(participant: DdsParticipant) -> Non
         sleep(0.001)
     assert read == packet
     assert reader.take() is None
+    witness = StructReader(participant, topic, go2.COMMAND.itemsize, of_others=True)
+    packets = [bytes([k]) + packet[1:] for k in range(100)]
+    assert all([writer.write(sent) for sent in packets])
+    sleep(0.05)  # a late process gets them all
+    assert [reader.take() for _ in packets] == packets
+    first = reader.writer
+    with DdsParticipant(DOMAIN, "lo") as other:
+        foreign = StructWriter(other, command_topic(other), go2.COMMAND.itemsize)
+        while witness.take() is None:
+            assert monotonic() < deadline
+            foreign.write(packet)
+            sleep(0.001)
+        assert reader.take() == packet
+        assert reader.writer == witness.writer != first
     assert participant.writers_seen_by(reader.handle) == 1
     assert participant.readers_seen_by(writer.handle) == 1
 

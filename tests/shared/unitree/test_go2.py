@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from quadriga.shared.unitree.go2 import GO2
 from quadriga.shared.unitree.packets import ON, MotorTargets, PacketError, RobotReport
 from tests.shared.unitree.packets_of import any_report, any_targets
 
+REAL = json.loads((Path(__file__).parent / "vectors" / "go2_real_packets.json").read_text("utf-8"))
 # Offsets in C of Unitree's headers, as a compiler gave them.
 COMMAND_AT = {
     "head": 0,
@@ -56,6 +59,31 @@ def test_the_layouts_are_those_of_c() -> None:
     for layout, offsets in ((go2.COMMAND, COMMAND_AT), (go2.REPORT, REPORT_AT)):
         assert layout.fields is not None
         assert {name: layout.fields[name][1] for name in offsets} == offsets
+
+
+@pytest.mark.parametrize("packet", [bytes.fromhex(text) for text in REAL["lowstate"]])
+def test_what_a_real_robot_sent_is_read(packet: bytes) -> None:
+    """It stands, its level is 0, and what a simulated one sends differs in values alone."""
+    report = GO2.decode_report(packet)
+    assert report.q[2::3] == pytest.approx([-1.556, -1.525, -1.522, -1.567], abs=1e-3)
+    assert (report.temperature[8], report.temperature[11]) == (78.0, 72.0)
+    assert np.linalg.norm(report.accel) == pytest.approx(9.6, abs=0.1)
+    assert report.foot.tolist() == [29.0, 16.0, 13.0, 33.0]
+    assert report.battery is not None
+    assert (report.battery.charge, report.battery.voltage) == pytest.approx((63, 29.54), abs=0.01)
+    assert set(report.mode.tolist()) == {ON}
+    assert GO2.encode_report(report)[:3] == packet[:3]
+
+
+def test_a_command_is_the_one_that_a_real_robot_was_sent() -> None:
+    (packet,) = map(bytes.fromhex, REAL["lowcmd"])
+    read = GO2.decode_command(packet)
+    assert set(read.kp.tolist()) == {40.0}
+    ours = np.frombuffer(GO2.encode_command(read), go2.COMMAND)[0]
+    theirs = np.frombuffer(packet, go2.COMMAND)[0]
+    for name in ("head", "level"):
+        np.testing.assert_array_equal(ours[name], theirs[name])
+    np.testing.assert_array_equal(ours["motor"][:12], theirs["motor"][:12])
 
 
 @given(any_targets())

@@ -158,14 +158,16 @@ def test_any_bytes_are_a_packet_or_one_clear_error(codec: UdpCodec, packet: byte
         codec.decode_command(packet)
 
 
-def test_the_others_packets_and_the_high_level_are_refused() -> None:
-    with pytest.raises(PacketError, match="771 bytes, expected 807"):
+def test_the_size_and_the_check_sum_decide_and_neither_head_nor_level() -> None:
+    with pytest.raises(PacketError, match=r"size: got 771 bytes, expected 807") as size:
         GO1.decode_report(A1.encode_report(_report()))
     packet = bytearray(A1.encode_report(_report()))
     packet[0] = 0x00
-    packet[-4:] = crc32(bytes(packet[:764])).to_bytes(4, "little")
-    with pytest.raises(PacketError, match=r"level: got 0x0, expected 0xff .*still in charge"):
+    with pytest.raises(PacketError, match=r"crc: got \w{8}, .*its level is 0x00") as crc:
         A1.decode_report(bytes(packet))
+    assert (size.value.reason, crc.value.reason) == ("size", "crc")
+    packet[-4:] = crc32(bytes(packet[:764])).to_bytes(4, "little")
+    assert A1.decode_report(bytes(packet)).tick == 1
 
 
 def _report() -> RobotReport:

@@ -31,8 +31,11 @@ class Desk:
 
     def __init__(self) -> None:
         robot, listen = Address(HOST, free_port()), Address(HOST, free_port())
-        self.robot = UdpRobot(A1, robot, listen, seed=(5,))
+        self.robot = UdpRobot(A1, robot, seed=(5,))
         self.driver = UdpDriver("a1", BridgeConfig(f"{HOST}:{robot.port}", f"{HOST}:{listen.port}"))
+        self.driver.introduce()
+        self.robot.obey()
+        self.robot.received = 0
         self.now = 0
         self.command: Command | None = None
 
@@ -103,7 +106,9 @@ def test_a_robot_that_is_off_says_nothing_and_forgets(desk: Desk) -> None:
     assert desk.ticks(20, send=True) == 0
     assert desk.command is None
     desk.robot.switch(on=True)
-    assert desk.ticks(5) == 5
+    assert desk.ticks(5) == 0, "nor does it know whom to tell"
+    desk.driver.introduce()
+    assert desk.ticks(5) == 4
     assert desk.command is None
     desk.tick(send=True)
     assert desk.command is not None

@@ -42,7 +42,6 @@ def test_what_is_open_is_closed_if_another_cannot_be_opened() -> None:
         overrides={
             "team.robots": 2,
             "bridge.endpoint": f"{HOST}:{port}",  # the same for both
-            "bridge.listen": f"{HOST}:{free_port()}",
         }
     )
     for _ in range(2):  # the first robot's port is free again

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from quadriga.bridges.postures import passive
 from quadriga.shared.config.load import load
 from quadriga.shared.unitree.remote import read_remote
 from quadriga.shared.unitree.udp import A1
@@ -40,10 +41,11 @@ class Desk:
     def __init__(self, orders: Sequence[str] = ()) -> None:
         self.world = World(load(overrides={"team.robots": 2, "world.spawn": "lying"}))
         places = {name: Address(HOST, free_port()) for name in NAMES}
-        self.bridges = {name: UdpPort(place) for name, place in places.items()}
-        self.robots = {
-            name: UdpRobot(A1, Address(HOST, free_port()), place) for name, place in places.items()
-        }
+        self.bridges = {name: UdpPort(Address(HOST, free_port()), places[name]) for name in NAMES}
+        self.robots = {name: UdpRobot(A1, place) for name, place in places.items()}
+        for name, bridge in self.bridges.items():
+            bridge.send(A1.encode_command(passive(np.zeros(12))))
+            self.robots[name].obey()
         self.hanger, self.typed, self.said = Hanger(self.world), Typed(), list[str]()
         parsed = [parse_order(order, NAMES) for order in orders]
         self.steering = Steering(self.robots, self.hanger, self.typed, parsed, self.said.append)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from quadriga.bridges.postures import passive
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.unitree.packets import NO_ANGLE, NO_RATE, OFF, PacketError
@@ -22,15 +23,21 @@ from tests.bridges.test_udp_driver import HOST, free_port
 @pytest.fixture
 def ends() -> Iterator[tuple[UdpRobot, UdpPort]]:
     here, listener = Address(HOST, free_port()), Address(HOST, free_port())
-    robot, bridge = UdpRobot(A1, here, listener), UdpPort(listener, here)
+    robot, bridge = UdpRobot(A1, here), UdpPort(listener, here)
     yield robot, bridge
     robot.close()
     bridge.close()
 
 
-def test_it_reports_what_its_sensors_measure(ends: tuple[UdpRobot, UdpPort]) -> None:
+def test_it_reports_what_its_sensors_measure_once_it_has_heard(
+    ends: tuple[UdpRobot, UdpPort],
+) -> None:
     robot, bridge = ends
     state = World(load(overrides={"team.robots": 1})).states()["r1"]
+    robot.report(state, np.full(12, 0.5))
+    assert list(bridge.drain()) == []
+    bridge.send(A1.encode_command(passive(np.zeros(12))))
+    assert robot.obey() is None, "that enables no motor"
     robot.report(state, np.full(12, 0.5))
     ((packet, _),) = bridge.drain()
     report = A1.decode_report(packet)
@@ -72,7 +79,7 @@ def test_what_is_not_asked_for_is_not_an_angle(ends: tuple[UdpRobot, UdpPort]) -
 
 
 def test_robots_without_an_address_of_their_own_are_refused() -> None:
-    with pytest.raises(ConfigError, match=r"bridge\.endpoint, bridge\.listen: got nothing"):
+    with pytest.raises(ConfigError, match=r"bridge\.endpoint: got nothing"):
         open_boards(load(overrides={"team.robots": 1}))
     with pytest.raises(PacketError):
         A1.decode_command(b"")
