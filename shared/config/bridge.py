@@ -72,10 +72,11 @@ class BridgeConfig:
         high=100,
     )
     temperature_max: float = key(
-        70.0,
+        0.0,
         "°C",
-        "temperature of a motor above which a robot does not stand up; 10 °C more stop it",
-        low=20.0,
+        "temperature of a motor above which a robot does not stand up, and warns; 8 °C more stop "
+        "it; 0: that of this kind of robot, by joint: A1 70, Go1 and Go2 80",
+        low=0.0,
         high=120.0,
     )
     report_share: float = key(
