@@ -190,7 +190,7 @@ def test_an_emergency_stop_of_the_team_stops_a_robot_in_every_state(mode: Bridge
 
 
 @pytest.mark.parametrize(
-    ("fields", "reason"), [({"report_age": 51}, "report-late"), ({"writers": 1}, "second-writer")]
+    ("fields", "reason"), [({"report_age": 71}, "report-late"), ({"writers": 1}, "second-writer")]
 )
 def test_a_lost_robot_or_another_writer_stops_it(fields: dict[str, Any], reason: str) -> None:
     state, _ = step(in_mode(BridgeMode.STANDING), at(**fields))
