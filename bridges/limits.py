@@ -76,6 +76,12 @@ def joint_limits(config: BridgeConfig, robot: RobotSpec) -> JointLimits:
     )
 
 
+def temperature_limits(config: BridgeConfig, robot: RobotSpec) -> Array:
+    """Temperature of each motor above which a robot does not stand up, (12,), °C."""
+    own = np.tile(robot.temperature_max, 4)
+    return np.full(N_JOINTS, config.temperature_max) if config.temperature_max else own
+
+
 @compiled
 def shares_of_speed(q: Array, dq: Array, fastest: Array, limits: JointLimits) -> Array:
     """How fast each joint is, (12,): beyond 1 too fast, ∞ if no true sensor could say this of it.

@@ -26,6 +26,7 @@ _LOOK_MS: Final = 1000  # of reports that are checked before the robot is comman
 _FIND_MS: Final = 3000  # for the first of them to come
 _INTRODUCE_MS: Final = 500  # between two packets to a robot that is silent
 _ANSWER_BIN: Final = 0.05  # ms
+_WARN_MS: Final = 1000, 60_000  # from a look for what to warn of to the next, and from a warning
 _LEAVE_MS: Final = 100  # of packets at the end, that one of them arrives
 
 
@@ -87,7 +88,7 @@ class RobotLoop:
         self.now = 0
         self.report: RobotReport | None = None
         self.report_at, self.arrived = -1, 0.0
-        self._sent_at = 0
+        self._sent_at, self._warn_at = 0, 0
         self.estops: Callable[[], str] = str
         self.untold = list[tuple[int, BridgeMode, str]]()
         self.answers = Histogram(_ANSWER_BIN)
@@ -214,7 +215,12 @@ class RobotLoop:
             self._driver.send(supervised.targets)
             if answer is not None and answer.arrived is not None:
                 self.answers.add(1e3 * (self._clock() - answer.arrived))
-        for mode, reason in supervised.changes:
+        changes = [*supervised.changes]
+        if self.now >= self._warn_at and self.mode is not BridgeMode.STOPPED:
+            warning = self._supervisor.warning(report)
+            self._warn_at = self.now + _WARN_MS[bool(warning)]
+            changes += [(self.mode, warning)] if warning else []
+        for mode, reason in changes:
             self._say(f"{self._name}: {mode} {reason}".rstrip())
             self.untold.append((self.now, mode, reason))
         return supervised

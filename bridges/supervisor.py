@@ -14,7 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.bridges.joint_motion import TORQUE, joint_motion, led_gently, stray
-from quadriga.bridges.limits import JointReading, joint_limits, limit_targets, shares_of_speed
+from quadriga.bridges.limits import (
+    JointReading,
+    joint_limits,
+    limit_targets,
+    shares_of_speed,
+    temperature_limits,
+)
 from quadriga.bridges.modes import BY_ITSELF, BY_WISH, BridgeMode, Wish
 from quadriga.bridges.postures import (
     SINKING,
@@ -36,7 +42,7 @@ from quadriga.shared.unitree.remote import are_pressed, parse_buttons
 from quadriga.shared.wire.codes import with_detail
 from quadriga.shared.wire.messages import Command
 
-_HOTTER: Final = 10.0  # °C above `temperature_max` that stop a robot
+_HOTTER: Final = 8.0  # °C above `temperature_max` that stop a robot: its motors end at 10 more
 _LETTING_GO: Final = 1.0  # s, for which a robot that has lain down is damped
 
 
@@ -124,6 +130,7 @@ class Supervisor:
         self._robot, self._config, self._servo = robot, config, servo
         self._stop_buttons = parse_buttons(config.stop_buttons, "bridge.stop_buttons")
         self._limits = joint_limits(config, robot)
+        self._warm = temperature_limits(config, robot)
         self._gentle = self._limits._replace(torque=np.minimum(TORQUE, self._limits.torque))
         still = JointReading(np.zeros(N_JOINTS), np.zeros(N_JOINTS))
         # Compiled, or loaded, now and not in the first millisecond.
@@ -228,14 +235,26 @@ class Supervisor:
             return with_detail("tilt", f"{tilt:.2f} rad")
         if (joint := _first(report.mode == PROTECTED)) is not None:
             return with_detail("motor-protected", JOINT_NAMES[joint])
-        if (joint := _first(report.temperature > config.temperature_max + _HOTTER)) is not None:
-            return with_detail(
-                "temperature", f"{JOINT_NAMES[joint]} {report.temperature[joint]:.0f} °C"
-            )
+        if heat := self._above(report, _HOTTER):
+            return with_detail("temperature", heat)
         battery = report.battery
         if battery is not None and battery.charge < config.battery_min / 2:
             return with_detail("battery", f"{battery.charge} %")
         return ""
+
+    def warning(self, report: RobotReport) -> str:
+        """What will soon stop the robot, "" if nothing will."""
+        heat = self._above(report, 0.0)
+        return heat and with_detail("hot", heat)
+
+    def _above(self, report: RobotReport, more: float) -> str:
+        """The motor that is farthest above its limit and `more`, °C; "" if none is."""
+        above = report.temperature - self._warm
+        joint = int(np.argmax(above))
+        if above[joint] <= more:
+            return ""
+        stop = self._warm[joint] + _HOTTER
+        return f"{JOINT_NAMES[joint]} {report.temperature[joint]:.0f} °C, {stop:.0f} °C stop it"
 
     def _command(
         self, state: SupervisorState, inputs: SupervisorInputs

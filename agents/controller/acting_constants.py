@@ -11,7 +11,6 @@ from quadriga.agents.controller.friction import N_FRICTION_RULE, FrictionRule, f
 from quadriga.agents.controller.maths.links import LINK_SIZE, N_LINKS
 from quadriga.agents.controller.maths.rows import numbers, places
 from quadriga.agents.controller.model import RigidBody
-from quadriga.agents.controller.torque_bounds import MotorLimits, motor_limits
 from quadriga.agents.controller.trunk_feedback import (
     N_TRUNK_GAINS,
     SingleRigidBody,
@@ -21,6 +20,7 @@ from quadriga.agents.controller.trunk_feedback import (
 from quadriga.agents.controller.whole_body.problem import N_WEIGHTS, Weights
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import N_JOINTS, Array
+from quadriga.shared.robot.torque_speed import MotorCurves, motor_curves
 from quadriga.shared.runtime.jit import compiled
 
 
@@ -34,7 +34,7 @@ class ActingConstants(NamedTuple):
         feet: what feet are asked for.
         weights: of the whole-body QP.
         friction: how much friction to count on.
-        motors: limits of their torques.
+        motors: their torque-speed curves.
         weight: of the bare robot, N; nominal forces carry it.
         free_fall: whether a robot without contact is asked to fall freely.
     """
@@ -45,7 +45,7 @@ class ActingConstants(NamedTuple):
     feet: FeetGains
     weights: Weights
     friction: FrictionRule
-    motors: MotorLimits
+    motors: MotorCurves
     weight: float
     free_fall: bool
 
@@ -76,7 +76,7 @@ _LAYOUT: Final = ConstantsLayout(
         feet=N_FEET_GAINS,
         weights=N_WEIGHTS,
         friction=N_FRICTION_RULE,
-        motors=3 * N_JOINTS,
+        motors=4 * N_JOINTS,
         weight=1,
         free_fall=1,
     )
@@ -96,7 +96,7 @@ def acting_constants(config: Config, body: RigidBody, weights: Weights) -> Array
             feet_gains(config),
             weights,
             friction_rule(controller),
-            *motor_limits(config),
+            *motor_curves(robot, torque_speed=config.motors.torque_speed),
             [robot.weight, float(controller.flight)],
         ]
     )
@@ -108,7 +108,7 @@ def unpack_constants(row: Array) -> ActingConstants:
     body = SingleRigidBody(
         row[_LAYOUT.mass], row[_LAYOUT.com], row[_LAYOUT.inertia_inverse].reshape(3, 3)
     )
-    motors = row[_LAYOUT.motors].reshape(3, N_JOINTS)
+    motors = row[_LAYOUT.motors].reshape(4, N_JOINTS)
     return ActingConstants(
         row[_LAYOUT.links].reshape(N_LINKS, LINK_SIZE),
         body,
@@ -116,7 +116,7 @@ def unpack_constants(row: Array) -> ActingConstants:
         FeetGains(*numbers(row[_LAYOUT.feet], N_FEET_GAINS)),
         Weights(*numbers(row[_LAYOUT.weights], N_WEIGHTS)),
         FrictionRule(*numbers(row[_LAYOUT.friction], N_FRICTION_RULE)),
-        MotorLimits(motors[0], motors[1], motors[2]),
+        MotorCurves(motors[0], motors[1], motors[2], motors[3]),
         row[_LAYOUT.weight],
         row[_LAYOUT.free_fall] > 0.5,
     )

@@ -22,7 +22,7 @@ from quadriga.agents.controller.model import RigidBody
 from quadriga.agents.controller.schedule import Schedule
 from quadriga.agents.controller.sensed import SENSED, SENSED_SIZE, Sensed
 from quadriga.agents.controller.sensing import place, sense, sensing_constants
-from quadriga.agents.controller.torque_bounds import motor_limits, torque_bounds
+from quadriga.agents.controller.torque_bounds import torque_bounds
 from quadriga.agents.controller.whole_body.assembly import build
 from quadriga.agents.controller.whole_body.limited import LIMITED_SIZE
 from quadriga.agents.controller.whole_body.problem import (
@@ -34,6 +34,7 @@ from quadriga.agents.controller.whole_body.problem import (
 from quadriga.agents.controller.whole_body.solution import finish
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robot.torque_speed import motor_curves
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.messages import State
 
@@ -102,7 +103,8 @@ class Controller:
         self.body = RigidBody(robot, rotors=config.motors.rotor_inertia)
         self.weights = qp_weights(config.controller)
         self._sensing = sensing_constants(config, self.body.links)
-        self._robot, self._motors = robot, motor_limits(config)
+        self._robot = robot
+        self._motors = motor_curves(robot, torque_speed=config.motors.torque_speed)
         self._acting = acting_constants(config, self.body, self.weights)
 
     def sense(self, memory: Memory | None, state: State, schedule: Schedule, dt: float) -> Sensed:

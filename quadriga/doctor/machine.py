@@ -15,6 +15,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER
 
 REALTIME: Final = "realtime"
+STALLS: Final = "stalls"
 GOVERNOR: Final = "governor"
 CORES: Final = "cores"
 MEMORY: Final = "memory"
@@ -26,6 +27,10 @@ BUFFER: Final = "buffer"
 _PROCESS_BYTES: Final = 400_000_000  # of memory that a process takes, at most
 _ROBOT_BYTES: Final = 400_000  # recorded of a robot in a second of a walk, at most
 _LEAST_DISK: Final = 200_000_000  # bytes, for what else is written
+_NO_STALLS: Final = (
+    "leave a core idle; or, as root, `sysctl -w kernel.sched_rt_runtime_us=-1`, from Linux 6.12 on "
+    "also write 0 into each /sys/kernel/debug/sched/fair_server/cpu*/runtime"
+)
 _FAST: Final = frozenset({"performance"})
 _BUSY: Final = 2  # processes of one robot that compute all the time: its agent and its plant
 _IDLE: Final = frozenset({OPERATOR, RECORDER})
@@ -37,6 +42,7 @@ class MachineReadings:
 
     Attributes:
         realtime: whether this user may schedule in real time.
+        reserved: of each second on a core that real-time processes fill, for ordinary ones, s.
         governors: of the processor's cores, each once.
         cores: how many this process may use, after the limits of its container.
         memory: that is free for it, bytes.
@@ -50,6 +56,7 @@ class MachineReadings:
     """
 
     realtime: bool | None
+    reserved: float | None
     governors: tuple[str, ...] | None
     cores: float | None
     memory: int | None
@@ -103,6 +110,7 @@ def check_machine(readings: MachineReadings, need: MachineNeed) -> tuple[Diagnos
     """All checks, one diagnosis each; what could not be read is unknown, never good."""
     return (
         check_realtime(readings.realtime, need),
+        check_stalls(readings.reserved, need),
         check_governor(readings.governors, need),
         check_cores(readings.cores, need),
         check_memory(readings.memory, need),
@@ -123,6 +131,18 @@ def check_realtime(permitted: bool | None, need: MachineNeed) -> Diagnosis:
     remedy = "`USER - rtprio 1` in /etc/security/limits.d, LimitRTPRIO=1 in a unit, or CAP_SYS_NICE"
     text = "real-time scheduling is not permitted"
     return Diagnosis(REALTIME, BAD if need.realtime else NOTE, text, remedy)
+
+
+def check_stalls(reserved: float | None, need: MachineNeed) -> Diagnosis:
+    """Ordinary processes get their share of a second at once: a bridge stands still."""
+    if reserved is None:
+        return _unknown(STALLS, "how long the kernel stops real-time processes")
+    if not reserved:
+        return Diagnosis(STALLS, GOOD, "the kernel stops no real-time processes")
+    text = (
+        f"the kernel stops real-time processes for {1e3 * reserved:.0f} ms a second on a full core"
+    )
+    return Diagnosis(STALLS, NOTE if need.realtime else GOOD, text, _NO_STALLS * need.realtime)
 
 
 def check_governor(governors: tuple[str, ...] | None, need: MachineNeed) -> Diagnosis:

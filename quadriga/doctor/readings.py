@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib.metadata
 import os
+import platform
+import re
 import shutil
 from collections.abc import Callable
 from functools import partial
@@ -21,6 +23,9 @@ T = TypeVar("T")
 
 _CORES: Final = Path("/sys/devices/system/cpu")
 _RECEIVE_BUFFER: Final = Path("/proc/sys/net/core/rmem_max")
+_RT_RUNTIME: Final = Path("/proc/sys/kernel/sched_rt_runtime_us")
+_FAIR: Final = Path("/sys/kernel/debug/sched/fair_server")
+_FAIR_DEFAULT: Final = 0.05  # s of each second
 _CGROUP: Final = Path("/sys/fs/cgroup")
 _UNLIMITED: Final = "max"
 
@@ -32,6 +37,7 @@ def read_machine() -> MachineReadings:
     versions = {name: _read(partial(importlib.metadata.version, name)) for name in names}
     return MachineReadings(
         realtime=_read(_may_take_realtime),
+        reserved=_read(_reserved),
         governors=_read(_governors),
         cores=_read(_cores),
         memory=_read(_free_memory),
@@ -61,6 +67,20 @@ def _may_take_realtime() -> bool:
         return False
     os.sched_setscheduler(0, before, priority)
     return True
+
+
+def _reserved() -> float:
+    """What ordinary processes get of a second on a full core, s.
+
+    From Linux 6.12 on the fair server gives it to them, whose settings root alone can read where
+    debugfs is mounted; before that it was the throttling of real-time processes.
+    """
+    kept = [1e-9 * int(file.read_text(encoding="ascii")) for file in _FAIR.glob("cpu*/runtime")]
+    release = re.match(r"(\d+)\.(\d+)", platform.release())
+    if release and (int(release[1]), int(release[2])) >= (6, 12):
+        return max(kept, default=_FAIR_DEFAULT)
+    runtime = int(_RT_RUNTIME.read_text(encoding="ascii"))
+    return 0.0 if runtime < 0 else 1.0 - 1e-6 * runtime
 
 
 def _governors() -> tuple[str, ...] | None:

@@ -32,6 +32,7 @@ def data_key(config: Config) -> str:
     ident = {k: v for k, v in asdict(config.identification).items() if k not in _FITTED}
     horizon = ("T_ini", "N") if config.identification.seconds == 0 else ()
     sections: dict[str, Any] = {
+        "robot": asdict(config.robot),
         "team": {k: team[k] for k in ("robots", "robot", "yokes", "spacing", "alternate_phase")},
         "sensors": asdict(config.sensors),
         "motors": asdict(config.motors),

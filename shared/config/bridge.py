@@ -72,10 +72,11 @@ class BridgeConfig:
         high=100,
     )
     temperature_max: float = key(
-        70.0,
+        0.0,
         "°C",
-        "temperature of a motor above which a robot does not stand up; 10 °C more stop it",
-        low=20.0,
+        "temperature of a motor above which a robot does not stand up, and warns; 8 °C more stop "
+        "it; 0: what this kind of robot has, by joint",
+        low=0.0,
         high=120.0,
     )
     report_share: float = key(
@@ -86,13 +87,17 @@ class BridgeConfig:
         high=1.0,
     )
     report_max_ms: int = key(
-        50, "ms", "age of the robot's last packet at which it stops", low=5, high=1000
+        70, "ms", "age of the robot's last packet at which it stops", low=5, high=1000
     )
     hold_ms: int = key(
         20, "ms", "age of the agent's command from which on the joints are held", low=2, high=200
     )
     damp_ms: int = key(
-        50, "ms", "age of the agent's command at which the robot stops", low=4, high=1000
+        70,
+        "ms",
+        "age of the agent's command at which the robot stops; Linux may stop a bridge for 54 ms",
+        low=4,
+        high=1000,
     )
     passive_s: float = key(
         3.0,

@@ -2,8 +2,10 @@
 
 Torques, speeds and angles are the URDF's, and so is the rotors' inertia: 1.118e-4 kg·m² in
 `FL_hip_rotor` and its like, behind a gear of 6, at the knee of 9. Unitree publishes a torque-speed
-curve of the Go2's motor alone, see `go2`; the corner speed is the same share of the speed limit.
-Continuous torque: the same share of the peak as the A1's.
+curve of the Go2's motor alone, see `go2`; corner speed and driving torque are the same shares of
+the speed limit and of the peak.
+Continuous torque: the same share of the peak as the A1's. Temperature: these motors protect
+themselves at 90 °C (unitree_actuator_sdk, GO-M8010-6); a bridge stops them 2 °C before.
 """
 
 from __future__ import annotations
@@ -24,9 +26,11 @@ GO1: Final = RobotSpec(
     imu=(-0.01592, -0.06659, -0.00617),
     yoke=(0.0, 0.0, 0.08),
     torque=(23.7, 23.7, 35.55),
+    driving_torque=(20.5, 20.5, 30.7),
     speed=(30.1, 30.1, 20.06),
     corner_speed=(13.5, 13.5, 9.0),
     continuous_torque=(8.5, 8.5, 12.75),
+    temperature_max=(80.0, 80.0, 80.0),
     rotor_inertia=(0.00403, 0.00403, 0.00906),
     lower=4 * (-0.863, -0.686, -2.818),
     upper=4 * (0.863, 4.501, -0.888),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -50,20 +51,23 @@ class RobotSpec:
         title: its name for people.
         urdf: of example-robot-data, below the folder of its robots.
         trunk_link: the URDF's link that is free in the world.
-        trunk_mass: kg; what the trunk link weighs, where that is not the URDF's mass.
         geometry: of the legs, and the mass.
         trunk_box: full lengths of the trunk's collision box, (3,), m, about its origin.
         imu: where gyro and accelerometer are, (3,), m, trunk frame; their axes are the trunk's.
         yoke: where the ball joint of the yokes and the payload sit, (3,), m, trunk frame.
-        torque: limits of the motors of hip, thigh and calf, (3,), N·m.
+        torque: limits of the motors of hip, thigh and calf that stand or brake, (3,), N·m.
+        driving_torque: likewise along a joint's own rotation, up to `corner_speed`, (3,), N·m.
         speed: likewise, (3,), rad/s.
-        corner_speed: up to which they give their full torque, (3,), rad/s; from there on it falls
-            linearly, to zero at `speed`.
+        corner_speed: from which on their driving torque falls, linearly, to zero at `speed`, (3,),
+            rad/s.
         continuous_torque: that they can give for any time without overheating, (3,), N·m.
+        temperature_max: above which none of them may be for the robot to stand up, (3,), °C.
         rotor_inertia: of their rotors, as the joints feel it behind the gears, (3,), kg·m².
         lower, upper: limits of the joint angles, in the order of `JOINT_NAMES`, (12,), rad.
         stand_height: of the trunk's origin above the ground when it stands, m.
         reach: how far under the hip a foot may be lowered, m; the knee's stop allows little more.
+        urdf_changes: attributes by the path of an element of the URDF, where the URDF is not
+            believed.
         defaults: values by `section.key` that this robot has where the configuration says nothing.
     """
 
@@ -76,15 +80,17 @@ class RobotSpec:
     imu: tuple[float, float, float]
     yoke: tuple[float, float, float]
     torque: tuple[float, float, float]
+    driving_torque: tuple[float, float, float]
     speed: tuple[float, float, float]
     corner_speed: tuple[float, float, float]
     continuous_torque: tuple[float, float, float]
+    temperature_max: tuple[float, float, float]
     rotor_inertia: tuple[float, float, float]
     lower: tuple[float, ...]
     upper: tuple[float, ...]
     stand_height: float
     reach: float
-    trunk_mass: float | None = None
+    urdf_changes: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     defaults: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -138,6 +144,22 @@ class RobotSpec:
         leg = self.geometry
         x, y = leg.hip_x, leg.hip_y + leg.thigh_y
         return _read_only(np.array([[x, y], [x, -y], [-x, y], [-x, -y]]))
+
+    def urdf_tree(self) -> ET.Element:
+        """The URDF with `urdf_changes` made: the one description of world and controller.
+
+        Raises:
+            ConfigError: the URDF is not installed, or has no such element.
+        """
+        root = ET.parse(self.urdf_path()).getroot()
+        for path, attributes in self.urdf_changes.items():
+            element = root.find(path)
+            if element is None:
+                raise ConfigError(
+                    self.urdf, f"no {path}", f"the URDF that the {self.title} is known from"
+                )
+            element.attrib.update(attributes)
+        return root
 
     def urdf_path(self) -> Path:
         """Path of the URDF that the package example-robot-data installs.

@@ -2,22 +2,57 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
+
+from quadriga.shared.robot.conventions import N_LEGS, Array
+from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.runtime.jit import compiled
 
 
-@compiled
-def available_torque(peak: float, rate: float, corner: float, top: float) -> float:
-    """Torque that a motor has along its own rotation, N·m; braking, it has its peak.
+class MotorCurves(NamedTuple):
+    """Torque-speed curves of a robot's motors, by joint, (12,).
 
-    Its voltage is limited: from the corner speed on, torque falls linearly, to zero at the top one.
+    Attributes:
+        peak: torque that stands or brakes, N·m.
+        driving: torque along the joint's own rotation, up to the corner speed, N·m.
+        corner: speed from which on the driving torque falls, rad/s; infinite if it does not.
+        top: speed at which none is left, rad/s.
+    """
+
+    peak: Array
+    driving: Array
+    corner: Array
+    top: Array
+
+
+def motor_curves(robot: RobotSpec, *, torque_speed: bool) -> MotorCurves:
+    """The motors of a robot; without `torque_speed` they have their peak torque always."""
+    speeds = robot.corner_speed if torque_speed else (np.inf, np.inf, np.inf)
+    driving = robot.driving_torque if torque_speed else robot.torque
+    rows = (robot.torque, driving, speeds, robot.speed)
+    return MotorCurves(*(np.tile(row, N_LEGS) for row in rows))
+
+
+@compiled
+def torque_range(rate: float, curves: MotorCurves, k: int) -> tuple[float, float]:
+    """Least and greatest torque of a motor, N·m.
+
+    Its voltage is limited: from the corner speed on, the driving torque falls linearly. A motor
+    that brakes has its peak.
 
     Args:
-        peak: torque limit, N·m.
-        rate: of the joint, rad/s.
-        corner: corner speed, rad/s; infinite for a motor whose torque does not fall.
-        top: top speed, rad/s.
+        rate: of its joint, rad/s.
+        curves: of the robot.
+        k: which joint.
     """
-    speed = abs(rate)
-    if speed <= corner:
-        return peak
-    return peak * max(0.0, top - speed) / (top - corner)
+    peak, driving = curves.peak[k], curves.driving[k]
+    if abs(rate) > curves.corner[k]:
+        left = max(0.0, curves.top[k] - abs(rate))
+        driving *= left / (curves.top[k] - curves.corner[k])
+    if rate > 0.0:
+        return -peak, driving
+    if rate < 0.0:
+        return -driving, peak
+    return -peak, peak

@@ -89,7 +89,9 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         RISES: EventCode("fault", "an agent gets its robot up, which was led down or stopped"),
         STANDS_AGAIN: EventCode("fault", "an agent's robot stands that had been down"),
         LINK_BACK: EventCode("fault", "the link to the router was gone for a while"),
-        BRIDGE_MODE: EventCode("bridge", "a bridge's robot begins to stand up, walk or lie down"),
+        BRIDGE_MODE: EventCode(
+            "bridge", "a bridge's robot begins to stand up, walk or lie down, or is hot"
+        ),
         ROBOT_STOPPED: EventCode("fault", "a bridge has stopped its robot: damped, then limp"),
         CLOCK: EventCode("fault", "how well a plant knows the team's clock crosses 1 ms"),
         TIME_OVER: EventCode("stop", "the walk is over: world.seconds have passed"),

@@ -8,10 +8,11 @@ it; the joint's friction is then taken off:
     τ ← τ + (1 − e^(−2π f Δt)) (τ* − τ),  |τ| ≤ limit        f: the bandwidth
     τ_joint = τ − c tanh(q̇ / v₀) − b q̇                       c, b: dry and viscous friction
 
-Where torque and rate point the same way the limit is full up to the corner speed and falls linearly
-to zero at the joint's speed limit, as in Unitree's torque-speed curves; a motor that brakes has its
-full torque. Losses in the winding heat it: h' = ((τ/τ_c)² − h) / T, where h = 1 is the temperature
-that the continuous torque τ_c reaches in the end. Above h = 0.8 the limit falls, to τ_c at h = 1.
+Where torque and rate point the same way the limit is the driving torque up to the corner speed and
+falls linearly to zero at the joint's speed limit, as in Unitree's torque-speed curves; a motor that
+stands or brakes has its peak torque. Losses in the winding heat it: h' = ((τ/τ_c)² − h) / T, where
+h = 1 is the temperature that the continuous torque τ_c reaches in the end. Above h = 0.8 the limit
+falls, to τ_c at h = 1.
 Friction has the shape of Unitree's actuator models; its size lies between that of the Go1's URDF
 (0.2 N·m, 0.01 N·m·s/rad) and of the G1's motor of like torque, N5020-16 (0.6, 0.06;
 unitree_rl_lab). Bandwidth and delay are those of good drives on a serial bus at 500 to 1000 Hz;
@@ -29,7 +30,7 @@ import numpy as np
 from quadriga.shared.config.motors import MotorsConfig
 from quadriga.shared.robot.conventions import N_JOINTS, N_LEGS, Array
 from quadriga.shared.robot.spec import RobotSpec
-from quadriga.shared.robot.torque_speed import available_torque
+from quadriga.shared.robot.torque_speed import MotorCurves, motor_curves, torque_range
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.world.layout import JOINT_POSITIONS, JOINT_RATES
@@ -49,20 +50,16 @@ class MotorData(NamedTuple):
     """What motors and joints are like; arrays are by joint, (12,).
 
     Attributes:
-        peak: torque limit of a cool motor that stands, N·m.
+        curves: torque limits of a cool motor.
         continuous: torque limit of a hot one, N·m.
-        corner: speed from which on the torque falls, rad/s; infinite if it does not.
-        top: speed at which none is left, rad/s.
         follow: share of a torque error that is made up for in a tick.
         friction: dry friction, N·m.
         viscous: friction by rate, N·m·s/rad.
         heating: share of a tick in the filter of the temperature; 0: it stays.
     """
 
-    peak: Array
+    curves: MotorCurves
     continuous: Array
-    corner: Array
-    top: Array
     follow: float
     friction: float
     viscous: float
@@ -71,13 +68,10 @@ class MotorData(NamedTuple):
 
 def motor_data(robot: RobotSpec, config: MotorsConfig) -> MotorData:
     """The motors of a robot as a configuration has them."""
-    corner, top = (np.tile(speeds, N_LEGS) for speeds in (robot.corner_speed, robot.speed))
     lag = 1.0 - math.exp(-2.0 * math.pi * config.bandwidth * _TICK)
     return MotorData(
-        peak=robot.torque_limit,
+        curves=motor_curves(robot, torque_speed=config.torque_speed),
         continuous=np.tile(robot.continuous_torque, N_LEGS),
-        corner=corner if config.torque_speed else np.full(N_JOINTS, np.inf),
-        top=top,
         follow=lag if config.bandwidth > 0.0 else 1.0,
         friction=config.friction,
         viscous=config.viscous_friction,
@@ -149,13 +143,11 @@ def _drive(
             wanted = kp[k] * (q_des[k] - angles[k])
             wanted += kd[k] * (v_des[k] - rates[k])
             wanted += tau_ff[k]
-            limit = data.peak[k]
+            lower, upper = torque_range(rates[k], data.curves, k)
             if data.heating > 0.0:
-                limit = derated(limit, data.continuous[k], heat[i, k])
-            # Heat limits the current, speed the voltage: the lower limit holds.
-            driving = available_torque(data.peak[k], rates[k], data.corner[k], data.top[k])
-            driving = min(limit, driving)
-            upper, lower = (driving, -limit) if rates[k] > 0.0 else (limit, -driving)
+                # Heat limits the current, speed the voltage: the lower limit holds.
+                limit = derated(data.curves.peak[k], data.continuous[k], heat[i, k])
+                lower, upper = max(lower, -limit), min(upper, limit)
             wanted = min(max(wanted, lower), upper)
             if data.follow < 1.0:
                 wanted = sound[i, k] + data.follow * (wanted - sound[i, k])

@@ -51,7 +51,7 @@ class RobotBody:
             "thigh": LEG_CONTACT if leg_collisions else NO_CONTACT,
             "calf": LEG_CONTACT if leg_collisions else NO_CONTACT,
         }
-        root = ET.parse(robot.urdf_path()).getroot()
+        root = robot.urdf_tree()
         self._links = {str(link.get("name")): link for link in root.findall("link")}
         self._joints: dict[str, list[ET.Element]] = {name: [] for name in self._links}
         for joint in sorted(root.findall("joint"), key=lambda item: str(item.get("name"))):
@@ -97,9 +97,7 @@ class RobotBody:
 
     def _fill(self, body: mujoco.MjsBody, link: str, prefix: str, friction: float) -> None:
         robot = self._robot
-        _set_inertia(
-            body, self._links[link], robot.trunk_mass if link == robot.trunk_link else None
-        )
+        _set_inertia(body, self._links[link])
         if link in FOOT_FRAMES:
             _add_foot(body, prefix + link, robot.geometry.foot_radius, friction, self._contact)
         for joint in self._joints[link]:
@@ -177,12 +175,11 @@ def _add_foot(
     )
 
 
-def _set_inertia(body: mujoco.MjsBody, link: ET.Element, mass: float | None) -> None:
-    """Inertia of a link; `mass` replaces the URDF's mass and leaves its rotational inertia."""
+def _set_inertia(body: mujoco.MjsBody, link: ET.Element) -> None:
     inertial = _child(link, "inertial")
     tensor: Mapping[str, str] = _child(inertial, "inertia").attrib
     body.explicitinertial = True
-    body.mass = _mass(link) if mass is None else mass
+    body.mass = _mass(link)
     body.ipos = _origin(inertial)
     xx, yy, zz, xy, xz, yz = (float(tensor[k]) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
     body.fullinertia = [xx, yy, zz, xy, xz, yz]

@@ -7,6 +7,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,8 +16,9 @@ import pytest
 from quadriga.bridges.bridge import build_bridge
 from quadriga.bridges.foot_calibration import FootScales
 from quadriga.bridges.guard import Guard
-from quadriga.bridges.modes import BridgeMode
+from quadriga.bridges.modes import BridgeMode, Wish
 from quadriga.bridges.open_driver import open_driver
+from quadriga.bridges.robot_loop import RobotLoop
 from quadriga.bridges.robot_plant import RobotPlant, to_state, yaw_of
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
@@ -100,6 +103,19 @@ def test_a_dry_run_enables_no_motor_whatever_the_agent_asks_for(board: Board) ->
     assert plant.mode is BridgeMode.DRY
     assert states > 50
     assert "r1: dry run, no motor is enabled; --armed commands the robot" in said
+
+
+def test_a_hot_motor_is_told_of_once_a_minute_and_recorded() -> None:
+    config, said = config_of("go2"), list[str]()
+    report = standing(config, temperature=np.where(np.arange(12) == 2, 82.0, 40.0))
+    driver: Any = SimpleNamespace(
+        servo=SERVO, period_ms=1, receive=lambda: report, other_writers=lambda: 0
+    )
+    loop = RobotLoop(config, "r1", driver, guard=None, say=said.append)
+    for _ in range(3000):
+        loop.turn(None, Wish.REST)
+    assert said == ["r1: dry hot:FL_calf_joint 82 °C, 88 °C stop it"]
+    assert [reason for _, _, reason in loop.untold] == ["hot:FL_calf_joint 82 °C, 88 °C stop it"]
 
 
 def test_a_robot_that_is_not_as_it_must_be_gets_no_command() -> None:

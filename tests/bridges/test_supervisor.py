@@ -122,7 +122,7 @@ def test_a_late_agent_is_waited_for_with_the_joints_held_then_the_robot_stops() 
     assert (supervised.targets.kd > 0.0).all()
 
 
-HOT = standing(CONFIG, temperature=np.full(12, 81.0))
+HOT = standing(CONFIG, temperature=np.full(12, 79.0))
 SICK = {
     "remote": standing(CONFIG, remote=pressing("L2", "B", "up")),
     "tilt": standing(CONFIG, quat_wxyz=tilted(0.95)),
@@ -143,6 +143,27 @@ def test_a_sick_robot_stops_for_good(mode: BridgeMode, reason: str) -> None:
     for wish in Wish:  # nothing brings it back
         again, _ = step(state, at(101, wish=wish))
         assert again.mode is BridgeMode.STOPPED
+
+
+@pytest.mark.parametrize(
+    ("kind", "key", "warm", "hot"),
+    [("a1", 0.0, 71.0, 79.0), ("go2", 0.0, 81.0, 89.0), ("go2", 60.0, 61.0, 69.0)],
+)
+def test_a_hot_motor_is_warned_of_before_it_stops_the_robot(
+    kind: str, key: float, warm: float, hot: float
+) -> None:
+    config = config_of(kind, temperature_max=key)
+    supervisor = Supervisor(config.robot, config.bridge, SERVO)
+
+    def at_heat(degrees: float) -> tuple[str, str]:
+        heat = np.where(np.arange(12) == 5, degrees, 40.0)
+        inputs = at(report=standing(config, temperature=heat))
+        state, _ = supervisor.step(in_mode(BridgeMode.STANDING), inputs)
+        return supervisor.warning(inputs.report)[:17], state.reason
+
+    assert at_heat(warm - 1.0) == ("", "")
+    assert at_heat(hot - 1.0) == at_heat(warm) == ("hot:FR_calf_joint", "")
+    assert at_heat(hot)[1].startswith("temperature:FR_calf_joint")
 
 
 @given(st.integers(1, 4), st.integers(0, 11), st.sampled_from([-1.0, 1.0]))
@@ -171,9 +192,9 @@ def test_an_emergency_stop_of_the_team_stops_a_robot_in_every_state(mode: Bridge
 @pytest.mark.parametrize(
     ("fields", "reason"),
     [
-        ({"report_age": 51}, "report-late"),
+        ({"report_age": 71}, "report-late"),
         ({"writers": 1}, "second-writer"),
-        ({"writers": 1, "stall": 51}, "bridge-late"),  # it is the guard
+        ({"writers": 1, "stall": 71}, "bridge-late"),  # it is the guard
         ({"writers": 1, "guarded": False}, "guard-gone"),
     ],
 )

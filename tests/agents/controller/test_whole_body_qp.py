@@ -129,7 +129,7 @@ def test_active_limits_are_those_of_the_full_problem(
 
 def test_what_cannot_be_had_together_is_weighed_by_the_length() -> None:
     """Two feet cannot turn the trunk about the line between them: what is given up for it?"""
-    across = np.array([0.1805, 0.1308]) / np.hypot(0.1805, 0.1308)
+    across = A1.feet_under_hips[0] / np.linalg.norm(A1.feet_under_hips[0])
     trunk = np.array([0.0, 0.0, 5.0, *(100.0 * across), 0.0])
     linear, angular = [], []
     for weights in (WEIGHTS, WEIGHTS._replace(tilt_length=0.15)):

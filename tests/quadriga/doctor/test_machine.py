@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from quadriga.doctor import readings
 from quadriga.doctor.machine import MachineNeed, MachineReadings, check_machine, need_of
 from quadriga.doctor.packages import check_packages
 from quadriga.doctor.readings import read_machine
@@ -15,6 +17,7 @@ from quadriga.shared.config.load import load
 
 FIT = MachineReadings(
     realtime=True,
+    reserved=0.0,
     governors=("performance",),
     cores=8.0,
     memory=16 * 10**9,
@@ -39,7 +42,7 @@ def verdicts(need: MachineNeed = WALK, **changes: Any) -> dict[str, str]:
 
 def test_a_fit_computer_is_good_at_everything() -> None:
     assert verdicts() == {}
-    assert len(check_machine(FIT, WALK)) == 9
+    assert len(check_machine(FIT, WALK)) == 10
 
 
 @pytest.mark.parametrize(
@@ -63,6 +66,40 @@ def test_each_lack_is_found_and_judged_by_what_the_walk_needs(
     assert verdicts(LOCKSTEP, **changes) == {code: in_lockstep}
 
 
+def test_what_the_kernel_keeps_from_real_time_processes_is_noted() -> None:
+    assert verdicts(reserved=0.05) == {"stalls": NOTE}
+    assert verdicts(LOCKSTEP, reserved=0.05) == {}
+
+
+@pytest.mark.parametrize(
+    ("release", "runtime", "server", "reserved"),
+    [
+        ("5.15.0-91-generic", "950000", None, 0.05),
+        ("5.15.0-91-generic", "-1", None, 0.0),
+        ("6.18.44", "-1", None, 0.05),
+        ("6.18.44", "950000", "20000000", 0.02),
+        ("6.12", "-1", "0", 0.0),
+    ],
+)
+def test_the_kernels_share_is_read_of_what_decides_it(
+    release: str,
+    runtime: str,
+    server: str | None,
+    reserved: float,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """From Linux 6.12 on the fair server does, whatever the throttling of before says."""
+    (tmp_path / "runtime").write_text(runtime)
+    if server is not None:
+        (tmp_path / "cpu0").mkdir()
+        (tmp_path / "cpu0/runtime").write_text(server)
+    monkeypatch.setattr(readings, "_RT_RUNTIME", tmp_path / "runtime")
+    monkeypatch.setattr(readings, "_FAIR", tmp_path)
+    monkeypatch.setattr(readings.platform, "release", lambda: release)
+    assert read_machine().reserved == pytest.approx(reserved)
+
+
 def test_little_room_for_what_is_received_matters_in_real_time_alone() -> None:
     assert verdicts(receive_buffer=212_992) == {"buffer": NOTE}
     assert verdicts(LOCKSTEP, receive_buffer=212_992) == {}
@@ -73,7 +110,7 @@ def test_what_cannot_be_read_is_unknown() -> None:
     nothing |= {"cache": "", "installed": {}}
     found = check_machine(replace(FIT, **nothing), WALK)
     assert {item.verdict for item in found} == {UNKNOWN}
-    assert len({item.text for item in found}) == 9
+    assert len({item.text for item in found}) == 10
 
 
 def test_a_team_at_a_loopback_address_runs_here_as_a_whole() -> None:
@@ -113,11 +150,11 @@ def test_a_package_that_is_wrong_is_named() -> None:
 
 
 def test_this_computer_is_read_and_has_the_packages_that_it_is_tested_with() -> None:
-    readings = read_machine()
-    assert readings.cores is not None
-    assert readings.cores > 0
-    assert readings.memory is not None
-    assert readings.disk is not None
-    assert readings.cache.endswith("/quadriga")
-    packages = check_packages(readings.requirements, readings.installed)
+    found = read_machine()
+    assert found.cores is not None
+    assert found.cores > 0
+    assert found.memory is not None
+    assert found.disk is not None
+    assert found.cache.endswith("/quadriga")
+    packages = check_packages(found.requirements, found.installed)
     assert packages.verdict == GOOD, packages.text

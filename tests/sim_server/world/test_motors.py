@@ -15,7 +15,7 @@ from quadriga.shared.config.motors import MotorsConfig
 from quadriga.shared.robot.a1 import A1
 from quadriga.shared.robot.conventions import N_JOINTS, Array
 from quadriga.shared.robot.robots import ROBOTS
-from quadriga.shared.robot.torque_speed import available_torque
+from quadriga.shared.robot.torque_speed import motor_curves, torque_range
 from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.world.motors import Motors
 from quadriga.sim_server.world.world import World
@@ -64,16 +64,23 @@ def test_no_motor_drives_beyond_its_torque_speed_line(v: float, tau: float, kind
     of = Motors(robot, replace(IDEAL_MOTORS, torque_speed=True), 1, IDLE)
     given = drive(of, command(tau=tau), v=v)
     for k in range(3):
-        line = np.interp(abs(v), [robot.corner_speed[k], robot.speed[k]], [robot.torque[k], 0.0])
+        ends = [robot.corner_speed[k], robot.speed[k]]
+        line = np.interp(abs(v), ends, [robot.driving_torque[k], 0.0])
         limit = line if tau * v > 0.0 else robot.torque[k]
         assert given[k] == pytest.approx(math.copysign(min(abs(tau), limit), tau), abs=1e-9)
 
 
-def test_the_line_is_full_up_to_the_corner_and_zero_from_the_top_speed_on() -> None:
-    assert available_torque(20.0, -9.9, 10.0, 30.0) == 20.0
-    assert available_torque(20.0, 20.0, 10.0, 30.0) == 10.0
-    assert available_torque(20.0, 30.0, 10.0, 30.0) == available_torque(20.0, -99, 10.0, 30.0) == 0
-    assert available_torque(20.0, 99.0, math.inf, 30.0) == 20.0
+@pytest.mark.parametrize("k", range(12))
+def test_the_go2_has_unitrees_curve(k: int) -> None:
+    """Y1 20.2 N·m driving, Y2 23.4 braking, X1 13.5 and X2 30 rad/s; the knee has a gear more."""
+    curves = motor_curves(ROBOTS["go2"], torque_speed=True)
+    gear = 30.1 / 15.7 if k % 3 == 2 else 1.0
+    for v in (0.0, 5.0, 13.49, 13.51, 20.0, 29.9, 30.1, 60.0):
+        driving = 20.2 * min(1.0, max(0.0, (30.0 - v) / (30.0 - 13.5))) if v else 23.4
+        for sign in (1.0, -1.0):
+            bounds = np.array(torque_range(sign * v / gear, curves, k))
+            expected = gear * np.array([-23.4, driving])
+            np.testing.assert_allclose(sorted(sign * bounds), expected, rtol=2e-3, atol=0.01)
 
 
 @given(st.floats(-30.0, 30.0))
@@ -142,7 +149,7 @@ def test_heat_takes_nothing_from_the_torque_that_speed_leaves() -> None:
     of = motors(torque_speed=True, heat_time=300.0)
     of.heat[:] = 1.2
     fast = A1.corner_speed[0] + 0.9 * (A1.speed[0] - A1.corner_speed[0])
-    by_speed = available_torque(A1.torque_limit[0], fast, A1.corner_speed[0], A1.speed[0])
+    by_speed = torque_range(fast, motor_curves(A1, torque_speed=True), 0)[1]
     assert by_speed < A1.continuous_torque[0]
     assert drive(of, command(tau=40.0), v=fast)[0] == by_speed
     assert drive(of, command(tau=40.0))[0] == A1.continuous_torque[0]
