@@ -3,7 +3,9 @@
 Torques, speeds and angles are the URDF's. Unitree publishes a torque-speed curve of the Go2's motor
 alone, see `go2`; the corner speed is the same share of the speed limit. Rotor inertia: MuJoCo
 Menagerie, `unitree_a1`. Continuous torque: assumed, so that an A1 that carries 3 kg
-overheats after minutes as in arXiv:2603.01631; no walk has been held against that.
+overheats after minutes as in arXiv:2603.01631; no walk has been held against that. Foot sensors and
+accelerometer: unknown; the configuration's defaults assume the Go1's feet and the Go2's
+accelerometer.
 """
 
 from __future__ import annotations
