@@ -64,6 +64,7 @@ class RobotLoop:
         arrived: the same by `clock`, s.
         estops: tells why the team's emergency stop was pressed; "" if it was not.
         untold: changes that nobody has taken yet: when, ms, the mode and its reason.
+        foot_refresh: how often feet's counts changed in the second in which they did most, Hz.
         answers: times from a report's arrival to the command that was made of it, ms.
 
     Raises:
@@ -89,6 +90,7 @@ class RobotLoop:
         self.report: RobotReport | None = None
         self.report_at, self.arrived = -1, 0.0
         self._sent_at, self._warn_at = 0, 0
+        self.foot_refresh = self._foot_changes = self._foot_second = 0
         self.estops: Callable[[], str] = str
         self.untold = list[tuple[int, BridgeMode, str]]()
         self.answers = Histogram(_ANSWER_BIN)
@@ -258,6 +260,7 @@ class RobotLoop:
         counters |= {f"limited_{name}": count for name, count in self._cut.items()}
         report = self.report
         if report is not None:
+            counters["foot_refresh_hz"] = self.foot_refresh
             counters["hottest_c"] = int(np.max(report.temperature))
             counters["motors_lost"] = int(np.sum(report.lost))
             if report.battery is not None:
@@ -276,8 +279,16 @@ class RobotLoop:
         report = self._driver.receive()
         if report is None:
             return False
+        self._count_foot_changes(report)
         self.report, self.report_at, self.arrived = report, self.now, self._clock()
         return True
+
+    def _count_foot_changes(self, report: RobotReport) -> None:
+        if self.now - self._foot_second >= 1000:
+            self.foot_refresh = max(self.foot_refresh, self._foot_changes)
+            self._foot_second, self._foot_changes = self.now, 0
+        before = report if self.report is None else self.report
+        self._foot_changes += not np.array_equal(report.foot, before.foot)
 
     def _stall(self) -> int:
         """Milliseconds since this was asked last: more than one if the process stood still."""

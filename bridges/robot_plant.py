@@ -158,7 +158,10 @@ class RobotPlant(Plant):
         if dead:
             self._say(f"{name}: {', '.join(dead)}: the sensor shows no load, and is not used")
         scales = ", ".join(f"{scale:.2f}" for scale in self._scales.per_newton)
-        self._say(f"{name}: feet calibrated, {scales} counts per N")
+        self._say(
+            f"{name}: feet calibrated, {scales} counts per N, "
+            f"new counts {self._loop.foot_refresh} times a second"
+        )
         return True
 
     def listen(self, estops: Callable[[], str]) -> None:

@@ -7,6 +7,8 @@ regressed on the force f by torques, both filtered alike, with what is older tha
 forgotten: s = s̄ + c (f − f̄) with c = cov(s, f) / var(f). That uses stance and swing alike. What s
 says of the load now, f̄ + (s − s̄) / c, counts as far as the two are correlated and while they
 agree. A sensor that is absent, dead or not yet compared is not correlated, and does not count.
+Real counts are held for some 20 ms: while one stays the same and the load by torques moves away
+from what it says, it counts the less the further that has moved.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ _LEAST_COVARIANCE = 1e-6  # N · count; that of a sensor stuck at one count deca
 _CORRELATED = (0.6, 0.9)  # squared correlation from which on a sensor counts, and counts fully
 _AGREES = (20.0, 0.4)  # N and share of the load by which a sensor may differ from the torques
 _PATIENCE = 0.008  # s for which it may differ by more: it shows a touchdown before torques do
+_OLD = 5.0  # N by which the load moves away from a held count until that does not count
 _OUTLIER = 0.1  # weight in the regression of what differs by more
 _SURE = 2.0  # times a sensor's error by which it must exceed the least load of a contact
 _MOST = 32768.0  # counts, of 16 bits
@@ -80,6 +83,8 @@ class FootLoadLayout(NamedTuple):
         age: time for which sensor and torques have been compared, (4,), s.
         mean_force, mean_counts: of the comparison, (4,), N and counts.
         var_force, var_counts, covariance: likewise, (4,).
+        last_counts: the counts at the last tick, (4,).
+        nearest: how near sensor and torques have come since they changed, (4,), N.
         differs: time for which a sensor has differed from the torques, (4,), s.
         by_torque: 1 where torques say that the foot is loaded, (4,).
         force: of the ground on each foot by torques, (12,), N, odometry frame.
@@ -97,6 +102,8 @@ class FootLoadLayout(NamedTuple):
     var_force: slice
     var_counts: slice
     covariance: slice
+    last_counts: slice
+    nearest: slice
     differs: slice
     by_torque: slice
     force: slice
@@ -116,6 +123,8 @@ FOOT_LOAD: Final = FootLoadLayout(
         var_force=N_LEGS,
         var_counts=N_LEGS,
         covariance=N_LEGS,
+        last_counts=N_LEGS,
+        nearest=N_LEGS,
         differs=N_LEGS,
         by_torque=N_LEGS,
         force=3 * N_LEGS,
@@ -266,7 +275,12 @@ def _by_sensor(
     sensed = (
         memory[FOOT_LOAD.mean_force][leg] + (counts - memory[FOOT_LOAD.mean_counts][leg]) / scale
     )
-    far = abs(sensed - force) > _AGREES[0] + _AGREES[1] * abs(force)
+    away, nearest = abs(sensed - force), memory[FOOT_LOAD.nearest]
+    is_new = counts != memory[FOOT_LOAD.last_counts][leg]
+    memory[FOOT_LOAD.last_counts][leg] = counts
+    nearest[leg] = away if is_new else min(nearest[leg], away)
+    weight *= max(0.0, 1.0 - (away - nearest[leg]) / _OLD)
+    far = away > _AGREES[0] + _AGREES[1] * abs(force)
     if far:
         failed = counts == 0.0
         differs[leg] = 2.0 * _PATIENCE if failed else min(2.0 * _PATIENCE, differs[leg] + dt)

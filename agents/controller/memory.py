@@ -42,7 +42,7 @@ class MemoryLayout(NamedTuple):
     mu_reduction: int
     load: int
     foot_load: slice
-    tilt_error: slice
+    imu_error: slice
     stood_s: int
     heading_over_feet: int
     drift_mean: int
@@ -74,7 +74,7 @@ MEMORY: Final = MemoryLayout(
         mu_reduction=1,
         load=1,
         foot_load=FOOT_LOAD_SIZE,
-        tilt_error=3,
+        imu_error=4,
         stood_s=1,
         heading_over_feet=1,
         drift_mean=1,
@@ -232,9 +232,9 @@ class Memory:
         return float(self.flat[MEMORY.load])
 
     @property
-    def tilt_error(self) -> Array:
-        """Estimated error of the IMU's roll and pitch, (2,), rad, trunk frame."""
-        return self.flat[MEMORY.tilt_error][:2]
+    def imu_error(self) -> Array:
+        """Estimated error of the acceleration that the IMU tells, (3,), m/s², trunk frame."""
+        return self.flat[MEMORY.imu_error][:3]
 
     @property
     def ground_force(self) -> Array:

@@ -55,14 +55,14 @@ def readings_of(state: Array) -> Readings:
 
 
 @compiled
-def with_attitude(readings: Readings, quat_wxyz: Array) -> Readings:
-    """The same readings with another attitude."""
+def with_imu(readings: Readings, quat_wxyz: Array, accel: Array) -> Readings:
+    """The same readings with another attitude and specific force."""
     return Readings(
         readings.q_joint,
         readings.v_joint,
         readings.tau_joint,
         quat_wxyz,
         readings.gyro,
-        readings.accel,
+        accel,
         readings.foot_force,
     )

@@ -28,16 +28,16 @@ from quadriga.agents.controller.foot_load import (
     foot_load_rule,
     update_foot_load,
 )
+from quadriga.agents.controller.imu_error import update_imu_error, without_imu_error
 from quadriga.agents.controller.maths.leg_reaction import LegMotion
 from quadriga.agents.controller.maths.links import LINK_SIZE, N_LINKS
 from quadriga.agents.controller.maths.rotation import roll_pitch_yaw, rotation_matrix
 from quadriga.agents.controller.maths.rows import numbers, places
 from quadriga.agents.controller.memory import MEMORY, FilterState, feet_memory_of, filter_state_of
 from quadriga.agents.controller.payload_estimate import estimate_load
-from quadriga.agents.controller.readings import Readings, readings_of, with_attitude
+from quadriga.agents.controller.readings import Readings, readings_of
 from quadriga.agents.controller.schedule import SCHEDULE, phase_of
 from quadriga.agents.controller.sensed import SENSED, feet_of, trunk_of
-from quadriga.agents.controller.tilt_error import update_tilt_error, without_tilt_error
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.robot.spec import N_GEOMETRY, Geometry
@@ -50,7 +50,7 @@ class SensingLayout(NamedTuple):
     Attributes:
         trust_ramp: share of stance in which trust in a foot ramps up and down.
         least_force: below which a foot is not trusted, N.
-        tilt_time: time constant of the error of roll and pitch, s; 0: none is assumed.
+        tilt_time: time constant of the IMU's error, s; 0: none is assumed.
         load_time: time constant of the load's filter, s; 0: no load is estimated.
         noise: `FilterNoise`.
         rule: `ContactRule`.
@@ -139,8 +139,8 @@ def sense(
         memory: the new `Memory.flat`, filled.
         sensed: `Sensed.flat`, filled.
     """
-    measured, tilt_error = readings_of(state), memory0[MEMORY.tilt_error].copy()
-    measured = with_attitude(measured, without_tilt_error(measured.quat_wxyz, tilt_error[:2]))
+    imu_error = memory0[MEMORY.imu_error].copy()
+    measured = without_imu_error(readings_of(state), imu_error[:3])
     geometry = Geometry(*numbers(constants[_CONSTANTS.geometry], N_GEOMETRY))
     body = FilterBody(geometry, constants[_CONSTANTS.imu])
     loads = memory0[MEMORY.foot_load].copy()
@@ -166,8 +166,8 @@ def sense(
     filtered, estimate, correction = filter_step(before, measured, load, trust, noise, body, dt)
     place(memory0, filtered, estimate, schedule, dt, constants, memory, sensed)
     memory[MEMORY.foot_load] = loads
-    update_tilt_error(tilt_error, correction, estimate.R, constants[_CONSTANTS.tilt_time], dt)
-    memory[MEMORY.tilt_error] = tilt_error
+    update_imu_error(imu_error, correction, estimate.R, constants[_CONSTANTS.tilt_time], dt)
+    memory[MEMORY.imu_error] = imu_error
 
 
 @compiled
@@ -196,7 +196,7 @@ def place(
     """Fill `memory` and `sensed` from a known estimate.
 
     `filtered` is the filter's new memory. That of foot loads begins anew, as after a gap in what is
-    measured; the error of the attitude stays.
+    measured; the error of the IMU stays.
     """
     ground_height0 = memory0[MEMORY.ground_height]
     switched = schedule[SCHEDULE.half_cycle] != memory0[MEMORY.half_cycle]

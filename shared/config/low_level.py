@@ -28,8 +28,8 @@ class EstimatorConfig:
     tilt_time: float = key(
         5.0,
         "s",
-        "time constant with which an error of the IMU's roll and pitch is found, by the "
-        "accelerometer and the legs; 0: none is assumed",
+        "time constant with which the error of the IMU is found, of its roll, pitch and "
+        "accelerometer, by the legs; 0: none is assumed",
         low=0.0,
         high=1e4,
     )

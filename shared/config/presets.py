@@ -72,6 +72,7 @@ _IDEAL_MOTORS: Final = MappingProxyType(
 _IDEAL: Final = MappingProxyType(
     {
         "joint_offset": 0.0, "orientation_bias": 0.0, "yaw_drift": 0.0, "foot_sensor": "newtons",
+        "foot_force": 1.0, "accel_bias": 0.02,
     }
 )  # fmt: skip
 

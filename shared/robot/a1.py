@@ -7,7 +7,8 @@ Torques, speeds and angles are the URDF's. Unitree publishes a torque-speed curv
 alone, see `go2`; corner speed and driving torque are the same shares of the speed limit and of the
 peak. Rotor inertia: MuJoCo Menagerie, `unitree_a1`. Continuous torque: assumed, so that an A1 that
 carries 3 kg overheats after minutes as in arXiv:2603.01631; no walk has been held against that.
-Temperature: assumed, nobody publishes what this motor bears.
+Temperature: assumed, nobody publishes what this motor bears. Foot sensors and accelerometer:
+unknown; the configuration's defaults assume the Go1's feet and the Go2's accelerometer.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What feet's sensors make of normal forces: raw counts that drift, and now and then nothing."""
+"""What feet's sensors make of normal forces: counts that are held, drift, and fail for a while."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Faults = NDArray[np.int8]
 
 
 class FootSensors:
-    """Scale, bias, drift and dropouts of all feet's sensors; each robot has a stream of its own.
+    """Scale, offset, refresh rate and dropouts of all feet; each robot has a stream of its own.
 
     Attributes:
         scale: counts per N, (n, 4).
@@ -32,7 +32,8 @@ class FootSensors:
         for i, stream in enumerate(streams):
             spread[i], bias[i] = stream.standard_normal((2, N_LEGS))
         self.scale = config.foot_scale * np.exp(config.foot_scale_spread * spread)
-        self._offset = config.foot_bias * bias
+        self._offset = config.foot_offset + config.foot_bias * bias
+        self._refresh = _TICK * config.foot_refresh_rate
         self._drift = config.foot_drift
         self._rate = _TICK * config.foot_dropout_rate
         self._duration = max(1.0, config.foot_dropout_ms)
@@ -61,7 +62,9 @@ class FootSensors:
         """What each foot's sensor does in the next ticks, (ticks, n, 4)."""
         first, last = self._tick, self._tick + ticks
         self._tick = last
-        faults = np.zeros((ticks, *self._begin.shape), dtype=np.int8)
+        count = np.floor(self._refresh * np.arange(first - 1, last))  # of readings so far
+        held = np.where(np.diff(count) > 0.0, MEASURES, REPEATS).astype(np.int8)
+        faults = np.tile(held[:, None, None], (1, *self._begin.shape))
         for i, leg in np.argwhere(self._begin < last):
             while self._begin[i, leg] < last:
                 begin, end = self._begin[i, leg], self._end[i, leg]

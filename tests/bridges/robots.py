@@ -1,15 +1,18 @@
-"""A robot that stands, as its reports tell it."""
+"""A robot that stands, as its reports tell it, and what the feet of a real one say."""
 
 from __future__ import annotations
 
+import gzip
+import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import GRAVITY
+from quadriga.shared.robot.conventions import GRAVITY, Array
 from quadriga.shared.unitree.packets import SERVO, Battery, MotorTargets, RobotReport
 from quadriga.shared.unitree.remote import RemoteReading, write_remote
 
@@ -37,6 +40,12 @@ def standing(config: Config, **fields: Any) -> RobotReport:
         battery=Battery(80, -5.0, 24.0),
     )
     return replace(report, **fields)
+
+
+def real_go1_counts() -> Array:
+    """Counts of a walking Go1's feet, (3970, 4), in the order sent; 500 rows a second."""
+    packed = (Path(__file__).parent / "go1_foot_counts.json.gz").read_bytes()
+    return np.array(json.loads(gzip.decompress(packed))["counts"], dtype=np.float64)
 
 
 def tilted(angle: float) -> Any:

@@ -27,8 +27,8 @@ from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.unitree.packets import OFF, SERVO, MotorTargets, RobotReport
 from quadriga.shared.unitree.udp import A1
 from quadriga.shared.unitree.udp_port import Address, UdpPort
-from quadriga.shared.wire.messages import Command
-from tests.bridges.robots import config_of, standing, tilted
+from quadriga.shared.wire.messages import Command, Status
+from tests.bridges.robots import config_of, real_go1_counts, standing, tilted
 from tests.bridges.test_udp_driver import HOST, free_port
 
 
@@ -205,6 +205,25 @@ def test_calibrated_feet_give_newtons_and_others_what_they_say() -> None:
     np.testing.assert_array_equal(to_state(report, 4, 0.0).foot_force, report.foot)
     scales = FootScales(np.array([40.0, -50.0, 0.0, 0.0]), np.array([2.0, 1.5, 0.0, 0.0]))
     np.testing.assert_allclose(to_state(report, 4, 0.0, scales).foot_force, [30.0, 20.0, 0.0, 0.0])
+
+
+def test_how_often_the_counts_of_a_real_go1_change_is_reported() -> None:
+    rows = iter(real_go1_counts())
+
+    class Go1(Script):
+        def receive(self) -> RobotReport | None:
+            report = super().receive()
+            return report and replace(report, foot=next(rows))
+
+    script = Go1(iter([True, False] * 1100))
+    plant = RobotPlant(config_of("go1"), "r1", script, guard=None, say=list[str]().append)
+    with suppress(StopIteration):
+        while True:
+            plant.states()
+            script.pass_ms()
+            plant.step({})
+    counters = plant.describe(Status(0, 0, "", "", "", {}, {}, np.empty(0), np.empty(0))).counters
+    assert counters["foot_refresh_hz"] in (49, 50, 51)
 
 
 def test_headings_count_from_where_the_robot_starts() -> None:

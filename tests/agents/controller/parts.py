@@ -10,6 +10,7 @@ from quadriga.agents.controller.contact import contact_rule, update_contacts
 from quadriga.agents.controller.controller import Task
 from quadriga.agents.controller.estimator import Estimate, FilterNoise, filter_step
 from quadriga.agents.controller.foot_load import FootLoad, foot_load_rule
+from quadriga.agents.controller.imu_error import update_imu_error, without_imu_error
 from quadriga.agents.controller.memory import (
     FeetMemory,
     FilterState,
@@ -37,13 +38,23 @@ RULE = foot_load_rule(Config())
 
 
 def estimate_trunk(
-    previous: FilterState, state: State, trust: Array, noise: FilterNoise, dt: float
+    previous: FilterState,
+    state: State,
+    trust: Array,
+    noise: FilterNoise,
+    dt: float,
+    imu_error: Array | None = None,
 ) -> tuple[FilterState, Estimate]:
-    """One step of the estimator of a robot whose foot sensors measure N."""
-    readings = readings_of(state.row)
+    """One step of the estimator of a robot whose foot sensors measure N.
+
+    With `imu_error`, (4,), that is estimated on the way, too, and changed in place.
+    """
+    error = np.zeros(4) if imu_error is None else imu_error
+    readings = without_imu_error(readings_of(state.row), error[:3])
     force = readings.foot_force
     load = FootLoad(force, force >= RULE.least_force)
-    filtered, estimate, _ = filter_step(previous, readings, load, trust, noise, BODY, dt)
+    filtered, estimate, correction = filter_step(previous, readings, load, trust, noise, BODY, dt)
+    update_imu_error(error, correction, estimate.R, 0.0 if imu_error is None else 5.0, dt)
     return filtered, estimate
 
 

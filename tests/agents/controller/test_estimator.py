@@ -95,6 +95,19 @@ def test_standing_still_stays_still() -> None:
     np.testing.assert_allclose(estimate.p_foot[:, 2], FOOT_RADIUS, atol=1e-12)
 
 
+def test_an_error_of_the_accelerometer_becomes_no_speed() -> None:
+    """Of a robot that stands; the error is found, without that it is 92 mm/s for each m/s²."""
+    state = sensed(*standing(), np.array([0.1, -0.1, 0.15]))
+    speeds = []
+    for imu_error in (None, np.zeros(4)):
+        memory = standing_filter(state)
+        for _ in range(3000):
+            memory, estimate = estimate_trunk(memory, state, ALL, NOISE, DT, imu_error)
+        speeds.append(np.abs(estimate.velocity))
+    assert (speeds[0] > 0.005).all()
+    assert (speeds[1] < 0.002).all()
+
+
 @pytest.mark.parametrize(
     ("velocity", "omega"),
     [

@@ -22,6 +22,7 @@ from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
 from tests.a1 import GEOMETRY, q_stand
 from tests.agents.controller.maths.test_leg_reaction import contact_torques
 from tests.agents.controller.poses import BODY, standing_pose
+from tests.bridges.robots import real_go1_counts
 
 DT = 1e-3
 RULE = foot_load_rule(Config())
@@ -94,6 +95,18 @@ def absent(_: int, noise: Array, load: Array) -> Array:
 
 def dead(_: int, noise: Array, load: Array) -> Array:
     return np.rint(50.0 + noise)
+
+
+def held(ticks: int) -> Sensor:
+    """A sensor that measures every so many ticks, and repeats what it read in between."""
+    last = np.zeros(N_LEGS)
+
+    def read(tick: int, noise: Array, load: Array) -> Array:
+        if tick % ticks == 0:
+            last[:] = raw(tick, 0.05 * noise, load)
+        return last
+
+    return read
 
 
 def settled(ticks: int) -> Flags:
@@ -191,6 +204,40 @@ def test_a_sensor_is_believed_again_once_it_has_drifted() -> None:
     calm = settled(400)
     # The drift of one second is not known yet, of the least sensitive one 6 N; the rest is noise.
     assert np.abs(told[calm] - load[calm]).max() < 6.0 + 5.0
+
+
+def test_counts_that_are_held_make_no_load_worse() -> None:
+    """Without a sensor, with counts held for 21 ms, with new ones at every tick."""
+    errors = []
+    for sensor in (absent, held(21), held(1)):
+        trot = Trot(sensor)
+        trot.run(800)
+        load, told, _ = trot.run(1600)
+        errors.append(np.sqrt(np.mean((told - load) ** 2)))
+    assert errors[1] < errors[0]
+    assert errors[2] < 0.5 * errors[0]
+
+
+def test_counts_of_a_real_go1_help_although_they_are_held() -> None:
+    """Its feet bear what they say at each change, and what lies between; joints have friction."""
+    rows = real_go1_counts()[:2000]
+    fresh = np.flatnonzero(np.any(np.diff(rows, axis=0), axis=1)) + 1
+    ticks = np.arange(2 * fresh[0], 2 * fresh[-1])
+    loads = np.array([np.interp(ticks, 2 * fresh, row[fresh]) for row in rows.T]).T
+    loads = np.maximum(0.0, loads - 120.0) / 12.5  # offset and scale of the Go1's record
+    errors = []
+    for counts in (np.zeros_like(rows), rows):
+        memory, told = np.zeros(FOOT_LOAD_SIZE), []
+        for tick, load in zip(ticks, loads, strict=True):
+            tau = AIR + np.repeat(load / LOAD, 3) * (GROUND - AIR) + 0.5
+            motion = LegMotion(q_stand(), np.zeros(12), tau, np.zeros(3), LEVEL)
+            told += [
+                update_foot_load(
+                    memory, motion, counts[tick // 2], np.eye(3), BODY.links, GEOMETRY, RULE, DT
+                ).force
+            ]
+        errors.append(np.sqrt(np.mean((told - loads)[1000:] ** 2)))
+    assert errors[1] < errors[0]
 
 
 def test_sensors_alone_are_believed_where_they_are_to_be() -> None:

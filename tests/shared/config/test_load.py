@@ -199,6 +199,15 @@ def test_a_robots_own_values_stand_beneath_what_is_given() -> None:
     assert load().reference.height == 0.26
 
 
+def test_a_robot_has_the_sensors_of_its_record_unless_others_are_asked_for() -> None:
+    go2 = load(None, {"team.robot": "go2", "sensors.foot_refresh_rate": 500.0}).sensors
+    assert (go2.foot_scale, go2.foot_offset, go2.foot_refresh_rate) == (0.65, 15.0, 500.0)
+    go1 = load(None, {"team.robot": "go1"}).sensors
+    assert (go1.foot_scale, go1.foot_scale_spread, go1.foot_offset) == (12.5, 0.06, 120.0)
+    ideal = load(None, {"team.robot": "go1", "sensors.preset": "ideal"}).sensors
+    assert (ideal.foot_sensor, ideal.foot_force, ideal.accel_bias) == ("newtons", 1.0, 0.02)
+
+
 def test_a_team_of_different_robots_is_refused_with_the_reason() -> None:
     with pytest.raises(ConfigError, match=r"'a1,go2'.*one of a1, go1, go2.*of one kind"):
         load(None, {"team.robot": "a1,go2"})

@@ -11,10 +11,13 @@ from quadriga.shared.config.sections import SensorsConfig
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import State
 from quadriga.sim_server.world.sensors import Sensors, turn_matrices
+from tests.bridges.robots import real_go1_counts
 from tests.sim_server.standing import SILENT
 
 CONFIG = load(None, {"sensors.preset": "ideal"}).sensors
 REAL = SensorsConfig()
+# Feet that measure at every tick, never fail, and have no offset in common.
+PLAIN = replace(REAL, foot_refresh_rate=1000.0, foot_dropout_rate=0.0, foot_offset=0.0)
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 ARRAYS = [item.name for item in fields(State) if "shape" in item.metadata]
 
@@ -120,29 +123,29 @@ def counts_under(config: SensorsConfig, forces: Array, seed: int = 0) -> Array:
 
 def test_counts_are_whole_numbers_of_16_bits_and_may_be_negative() -> None:
     forces = np.random.default_rng(0).uniform(0.0, 200.0, (2000, 4))
-    counts = counts_under(replace(REAL, foot_dropout_rate=0.0), forces)
+    counts = counts_under(PLAIN, forces)
     np.testing.assert_array_equal(counts, np.rint(counts))
     assert counts.min() < 0.0
-    wild = counts_under(replace(REAL, foot_dropout_rate=0.0), np.array([[1e9, -1e9, 0.0, 0.0]]))
+    wild = counts_under(PLAIN, np.array([[1e9, -1e9, 0.0, 0.0]]))
     assert wild.min() == -(2.0**15)
     assert wild.max() == 2.0**15 - 1
 
 
 def test_every_foot_has_a_scale_and_a_bias_of_its_own() -> None:
     """A straight line fits what a foot reads; over many robots its numbers spread as configured."""
-    config = replace(REAL, foot_drift=0.0, foot_dropout_rate=0.0, foot_force=0.0)
+    config = replace(PLAIN, foot_drift=0.0, foot_force=0.0, foot_offset=500.0)
     forces = np.repeat([0.0, 1000.0], 2)[:, None] * np.ones(4)
     read = np.array([counts_under(config, forces, seed) for seed in range(150)])
     bias, scale = read[:, 0].ravel(), ((read[:, -1] - read[:, 0]) / 1000.0).ravel()
     assert np.median(scale) == pytest.approx(REAL.foot_scale, rel=0.1)
     assert np.log(scale).std() == pytest.approx(REAL.foot_scale_spread, rel=0.1)
     assert bias.std() == pytest.approx(REAL.foot_bias, rel=0.1)
-    assert abs(bias.mean()) < 4.0 * REAL.foot_bias / bias.size**0.5
+    assert abs(bias.mean() - 500.0) < 4.0 * REAL.foot_bias / bias.size**0.5
 
 
 def test_the_bias_walks_at_random() -> None:
     """Its variance grows in proportion to time."""
-    config = replace(REAL, foot_force=0.0, foot_dropout_rate=0.0, foot_drift=30.0)
+    config = replace(PLAIN, foot_force=0.0, foot_drift=30.0)
     quiet = np.zeros((1024, 4))
     walks = np.array([counts_under(config, quiet, seed) for seed in range(100)])
     for ticks in (256, 1023):
@@ -151,7 +154,7 @@ def test_the_bias_walks_at_random() -> None:
 
 
 def test_a_sensor_that_fails_reads_0_or_repeats_its_last_value() -> None:
-    config = replace(REAL, foot_dropout_rate=0.5, foot_dropout_ms=100.0, foot_force=5.0)
+    config = replace(PLAIN, foot_dropout_rate=0.5, foot_dropout_ms=100.0, foot_force=5.0)
     counts = counts_under(config, np.full((40_000, 4), 500.0))
     zero = counts == 0.0
     repeats = np.zeros_like(zero)
@@ -161,6 +164,19 @@ def test_a_sensor_that_fails_reads_0_or_repeats_its_last_value() -> None:
     # A failure in 2 s of 0.1 s each: a twentieth of the time; half of it reads 0.
     for share in (zero.mean(), repeats.mean()):
         assert 0.01 < share < 0.045
+
+
+def test_counts_are_held_as_those_of_a_real_go1() -> None:
+    """All feet measure at once, 49 times a second; within the real ones' range while unloaded."""
+    real = real_go1_counts()[::2]  # each for 4 ms
+    config = load(None, {"team.robot": "go1", "sensors.foot_dropout_rate": 0.0}).sensors
+    forces = np.maximum(0.0, np.repeat(real, 4, axis=0) - 120.0) / 12.5
+    simulated = counts_under(config, forces)
+    for counts, per_second in ((real, 250.0), (simulated, 1000.0)):
+        changes = np.any(np.diff(counts, axis=0), axis=1)
+        assert per_second * changes.mean() == pytest.approx(49.5, abs=1.0)
+    assert np.quantile(simulated, 0.1) == pytest.approx(np.quantile(real, 0.1), abs=40.0)
+    assert simulated.max() == pytest.approx(real.max(), rel=0.2)
 
 
 def test_an_absent_foot_sensor_reads_0() -> None:
@@ -194,7 +210,7 @@ def test_yaw_drifts_about_the_vertical_whatever_the_attitude() -> None:
 
 def test_errors_of_sensors_change_no_noise() -> None:
     """A robot's gyro and torques are the same numbers with ideal and with realistic sensors."""
-    ideal, real = record(CONFIG, 70), record(REAL, 70)
+    ideal, real = record(replace(CONFIG, accel_bias=REAL.accel_bias), 70), record(REAL, 70)
     for name in ("v_joint", "tau_joint", "imu_gyro", "imu_accel"):
         np.testing.assert_array_equal(ideal[name], real[name])
 
