@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -41,9 +41,10 @@ from quadriga.agents.modes import (
     stop_safely,
 )
 from quadriga.agents.planner.qp_solver import SolvedQp
+from quadriga.agents.planning.active_plan import setpoint_at
 from quadriga.agents.planning.interface import Expected, PlanningInputs
 from quadriga.agents.planning.operator_references import reference_at, remember_references
-from quadriga.agents.planning.registry import build_planning
+from quadriga.agents.planning.registry import PlanningState, build_planning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.rising import Rise, Rising
 from quadriga.agents.schedules import Schedules
@@ -66,7 +67,7 @@ _LONGEST_DT: Final = 0.02  # s, after a gap in the ticks the filters advance by 
 
 @record
 class AgentState:
-    """Everything the agent remembers between ticks; `planning` is known to its planning part.
+    """Everything the agent remembers between ticks.
 
     `rise` is there while the robot gets up; `encoders` is known to `agents.encoder_bridge`, `held`
     to `agents.held_posture`.
@@ -74,7 +75,7 @@ class AgentState:
 
     tick: int
     mode: Mode
-    planning: Any
+    planning: PlanningState
     low_level: Memory | None = None
     references: tuple[Reference, ...] = ()
     last_tau: Array = field(default_factory=lambda: np.zeros(12))
@@ -251,8 +252,9 @@ class Agent:
             stops.append(Stop(STOPPING, planned.stop_reason))
             mode = resolve_stops(course, tick, stops)
 
+        setpoint = setpoint_at(planning.plans, tick)
         task = self._tasks.build(
-            tick, mode, reference, planned.setpoint, inputs.excitation, schedule.progress
+            tick, mode, reference, setpoint, inputs.excitation, schedule.progress
         )
         new_sample = tick // SAMPLE_MS != state.tick // SAMPLE_MS
         acted = self._controller.act(sensed, schedule, task, dt, new_sample=new_sample)
@@ -295,7 +297,7 @@ class Agent:
             stops.append(Stop(STOPPING, with_detail(PEER_LOST, ",".join(lost))))
         return stops
 
-    def _is_whole(self, tick: int, mode: Mode, team: Teammates, planning: Any) -> bool:
+    def _is_whole(self, tick: int, mode: Mode, team: Teammates, planning: PlanningState) -> bool:
         """Whether a robot that stands, and may go on, has all plans, and the others can walk."""
         if mode.name != STAND or not rests(mode):
             return False

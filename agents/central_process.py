@@ -152,6 +152,7 @@ class _CentralShell:
             self._put[name](encode(plan))
         if not outputs.plans or outputs.planner_ns is None:
             return
+        self._counters.update(outputs.unusual)
         plan = outputs.plans[0][1]
         if plan.status != SOLVED:
             self._counters[f"plan_{code_of(plan.status)}"] += 1

@@ -8,7 +8,7 @@ from typing import Final, Protocol, TypeVar
 
 from quadriga.agents.modes import Mode
 from quadriga.agents.planner.qp_solver import SolvedQp
-from quadriga.agents.planning.active_plan import Setpoint
+from quadriga.agents.planning.active_plan import ActivePlan
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.messages import Measurement, Plan, Reference
 
@@ -42,7 +42,7 @@ class PlanningOutputs:
 
     Attributes:
         plan: a new plan to publish, if one was made.
-        setpoint: what to apply now.
+        active: a new plan to apply from its start on, if one was made.
         stop_reason: why the robot must stop, or "".
         planner_ns: time that the planner took by the agent's clock; None: no QP was solved.
         ages_ms: age of each plan in use.
@@ -50,7 +50,7 @@ class PlanningOutputs:
     """
 
     plan: Plan | None = None
-    setpoint: Setpoint = field(default_factory=Setpoint)
+    active: ActivePlan | None = None
     stop_reason: str = ""
     planner_ns: int | None = None
     ages_ms: Mapping[str, float] = field(default_factory=dict)
@@ -99,7 +99,7 @@ class PlanningInterface(Protocol[S]):
         return NOTHING
 
     def step(self, state: S, inputs: PlanningInputs) -> tuple[S, PlanningOutputs]:
-        """Take in what arrived, plan if it is time to, say what to apply now."""
+        """Take in what arrived, plan if it is time to."""
         ...
 
     def is_whole(self, state: S, tick: int) -> bool:

@@ -15,7 +15,7 @@ from quadriga.agents.planner.peer_memory import PeerMemory
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs, PlannerState
 from quadriga.agents.planner.qp_solver import SolvedQp
-from quadriga.agents.planning.active_plan import ActivePlan, add_plan, setpoint_at
+from quadriga.agents.planning.active_plan import ActivePlan
 from quadriga.agents.planning.adaptation import Adapter
 from quadriga.agents.planning.fade import fade_factor, outputs_to_follow, plan_message
 from quadriga.agents.planning.interface import (
@@ -49,7 +49,6 @@ class LocalState:
     Attributes:
         peers: the peers' messages.
         own: the agent's last samples, T_ini or, if it adapts, T_ini + N of them.
-        plans: those in force or waiting for their start.
         newest: step and exchange of the newest plan.
         terms: what the peers will do, for planning step `terms_step`.
         inputs: what the plan of the present step was made of.
@@ -60,7 +59,6 @@ class LocalState:
 
     peers: PeerMemory
     own: tuple[Measurement, ...] = ()
-    plans: tuple[ActivePlan, ...] = ()
     newest: tuple[int, int] = (-1, 0)
     terms: PeerTerms = field(default_factory=PeerTerms)
     terms_step: int = -1
@@ -131,9 +129,8 @@ class LocalPlanning:
         if inputs.mode.name != WALK:
             return state, PlanningOutputs(unusual=unusual)
         if request is None:
-            setpoint = setpoint_at(state.plans, inputs.tick)
             stop = self._stop_without_plan(state, inputs)
-            return state, PlanningOutputs(setpoint=setpoint, stop_reason=stop, unusual=unusual)
+            return state, PlanningOutputs(stop_reason=stop, unusual=unusual)
         return self._solve(state, request, inputs.tick, unusual)
 
     def problem_of(self, state: LocalState, inputs: PlanningInputs) -> SolvedQp | None:
@@ -159,7 +156,7 @@ class LocalPlanning:
             return state
         recent = since - patience(self._config) * self._step_ms
         peers = self._neighbours.forget_plans(state.peers, recent)
-        return replace(state, peers=peers, plans=(), terms=PeerTerms(), terms_step=-1, begun=since)
+        return replace(state, peers=peers, terms=PeerTerms(), terms_step=-1, begun=since)
 
     def _first(self, state: LocalState) -> int:
         """The first planning step: the team's, or that of a robot which began to walk later."""
@@ -274,17 +271,16 @@ class LocalPlanning:
             factor * result.du,
             outputs_to_follow(result, factor, own.y_des),
         )
-        plans = add_plan(state.plans, active)
         behind = 0 if request.serial[1] else 1  # steps of the peers' plans before this one
         outputs = PlanningOutputs(
             plan_message(result, factor, request.serial, plan_tick),
-            setpoint_at(plans, tick),
+            active,
             _peer_lost(result.lost) if result.lost else "",
             took,
             {f"plan.{p}": float(self._step_ms * (behind + age)) for p, age in terms.ages.items()},
             unusual,
         )
-        return replace(state, planner=planner, plans=plans, newest=request.serial), outputs
+        return replace(state, planner=planner, newest=request.serial), outputs
 
     def _stop_without_plan(self, state: LocalState, inputs: PlanningInputs) -> str:
         """Why to stop at a tick without a new plan; "" for no reason.

@@ -1,24 +1,123 @@
-"""Which planning part an agent has, by the configured kind of planner."""
+"""Which planning part an agent has, by the configured kind of planner; its plans are checked."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
 
 # Named as text by the table of kinds. Imported here too, so that whoever follows imports to find
 # what an agent's behaviour depends on finds these.
 import quadriga.agents.planning.local
 import quadriga.agents.planning.remote  # noqa: F401
-from quadriga.agents.planning.interface import PlanningInterface
+from quadriga.agents.modes import WALK
+from quadriga.agents.planner.qp_solver import SolvedQp
+from quadriga.agents.planning.active_plan import ActivePlan, PlanCheck, add_plan
+from quadriga.agents.planning.interface import (
+    Expected,
+    PlanningInputs,
+    PlanningInterface,
+    PlanningOutputs,
+)
 from quadriga.agents.planning.nominal import NominalPlanning
+from quadriga.agents.planning.operator_references import reference_at
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind, load_builder
+from quadriga.shared.runtime.record import record
+from quadriga.shared.wire.messages import Plan
+
+_NONE: Final = np.zeros((0, 0))
+
+
+@record
+class PlanningState:
+    """What an agent remembers of its planning.
+
+    Attributes:
+        planner: the planner's own state.
+        plans: those in force or waiting for their start.
+    """
+
+    planner: Any
+    plans: tuple[ActivePlan, ...] = ()
+
+
+class CheckedPlanning(PlanningInterface[PlanningState]):
+    """A planner of any kind; no plan of its is followed or published that cannot be meant.
+
+    In the place of one that cannot be come nominal forces and the desired outputs, with a status
+    that names the planner and the reason.
+
+    Args:
+        config: the team's configuration.
+        index: the agent's place in the team, 0-based.
+        planner: whose plans these are.
+    """
+
+    def __init__(self, config: Config, index: int, planner: PlanningInterface[Any]) -> None:
+        self._planner, self._check = planner, PlanCheck(config, index)
+        self._height = config.reference.height
+
+    @property
+    def peers(self) -> tuple[str, ...]:
+        """Robots whose plans and measurements it takes in."""
+        return self._planner.peers
+
+    def initial(self) -> PlanningState:
+        """The planner's state before the first tick, and no plan."""
+        return PlanningState(self._planner.initial())
+
+    def expected(self, tick: int) -> Expected:
+        """What lock-step waits for before the step of `tick`."""
+        return self._planner.expected(tick)
+
+    def step(
+        self, state: PlanningState, inputs: PlanningInputs
+    ) -> tuple[PlanningState, PlanningOutputs]:
+        """Step the planner, and take its plan into force; a robot that does not walk has none."""
+        planner, outputs = self._planner.step(state.planner, inputs)
+        plans = state.plans if inputs.mode.name == WALK else ()
+        if outputs.plan is not None or outputs.active is not None:
+            if fault := self._find_fault(outputs, inputs.tick):
+                outputs = self._refuse(outputs, inputs, fault)
+            if outputs.active is not None:
+                plans = add_plan(plans, outputs.active)
+        return PlanningState(planner, plans), outputs
+
+    def is_whole(self, state: PlanningState, tick: int) -> bool:
+        """Whether all that planning takes in is there, of a robot that stands for lack of it."""
+        return self._planner.is_whole(state.planner, tick)
+
+    def problem_of(self, state: PlanningState, inputs: PlanningInputs) -> SolvedQp | None:
+        """The QP that `step` solves for these arguments; None if it solves none."""
+        return self._planner.problem_of(state.planner, inputs)
+
+    def _find_fault(self, outputs: PlanningOutputs, now: int) -> str:
+        """Why what is published, or what is followed, cannot be meant; "": it can."""
+        fault = "" if outputs.plan is None else self._check.fault_of(outputs.plan, now)
+        if not fault and outputs.active is not None:
+            fault = self._check.fault_of_active(outputs.active, now)
+        return fault
+
+    def _refuse(
+        self, outputs: PlanningOutputs, inputs: PlanningInputs, fault: str
+    ) -> PlanningOutputs:
+        """Nominal forces from now on, published if the planner's plan was to be."""
+        tick, made = inputs.tick, outputs.plan or Plan(0, 0, 0, _NONE, _NONE, "", {}, 0)
+        reference, _ = reference_at(inputs.references, tick, self._height)
+        plan = self._check.replacement(made, fault, tick, reference)
+        active = ActivePlan(tick, plan.tick, np.zeros_like(plan.u), plan.y)
+        published = None if outputs.plan is None else plan
+        unusual = (*outputs.unusual, self._check.counter)
+        return replace(outputs, plan=published, active=active, unusual=unusual)
 
 
 def build_planning(
     config: Config, index: int, predictor: Predictor | None, clock_ns: Callable[[], int]
-) -> PlanningInterface[Any]:
+) -> CheckedPlanning:
     """The planning part of one agent.
 
     Args:
@@ -31,9 +130,7 @@ def build_planning(
         ConfigError: the kind of planner is not installed, or cannot be imported.
     """
     kind = find_kind(config.planner.kind)
-    if kind.agents_predict and predictor is None:
-        return NominalPlanning()
-    planning: PlanningInterface[Any] = load_builder(kind, kind.build)(
-        config, index, predictor, clock_ns
-    )
-    return planning
+    planner: PlanningInterface[Any] = NominalPlanning()
+    if predictor is not None or not kind.agents_predict:
+        planner = load_builder(kind, kind.build)(config, index, predictor, clock_ns)
+    return CheckedPlanning(config, index, planner)

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Final
 
-import numpy as np
-
-from quadriga.agents.gait import nominal_forces
 from quadriga.agents.modes import PLANNER_LOST, WALK
-from quadriga.agents.planning.active_plan import ActivePlan, add_plan, setpoint_at
+from quadriga.agents.planning.active_plan import FARTHEST, ActivePlan, PlanCheck
 from quadriga.agents.planning.fade import FADED, fade_factor
 from quadriga.agents.planning.interface import (
     NOTHING,
@@ -23,18 +19,11 @@ from quadriga.agents.planning.interface import (
 from quadriga.agents.planning.operator_references import reference_at
 from quadriga.agents.predictor.episode import commanded_outputs
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import first_step, horizon_stance, owed_from, patience, step_ms
+from quadriga.agents.time_grid import first_step, owed_from, patience, step_ms
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import N_LEGS, Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.messages import Measurement, Plan
 from quadriga.shared.wire.topics import SAMPLE_MS
-
-# A planner's own plans keep to deviation_max: the share and N on top are for its solver.
-# With forces far beyond it a single message would drive all joints to their limits.
-_SHARE: Final = 1.5
-_MARGIN: Final = 1.0  # N
-_FARTHEST: Final = 10.0  # m, m/s, rad, rad/s: no trunk gets there, whatever is predicted
 
 
 @record
@@ -43,12 +32,10 @@ class RemoteState:
 
     Attributes:
         newest_sample: the agent's own newest sample.
-        plans: those in force or waiting for their start.
         newest: step and exchange of the newest plan.
     """
 
     newest_sample: Measurement | None = None
-    plans: tuple[ActivePlan, ...] = ()
     newest: tuple[int, int] = (-1, 0)
 
 
@@ -61,10 +48,9 @@ class RemotePlanning(PlanningInterface[RemoteState]):
     """
 
     def __init__(self, config: Config, index: int) -> None:
-        self._config, self._index = config, index
+        self._config, self._check = config, PlanCheck(config, index)
         self._step_ms, self._latency = step_ms(config), central_latency(config)
         self._first_step = first_step(config)
-        self._most = _SHARE * np.tile(config.planner.deviation_max, N_LEGS) + _MARGIN  # (12,), N
 
     def initial(self) -> RemoteState:
         """No plan yet."""
@@ -79,16 +65,16 @@ class RemotePlanning(PlanningInterface[RemoteState]):
     def step(
         self, state: RemoteState, inputs: PlanningInputs
     ) -> tuple[RemoteState, PlanningOutputs]:
-        """Take the newest plan into force; say what to apply now."""
+        """Take the newest plan into force."""
         tick = inputs.tick
         if inputs.measurement is not None:
             state = replace(state, newest_sample=inputs.measurement)
-        unusual: list[str] = []
+        unusual, active = list[str](), None
         for _, plan in inputs.plans:
             if not self._is_usable(plan, tick):
                 unusual.append(REFUSED)
             elif state.newest < plan.serial:
-                state, factor = self._take(state, plan, inputs)
+                state, active, factor = self._take(state, plan, inputs)
                 unusual += [f"plan_{FADED}"] if factor < 1.0 else []
         if inputs.mode.name != WALK:
             return state, PlanningOutputs(unusual=tuple(unusual))
@@ -97,7 +83,7 @@ class RemotePlanning(PlanningInterface[RemoteState]):
         age = due - max(newest_step, owed_from(self._config, inputs.mode.since) - 1)
         plan_tick = self._step_ms * newest_step
         return state, PlanningOutputs(
-            setpoint=setpoint_at(state.plans, tick),
+            active=active,
             stop_reason=PLANNER_LOST if age > patience(self._config) else "",
             ages_ms={"plan": float(tick - plan_tick)} if newest_step >= 0 else {},
             unusual=tuple(unusual),
@@ -110,27 +96,11 @@ class RemotePlanning(PlanningInterface[RemoteState]):
 
     def _is_usable(self, plan: Plan, tick: int) -> bool:
         """Whether a plan is one of this team's at this time: else it is foreign, or forged."""
-        samples = self._config.planner.N
-        if plan.tick != plan.step * self._step_ms or len(plan.u) != samples:
-            return False
-        if plan.tick > tick or tick >= plan.tick + SAMPLE_MS * samples:
-            return False
-        return self._is_possible(plan)
-
-    def _is_possible(self, plan: Plan) -> bool:
-        """Whether forces and outputs are such as a planner of this configuration may plan."""
-        possible = np.abs(self._deviation(plan)) <= self._most
-        return bool(possible.all() and (np.abs(plan.y) <= _FARTHEST).all())
-
-    def _deviation(self, plan: Plan) -> Array:
-        """What a plan adds to the nominal forces. Shape (N, 12), N."""
-        stance = horizon_stance(self._config, self._index, plan.step)
-        du: Array = plan.u - nominal_forces(stance, self._config.robot.weight)
-        return du
+        return not self._check.fault_of(plan, tick, FARTHEST)
 
     def _take(
         self, state: RemoteState, plan: Plan, inputs: PlanningInputs
-    ) -> tuple[RemoteState, float]:
+    ) -> tuple[RemoteState, ActivePlan, float]:
         """Take a plan into force; with the share of it that is applied."""
         factor, outputs = 1.0, plan.y
         if state.newest_sample is not None:
@@ -140,9 +110,9 @@ class RemotePlanning(PlanningInterface[RemoteState]):
             # The plan does not tell the outputs without its forces: as it fades out, the desired
             # speeds take over.
             outputs = y_des + factor * (plan.y - y_des)
-        active = ActivePlan(inputs.tick, plan.tick, factor * self._deviation(plan), outputs)
-        state = replace(state, plans=add_plan(state.plans, active), newest=plan.serial)
-        return state, factor
+        du = plan.u - self._check.nominal(plan.tick)
+        active = ActivePlan(inputs.tick, plan.tick, factor * du, outputs)
+        return replace(state, newest=plan.serial), active, factor
 
 
 def central_latency(config: Config) -> int:

@@ -6,9 +6,12 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
+import numpy as np
+
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.team_planner import TeamPlanner
-from quadriga.agents.planning.operator_references import AHEAD_MS, remember_references
+from quadriga.agents.planning.active_plan import FARTHEST, PlanCheck
+from quadriga.agents.planning.operator_references import AHEAD_MS, reference_at, remember_references
 from quadriga.agents.planning.reference_slew import ReferenceSlew
 from quadriga.agents.planning.window import build_planner_inputs
 from quadriga.agents.plausibility import is_plausible
@@ -43,10 +46,11 @@ class CentralState:
 
 @dataclass(frozen=True, slots=True)
 class CentralOutputs:
-    """Plans by robot, if there are any, and the time the planner took by the given clock."""
+    """Plans by robot, if there are any, the time the planner took by the given clock, counters."""
 
     plans: tuple[tuple[str, Plan], ...] = ()
     planner_ns: int | None = None
+    unusual: tuple[str, ...] = ()
 
 
 class Central:
@@ -65,6 +69,7 @@ class Central:
         self._names, self._step_ms = robot_names(config.team.robots), step_ms(config)
         self._kept = config.planner.T_ini + config.planner.applied
         self._slew = ReferenceSlew(config)
+        self._checks = [PlanCheck(config, index) for index in range(config.team.robots)]
 
     def due(self, state: CentralState) -> int | None:
         """The newest planning step that all robots' windows allow and that is not planned yet.
@@ -145,12 +150,21 @@ class Central:
             [self._inputs(state, state.windows[name], step) for name in self._names]
         )
         took, tick = self._clock_ns() - begun, step * self._step_ms
-        used = dict.fromkeys(self._names, step)
-        plans = tuple(
-            (name, Plan(tick, tick * 1_000_000, step, u, y, result.status, used, 0))
-            for name, u, y in zip(self._names, result.u, result.y, strict=True)
-        )
-        return replace(state, step=step), CentralOutputs(plans, took)
+        used, stamp_ns = dict.fromkeys(self._names, step), tick * 1_000_000
+        reference, _ = reference_at(state.references, tick, self._config.reference.height)
+        plans, unusual = [], []
+        # What is not of all robots has no robot's shape: it is refused for each of them.
+        each = [
+            values if np.shape(values)[:1] == (len(self._names),) else [values] * len(self._names)
+            for values in (result.u, result.y)
+        ]
+        for name, check, u, y in zip(self._names, self._checks, *each, strict=True):
+            plan = Plan(tick, stamp_ns, step, u, y, result.status, used, 0)
+            if fault := check.fault_of(plan, tick, FARTHEST):
+                plan = check.replacement(plan, fault, tick, reference)
+                unusual.append(check.counter)
+            plans.append((name, plan))
+        return replace(state, step=step), CentralOutputs(tuple(plans), took, tuple(unusual))
 
     def _inputs(
         self, state: CentralState, window: tuple[Measurement, ...], step: int

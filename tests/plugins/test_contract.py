@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
-from typing import Any
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from quadriga.agents.gait import nominal_forces
 from quadriga.agents.modes import STAND, WALK, Mode
+from quadriga.agents.planning.active_plan import ActivePlan, setpoint_at
 from quadriga.agents.planning.interface import (
     Expected,
     PlanningInputs,
@@ -19,7 +23,7 @@ from quadriga.agents.planning.interface import (
 )
 from quadriga.agents.planning.registry import build_planning
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import step_ms
+from quadriga.agents.time_grid import first_step, horizon_stance, step_ms
 from quadriga.experiments.trial.sample_trials import sample_predictor
 from quadriga.identification.central_planner import choose_central_planner
 from quadriga.identification.rollout import Rollout
@@ -28,9 +32,11 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import PLANNER
 from quadriga.shared.planner_kinds import find_kind, installed_kinds
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robot.conventions import Array, robot_names
+from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Plan
 from quadriga.team.operator import references_of
+from tests.plugins.kinds import install_kind
 
 TICKS = 600
 KEYS = {
@@ -126,7 +132,7 @@ def walk(name: str) -> tuple[list[Call], ...]:
     rollout = Rollout(config, of_agents, references_of(config), planner=team)
     watched = [Watched(build(config, index)) for index in range(2)]
     for agent, planning in zip(rollout.agents.values(), watched, strict=True):
-        agent._planning = planning
+        agent._planning = cast("Any", planning)
     for _ in rollout.ticks(TICKS):
         pass
     assert not rollout.world.fallen()
@@ -154,7 +160,7 @@ def test_plans_and_setpoints_are_finite(name: str, robot: int) -> None:
         assert plan.tick == plan.step * step_ms(config)
     assert [plan.serial for plan in plans] == sorted({plan.serial for plan in plans})
     for call in walk(name)[robot]:
-        setpoint = call.outputs.setpoint
+        setpoint = setpoint_at(call.after.plans, call.inputs.tick)
         assert setpoint.deviation.shape == (12,)
         assert np.isfinite(setpoint.deviation).all()
         assert setpoint.v_ref is None or np.isfinite(setpoint.v_ref).all()
@@ -197,7 +203,7 @@ def test_there_is_no_state_without_input(name: str) -> None:
         assert are_equal(state, begin)
         assert outputs.plan is None
         assert outputs.stop_reason == ""
-        assert not outputs.setpoint.deviation.any()
+        assert outputs.active is None
 
 
 @every_kind
@@ -220,3 +226,70 @@ def test_what_is_expected_can_have_been_sent(name: str, robot: int) -> None:
             assert expected.measurement_tick < tick
     for plan in plans_of(name, robot):
         assert kind.central or {*plan.used} <= {*planning.peers}
+
+
+Planned = tuple[Array, Array, Array, int]  # forces, their deviation, outputs, tick
+FAULTS: dict[str, Callable[[Array, Array, Array, int], Planned]] = {
+    "forces of shape 10x6 instead of 10x12": lambda u, du, y, t: (u[:, :6], du[:, :6], y, t),
+    "forces of shape 5x12 instead of 10x12": lambda u, du, y, t: (u[:5], du[:5], y[:5], t),
+    "forces of type float32 instead of an array of float64": (
+        lambda u, du, y, t: (u.astype(np.float32), du, y, t)
+    ),
+    "forces that are not finite": lambda u, du, y, t: (u, du * np.nan, y, t),
+    "outputs that are not finite": lambda u, du, y, t: (u, du, y * np.nan, t),
+    "outputs beyond 10 m or m/s or rad or rad/s": lambda u, du, y, t: (u, du, y + 11.0, t),
+    "forces that deviate by more than planner.deviation_max": (
+        lambda u, du, y, t: (u + 1e6, du + 1e6, y, t)
+    ),
+    "forces of a leg that swings": lambda u, du, y, t: (u, du + 15.0 * (u == 0.0), y, t),
+    "forces outside the friction cone of planner.mu": (
+        lambda u, du, y, t: (u, du + (u > 0.0) * -60.0 + np.roll(u > 0.0, -1, 1) * 15.0, y, t)
+    ),
+    "samples of another time": lambda u, du, y, t: (u, du, y, t - 400),
+}
+
+
+class Faulty(PlanningInterface[None]):
+    """Plans nominal forces, with a fault."""
+
+    def __init__(self, config: Config, index: int, *_: object) -> None:
+        self.config, self.index = config, index
+        self.fault = [*FAULTS.values()][int(config.planner.option_values["fault"])]
+
+    def initial(self) -> None:
+        return None
+
+    def step(self, state: None, inputs: PlanningInputs) -> tuple[None, PlanningOutputs]:
+        step, rest = divmod(inputs.tick, step_ms(self.config))
+        if rest or inputs.mode.name != WALK or step < first_step(self.config):
+            return None, PlanningOutputs()
+        stance = horizon_stance(self.config, self.index, step)
+        u = nominal_forces(stance, self.config.robot.weight)
+        y = np.tile([0.26, 0.3, 0.0, 0.0, 0.0, 0.0], (len(u), 1))
+        u, du, y, tick = self.fault(u, np.zeros_like(u), y, inputs.tick)
+        plan = Plan(tick, tick * 10**6, tick // step_ms(self.config), u, y, "solved", {}, 0)
+        return None, PlanningOutputs(plan, ActivePlan(inputs.tick, tick, du, y))
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_plan_that_cannot_be_meant_is_refused_by_name_and_the_robot_walks_on(
+    fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    build = "build='tests.plugins.test_contract:Faulty', needs_predictor=False"
+    install_kind(tmp_path, monkeypatch, "faulty", f"{build}, options={{'fault': 0}}")
+    keys = {"planner.kind": "faulty", "planner.options": f"fault={[*FAULTS].index(fault)}"}
+    config = load(None, {**KEYS, "team.robots": 1, **keys})
+    rollout = Rollout(config, None, references_of(config))
+    plans = []
+    for tick in rollout.ticks(800):
+        plans += [out.plan for out in tick.outputs.values() if out.plan is not None]
+    assert not rollout.world.fallen()
+    for out in tick.outputs.values():
+        assert out.mode == WALK
+        assert out.counters["refused_plan_of_faulty"] == len(plans) > 15
+    for plan in plans:
+        sent = decode(encode(plan), Plan)
+        assert sent.status == f"nominal:plan of faulty refused: {fault}"
+        assert sent.u.shape == (10, 12)
+        assert (sent.y[:, 1] <= 0.3).all()
+    assert rollout.world.truth().base_vel[:, 0].min() > 0.15

@@ -65,7 +65,7 @@ def test_who_plans_for_the_team_looks_at_its_peers_as_they_are_now() -> None:
                 continue
             assert plan.status == "solved"
             assert plan.used == {peer: plan.step if plan.exchange else plan.step - 1}
-            terms = after.before.planning.terms
+            terms = after.before.planning.planner.terms
             assert terms.steps == (plan.step, plan.step)
             looked += 1
     assert looked == 2 * 6 * (ANSWERS + 1)

@@ -13,9 +13,11 @@ from quadriga.agents.gait import scheduled_stance
 from quadriga.agents.modes import STAND, STOPPING, WALK, Mode
 from quadriga.agents.planner.optimality import Residuals
 from quadriga.agents.planner.planner import PlanResult
+from quadriga.agents.planning.active_plan import Setpoint, setpoint_at
 from quadriga.agents.planning.fade import plan_message
 from quadriga.agents.planning.interface import PlanningInputs, PlanningOutputs
 from quadriga.agents.planning.local import LocalPlanning
+from quadriga.agents.planning.registry import CheckedPlanning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.robot.conventions import Array
@@ -31,12 +33,12 @@ FIRST = 320
 
 
 @cache
-def planning_of(config: Config) -> LocalPlanning:
+def planning_of(config: Config) -> CheckedPlanning:
     return planning_with(config, simple_predictor(config))
 
 
-def planning_with(config: Config, predictor: Predictor) -> LocalPlanning:
-    return LocalPlanning(config, 0, predictor, lambda: 0)
+def planning_with(config: Config, predictor: Predictor) -> CheckedPlanning:
+    return CheckedPlanning(config, 0, LocalPlanning(config, 0, predictor, lambda: 0))
 
 
 @cache
@@ -74,6 +76,9 @@ class Walker:
         self.state, outputs = self.planning.step(self.state, arrived)
         return outputs
 
+    def applied(self, tick: int = FIRST) -> Setpoint:
+        return setpoint_at(self.state.plans, tick)
+
     def walk(self, until: int, y: Array = ON_COURSE) -> PlanningOutputs:
         """All samples up to and including the tick `until`."""
         for tick in range(10, until + 1, 10):
@@ -82,10 +87,11 @@ class Walker:
 
 
 def test_on_course_the_plan_is_nominal() -> None:
-    outputs = Walker().walk(FIRST)
+    walker = Walker()
+    outputs = walker.walk(FIRST)
     assert outputs.plan is not None
     assert outputs.plan.status == "solved"
-    np.testing.assert_allclose(outputs.setpoint.deviation, 0.0, atol=1e-6)
+    np.testing.assert_allclose(walker.applied().deviation, 0.0, atol=1e-6)
 
 
 def test_off_course_the_plan_pushes_back_and_is_handed_on_sample_by_sample() -> None:
@@ -99,9 +105,8 @@ def test_off_course_the_plan_pushes_back_and_is_handed_on_sample_by_sample() -> 
         outputs = walker.step(tick, slow)
         assert outputs.plan is None
         sample = (tick - FIRST) // 10
-        np.testing.assert_allclose(
-            outputs.setpoint.deviation, (plan.u - nominal)[sample], atol=1e-9
-        )
+        deviation = walker.applied(tick).deviation
+        np.testing.assert_allclose(deviation, (plan.u - nominal)[sample], atol=1e-9)
 
 
 def test_a_plan_that_is_not_renewed_runs_out() -> None:
@@ -111,9 +116,9 @@ def test_a_plan_that_is_not_renewed_runs_out() -> None:
     walker.walk(FIRST, slow)
     state, end = walker.state, FIRST + 10 * ALONE.planner.N
     for tick, expected in ((end - 1, True), (end + 1, False), (end + 1001, False)):
-        _, outputs = walker.planning.step(state, PlanningInputs(tick, WALKING, (REFERENCE,)))
+        after, outputs = walker.planning.step(state, PlanningInputs(tick, WALKING, (REFERENCE,)))
         assert outputs.plan is None
-        assert bool(outputs.setpoint.deviation.any()) == expected
+        assert bool(setpoint_at(after.plans, tick).deviation.any()) == expected
 
 
 @pytest.mark.parametrize("missing", [FIRST - 30, FIRST - 80, FIRST])
@@ -156,7 +161,7 @@ def test_nothing_is_planned_and_nothing_handed_on_unless_walking(mode: Mode) -> 
     walker.walk(FIRST, slow)
     outputs = walker.step(FIRST + 40, slow, mode)
     assert outputs.plan is None
-    assert not outputs.setpoint.deviation.any()
+    assert not walker.applied(FIRST + 40).deviation.any()
 
 
 @pytest.mark.parametrize(
@@ -172,11 +177,13 @@ def test_a_plan_fades_out_beyond_the_range_of_the_data(
     y[output] += excess * limits[output]
     y[1] -= 0.1 if output != 1 else 0.0  # something to correct in any case
     wide = replace(ALONE, planner=replace(ALONE.planner, fade=(1e3, 1e3, 1e3, 1e3)))
-    full, faded = Walker(wide).walk(FIRST, y), Walker().walk(FIRST, y)
+    sure, wary = Walker(wide), Walker()
+    full, faded = sure.walk(FIRST, y), wary.walk(FIRST, y)
     assert full.plan is not None
     assert faded.plan is not None
-    assert np.abs(full.setpoint.deviation).max() > 1.0
-    np.testing.assert_allclose(faded.setpoint.deviation, share * full.setpoint.deviation, atol=1e-6)
+    whole = sure.applied().deviation
+    assert np.abs(whole).max() > 1.0
+    np.testing.assert_allclose(wary.applied().deviation, share * whole, atol=1e-6)
     assert faded.plan.status == ("solved" if share == 1.0 else "faded")
     nominal = nominal_forces(scheduled_stance(ALONE, 0, FIRST + 10 * np.arange(25)))
     np.testing.assert_allclose(faded.plan.u - nominal, share * (full.plan.u - nominal), atol=1e-6)
@@ -188,9 +195,10 @@ def test_a_plan_fades_out_beyond_the_range_of_the_data(
 
 def test_the_planned_speeds_are_handed_on_with_the_plan() -> None:
     slow = ON_COURSE - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
-    outputs = Walker().walk(FIRST, slow)
+    walker = Walker()
+    outputs = walker.walk(FIRST, slow)
     assert outputs.plan is not None
-    np.testing.assert_array_equal(outputs.setpoint.v_ref, outputs.plan.y[:, 1:3])
+    np.testing.assert_array_equal(walker.applied().v_ref, outputs.plan.y[:, 1:3])
 
 
 @pytest.mark.parametrize(("excess", "share"), [(1.25, 0.75), (1.5, 0.5), (2.0, 0.0), (3.0, 0.0)])
@@ -200,23 +208,26 @@ def test_the_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for(
     """What is published stays what the forces come to: without any, that is the free response."""
     y = ON_COURSE + np.array([0.0, excess * ALONE.planner.fade[1], 0.0, 0.0, 0.0, 0.0])
     wide = replace(ALONE, planner=replace(ALONE.planner, fade=(1e3, 1e3, 1e3, 1e3)))
-    full, faded = Walker(wide).walk(FIRST, y), Walker().walk(FIRST, y)
+    wary = Walker()
+    full, faded = Walker(wide).walk(FIRST, y), wary.walk(FIRST, y)
     assert full.plan is not None
     assert faded.plan is not None
-    assert faded.setpoint.v_ref is not None
+    v_ref = wary.applied().v_ref
+    assert v_ref is not None
     wish = ON_COURSE[1:3]
     expected = wish + share * (full.plan.y[:, 1:3] - wish)
-    np.testing.assert_allclose(faded.setpoint.v_ref, expected, atol=1e-12)
+    np.testing.assert_allclose(v_ref, expected, atol=1e-12)
     assert np.abs(faded.plan.y[:, 1:3] - expected).max() > 1e-3
 
 
 def test_a_fallback_follows_the_speeds_asked_for() -> None:
     y = ON_COURSE - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
     limits = replace(ALONE.planner, force_min=200.0, deviation_max=(20.0, 20.0, 5.0))
-    outputs = Walker(replace(ALONE, planner=limits)).walk(FIRST, y)
+    walker = Walker(replace(ALONE, planner=limits))
+    outputs = walker.walk(FIRST, y)
     assert outputs.plan is not None
     assert outputs.plan.status == "nominal:infeasible"
-    np.testing.assert_array_equal(outputs.setpoint.v_ref, np.tile(ON_COURSE[1:3], (25, 1)))
+    np.testing.assert_array_equal(walker.applied().v_ref, np.tile(ON_COURSE[1:3], (25, 1)))
     assert outputs.plan.y[0, 1] < 0.25  # nominal forces alone do not mend it at once
 
 
@@ -237,8 +248,8 @@ def test_a_plan_of_absurd_samples_is_nominal_by_name_and_follows_what_is_asked_f
     nominal = nominal_forces(scheduled_stance(ALONE, 0, FIRST + 10 * np.arange(25)))
     np.testing.assert_array_equal(outputs.plan.u, nominal)
     np.testing.assert_array_equal(outputs.plan.y, np.tile(ON_COURSE, (25, 1)))
-    assert not outputs.setpoint.deviation.any()
-    np.testing.assert_array_equal(outputs.setpoint.v_ref, np.tile(ON_COURSE[1:3], (25, 1)))
+    assert not walker.applied().deviation.any()
+    np.testing.assert_array_equal(walker.applied().v_ref, np.tile(ON_COURSE[1:3], (25, 1)))
 
 
 @pytest.mark.parametrize("absurd", [1e39, 1e300, np.nan])

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from quadriga.agents.modes import STAND, WALK, Mode
+from quadriga.agents.planning.active_plan import setpoint_at
 from quadriga.agents.planning.interface import Expected, PlanningInputs, PlanningOutputs
-from quadriga.agents.planning.remote import RemotePlanning, RemoteState
+from quadriga.agents.planning.registry import CheckedPlanning, PlanningState
+from quadriga.agents.planning.remote import RemotePlanning
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.config.timing import max_ages
@@ -37,14 +39,26 @@ def sample_at(tick: int, y: Array = ON_COURSE) -> Measurement:
     return Measurement(tick, 0, np.zeros(12), y, np.ones(4))
 
 
+def follower_of(config: Config = CONFIG) -> CheckedPlanning:
+    return CheckedPlanning(config, 1, RemotePlanning(config, 1))
+
+
+NOTHING_YET = follower_of().initial()
+
+
+def applied(state: PlanningState, tick: int) -> Array:
+    """The force deviations that a state has applied at a tick."""
+    return setpoint_at(state.plans, tick).deviation
+
+
 def follow(
-    follower: RemotePlanning,
-    state: RemoteState,
+    follower: CheckedPlanning,
+    state: PlanningState,
     tick: int,
     *plans: Plan,
     y: Array = ON_COURSE,
     mode: Mode = WALKING,
-) -> tuple[RemoteState, PlanningOutputs]:
+) -> tuple[PlanningState, PlanningOutputs]:
     arrived = PlanningInputs(
         tick, mode, (REFERENCE,), sample_at(tick, y), (), tuple(("planner", p) for p in plans)
     )
@@ -52,47 +66,43 @@ def follow(
 
 
 def test_a_plan_is_in_force_from_its_arrival_on_and_aligned_with_its_own_time() -> None:
-    follower = RemotePlanning(CONFIG, 1)
-    state, before = follow(follower, RemoteState(), 320)
-    assert not before.setpoint.deviation.any()
-    state, at = follow(follower, state, 323, plan_of(8))
-    assert at.setpoint.deviation.max() == pytest.approx(8.0)
+    follower = follower_of()
+    state, _ = follow(follower, NOTHING_YET, 320)
+    assert not applied(state, 320).any()
+    state, _ = follow(follower, state, 323, plan_of(8))
+    assert applied(state, 323).max() == pytest.approx(8.0)
     state, later = follow(follower, state, 320 + 35)
-    assert later.setpoint.deviation.max() == pytest.approx(8.03)
+    assert applied(state, 355).max() == pytest.approx(8.03)
     assert later.plan is None
     assert later.planner_ns is None
 
 
 def test_lock_step_awaits_a_plan_its_latency_after_its_data() -> None:
-    assert RemotePlanning(CONFIG, 1).expected(321) == Expected(plan=(8, 0))
-    assert RemotePlanning(CONFIG, 1).expected(320) == Expected()
+    assert follower_of().expected(321) == Expected(plan=(8, 0))
+    assert follower_of().expected(320) == Expected()
     late = replace(CONFIG, planner=replace(CONFIG.planner, latency_ms=16))
-    assert [t for t in range(300, 420) if RemotePlanning(late, 1).expected(t).plan] == [
-        336,
-        376,
-        416,
-    ]
+    assert [t for t in range(300, 420) if follower_of(late).expected(t).plan] == [336, 376, 416]
 
 
 def test_older_and_repeated_plans_and_those_of_another_horizon_are_passed_over() -> None:
-    follower = RemotePlanning(CONFIG, 1)
-    state, _ = follow(follower, RemoteState(), 361, plan_of(9))
+    follower = follower_of()
+    state, _ = follow(follower, NOTHING_YET, 361, plan_of(9))
     short = replace(plan_of(10), u=np.zeros((5, 12)))
     for stale in (plan_of(8), plan_of(9), short):
-        state, outputs = follow(follower, state, 362, stale)
-        assert outputs.setpoint.deviation.max() == pytest.approx(9.0)
+        state, _ = follow(follower, state, 362, stale)
+        assert applied(state, 362).max() == pytest.approx(9.0)
 
 
 @pytest.mark.parametrize(
     "change", [{"tick": 400, "step": 10}, {"tick": 0, "step": 0}, {"step": 10**9}, {"tick": 327}]
 )
 def test_a_plan_from_another_time_is_not_used_and_blocks_none(change: dict[str, Any]) -> None:
-    follower = RemotePlanning(CONFIG, 1)
-    state, outputs = follow(follower, RemoteState(), 365, replace(plan_of(8), **change))
-    assert not outputs.setpoint.deviation.any()
+    follower = follower_of()
+    state, outputs = follow(follower, NOTHING_YET, 365, replace(plan_of(8), **change))
+    assert not applied(state, 365).any()
     assert outputs.unusual == ("refused_by_planner",)
-    _, outputs = follow(follower, state, 366, plan_of(9))
-    assert outputs.setpoint.deviation.max() == pytest.approx(9.0)
+    state, outputs = follow(follower, state, 366, plan_of(9))
+    assert applied(state, 366).max() == pytest.approx(9.0)
     assert outputs.unusual == ()
 
 
@@ -102,48 +112,48 @@ def test_a_plan_from_another_time_is_not_used_and_blocks_none(change: dict[str, 
 def test_a_plan_that_no_planner_makes_is_not_used_and_blocks_none(
     name: str, size: float, sign: float
 ) -> None:
-    follower, wild = RemotePlanning(CONFIG, 1), plan_of(9)
+    follower, wild = follower_of(), plan_of(9)
     values = getattr(wild, name).copy()
     values[3, 5] += sign * size
-    state, outputs = follow(follower, RemoteState(), 365, replace(wild, **{name: values}))
-    assert not outputs.setpoint.deviation.any()
+    state, outputs = follow(follower, NOTHING_YET, 365, replace(wild, **{name: values}))
+    assert not applied(state, 365).any()
     assert outputs.unusual == ("refused_by_planner",)
-    _, outputs = follow(follower, state, 366, plan_of(9))
-    assert outputs.setpoint.deviation.max() == pytest.approx(9.0)
+    state, outputs = follow(follower, state, 366, plan_of(9))
+    assert applied(state, 366).max() == pytest.approx(9.0)
 
 
 @pytest.mark.parametrize("largest", [(20.0, 20.0, 60.0), (0.0, 0.0, 0.0)])
 def test_a_plan_at_the_bounds_of_its_planner_is_used(largest: tuple[float, ...]) -> None:
     config = replace(CONFIG, planner=replace(CONFIG.planner, deviation_max=largest))
     stance = horizon_stance(config, 1, 9)
-    du = np.repeat(stance, 3, axis=1) * np.tile(largest, 4)
-    full = replace(plan_of(9), u=nominal_forces(stance) - (1.0 + 1e-6) * du)
-    state, outputs = follow(RemotePlanning(config, 1), RemoteState(), 365, full)
+    du = np.repeat(stance, 3, axis=1) * np.tile(np.multiply(largest, (-1.0, -1.0, 1.0)), 4)
+    full = replace(plan_of(9), u=nominal_forces(stance) + (1.0 + 1e-6) * du)
+    state, outputs = follow(follower_of(config), NOTHING_YET, 365, full)
     assert outputs.unusual == ()
-    assert state.newest == (9, 0)
+    assert state.planner.newest == (9, 0)
 
 
 def test_the_age_of_the_plan_in_use_is_told_at_every_tick() -> None:
-    follower = RemotePlanning(CONFIG, 1)
-    state, _ = follow(follower, RemoteState(), 321, plan_of(8))
+    follower = follower_of()
+    state, _ = follow(follower, NOTHING_YET, 321, plan_of(8))
     for tick in (330, 401, 600):
         assert follow(follower, state, tick)[1].ages_ms == {"plan": tick - 320.0}
 
 
 def test_a_plan_fades_out_beyond_the_range_of_the_data() -> None:
     far = ON_COURSE + np.array([0.0, 1.5 * CONFIG.planner.fade[1], 0.0, 0.0, 0.0, 0.0])
-    _, outputs = follow(RemotePlanning(CONFIG, 1), RemoteState(), 321, plan_of(8), y=far)
-    assert outputs.setpoint.deviation.max() == pytest.approx(4.0)
+    state, outputs = follow(follower_of(), NOTHING_YET, 321, plan_of(8), y=far)
+    assert applied(state, 321).max() == pytest.approx(4.0)
     assert outputs.unusual == ("plan_faded",)
 
 
 def test_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for() -> None:
-    follower, faster = RemotePlanning(CONFIG, 1), plan_of(8)
+    follower, faster = follower_of(), plan_of(8)
     faster = replace(faster, y=faster.y + np.array([0.0, 0.2, 0.1, 0.0, 0.0, 0.0]))
     off = np.array([0.0, CONFIG.planner.fade[1], 0.0, 0.0, 0.0, 0.0])
     for times, share in ((0.0, 1.0), (1.5, 0.5), (2.0, 0.0)):
-        _, outputs = follow(follower, RemoteState(), 321, faster, y=ON_COURSE + times * off)
-        v_ref = outputs.setpoint.v_ref
+        state, _ = follow(follower, NOTHING_YET, 321, faster, y=ON_COURSE + times * off)
+        v_ref = setpoint_at(state.plans, 321).v_ref
         assert v_ref is not None
         expected = np.tile([0.3 + 0.2 * share, 0.1 * share], (N, 1))
         np.testing.assert_allclose(v_ref, expected, atol=1e-12)
@@ -151,30 +161,28 @@ def test_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for() -> None:
 
 def test_no_plan_is_used_that_is_older_than_check_allows() -> None:
     late = replace(CONFIG, planner=replace(CONFIG.planner, latency_ms=16))
-    follower, limit = RemotePlanning(late, 1), max_ages(late)["plan"]
-    state, _ = follow(follower, RemoteState(), 336, plan_of(8))
+    follower, limit = follower_of(late), max_ages(late)["plan"]
+    state, _ = follow(follower, NOTHING_YET, 336, plan_of(8))
     _, used = follow(follower, state, 320 + limit - 1)
     _, given_up = follow(follower, state, 320 + limit)
     assert (used.stop_reason, given_up.stop_reason) == ("", "planner-lost")
 
 
 def test_without_plans_the_robot_stops_with_a_name_for_it() -> None:
-    follower, planner = RemotePlanning(CONFIG, 1), CONFIG.planner
-    state, outputs = follow(follower, RemoteState(), 321, plan_of(8))
+    follower, planner = follower_of(), CONFIG.planner
+    state, outputs = follow(follower, NOTHING_YET, 321, plan_of(8))
     assert outputs.stop_reason == ""
     reasons = {}
     for step in range(9, 25):
         state, outputs = follow(follower, state, 40 * step + 1)
         reasons[step] = outputs.stop_reason
         if step - 8 >= planner.N // planner.applied + 1:
-            assert not outputs.setpoint.deviation.any(), "a plan that has run out says nothing"
+            assert not applied(state, 40 * step + 1).any(), "a plan that has run out says nothing"
     patience = planner.max_peer_age + planner.hold_steps
     assert next(step for step, why in reasons.items() if why) == 8 + patience + 1
     assert set(reasons.values()) == {"", "planner-lost"}
 
 
 def test_nothing_is_applied_unless_walking() -> None:
-    _, outputs = follow(
-        RemotePlanning(CONFIG, 1), RemoteState(), 321, plan_of(8), mode=Mode(STAND, 0)
-    )
-    assert not outputs.setpoint.deviation.any()
+    state, _ = follow(follower_of(), NOTHING_YET, 321, plan_of(8), mode=Mode(STAND, 0))
+    assert not applied(state, 321).any()

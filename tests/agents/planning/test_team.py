@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations
+from typing import cast
 
 import numpy as np
 import pytest
 
 from quadriga.agents.gait import scheduled_stance
 from quadriga.agents.modes import DAMPING, STOPPING, Mode
-from quadriga.agents.planner.team_planner import build_centralised
+from quadriga.agents.planner.planner import PlannerInputs
+from quadriga.agents.planner.team_planner import TeamPlanner, TeamResult, build_centralised
 from quadriga.agents.planning.reference_slew import ReferenceSlew
 from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
+from quadriga.shared.robot.conventions import Array
+from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Measurement, Reference
 from tests.a1 import nominal_forces
 from tests.agents.duet import asked, every_100_ms, fingerprint, simple_predictor
@@ -88,6 +93,30 @@ def test_the_order_of_arrival_does_not_matter_and_strangers_do_not_count() -> No
         _, outputs = CENTRAL.step(CENTRAL.remember(heard(310), order, ()))
         results.add(b"".join(plan.u.tobytes() for _, plan in outputs.plans))
     assert len(results) == 1
+
+
+@pytest.mark.parametrize(
+    ("u", "refused"), [(np.full((25, 12), np.nan), ["r2"]), (np.zeros((7, 12)), ["r1", "r2"])]
+)
+def test_a_plan_that_cannot_be_meant_is_refused_for_its_robot_by_name(
+    u: Array, refused: list[str]
+) -> None:
+    class Faulty:
+        def step(self, inputs: Sequence[PlannerInputs]) -> TeamResult:
+            result = CENTRAL._planner.step(inputs)
+            return replace(result, u=np.stack([result.u[0], u]) if len(u) == 25 else u)
+
+    central = Central(CONFIG, cast("TeamPlanner", Faulty()))
+    (_, expected), (_, found) = CENTRAL.step(heard(320)), central.step(heard(320))
+    assert found.unusual == ("refused_plan_of_centralised",) * len(refused)
+    for (name, plan), (_, right) in zip(found.plans, expected.plans, strict=True):
+        if name not in refused:
+            assert encode(plan) == encode(right)
+            continue
+        stance = scheduled_stance(CONFIG, int(name[1]) - 1, 320 + 10 * np.arange(25))
+        np.testing.assert_array_equal(plan.u, nominal_forces(stance))
+        np.testing.assert_array_equal(plan.y, np.tile(ON_COURSE, (25, 1)))
+        assert plan.status.startswith("nominal:plan of centralised refused: forces")
 
 
 def test_the_clock_is_only_told() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 
 from quadriga.agents.gait import nominal_forces
 from quadriga.agents.modes import WALK
-from quadriga.agents.planning.active_plan import ActivePlan, add_plan, setpoint_at
+from quadriga.agents.planning.active_plan import ActivePlan
 from quadriga.agents.planning.interface import PlanningInputs, PlanningInterface, PlanningOutputs
 from quadriga.agents.planning.operator_references import reference_at
 from quadriga.agents.predictor.episode import commanded_outputs
@@ -13,32 +13,31 @@ from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Plan
 
 FRONT, LEFT = np.array([1, 1, -1, -1]), np.array([1, -1, 1, -1])  # of FL FR RL RR
-State = tuple[Array, tuple[ActivePlan, ...]]  # filtered errors, (6,); plans
 
 
-class Balance(PlanningInterface[State]):
+class Balance(PlanningInterface[Array]):  # its state: filtered errors, (6,)
     def __init__(self, config, index, predictor, clock_ns) -> None:  # type: ignore[no-untyped-def]
         self.config, self.index, self.step_ms = config, index, step_ms(config)
         self.speed, self.height, self.tilt = config.planner.option_values.values()
 
-    def initial(self) -> State:
-        return np.zeros(6), ()
+    def initial(self) -> Array:
+        return np.zeros(6)
 
-    def step(self, state: State, inputs: PlanningInputs) -> tuple[State, PlanningOutputs]:
-        (errors, plans), sample, tick = state, inputs.measurement, inputs.tick
+    def step(self, errors: Array, inputs: PlanningInputs) -> tuple[Array, PlanningOutputs]:
+        sample, tick = inputs.measurement, inputs.tick
         if sample is None or inputs.mode.name != WALK:
-            return state, PlanningOutputs(setpoint=setpoint_at(plans, tick))
+            return errors, PlanningOutputs()
         now, _ = reference_at(inputs.references, tick, self.config.reference.height)
-        wanted, plan = commanded_outputs(now), None
+        wanted = commanded_outputs(now)
         errors = 0.8 * errors + 0.2 * (sample.y - wanted)
         step, rest = divmod(tick, self.step_ms)
-        if rest == 0 and step >= first_step(self.config):
-            stance = horizon_stance(self.config, self.index, step)
-            du, y = self.forces(errors, stance.astype(float)), np.tile(wanted, (len(stance), 1))
-            u = nominal_forces(stance, self.config.robot.weight) + du
-            plan = Plan(tick, tick * 10**6, step, u, y, "solved", {}, 0)
-            plans = add_plan(plans, ActivePlan(tick, tick, du, y))
-        return (errors, plans), PlanningOutputs(plan, setpoint_at(plans, tick))
+        if rest or step < first_step(self.config):
+            return errors, PlanningOutputs()
+        stance = horizon_stance(self.config, self.index, step)
+        du, y = self.forces(errors, stance.astype(float)), np.tile(wanted, (len(stance), 1))
+        u = nominal_forces(stance, self.config.robot.weight) + du
+        plan = Plan(tick, tick * 10**6, step, u, y, "solved", {}, 0)
+        return errors, PlanningOutputs(plan, ActivePlan(tick, tick, du, y))
 
     def forces(self, errors: Array, stance: Array) -> Array:
         z, vx, vy, roll, pitch, _ = errors
