@@ -6,6 +6,7 @@ import hashlib
 import importlib.metadata
 import os
 import platform
+import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
@@ -15,6 +16,9 @@ from typing import Final
 import quadriga
 
 PROJECT: Final = "quadriga"
+# Begins the command of every process started here. -P: a file `random.py` in the working directory
+# must not be imported in the place of Python's.
+PYTHON: Final = (sys.executable, "-P")
 # What a run's figures depend on.
 LIBRARIES: Final = ("eclipse-zenoh", "mujoco", "pin", "numpy", "daqp", "osqp", "numba", "msgpack")
 
