@@ -292,7 +292,8 @@ def _is_quadriga(row: ProcessSpec) -> bool:
 
 
 def _environment() -> dict[str, str]:
-    return {**os.environ, **dict.fromkeys(_ONE_THREAD, "1")}
+    # Their logs are read as UTF-8, whatever the terminal has.
+    return {**os.environ, **dict.fromkeys(_ONE_THREAD, "1"), "PYTHONIOENCODING": "utf-8"}
 
 
 def _is_full(folder: Path) -> bool:
