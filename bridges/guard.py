@@ -25,6 +25,7 @@ from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import BridgeError
 from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.runtime.clock import Rate
+from quadriga.shared.runtime.installed import PYTHON
 from quadriga.shared.runtime.scheduling import take_priority
 
 ALIVE: Final = b"."
@@ -46,7 +47,7 @@ class Guard:
     """
 
     def __init__(self, kind: str, config: BridgeConfig) -> None:
-        command = [sys.executable, "-m", "quadriga.bridges.guard", kind, json.dumps(asdict(config))]
+        command = [*PYTHON, "-m", "quadriga.bridges.guard", kind, json.dumps(asdict(config))]
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
         )

@@ -3,15 +3,30 @@
 from __future__ import annotations
 
 import gc
+import io
 import os
 import signal
 import sys
-from typing import Final, NoReturn
+from typing import Any, Final, NoReturn
 
 _STOP: Final = "estop"
 _FEW_COLLECTIONS: Final = 50_000  # new objects between two; imports make many and no garbage
 _WRONG: Final = 2
 _INTERRUPTED: Final = 130
+_ENDLESS: Final = ("echo", "hz", "top")  # they only show, until nobody reads any more
+
+
+class _Unread(io.FileIO):
+    """A standard stream whose reader may leave, as of `walk | head -1`: the walk goes on."""
+
+    def write(self, text: Any) -> int:
+        try:
+            return super().write(text)
+        except BrokenPipeError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self.fileno())
+            os.close(nowhere)
+            return len(text)
 
 
 def main() -> NoReturn:
@@ -23,6 +38,8 @@ def run() -> int:
     """Run the command line; a signal that comes while it is being imported waits until then."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     gc.set_threshold(_FEW_COLLECTIONS)
+    for name in ("stdout", "stderr"):
+        setattr(sys, name, _forgiving(getattr(sys, name)))
     from quadriga.shared.errors import QuadrigaError
     from quadriga.shared.printable import printable_line
     from quadriga.shared.runtime.opengl import do_without_opengl
@@ -43,8 +60,50 @@ def run() -> int:
     except QuadrigaError as error:  # of a package that adds to this one
         print(printable_line(f"quadriga: {error}"), file=sys.stderr)
         return _WRONG
+    except Exception:
+        foreign = _find_shadowing_file()
+        if not foreign:
+            raise
+        expected = "no file of the name of a module of Python or of a package that is needed"
+        cause = "rename it, or take its folder out of PYTHONPATH"
+        print(f"quadriga: {foreign}: got imported, expected {expected} ({cause})", file=sys.stderr)
+        return _WRONG
 
     return command_line()
+
+
+def _forgiving(stream: Any) -> Any:
+    """A standard stream that writes `?` for a letter that the terminal does not have."""
+    if not isinstance(stream, io.TextIOWrapper):  # it is closed, or a notebook's
+        return stream
+    kind = io.FileIO if sys.argv[1:2] and sys.argv[1] in _ENDLESS else _Unread
+    raw: Any = kind(stream.fileno(), "w", closefd=False)
+    unbuffered = stream.write_through
+    return io.TextIOWrapper(
+        raw if unbuffered else io.BufferedWriter(raw),
+        stream.encoding,
+        "replace",
+        line_buffering=stream.line_buffering,
+        write_through=unbuffered,
+    )
+
+
+def _find_shadowing_file() -> str:
+    """A file that was imported in the place of another module; "": there is none.
+
+    The look at it must not import such files itself.
+    """
+    own = sys.path.index(os.path.dirname(os.__file__))
+    before, sys.path[:] = sys.path[:own], sys.path[own:]
+    theirs = tuple(f"{os.path.abspath(folder)}/" for folder in before)
+    for name, module in [*sys.modules.items()]:
+        if str(getattr(module, "__file__", "")).startswith(theirs):
+            del sys.modules[name]
+    try:
+        from quadriga.shared.runtime.installed import shadowing_files
+    except ImportError:  # this project lies there itself
+        return ""
+    return next(iter(shadowing_files(before)), "")
 
 
 def end(status: int) -> NoReturn:

@@ -10,11 +10,13 @@ import numpy as np
 from rich.console import Console
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.runtime.jit_cache import compiled_folder, is_switched_off
-
-_DONE: Final = "rehearsed"  # a file beside the machine code of all that an agent runs
+from quadriga.shared.runtime.jit_cache import REHEARSED, compiled_folder, is_switched_off
 
 _ROBOTS: Final = 2  # the fewest of which one has a peer, whose terms are compiled, too
+_UNKEPT: Final = (
+    "the agents are compiled anew, for a minute or two: no folder for machine code can be written "
+    "to, or its disk is full; set NUMBA_CACHE_DIR or XDG_CACHE_HOME to one with room"
+)
 _PULL: Final = 1e6  # of the planner's cost on each force: the best forces are beyond their limits
 
 
@@ -26,20 +28,26 @@ def warm_up(config: Config, console: Console) -> None:
     folder = compiled_folder()
     if is_switched_off() or _is_compiled(folder):
         return
+    if folder is None:  # who forks the agents compiles
+        console.print(_UNKEPT)
+        return
     with console.status("compiling the agents (the first time only)"):
         _rehearse_agent(config)
-    if folder is not None:
-        (folder / _DONE).touch()
+    (folder / REHEARSED).touch()
 
 
 def load_compiled() -> None:
-    """Load what has been compiled, and compile nothing: what this process forks then has it."""
-    if not is_switched_off() and _is_compiled(compiled_folder()):
+    """Load what has been compiled: what this process forks then has it.
+
+    Where nothing can be kept it is compiled here, once for all forks.
+    """
+    folder = compiled_folder()
+    if not is_switched_off() and (folder is None or _is_compiled(folder)):
         _rehearse_agent(Config())
 
 
 def _is_compiled(folder: Path | None) -> bool:
-    return folder is not None and (folder / _DONE).exists()
+    return folder is not None and (folder / REHEARSED).exists()
 
 
 def _rehearse_agent(config: Config) -> None:

@@ -21,6 +21,7 @@ from quadriga.shared.runtime.signals import die_with_parent, interrupts_held
 A = TypeVar("A")
 B = TypeVar("B")
 
+SAFE_PATH: Final = "PYTHONSAFEPATH"  # of the environment: `-P` for a process that is spawned
 _HIDDEN: Final = Lock()  # held by the thread that has hidden the script
 
 
@@ -39,8 +40,10 @@ def run_each(
     """
     # Spawn: a forked child would share the parent's threads' locks.
     context = multiprocessing.get_context("spawn")
-    resource_tracker.ensure_running()  # before signals are held: its start lets them through
-    with ProcessPoolExecutor(jobs, context, die_with_parent, (os.getpid(),)) as pool:
+    with _script_hidden():
+        resource_tracker.ensure_running()  # before signals are held: its start lets them through
+    begins = (os.getpid(), os.environ.get(SAFE_PATH))
+    with ProcessPoolExecutor(jobs, context, _begin, begins) as pool:
         try:
             # Not `as_completed`: interrupted while it holds every future's lock, it leaves them
             # locked, and the pool waits for them for ever.
@@ -65,18 +68,33 @@ def run_each(
             raise
 
 
+def _begin(parent: int, safe_path: str | None) -> None:
+    die_with_parent(parent)
+    _set_safe_path(safe_path)  # as the user has it, for the user's programs
+
+
 @contextmanager
 def _script_hidden() -> Iterator[None]:
     """Processes that are started within the block do not run the caller's script anew.
 
     A process that is spawned imports the main module of its parent, in case what it is to call
     stands there. Here it never does; and a script without `if __name__ == "__main__"` would walk
-    a team in each of the processes that it merely waits for.
+    a team in each of the processes that it merely waits for. Nor do they import from the working
+    directory.
     """
     with _HIDDEN:
-        script = sys.modules["__main__"]
+        script, safe_path = sys.modules["__main__"], os.environ.get(SAFE_PATH)
         sys.modules["__main__"] = ModuleType("__main__")
+        _set_safe_path("1")
         try:
             yield
         finally:
             sys.modules["__main__"] = script
+            _set_safe_path(safe_path)
+
+
+def _set_safe_path(value: str | None) -> None:
+    if value is None:
+        os.environ.pop(SAFE_PATH, None)
+    else:
+        os.environ[SAFE_PATH] = value

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import Final
 
 _LONGEST: Final = 500  # characters shown of a name, or of what was got
+_ELSEWHERE: Final = "use another folder: --out for a run, XDG_CACHE_HOME for the cache"
+_REMEDIES: Final = {
+    errno.ENOSPC: f"free some room there, or {_ELSEWHERE}",
+    errno.EDQUOT: f"free some room there, or {_ELSEWHERE}",
+    errno.EROFS: _ELSEWHERE,
+    errno.EACCES: f"give this user the right to, or {_ELSEWHERE}",
+}
 
 
 class QuadrigaError(Exception):
@@ -97,7 +105,7 @@ def name_file_errors(
     try:
         yield
     except (OSError, UnicodeDecodeError) as error:
-        raise kind(str(name), system_reason(error), expected, cause) from None
+        raise kind(str(name), system_reason(error), expected, cause or remedy(error)) from None
 
 
 def system_reason(error: OSError | UnicodeDecodeError) -> str:
@@ -105,6 +113,11 @@ def system_reason(error: OSError | UnicodeDecodeError) -> str:
     if isinstance(error, UnicodeDecodeError):
         return "bytes that are not UTF-8"
     return error.strerror or str(error)
+
+
+def remedy(error: OSError | UnicodeDecodeError) -> str:
+    """What helps where the system lets nothing be written; "" of another refusal."""
+    return _REMEDIES.get(error.errno or 0, "") if isinstance(error, OSError) else ""
 
 
 def did_you_mean(got: object, known: Iterable[str]) -> str:

@@ -123,6 +123,12 @@ def test_files_import_each_other_in_one_direction() -> None:
         pytest.fail(f"files that import each other: {' -> '.join(error.args[1])}")
 
 
+def test_every_process_is_started_by_the_words_that_keep_the_working_directory_out() -> None:
+    found = {path.name for path in trees() if "sys.executable" in (TOP / path).read_text()}
+    found -= {path.name for path in (TOP / "benchmarks").rglob("*.py")}  # which lie there
+    assert found == {"installed.py", "controller_program.py"}, "the second starts the user's own"
+
+
 def test_the_formatter_is_seldom_told_to_look_away() -> None:
     files = [*(TOP / path for path in trees()), *(TOP / "tests").rglob("*.py")]
     skips = sum(path.read_text(encoding="utf-8").count("# fmt: " + "skip") for path in files)

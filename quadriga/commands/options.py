@@ -3,10 +3,36 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 KEY_HELP: Final = "a topic, a robot or a key: plan, r2, r1/state, 'r*/**'"
+
+
+def named_path(text: str) -> Path:
+    """A file or a folder that is named: Python takes no name for the working directory."""
+    if not text:
+        raise argparse.ArgumentTypeError("got '', expected the name of a file or a folder")
+    return Path(text)
+
+
+def _number(kind: type) -> Callable[[str], Any]:
+    def convert(text: str) -> Any:
+        if "_" in text or not text.isascii():  # as Python writes numbers, and nobody else
+            raise ValueError
+        return kind(text)
+
+    convert.__name__ = kind.__name__
+    return convert
+
+
+# How words become values, by the type that an option has.
+READ_AS: Final[dict[Any, Callable[[str], Any]]] = {
+    int: _number(int),
+    float: _number(float),
+    Path: named_path,
+}
 
 
 def add_file(command: argparse.ArgumentParser, what: str = "") -> None:
@@ -19,7 +45,7 @@ def add_file(command: argparse.ArgumentParser, what: str = "") -> None:
 
 def recording_path(text: str) -> Path:
     """The recording that a user names by its file or its run folder."""
-    path = Path(text)
+    path = named_path(text)
     if not path.is_dir():
         return path
     from quadriga.recordings.readable import recording_of

@@ -7,15 +7,17 @@ import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
+from itertools import takewhile
 from typing import Final
 
 from quadriga.commands.command import Run
 from quadriga.commands.command_table import GROUPS
 from quadriga.commands.config_options import build_config_options, read_config
 from quadriga.commands.mistakes import check_words, refuse_strays
+from quadriga.commands.options import READ_AS
 from quadriga.commands.running import registered
 from quadriga.commands.version import ShowVersion
-from quadriga.shared.errors import ConfigError, ProcessError, QuadrigaError, system_reason
+from quadriga.shared.errors import ConfigError, ProcessError, QuadrigaError, remedy, system_reason
 from quadriga.shared.printable import printable, printable_line
 from quadriga.shared.runtime.signals import (
     die_with_parent,
@@ -76,7 +78,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     except OSError as error:  # a disk that is full, a folder that is read-only
         what, reason = error.filename or "a file or a connection", system_reason(error)
-        return _complain(ConfigError(str(what), reason, "one that can be used"), WRONG)
+        return _complain(
+            ConfigError(str(what), reason, "one that can be used", remedy(error)), WRONG
+        )
     except Exception:  # a compiler's, whose callback an interrupt has ended
         if not take_due_interrupt():
             raise
@@ -96,13 +100,26 @@ def _parse(parser: CommandLine, typed: Sequence[str]) -> argparse.Namespace:
         ConfigError: the command has no place for one of the words.
     """
     arguments, strays = parser.parse_known_args(typed)
+    command = parser.commands[arguments.command]
+    _refuse_repeats(command, typed)
     if strays:
         from quadriga.team.scenarios import names
 
-        command = parser.commands[arguments.command]
         places = [takes(action) for action in command._actions if not action.option_strings]
         refuse_strays(arguments.command, strays, places, list_options(command), names())
     return arguments
+
+
+def _refuse_repeats(command: argparse.ArgumentParser, typed: Sequence[str]) -> None:
+    """Refuse an option that is given twice, of which only the last one would count."""
+    actions = {option: action for action in command._actions for option in action.option_strings}
+    seen = set[argparse.Action]()
+    for word in takewhile("--".__ne__, typed):
+        action = actions.get(word.partition("=")[0])
+        if action in seen:
+            raise ConfigError(word.partition("=")[0], "twice", "once, with all of its value")
+        if isinstance(action, argparse._StoreAction):
+            seen.add(action)
 
 
 @cache
@@ -146,6 +163,9 @@ def build_parser(*, everything: bool = False) -> CommandLine:
             add(add_command)
         groups.append((title, list(told.items())[before:]))
     top.commands = commands.choices
+    for command in top.commands.values():
+        for action in command._actions:
+            action.type = READ_AS.get(action.type, action.type)
     top.epilog = _format_groups(groups)
     return top
 

@@ -78,6 +78,10 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
         from quadriga.team.run_folder import make_run_dir
 
         path = make_run_dir(None) / RECORDING
+    elif path.is_dir():
+        raise ConfigError(
+            "--output", f"{path}, a folder", f"a new file, such as {path / RECORDING}"
+        )
     elif arguments.report and path.name != RECORDING:
         raise ConfigError("--output", str(path), f"DIR/{RECORDING}", "--report fills its folder")
     sha256 = arguments.predictor_sha256 or fitted_sha256(config, arguments.wait)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final, NamedTuple, Self
 
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.installed import PYTHON
 
 _STARTED: Final = "on the network"
 _START: Final = 60.0  # s
@@ -42,7 +42,7 @@ class SimulatedRobots:
 
     def __init__(self, config_file: Path, kind: str, folder: Path) -> None:
         self._log, self.truth = folder / "robots.log", folder / "truth.csv"
-        command = [sys.executable, "-m", "quadriga", "sim", "--as", kind]
+        command = [*PYTHON, "-m", "quadriga", "sim", "--as", kind]
         command += ["--config", str(config_file), "--truth", str(self.truth)]
         command += ["--parent", str(os.getpid())]
         with self._log.open("wb") as log:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -53,6 +53,7 @@ class MachineReadings:
         receive_buffer: that a socket may ask for, bytes.
         requirements: what this project asks for: `name>=1.0,<2`.
         installed: versions by name of what is asked for.
+        shadowing: files that are imported in the place of what is installed.
     """
 
     realtime: bool | None
@@ -67,6 +68,7 @@ class MachineReadings:
     receive_buffer: int | None
     requirements: tuple[str, ...] | None
     installed: Mapping[str, str]
+    shadowing: Sequence[str] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +120,7 @@ def check_machine(readings: MachineReadings, need: MachineNeed) -> tuple[Diagnos
         check_cache(readings.cache_writable, readings.cache),
         check_clock(readings.clock_error, need),
         check_buffer(readings.receive_buffer, need),
-        check_packages(readings.requirements, readings.installed),
+        check_packages(readings.requirements, readings.installed, readings.shadowing),
     )
 
 
@@ -197,8 +199,8 @@ def check_cache(writable: bool | None, folder: str) -> Diagnosis:
         return _unknown(CACHE, f"the cache folder {folder}")
     if writable:
         return Diagnosis(CACHE, GOOD, f"the cache folder {folder} can be written to")
-    text = f"the cache folder {folder} cannot be written to"
-    return Diagnosis(CACHE, BAD, text, "set XDG_CACHE_HOME to a folder of this user")
+    text = f"the cache folder {folder} cannot be written to, or its disk is full"
+    return Diagnosis(CACHE, BAD, text, "set XDG_CACHE_HOME to a folder of this user with room")
 
 
 def check_buffer(permitted: int | None, need: MachineNeed) -> Diagnosis:

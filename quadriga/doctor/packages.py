@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from quadriga.shared.bus.diagnosis import BAD, GOOD, UNKNOWN, Diagnosis
@@ -14,13 +14,21 @@ _BOUND: Final = re.compile(r"(>=|<|==)(\d+(?:\.\d+)*)")
 _RELEASE: Final = re.compile(r"\d+(?:\.\d+)*")
 
 
-def check_packages(requirements: tuple[str, ...] | None, installed: Mapping[str, str]) -> Diagnosis:
+def check_packages(
+    requirements: tuple[str, ...] | None,
+    installed: Mapping[str, str],
+    shadowing: Sequence[str] = (),
+) -> Diagnosis:
     """Versions that are installed against those that are asked for.
 
     Args:
         requirements: such as `name>=1.0,<2`; None: not known.
         installed: versions by name; what is not installed is not in it.
+        shadowing: files that are imported in the place of what is installed.
     """
+    if shadowing:
+        text = f"imported in the place of what is installed: {', '.join(shadowing)}"
+        return Diagnosis(PACKAGES, BAD, text, "rename it, or take its folder out of PYTHONPATH")
     if requirements is None:
         text = "what this project asks for is not known: it is not installed"
         return Diagnosis(PACKAGES, UNKNOWN, text)

@@ -14,7 +14,7 @@ from typing import Final, TypeVar
 
 from quadriga.doctor.machine import MachineReadings
 from quadriga.doctor.packages import split_requirement
-from quadriga.shared.runtime.installed import PROJECT
+from quadriga.shared.runtime.installed import PROJECT, shadowing_files
 from quadriga.shared.runtime.places import cache_dir
 from quadriga.shared.runtime.system_clock import system_clock_error_ns
 from quadriga.team.run_folder import RUNS
@@ -28,6 +28,7 @@ _FAIR: Final = Path("/sys/kernel/debug/sched/fair_server")
 _FAIR_DEFAULT: Final = 0.05  # s of each second
 _CGROUP: Final = Path("/sys/fs/cgroup")
 _UNLIMITED: Final = "max"
+_CACHE_BYTES: Final = 200_000_000  # of machine code, and of data and predictors of some teams
 
 
 def read_machine() -> MachineReadings:
@@ -43,11 +44,12 @@ def read_machine() -> MachineReadings:
         memory=_read(_free_memory),
         disk=_read(lambda: shutil.disk_usage(_existing(RUNS)).free),
         cache=str(cache_dir()),
-        cache_writable=_read(lambda: os.access(_existing(cache_dir()), os.W_OK | os.X_OK)),
+        cache_writable=_read(lambda: _has_room(_existing(cache_dir()))),
         clock_error=_read(lambda: 1e-9 * system_clock_error_ns()),
         receive_buffer=_read(lambda: int(_RECEIVE_BUFFER.read_text(encoding="ascii"))),
         requirements=requirements,
         installed={name: version for name, version in versions.items() if version},
+        shadowing=shadowing_files(),
     )
 
 
@@ -107,6 +109,11 @@ def _read_limit(name: str) -> str:
     """What limits this process's container; "" where it has none of its own."""
     file = _CGROUP / name
     return file.read_text(encoding="ascii").strip() if file.is_file() else ""
+
+
+def _has_room(folder: Path) -> bool:
+    """Whether what is kept between walks can be written there."""
+    return os.access(folder, os.W_OK | os.X_OK) and shutil.disk_usage(folder).free > _CACHE_BYTES
 
 
 def _existing(folder: Path) -> Path:

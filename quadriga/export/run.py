@@ -74,7 +74,7 @@ def run(path: Path, form: str, out: Path | None, console: Console) -> None:
     recording = Recording(path)
     write = _import_writer(form)
     out = out or path.with_name(_FORMATS[form].output.format(path.stem))
-    layout = _layout_file(form, out)
+    layout = _layout_file(form, out) if out.name else None
     for file in (out, layout):
         if file is not None and file.exists():
             raise ConfigError(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -17,6 +16,7 @@ from quadriga.faults import skewed
 from quadriga.faults.fault import OWN, Draw, FaultScene, SetStage, Stage, TeamFault, robot_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER, SIM
+from quadriga.shared.runtime.installed import PYTHON
 from quadriga.team.launch import QUADRIGA, ProcessSpec
 
 _STEPS_S: Final = (-3600.0, -1.0, 1.0, 3600.0)
@@ -50,7 +50,7 @@ def _skewed(draw_skew: Callable[[np.random.Generator], _Skew], whose: tuple[str,
         def wrap(row: ProcessSpec) -> ProcessSpec:
             if row.name != name:
                 return row
-            words = (sys.executable, "-m", skewed.__name__, str(file))
+            words = (*PYTHON, "-m", skewed.__name__, str(file))
             return replace(row, command=(*words, *row.command[len(QUADRIGA) - 1 :]))
 
         def strike(scene: FaultScene) -> None:

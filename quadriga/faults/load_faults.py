@@ -6,7 +6,6 @@ import os
 import resource
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -19,6 +18,7 @@ from quadriga.recordings.summary import RECORDING
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import RECORDER
 from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.installed import PYTHON
 from quadriga.team.run_folder import CONFIG
 
 _SLOW_S: Final = 2.0  # for which a process gets too little of the processor
@@ -53,7 +53,7 @@ class _Bystander:
     def __call__(self, scene: FaultScene) -> None:
         log, config = scene.folder / "logs" / f"{self._kind}.log", scene.folder / CONFIG
         with log.open("wb") as file:
-            command = [sys.executable, "-m", bystander.__name__, self._kind, str(config)]
+            command = [*PYTHON, "-m", bystander.__name__, self._kind, str(config)]
             self._process = subprocess.Popen(
                 [*command, str(os.getpid())], stdin=subprocess.DEVNULL, stdout=file, stderr=file
             )

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 from quadriga.pictures import software_frames
 from quadriga.pictures.frames import CLIP, SHEET
+from quadriga.shared.runtime.installed import PYTHON
 from quadriga.shared.runtime.opengl import environment_to_draw
 
 _TIMEOUT: Final = 120.0  # s
@@ -36,7 +36,7 @@ def render(run_dir: Path, say: Callable[[str], None] = print) -> tuple[Path, ...
 
 def _draw_offscreen(run_dir: Path, say: Callable[[str], None]) -> str:
     """Draw with MuJoCo; the reason why it did not work, or an empty text."""
-    command = [sys.executable, "-m", "quadriga.pictures.mujoco_frames", str(run_dir)]
+    command = [*PYTHON, "-m", "quadriga.pictures.mujoco_frames", str(run_dir)]
     try:
         done = subprocess.run(
             command,

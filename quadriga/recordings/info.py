@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from datetime import UTC, datetime
 
 from quadriga.recordings.metadata import read_counts, recorded_patterns, recorded_versions
 from quadriga.recordings.survey import Survey, type_of
@@ -12,6 +11,7 @@ from quadriga.shared.config.write import departures
 from quadriga.shared.recording.admission import describe_refused
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.recording.writer import END
+from quadriga.shared.runtime.clock import format_local
 from quadriga.tables import NOTHING, align_columns
 
 _EVENTS = 40  # as many are shown
@@ -38,8 +38,8 @@ def _about(s: Survey) -> Iterator[tuple[str, str]]:
         yield "damage", str(damage)
     if s.log_times is not None:
         first, last = s.log_times
-        start = datetime.fromtimestamp(first / 1e9, UTC).astimezone()
-        yield "recorded", f"{start:%Y-%m-%d %H:%M:%S %Z}, {(last - first) / 1e9:.2f} s wall time"
+        start = format_local("%Y-%m-%d %H:%M:%S %Z", first)
+        yield "recorded", f"{start}, {(last - first) / 1e9:.2f} s wall time"
     lost = sum(track.lost for track in s.tracks.values())
     yield "messages", f"{sum(t.count for t in s.tracks.values()):,}, {lost:,} lost"
     for text in describe_refused(read_counts(s.notes)):

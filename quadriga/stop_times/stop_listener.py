@@ -18,6 +18,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.members import OBSERVER
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import sleep
+from quadriga.shared.runtime.installed import PYTHON
 from quadriga.shared.runtime.scheduling import go_first
 from quadriga.shared.runtime.signals import die_with_parent, stop_on_signals
 from quadriga.shared.wire.topics import EVENT, STATUS
@@ -34,7 +35,7 @@ def stop_listener(config: Path, heard: Path) -> Iterator[None]:
         config: file with the configuration of the team.
         heard: file to write to, see `read_heard`.
     """
-    command = (sys.executable, "-m", __name__, str(config), str(heard), str(os.getpid()))
+    command = (*PYTHON, "-m", __name__, str(config), str(heard), str(os.getpid()))
     with heard.with_suffix(".log").open("wb") as log:
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
     try:

@@ -6,7 +6,6 @@ import os
 import pty
 import struct
 import subprocess
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Final
 from quadriga.drive.gamepad import STOP_BUTTON
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
+from quadriga.shared.runtime.installed import PYTHON
 from quadriga.stop_times.page_driver import PageDriver
 from quadriga.team.launch import QUADRIGA
 from quadriga.team.run_folder import CONFIG
@@ -144,7 +144,7 @@ def _driving(
     """`quadriga drive` within the block, once it has shown what it listens to."""
     command = (*QUADRIGA, "drive", *options, "--set", f"team.name={team}")
     if terminal is not None:
-        command = (sys.executable, "-c", _IN_TERMINAL, *command)
+        command = (*PYTHON, "-c", _IN_TERMINAL, *command)
     with path.open("wb") as log:
         process = subprocess.Popen(
             command,

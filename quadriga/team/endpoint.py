@@ -10,10 +10,11 @@ from dataclasses import replace
 from typing import Any, Final
 
 from quadriga.shared.bus.reach import OPEN, try_endpoint
-from quadriga.shared.config.sections import Config
+from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.errors import ConfigError
 
 _PORT: Final = 7447  # Zenoh's own
+_IPV6: Final = "tcp/[::1]"
 
 
 def with_free_endpoint(config: Config, given: Mapping[str, Any]) -> Config:
@@ -40,7 +41,10 @@ def with_free_endpoint(config: Config, given: Mapping[str, Any]) -> Config:
                 "bus.endpoint", f"{endpoint}, where something listens", expected, cause
             )
         return config
-    return replace(config, bus=replace(config.bus, endpoint=free_endpoint()))
+    endpoint, listen = free_endpoint(), config.bus.listen
+    if endpoint.startswith(_IPV6) and listen == BusConfig().listen:
+        listen = f"{_IPV6}:0"
+    return replace(config, bus=replace(config.bus, endpoint=endpoint, listen=listen))
 
 
 def free_endpoint() -> str:
@@ -48,21 +52,26 @@ def free_endpoint() -> str:
 
     It has a loopback address of its own (127.0.0.0/8, RFC 1122), where the system permits one:
     a port at 127.0.0.1 may be given to another process, even of the same team, before the sim
-    server listens there, which would end one walk in some thousands.
+    server listens there, which would end one walk in some thousands. Without IPv4 it is ::1.
+
+    Raises:
+        OSError: there is no loopback at all.
     """
     address = (f"127.{'.'.join(map(str, secrets.token_bytes(2)))}.2", _PORT)
-    with suppress(OSError):
-        return _free(address)
-    return _free(("127.0.0.1", 0))
+    for host, port in (address, ("127.0.0.1", 0)):
+        with suppress(OSError):
+            return _free(host, port)
+    return _free("::1", 0)
 
 
-def _free(address: tuple[str, int]) -> str:
+def _free(host: str, port: int) -> str:
     """The endpoint at an address whose port may be 0: any free one.
 
     Raises:
         OSError: it cannot be listened on.
     """
-    with socket.socket() as probe:
-        probe.bind(address)
-        host, port = probe.getsockname()
-        return f"tcp/{host}:{port}"
+    is_ipv6 = ":" in host
+    with socket.socket(socket.AF_INET6 if is_ipv6 else socket.AF_INET) as probe:
+        probe.bind((host, port))
+        port = probe.getsockname()[1]
+        return f"{_IPV6}:{port}" if is_ipv6 else f"tcp/{host}:{port}"

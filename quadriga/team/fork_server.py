@@ -20,7 +20,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final, NoReturn
 
-from quadriga.shared.runtime.installed import code_digest, package_versions
+from quadriga.shared.runtime.installed import PYTHON, code_digest, package_versions
 from quadriga.shared.runtime.signals import die_with_parent
 
 # What each command imports once it is called, by the command.
@@ -93,7 +93,7 @@ def command_line(line: int, commands: Collection[str]) -> tuple[str, ...]:
         Words of which the last one keeps room for a fork's command line.
     """
     words = (str(line), str(os.getpid()), ",".join(commands))
-    return (sys.executable, "-m", __name__, *words, " " * _ROOM)
+    return (*PYTHON, "-m", __name__, *words, " " * _ROOM)
 
 
 def main() -> NoReturn:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import sys
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import LAST, LEADS, OPERATOR, RECORDER, ROUTER, SIM, Member, has_lead
 from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.installed import PYTHON
 from quadriga.shared.runtime.scheduling import valid_priority
 from quadriga.team.fork_server import Fork
 from quadriga.team.forked import ForkedProcess, expect_forks, start_forked
@@ -27,7 +27,7 @@ _ONE_THREAD: Final = (
     "MKL_NUM_THREADS",
     "NUMBA_NUM_THREADS",
 )
-QUADRIGA: Final = (sys.executable, "-m", "quadriga")
+QUADRIGA: Final = (*PYTHON, "-m", "quadriga")
 _SEVERAL: Final = 2  # processes, from which on it pays to import once for all
 _LAST_WORDS: Final = 12  # lines of a failed process's log that are shown
 _LEAST_DISK: Final = 4096  # bytes, of a file's first block
@@ -292,7 +292,8 @@ def _is_quadriga(row: ProcessSpec) -> bool:
 
 
 def _environment() -> dict[str, str]:
-    return {**os.environ, **dict.fromkeys(_ONE_THREAD, "1")}
+    # Their logs are read as UTF-8, whatever the terminal has.
+    return {**os.environ, **dict.fromkeys(_ONE_THREAD, "1"), "PYTHONIOENCODING": "utf-8"}
 
 
 def _is_full(folder: Path) -> bool:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
 from quadriga.shared.errors import ConfigError, name_file_errors
 from quadriga.shared.recording.writer import RECORDING
-from quadriga.shared.runtime.clock import wall_ns
+from quadriga.shared.runtime.clock import format_local, wall_ns
 
 RUNS: Final = Path("runs")
 CONFIG: Final = "config.toml"  # the configuration in force, in a run folder
@@ -53,8 +52,7 @@ def check_own_config(given: Path | None, out: Path | None) -> None:
 
 def _make_dated_folder() -> Path:
     """`runs/<date>-<time>`, with a number where another walk began in the same second."""
-    now = datetime.fromtimestamp(1e-9 * wall_ns(), UTC).astimezone()
-    name, number = f"{now:%Y%m%d-%H%M%S}", 1
+    name, number = format_local("%Y%m%d-%H%M%S", wall_ns()), 1
     while True:
         run_dir = RUNS / (f"{name}-{number}" if number > 1 else name)
         try:

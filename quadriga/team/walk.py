@@ -14,8 +14,13 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import OPERATOR
 from quadriga.shared.planner_kinds import find_kind
+from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.scheduling import valid_priority
 from quadriga.shared.runtime.signals import stop_flag
+from quadriga.shared.wire.codes import FAULT_ENDS
+from quadriga.shared.wire.messages import Event
+from quadriga.sim_server.world.faults.injection import Injection
 from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.team.controller_program import check_controller
@@ -44,8 +49,11 @@ FELL: Final = 1
 INTERRUPTED: Final = 130
 
 
-def check_walk(config: Config) -> None:
+def check_walk(config: Config) -> list[Event]:
     """Refuse what cannot be walked, before anything is written or started.
+
+    Returns:
+        Disturbances that will not come: they would begin when the walk is over.
 
     Raises:
         ConfigError: there is no such plant or controller, its world cannot be built, the trace that
@@ -54,8 +62,11 @@ def check_walk(config: Config) -> None:
     valid_priority(config.runtime.priority)
     check_plant(config)
     check_controller(config)
-    build_scenario(config, build_loads(config))
+    events = build_scenario(config, build_loads(config)).events
+    faults = Injection(config, robot_names(config.team.robots)).events
     trace_of(config)
+    begin = (event for event in (*events, *faults) if event.code != FAULT_ENDS)
+    return [event for event in begin if event.tick >= 1000 * config.world.seconds]
 
 
 def walk(
@@ -82,14 +93,17 @@ def walk(
         QuadrigaError: anything a user can put right before the walk begins.
     """
     expect_launch(config)
-    check_walk(config)
+    for event in check_walk(config):
+        late = f"{event.kind} {event.robot} {event.detail} at {event.tick / 1000:g} s"
+        end = f"the walk ends at {config.world.seconds:g} s"
+        console.print(f"will not come: {late}, {end}", markup=False, highlight=False)
     run_dir = make_run_dir(out)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
     warm_up(config, console)
     predictor, sha256 = None, ""
     if find_kind(config.planner.kind).needs_predictor:
         predictor, sha256 = _take_predictor(config, run_dir, console)
-    (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
+    write_text(run_dir / CONFIG, to_toml(config))
     # By another name of this computer, so that the browser draws it in a process of its own: the
     # page to drive from must not be silent while the scene is drawn.
     url = "" if view is None else url_of(view, "localhost")

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
-from quadriga.shared.config.endpoints import check_exposure, is_tls
+from quadriga.shared.config.endpoints import check_exposure, check_port, is_tls
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError, ConfigError
 from quadriga.shared.members import LEADS, ROUTER
@@ -83,6 +83,7 @@ def router_settings(listen: str, bus: BusConfig, rules: Mapping[str, Any]) -> di
     Raises:
         ConfigError: the endpoint is open to others, or a certificate is missing.
     """
+    check_port("--listen", listen)
     check_exposure(replace(bus, mode="client"), "--listen", listen)
     secured = is_tls(listen)
     return {
@@ -133,7 +134,7 @@ def opening_error(settings: dict[str, Any], at: str, name: str, error: str) -> B
     elif NO_LINK in error:
         cause = "no router there (`quadriga router`), or a name that does not resolve"
     elif "assign" in error:
-        cause = "no interface of this machine has that address"
+        cause = "no interface of this machine has that address; without IPv4, give [::1]"
     else:
         cause = "a name that does not resolve, or not of the form tcp/HOST:PORT"
     where = "sim server" if name in LEADS else name

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
+from quadriga.shared.config.endpoints import check_port
 from quadriga.shared.config.friction import friction_of_robots
 from quadriga.shared.config.payload import carriers
 from quadriga.shared.config.sections import (
@@ -40,6 +41,7 @@ def check(config: Config) -> None:
         ConfigError: a rule is broken; the first one that is.
     """
     _check_team_name(config.team.name)
+    check_port("bus.endpoint", config.bus.endpoint)
     _check_gait(config.gait)
     _check_world(config.world, robot_names(config.team.robots))
     _check_motors(config.motors)

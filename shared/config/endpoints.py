@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from ipaddress import ip_address
 from typing import Final
 
@@ -9,6 +10,7 @@ from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import ConfigError
 
 TLS: Final = "tls"
+_ANY_PORT: Final = re.compile(r":0+(?=[?#]|$)")
 # Protocols of Zenoh that reach other machines; what it does not know it refuses itself.
 _NETWORK: Final = ("tcp", "udp", "quic", "quic_datagram", "ws", "vsock", "serial")
 
@@ -45,6 +47,17 @@ def is_loopback(endpoint: str) -> bool:
         return ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def check_port(name: str, endpoint: str) -> None:
+    """Refuse an endpoint where any free port would be taken, which the others would not find.
+
+    Raises:
+        ConfigError: it has port 0.
+    """
+    if _ANY_PORT.search(endpoint):
+        cause = "without bus.endpoint a walk finds a port that is free"
+        raise ConfigError(name, repr(endpoint), "a port of 1 … 65535", cause)
 
 
 def check_exposure(bus: BusConfig, name: str, endpoint: str) -> None:

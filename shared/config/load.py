@@ -159,7 +159,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         ConfigError: it cannot be read, or is no TOML.
     """
     with name_file_errors(ConfigError, path, "a readable TOML file"):
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # some editors begin with a mark
     try:
         return _parse_toml(str(path), text)
     except tomllib.TOMLDecodeError as error:

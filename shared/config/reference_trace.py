@@ -104,7 +104,7 @@ def _read_trace(path: Path | None, given: str, begin: float) -> Trace:
 
 def _read_text(path: Path) -> str:
     with name_file_errors(ConfigError, f"reference.trace {path}", _READABLE):
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # as spreadsheets write it
 
 
 def _split_rows(text: str) -> list[list[str]]:

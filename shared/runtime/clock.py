@@ -29,6 +29,11 @@ def wall_ns() -> int:
     return time.time_ns()
 
 
+def format_local(form: str, ns: int) -> str:
+    """A time of `wall_ns` in the user's time zone, whatever TZ says, in a form of `strftime`."""
+    return time.strftime(form, time.localtime(ns // 1_000_000_000))
+
+
 def sleep(seconds: float) -> None:
     """Sleep; a signal handler may run meanwhile."""
     time.sleep(max(seconds, 0.0))

@@ -25,6 +25,10 @@ from quadriga.shared.runtime.places import SOURCE, cache_dir
 _PACKAGES: Final = ("agents", "bridges", "plant", "shared", "sim_server")
 _MARK: Final = "\n@compiled"
 _KNOWN: Final = "sources.json"  # the digest of files that looked like those of today
+_TAG: Final = "CACHEDIR.TAG"  # see bford.info/cachedir: backups leave such folders out
+_OURS: Final = "Signature: 8a477f597d28d172789f06886806bc55\n# Machine code of quadriga.\n"
+REHEARSED: Final = "rehearsed"  # a file beside the machine code of all that an agent runs
+_BYTES: Final = 100_000_000  # that all machine code takes, at most
 
 
 def sources(root: Path) -> Sequence[Path]:
@@ -49,9 +53,9 @@ def is_switched_off() -> bool:
 
 @lru_cache(maxsize=1)
 def compiled_folder() -> Path | None:
-    """The folder of this code's machine code, made if need be; None: nothing can be written.
+    """The folder of this code's machine code, made if need be; None: nothing can be kept.
 
-    What older code has left is removed then.
+    What older code has left is removed then: folders that carry our mark, and no others.
     """
     given = os.environ.get("NUMBA_CACHE_DIR")
     bases = (
@@ -62,12 +66,22 @@ def compiled_folder() -> Path | None:
         folder = base / f"compiled-{digest}"
         with suppress(OSError):
             if not folder.exists():
-                for old in {*base.glob("compiled-*")} - {folder}:
-                    shutil.rmtree(old, ignore_errors=True)
-            folder.mkdir(parents=True, exist_ok=True)
-            if os.access(folder, os.W_OK):
+                for tag in [*base.glob(f"compiled-*/{_TAG}")]:
+                    _remove_if_ours(tag)
+                folder.mkdir(parents=True, exist_ok=True)
+            if not (folder / _TAG).exists():
+                write_text(folder / _TAG, _OURS)
+            room = (folder / REHEARSED).exists() or shutil.disk_usage(folder).free > _BYTES
+            if room and os.access(folder, os.W_OK):
                 return folder
     return None
+
+
+def _remove_if_ours(tag: Path) -> None:
+    """Remove the folder that a tag lies in, if it is one of machine code of this project."""
+    with suppress(OSError, UnicodeDecodeError):
+        if tag.read_text(encoding="ascii") == _OURS:
+            shutil.rmtree(tag.parent, ignore_errors=True)
 
 
 def _digest(bases: Sequence[Path]) -> str:

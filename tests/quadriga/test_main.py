@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-QUADRIGA = (sys.executable, "-m", "quadriga")
+from quadriga.team.launch import QUADRIGA
+
 # Each costs a process 0.1 to 0.5 s before it does anything; a team has six of them on two cores.
 HEAVY = ("matplotlib", "mujoco", "numba", "osqp", "pinocchio", "scipy")
 
@@ -69,6 +70,60 @@ def test_a_reader_that_has_left_is_no_error() -> None:
         process.stdout.close()
         assert process.stderr.read() == ""
     assert process.returncode == 0
+
+
+WORKS = (
+    "from quadriga.commands import parser; "
+    "parser.main = lambda: [print(k, flush=True) for k in range(3)] and 7; "
+    "from quadriga.__main__ import main; main()"
+)
+
+
+@pytest.mark.parametrize(("command", "status"), [("walk", 7), ("echo", 1)])
+def test_what_has_more_to_do_than_to_print_goes_on_without_a_reader(
+    command: str, status: int
+) -> None:
+    words = [sys.executable, "-c", WORKS, command]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        assert process.stdout
+        process.stdout.close()
+    assert process.returncode == status
+
+
+def test_a_terminal_may_lack_letters() -> None:
+    written = {}
+    for encoding in ("utf-8", "gbk", "iso-8859-1"):
+        variables = {**os.environ, "PYTHONIOENCODING": encoding}
+        done = subprocess.run(
+            [*QUADRIGA, "config", "--markdown"], env=variables, capture_output=True, check=False
+        )
+        assert (done.returncode, done.stderr) == (0, b"")
+        written[encoding] = done.stdout.decode(encoding)
+    assert {len(text) for text in written.values()} == {len(written["utf-8"])}
+    assert "≥" in written["utf-8"]
+    assert "?" in written["iso-8859-1"]
+
+
+@pytest.mark.parametrize(("module", "status"), [("numpy", 2), ("random", 2), ("pinocchio", 1)])
+def test_a_file_that_takes_a_modules_place_is_named(
+    tmp_path: Path, module: str, status: int
+) -> None:
+    foreign = tmp_path / f"{module}.py"
+    foreign.write_text("", encoding="utf-8")
+    (tmp_path / "mine.py").write_text("", encoding="utf-8")
+    done = subprocess.run(
+        [*QUADRIGA, "doctor", "--here"],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == status
+    assert [str(foreign) in text for text in (done.stderr, done.stdout)] == [
+        status == 2,
+        status == 1,
+    ]
+    assert "Traceback" not in done.stderr
 
 
 def test_a_mistake_in_the_command_line_has_its_status() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Generator, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -10,6 +11,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, Final
 
+import dask
 import distributed
 from distributed import Client, LocalCluster, WorkerPlugin
 
@@ -20,6 +22,7 @@ from quadriga.shared.errors import ConfigError, ProcessError
 from quadriga.shared.runtime.atomic import write_bytes
 from quadriga.shared.runtime.places import cache_dir
 from quadriga.shared.runtime.signals import interrupts_held
+from quadriga.workers import SAFE_PATH
 
 LOCAL: Final = "local"  # the address of a cluster that is made here and goes with the campaign
 _CONNECT: Final = 15.0  # s
@@ -108,9 +111,15 @@ def walk_on_worker(job: TrialJob) -> TrialOutcome:
 
 def _client(stack: ExitStack, jobs: int, address: str) -> Client:
     if address == LOCAL:
-        with interrupts_held():  # an interrupt is this process's to handle, not its workers'
+        # No worker may import from the working directory; the user's programs that it starts may.
+        safe = dask.config.set({f"distributed.nanny.pre-spawn-environ.{SAFE_PATH}": "1"})
+        with interrupts_held(), safe:  # an interrupt is this process's to handle
             cluster = LocalCluster(
-                n_workers=jobs, threads_per_worker=1, dashboard_address=None, silence_logs=50
+                n_workers=jobs,
+                threads_per_worker=1,
+                dashboard_address=None,
+                silence_logs=50,
+                env={SAFE_PATH: os.environ.get(SAFE_PATH, "")},
             )
         stack.callback(cluster.close)
         address = cluster.scheduler_address

@@ -6,7 +6,6 @@ import json
 import os
 import select
 import subprocess
-import sys
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Final, Self
 from quadriga.faults.network.layout import NetworkLayout
 from quadriga.faults.network.order import RadioOrder
 from quadriga.shared.errors import ProcessError, system_reason
+from quadriga.shared.runtime.installed import PYTHON
 from quadriga.shared.runtime.process_use import read_use
 from quadriga.team.launch import ProcessSpec
 
@@ -38,7 +38,7 @@ class EmulatedNetwork:
 
     def __init__(self, layout: NetworkLayout, seed: int, log: Path) -> None:
         self.layout, self._log = layout, log
-        command = [sys.executable, "-m", _MODULE, str(layout.number), str(seed), str(os.getpid())]
+        command = [*PYTHON, "-m", _MODULE, str(layout.number), str(seed), str(os.getpid())]
         command += [*layout.robots, *(["--wired"] if layout.wired else [])]
         command += ["--rto-min-ms", str(layout.rto_min_ms)]
         log.parent.mkdir(parents=True, exist_ok=True)

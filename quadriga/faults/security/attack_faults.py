@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -23,6 +22,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError, RecordingError
 from quadriga.shared.members import ROUTER
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.installed import PYTHON
 from quadriga.shared.security.audit_line import parse_refusals
 
 _LASTS_S: Final = 4.0  # world time that the attack takes on a busy computer
@@ -62,7 +62,7 @@ class _AttackStrike:
         self._scene = scene
         plan = self._private / "attack.json"
         plan.write_text(self._attack.to_json(), encoding="utf-8")
-        command = [sys.executable, "-m", "quadriga.faults.security.attacker", str(plan)]
+        command = [*PYTHON, "-m", "quadriga.faults.security.attacker", str(plan)]
         try:
             done = subprocess.run(
                 command, capture_output=True, text=True, timeout=_WAIT_S, check=False

@@ -76,7 +76,11 @@ def parse_faults(
     """
     if not text:
         return ()
-    return tuple(_parse(part.strip(), robots, components) for part in text.split(","))
+    found = tuple(_parse(part.strip(), robots, components) for part in text.split(","))
+    for fault in found:
+        if found.count(fault) > 1:
+            raise ConfigError(KEY, f"{fault.robot}/{fault.detail} twice", "each fault once")
+    return found
 
 
 def with_time(text: str, tick: int) -> str:

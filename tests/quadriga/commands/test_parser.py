@@ -97,6 +97,12 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
         (["router", "--listen", "pigeon/roof"], "bus.endpoint 'pigeon/roof' of router"),
         (["operate", "--endpoint", "pigeon/roof"], "bus.endpoint 'pigeon/roof'"),
         (["record", "-o", "/proc/run.mcap"], "/proc/run.mcap"),
+        (["record", "-o", "/"], "--output: got /, a folder, expected a new file"),
+        (["walk", "--endpoint", "tcp/127.0.0.1:0"], "bus.endpoint: got 'tcp/127.0.0.1:0'"),
+        (["router", "--listen", "tcp/[::1]:0"], "--listen: got 'tcp/[::1]:0', expected a port"),
+        (["walk", "--faults", "r1/imu stuck -4"], "world.faults: got start '-4' in"),
+        (["walk", "--faults", "r1/imu off 1,r1/imu off 1"], "world.faults: got r1/imu off twice"),
+        (["walk", "--seed", "1", "--vx", "0.1", "--seed=2"], "--seed: got twice, expected once"),
     ],
 )
 def test_mistakes(

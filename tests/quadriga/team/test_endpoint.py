@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import secrets
 import socket
 
@@ -30,6 +31,28 @@ def test_where_the_address_cannot_be_had_a_port_is(monkeypatch: pytest.MonkeyPat
         other.bind(("127.7.7.2", 7447))
         assert free_endpoint().startswith("tcp/127.0.0.1:")
     assert free_endpoint() == "tcp/127.7.7.2:7447"
+
+
+def test_without_ipv4_all_processes_take_the_loopback_of_ipv6(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bind = socket.socket.bind
+
+    def without_ipv4(self: socket.socket, address: tuple[str, int]) -> None:
+        if self.family == socket.AF_INET:
+            raise OSError(errno.EADDRNOTAVAIL, "Cannot assign requested address")
+        bind(self, address)
+
+    monkeypatch.setattr(socket.socket, "bind", without_ipv4)
+    try:
+        free_endpoint()
+    except OSError:
+        pytest.skip("this computer has no IPv6")
+    bus = with_free_endpoint(Config(), {}).bus
+    assert bus.endpoint.startswith("tcp/[::1]:")
+    with Bus.open(bus, "team", "sim") as sim, Bus.open(bus, "team", "r1") as r1:
+        r1.declare(HERE)
+        assert sim.wait_for(HERE, {"r1"}, WAIT, lambda: False)
 
 
 def test_no_team_walks_where_another_one_does() -> None:

@@ -17,6 +17,7 @@ from quadriga.team.endpoint import free_endpoint
 from quadriga.team.fork_server import Fork, ForkOrder
 from quadriga.team.forked import ForkedProcess, ForkServer, start_forked
 from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec
+from quadriga.workers import run_each
 
 WAIT = 20.0  # s
 
@@ -91,6 +92,20 @@ def test_a_wrong_command_has_its_own_status_and_says_why(tmp_path: Path) -> None
     (process,) = start(Fork(words, str(log)))
     assert process.wait(WAIT) == 2
     assert "--robot: got 'r7'" in log.read_text()
+
+
+def test_no_process_imports_from_the_working_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("json", "numpy", "pickle", "random", "zenoh"):
+        (tmp_path / f"{name}.py").write_text("raise ImportError('of the working directory')")
+    monkeypatch.chdir(tmp_path)
+    alone = subprocess.run([*QUADRIGA, "version"], capture_output=True, check=False)
+    assert (alone.returncode, alone.stderr) == (0, b"")
+    log = tmp_path / "version.log"
+    (process,) = start(Fork((*QUADRIGA, "version"), str(log)))
+    assert (process.wait(WAIT), log.read_bytes()) == (0, alone.stdout)
+    assert dict(run_each(os.getenv, ["PYTHONSAFEPATH"], 1)) == {"PYTHONSAFEPATH": None}
 
 
 def test_nobody_begins_whose_start_is_not_known(forks: list[Fork]) -> None:

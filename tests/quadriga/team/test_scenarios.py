@@ -21,6 +21,7 @@ from quadriga.shared.wire.codes import FAULT_BEGINS
 from quadriga.sim_server.world.world import World
 from quadriga.team.operator import reference_at
 from quadriga.team.scenarios import description, label, names, path
+from quadriga.team.walk import check_walk
 from tests.quadriga.conftest import WriteRun, run_config
 from tests.sim_server.standing import SILENT
 
@@ -33,6 +34,12 @@ PROMISED = {
     "edge-push": 3, "edge-motor": 3, "distribution-pushed": 3, "distribution-loaded": 3,
     "distribution-slipping": 3, "faulty-imu": 3,
 }  # fmt: skip
+
+
+def test_what_would_begin_after_the_end_of_a_walk_is_told() -> None:
+    world = {"seconds": 0.5, "push": "r1:50:90:99:0.2", "faults": "r2/imu off 0.1 5"}
+    late = check_walk(build({"world": world}))
+    assert [(event.kind, event.robot, event.tick) for event in late] == [("push", "r1", 99_000)]
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:

@@ -41,6 +41,12 @@ def test_file_then_overrides(tmp_path: Path) -> None:
     assert type(config.world.seconds) is float
 
 
+def test_a_mark_of_the_byte_order_is_no_key(tmp_path: Path) -> None:
+    path = tmp_path / "team.toml"
+    path.write_text("[team]\nrobots = 5\n", encoding="utf-8-sig")
+    assert load(path).team.robots == 5
+
+
 def test_what_is_written_loads_as_the_same(tmp_path: Path) -> None:
     config = load(None, {"team.robots": 4, "world.push": "r1:80:90:5:0.2", "planner.Q": [1] * 6})
     again = load(write(tmp_path, to_toml(config)))

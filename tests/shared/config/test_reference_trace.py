@@ -32,7 +32,7 @@ def traced(path: Path | str, **keys: float) -> Trace:
 @pytest.fixture
 def good(tmp_path: Path) -> Path:
     path = tmp_path / "trace.csv"
-    path.write_text(GOOD, encoding="utf-8")
+    path.write_text(GOOD.partition("\n")[2], encoding="utf-8-sig")  # as spreadsheets write it
     return path
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 
 import pytest
 
+from quadriga.shared.errors import ConfigError, name_file_errors
 from quadriga.shared.runtime.atomic import atomic_write, write_text
 
 
@@ -32,6 +35,21 @@ def test_what_fails_leaves_all_as_it_was(tmp_path: Path) -> None:
         fail()
     assert path.read_text(encoding="utf-8") == "± old"
     assert [*tmp_path.iterdir()] == [path]
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS])
+def test_where_nothing_can_be_written_the_file_is_named_and_what_helps(
+    tmp_path: Path, number: int
+) -> None:
+    path = tmp_path / "notes.txt"
+    reason = os.strerror(number)
+    with pytest.raises(OSError, match=reason) as caught, atomic_write(path) as partial:
+        raise OSError(number, reason, str(partial) if number == errno.EROFS else None)
+    assert caught.value.filename == str(path)
+    with pytest.raises(ConfigError) as told, name_file_errors(ConfigError, path, "room"):
+        raise caught.value
+    assert "XDG_CACHE_HOME" in told.value.cause
+    assert ("free some room" in told.value.cause) == (number == errno.ENOSPC)
 
 
 def test_nothing_written_is_nothing_replaced(tmp_path: Path) -> None:

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
-from quadriga.shared.runtime.clock import Rate, monotonic, sleep
+from quadriga.shared.runtime.clock import Rate, format_local, monotonic, sleep
 from tests.manual_clock import ManualClock
 
 
 def rate(clock: ManualClock) -> Rate:
     return Rate(0.01, clock.monotonic, clock.sleep)
+
+
+def test_a_time_zone_that_there_is_not_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TZ", "UTC+25")
+    time.tzset()
+    try:
+        assert format_local("%Y%m%d", 10**18) == "20010908"
+    finally:
+        monkeypatch.undo()
+        time.tzset()
 
 
 def test_a_punctual_loop_keeps_its_schedule() -> None:

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -90,12 +91,38 @@ def test_what_is_called_and_what_it_counts_with_is_compiled_anew(package: Path) 
     assert len(kept) == 1, "no heap of what is of no use any more"
 
 
+def test_what_is_empty_or_damaged_is_compiled_anew(package: Path) -> None:
+    assert run(package) == (2.5, 0)
+    kept = package / "quadriga" / "shared" / "__pycache__"
+    for pattern, length, hits in (("*.nbc", -9, 0), ("*.nbi", 0, 0), ("none", 0, 1)):
+        for file in kept.rglob(pattern):
+            code = file.read_bytes()
+            file.write_bytes(code[:length] and code[:length] + bytes(-length))
+        assert run(package) == (2.5, hits), pattern
+
+
+def test_on_a_full_disk_only_what_is_complete_is_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(jit_cache.shutil, "disk_usage", lambda _: SimpleNamespace(free=4096))
+    assert jit_cache.compiled_folder.__wrapped__() is None
+    (folder,) = tmp_path.glob("compiled-*")
+    (folder / jit_cache.REHEARSED).touch()
+    assert jit_cache.compiled_folder.__wrapped__() == folder
+
+
 def test_so_it_is_in_a_folder_that_the_user_names(package: Path, tmp_path: Path) -> None:
     there = str(tmp_path / "there")
+    mine = tmp_path / "there" / "compiled-mydata" / "precious"
+    mine.parent.mkdir(parents=True)
+    mine.touch()
     assert run(package, NUMBA_CACHE_DIR=there) == (2.5, 0)
     assert run(package, NUMBA_CACHE_DIR=there) == (2.5, 1)
     edit(package / "quadriga" / "agents" / "called.py", "2.0", "3.0")
     assert run(package, NUMBA_CACHE_DIR=there) == (3.5, 0)
+    assert mine.exists()
+    assert len([*mine.parents[1].glob("compiled-*")]) == 2, "but older machine code goes"
     assert not list((package / "quadriga" / "shared" / "__pycache__").glob("compiled-*"))
 
 
