@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final, TypeAlias
 
-from quadriga.certs.secured import secure, utc_now
+from quadriga.certs.secured import secure
 from quadriga.faults.aftermath import read_log
 from quadriga.faults.fault import Draw, FaultScene, SetStage, Stage, TeamFault
 from quadriga.faults.security import attacks
@@ -23,6 +23,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError, RecordingError
 from quadriga.shared.members import ROUTER
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.clock import utc_now
 from quadriga.shared.security.audit_line import parse_refusals
 
 _LASTS_S: Final = 4.0  # world time that the attack takes on a busy computer
