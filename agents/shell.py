@@ -160,7 +160,8 @@ class AgentShell(Generic[S]):
                 STATE.key(self._config.team.name, self._agent.robot),
                 f"{count} states within {now - since:.0f} s whose ticks do not go on",
                 f"ticks that rise from {tick} on",
-                "has the world's clock been set, or does someone else send states?",
+                "has the world's clock been set, or does someone else send states?"
+                f"{self._bus.standstill.note}",
             )
 
     def _receive(self, timeout: float) -> bool:

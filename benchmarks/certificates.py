@@ -19,7 +19,7 @@ from typing import Any, Final
 from rich.console import Console
 
 from benchmarks.realtime import late_commands
-from quadriga.certs.secured import secure, utc_now
+from quadriga.certs.secured import secure
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.recordings.summary import summarise
 from quadriga.shared.config.load import load
@@ -28,7 +28,7 @@ from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.members import ROUTER
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.runtime.clock import monotonic, utc_now
 from quadriga.shared.runtime.process_use import read_use
 from quadriga.shared.runtime.signals import interrupt_on_sigterm
 from quadriga.tables import Table, print_tables

@@ -42,7 +42,8 @@ def _note_operator(server: PlantServer, present: Collection[str]) -> None:
         return
     server.operator_gone = gone
     if gone:
-        server.announce(codes.OPERATOR_GONE, "", "operator gone: no reference counts any more")
+        gone_so = f"operator gone: no reference counts any more{server.bus.standstill.note}"
+        server.announce(codes.OPERATOR_GONE, "", gone_so)
     else:
         server.announce(codes.OPERATOR_BACK, "", "the operator is there again")
 

@@ -35,9 +35,11 @@ def _commands(server: PlantServer, stopped: Callable[[], bool]) -> dict[str, Com
     tick, box, bus = server.plant.tick, server.commands, server.bus
     waiting = set(server.plant.names) - server.silent
     alone = not waiting
-    deadline = monotonic() + (_ALONE if alone else server.config.world.command_timeout)
+    patience = _ALONE if alone else server.config.world.command_timeout
+    still = bus.standstill
+    deadline = monotonic() + patience - still.total  # the robots are not to blame for that
     while (waiting or alone) and not stopped() and server.time.end is None:
-        left = deadline - monotonic()
+        left = deadline + still.total - monotonic()
         if left <= 0.0:
             silence = f"silent for {server.config.world.command_timeout:g} s"
             _give_up(server, waiting, codes.SILENT, silence)

@@ -171,8 +171,9 @@ class PlantServer:
 
     def explain_silence(self, robot: str, why: str) -> str:
         """Why a robot is given up, and what was wrong with its latest command if something was."""
-        refused = self.commands.why_refused(robot)
-        return f"{why}, its last command was refused ({refused})" if refused else why
+        if refused := self.commands.why_refused(robot):
+            why += f", its last command was refused ({refused})"
+        return why + self.bus.standstill.note
 
     def publish_status(self, status: Status) -> None:
         """Publish the plant's report on itself."""

@@ -108,7 +108,10 @@ class TeamPace(ABC):
         """Why the walk must end: a plant on which this one depends is silent."""
         silent = self.clock.silent(monotonic_ns())
         return (
-            plant_gone(silent, f"silent for {self._config.bus.clock_timeout:g} s")
+            plant_gone(
+                silent,
+                f"silent for {self._config.bus.clock_timeout:g} s{self._bus.standstill.note}",
+            )
             if silent
             else None
         )

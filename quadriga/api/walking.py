@@ -70,7 +70,7 @@ def walk(
         cause = "a Run is read from its recording"
         raise ConfigError("recorder.enabled", "false", "true", cause)
     check_walk(in_force)
-    folder = make_run_dir(None if out is None else Path(out))
+    folder = make_run_dir(None) if out is None else Path(out)
     with blas_threads_kept():
         status = walk_team(in_force, folder, report=wanted, console=quiet_console())
     if status == INTERRUPTED:

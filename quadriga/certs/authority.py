@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from ipaddress import ip_address
@@ -18,10 +19,14 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from quadriga.certs.certificate import UNREADABLE, load_certificate
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.security.certificate import UNREADABLE, describe_pem_error, load_certificate
 
 _YEARS: Final = timedelta(days=3650)  # of the authority itself
+# RFC 1123, and `_` as container networks have it; digits alone are an address with a mistake.
+_HOST_NAME: Final = re.compile(
+    r"(?=.{1,253}$)(?![0-9.]+$)((?!-)[A-Za-z0-9_-]{1,63}(?<!-)\.)*(?!-)[A-Za-z0-9_-]{1,63}(?<!-)"
+)
 _SKEW: Final = timedelta(hours=1)  # that a clock may be behind when a certificate is new
 
 
@@ -57,10 +62,12 @@ class Authority:
         """
         self.pair = pair
         try:
-            self._certificate = load_certificate(pair.certificate)
-            key = load_pem_private_key(pair.key, password=None)
+            text = pair.certificate
+            self._certificate = load_certificate(text)
+            text = pair.key
+            key = load_pem_private_key(text, password=None)
         except UNREADABLE as error:
-            raise _unreadable("authority of the team", error) from None
+            raise _unreadable("authority of the team", describe_pem_error(text, error)) from None
         if not isinstance(key, ec.EllipticCurvePrivateKey):
             raise _unreadable("key of the team's authority", type(key).__name__)
         self._key = key
@@ -143,10 +150,9 @@ def _host(text: str) -> x509.GeneralName:
         return x509.IPAddress(ip_address(text))
     except ValueError:
         pass
-    try:
-        return x509.DNSName(text)
-    except ValueError as error:
-        raise ConfigError("--router", repr(text), "a host name or an address", str(error)) from None
+    if not _HOST_NAME.fullmatch(text):
+        raise ConfigError("--router", repr(text[:80]), "a host name or an address")
+    return x509.DNSName(text)
 
 
 def _pair(certificate: x509.Certificate, key: ec.EllipticCurvePrivateKey) -> Pair:

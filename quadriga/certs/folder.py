@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
+from fcntl import LOCK_EX, flock
 from pathlib import Path
 from typing import Final
 
 from quadriga.certs.authority import Authority, Pair, Subject
-from quadriga.certs.certificate import Certificate, read_certificate
 from quadriga.shared.errors import ConfigError, did_you_mean, name_file_errors
 from quadriga.shared.members import ROUTER
 from quadriga.shared.runtime.atomic import atomic_write, write_text
+from quadriga.shared.security.certificate import Certificate, is_signed, read_certificate
 from quadriga.shared.security.roll import (
     MOST_VALID,
     REVOKED,
@@ -26,6 +28,7 @@ from quadriga.shared.security.tls import AUTHORITY, TlsFiles, identity_folder
 
 _AUTHORITY_KEY: Final = "authority.key"
 _ISSUED: Final = "issued.json"  # by identity how many certificates it was given
+_LOCK: Final = ".lock"  # held by who changes the folder
 _PRIVATE: Final = 0o600
 _OWN: Final = 0o700
 # Beside the hosts that are given: a router's own machine always reaches it.
@@ -40,11 +43,22 @@ class Standing:
         identity: who.
         certificate: the one in the folder.
         revoked: whether the router refuses it, once it has heard of it.
+        signed: whether the authority beside it has signed it.
     """
 
     identity: str
     certificate: Certificate
     revoked: bool
+    signed: bool
+
+    def state(self, now: datetime) -> str:
+        """In words whether its process can use it."""
+        owner = split_common_name(self.certificate.name)[0]
+        if owner != self.identity:
+            return f"somebody else's ({owner})"
+        if not self.signed:
+            return "another authority's"
+        return "revoked" if self.revoked else self.certificate.state(now)
 
 
 class CertificateFolder:
@@ -66,16 +80,17 @@ class CertificateFolder:
             OSError: it cannot be written.
         """
         self.path.mkdir(mode=_OWN, parents=True, exist_ok=True)
-        if (self.path / _AUTHORITY_KEY).exists():
-            authority = self._authority()
-        else:
-            authority = Authority.create(team, now)
-            _write_private(self.path / _AUTHORITY_KEY, authority.pair.key)
-            (self.path / AUTHORITY).write_bytes(authority.pair.certificate)
-        without = [name for name in self._identities if not self._files(name).certificate.exists()]
-        for name in without:
-            self._issue(authority, name, hosts if name == ROUTER else (), now, days)
-        self._write_numbers(self.revoked_file, self._numbers(self.revoked_file))
+        with self._alone():
+            if (self.path / _AUTHORITY_KEY).exists():
+                authority = self._authority()
+            else:
+                authority = Authority.create(team, now)
+                _write_private(self.path / _AUTHORITY_KEY, authority.pair.key)
+                (self.path / AUTHORITY).write_bytes(authority.pair.certificate)
+            without = [n for n in self._identities if not self._files(n).certificate.exists()]
+            for name in without:
+                self._issue(authority, name, hosts if name == ROUTER else (), now, days)
+            self._write_numbers(self.revoked_file, self._numbers(self.revoked_file))
         return without
 
     def renew(
@@ -92,9 +107,10 @@ class CertificateFolder:
         """
         chosen, made = self._check(names) or self._identities, []
         authority = self._authority()
-        for name in chosen:
-            listens = hosts or self._hosts(name) if name == ROUTER else ()
-            made.append(self._issue(authority, name, listens, now, days))
+        with self._alone():
+            for name in chosen:
+                listens = hosts or self._hosts(name) if name == ROUTER else ()
+                made.append(self._issue(authority, name, listens, now, days))
         return made
 
     def revoke(self, names: Iterable[str]) -> list[str]:
@@ -107,16 +123,17 @@ class CertificateFolder:
             ConfigError: there is no such identity, or it is the router's, which nobody asks.
             OSError: the folder cannot be written.
         """
-        issued, revoked = self._numbers(self._issued_file), self._numbers(self.revoked_file)
-        gone = []
-        for name in self._check(names):
-            if name == ROUTER:
-                cause = "`quadriga certs make` in an empty folder replaces everything"
-                raise ConfigError("revoke", repr(name), "who connects to the router", cause)
-            before, last = revoked.get(name, 0), issued.get(name, 0)
-            gone += [common_name(name, k) for k in range(before + 1, last + 1)]
-            revoked[name] = last
-        self._write_numbers(self.revoked_file, revoked)
+        gone, chosen = [], self._check(names)
+        if ROUTER in chosen:
+            cause = "`quadriga certs make` in an empty folder replaces everything"
+            raise ConfigError("revoke", repr(ROUTER), "who connects to the router", cause)
+        with self._alone():
+            issued, revoked = self._numbers(self._issued_file), self._numbers(self.revoked_file)
+            for name in chosen:
+                before, last = revoked.get(name, 0), issued.get(name, 0)
+                gone += [common_name(name, k) for k in range(before + 1, last + 1)]
+                revoked[name] = last
+            self._write_numbers(self.revoked_file, revoked)
         return gone
 
     def standings(self) -> list[Standing]:
@@ -132,8 +149,18 @@ class CertificateFolder:
             if path.exists():
                 held = read_certificate(path)
                 number = split_common_name(held.name)[1]
-                found.append(Standing(name, held, number <= revoked.get(name, 0)))
+                signed = is_signed(path, self._files(name).authority)
+                found.append(Standing(name, held, number <= revoked.get(name, 0), signed))
         return found
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Within the block no other process changes the folder: no number is given twice."""
+        with name_file_errors(ConfigError, self.path, "the certificates of a team"):
+            lock = (self.path / _LOCK).open("a", encoding="utf-8")
+        with lock:
+            flock(lock, LOCK_EX)
+            yield
 
     @property
     def _issued_file(self) -> Path:

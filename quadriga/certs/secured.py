@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import Final
 
 from quadriga.certs.folder import CertificateFolder
 from quadriga.shared.config.endpoints import host_and_port
 from quadriga.shared.config.sections import Config
-from quadriga.shared.runtime.clock import wall_ns
 from quadriga.shared.security.roll import team_roll
 
 _DAYS: Final = 1.0  # that these certificates are valid
@@ -29,11 +28,6 @@ def secure(config: Config, folder: Path, now: datetime) -> Config:
     secured = replace(config, bus=bus)
     certificates_of(secured).make(config.team.name, [host_and_port(endpoint)[0]], now, _DAYS)
     return secured
-
-
-def utc_now() -> datetime:
-    """The time by which certificates are made and judged here."""
-    return datetime.fromtimestamp(1e-9 * wall_ns(), UTC)
 
 
 def certificates_of(config: Config) -> CertificateFolder:

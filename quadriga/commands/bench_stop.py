@@ -33,7 +33,7 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     from quadriga.stop_times.figures import build_stop_table, sum_up
     from quadriga.stop_times.ways import WAYS
     from quadriga.tables import print_tables
-    from quadriga.team.run_folder import check_own_config, make_run_dir
+    from quadriga.team.run_folder import make_run_dir
 
     ways = arguments.ways or [*WAYS]
     for way in ways:
@@ -45,7 +45,6 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
         raise ConfigError("team.plant", repr(config.team.plant), "one simulated world")
     if "mode" not in given.get("world", {}):
         config = replace(config, world=replace(config.world, mode="realtime"))
-    check_own_config(arguments.config, arguments.out)
     console = Console()
     folder = make_run_dir(arguments.out)
     rows = time_stops(config, ways, arguments.tries, folder, console)

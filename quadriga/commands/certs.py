@@ -43,7 +43,8 @@ def add(add_command: AddCommand) -> None:
 
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Do one of the four in the folder `bus.certificates`."""
-    from quadriga.certs.secured import certificates_of, utc_now
+    from quadriga.certs.secured import certificates_of
+    from quadriga.shared.runtime.clock import utc_now
 
     action, names = arguments.action, arguments.names
     if not 0.0 < arguments.days <= _LONGEST:
@@ -80,7 +81,6 @@ def _show(folder: CertificateFolder, now: datetime) -> None:
         raise ConfigError(str(folder.path), "no certificate", "the certificates of a team", cause)
     for standing in standings:
         held = standing.certificate
-        days = held.days_left(now)
-        state = "revoked" if standing.revoked else "valid" if days > 0.0 else "expired"
-        rows.append((standing.identity, held.name, f"{days:.0f}", state))
+        days = f"{held.days_left(now):.0f}"
+        rows.append((standing.identity, held.name, days, standing.state(now)))
     print("\n".join(align_columns(rows, right=(2,), indent="")))

@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     from quadriga.desk.campaign import has_failed, named_faults, run_campaign
     from quadriga.desk.tables import build_fault_table, build_walk_table
     from quadriga.tables import print_tables
-    from quadriga.team.run_folder import check_own_config, make_run_dir
+    from quadriga.team.run_folder import make_run_dir
 
     if config.team.plant != BRIDGED:
         cause = "deploy/desk.toml is a configuration for this"
@@ -42,7 +42,6 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     if arguments.tries < 1:
         raise ConfigError("--tries", str(arguments.tries), "at least 1")
     faults = named_faults(arguments.fault)
-    check_own_config(arguments.config, arguments.out)
     folder = make_run_dir(arguments.out)
     first = config.world.seed
     console = Console()

@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     from quadriga.faults.table import build_team_fault_tables
     from quadriga.shared.errors import name_file_errors
     from quadriga.tables import print_tables
-    from quadriga.team.run_folder import check_own_config, make_run_dir
+    from quadriga.team.run_folder import make_run_dir
 
     if arguments.list:
         print_tables(build_meaning_tables())
@@ -79,7 +79,6 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     if "seconds" not in given.get("world", {}):  # then a walk lasts no longer than its fault needs
         config = replace(config, world=replace(config.world, seconds=_SHORTEST_S))
     faults = select_faults(names, config)
-    check_own_config(arguments.config, arguments.out)
     folder = make_run_dir(arguments.out)
     seeds = range(config.world.seed, config.world.seed + arguments.tries)
     console = Console()

@@ -65,6 +65,9 @@ def add(add_command: AddCommand) -> None:
 def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     """Record until the walk is over or a signal comes, then show its report if asked to.
 
+    Returns:
+        1 if messages of the team were lost, or as `quadriga report` does.
+
     Raises:
         ProcessError: who drives time, or the link to the router, vanished while the team walked.
     """
@@ -99,7 +102,8 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
             print(printable(_format_files(files)), flush=True)
             if files.error is not None:
                 raise files.error
-            return 0
+            # Who has started the team reads it in the recording, and still makes its report.
+            return int(bool(files.lost) and not arguments.parent)
     arguments.run, arguments.html = path.parent, None
     return report.run(arguments, config, given)
 

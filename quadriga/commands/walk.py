@@ -57,11 +57,9 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     from rich.console import Console
 
     from quadriga.team.endpoint import with_free_endpoint
-    from quadriga.team.run_folder import check_own_config
     from quadriga.team.walk import walk
     from quadriga.view.port import choose_port, is_at_display
 
-    check_own_config(arguments.config, arguments.out)
     config = with_free_endpoint(config, given)
     if arguments.drive:
         config = _driven(config, given)

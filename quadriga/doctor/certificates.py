@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Final
 
-from quadriga.certs.certificate import Certificate
 from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, Diagnosis
+from quadriga.shared.security.certificate import EXPIRED, NOT_YET_VALID, Certificate
 from quadriga.shared.security.roll import split_common_name
 
 CERTIFICATE: Final = "certificate"
+CERTIFICATE_EARLY: Final = "certificate-not-yet-valid"
 CERTIFICATE_EXPIRED: Final = "certificate-expired"
 CERTIFICATE_EXPIRING: Final = "certificate-expiring"
 CERTIFICATE_UNTRUSTED: Final = "certificate-untrusted"
@@ -76,13 +77,20 @@ def _check(held: HeldCertificate, revoked: dict[str, int], now: datetime) -> Ite
         return
     identity, number = split_common_name(certificate.name)
     days = certificate.days_left(now)
+    if identity != name:
+        text = f"the folder {name} has the certificate {certificate.name}"
+        yield Diagnosis(CERTIFICATE_UNTRUSTED, BAD, text, f"copy the folder {name} again")
     if not held.signed:
         text = f"{certificate.name} is not signed by the authority whose certificate is beside it"
         cause = "files of two teams, or of before `quadriga certs make` began anew: copy the folder"
         yield Diagnosis(CERTIFICATE_UNTRUSTED, BAD, text, cause)
     if 0 < number <= revoked.get(identity, 0):
         yield Diagnosis(CERTIFICATE_REVOKED, BAD, f"{certificate.name} is revoked", again)
-    if days <= 0.0:
+    state = certificate.state(now)
+    if state == NOT_YET_VALID:
+        text = f"{certificate.name} is not valid before {certificate.begins:%F %T} UTC"
+        yield Diagnosis(CERTIFICATE_EARLY, BAD, text, "is the clock of this computer right?")
+    elif state == EXPIRED:
         text = f"{certificate.name} expired {-days:.1f} days ago"
         yield Diagnosis(CERTIFICATE_EXPIRED, BAD, text, again)
     elif days < _SOON:

@@ -7,8 +7,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-from quadriga.certs.certificate import is_signed, read_certificate
-from quadriga.certs.secured import utc_now
 from quadriga.doctor.certificates import HeldCertificate, check_certificates
 from quadriga.shared.bus.diagnosis import BAD, GOOD, Diagnosis
 from quadriga.shared.bus.distrust import EXPIRED, NOT_TRUSTED
@@ -16,7 +14,9 @@ from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, system_reason
 from quadriga.shared.members import ROUTER
+from quadriga.shared.runtime.clock import utc_now
 from quadriga.shared.security import handshake
+from quadriga.shared.security.certificate import is_signed, read_certificate
 from quadriga.shared.security.roll import REVOKED, read_numbers, team_roll
 from quadriga.shared.security.tls import TlsFiles, identity_folder, tls_files
 
@@ -64,6 +64,8 @@ def _judge(found: handshake.Handshake) -> tuple[str, str] | None:
         return TRUSTED, "its certificate here and the router trust each other"
     if found.outcome == handshake.EXPIRED:
         return EXPIRED, f"it does not trust the router: {found.detail}"
+    if found.outcome == handshake.NOT_YET_VALID:
+        return NOT_TRUSTED, f"a certificate is not yet valid: {found.detail}"
     if found.outcome == handshake.UNTRUSTED:
         return NOT_TRUSTED, f"it does not trust the router: {found.detail}"
     if found.outcome == handshake.REFUSED:

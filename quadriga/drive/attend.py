@@ -16,6 +16,9 @@ from quadriga.shared.errors import MessageError
 
 _NEWS: Final = 0.1  # s, between two of what drivers are told
 _LOOK: Final = 0.005  # s, between two looks at whether all have stopped
+# s, between two words of one driver, and of all of them together: whatever drivers say meanwhile
+# waits in their own connections, so that a stop, which has another, finds this thread free.
+_BETWEEN, _BETWEEN_ALL = 0.005, 0.001
 
 Send = Callable[[str], Awaitable[None]]
 
@@ -34,6 +37,7 @@ class Attendant:
         self._controls = controls
         self.url = ""
         self._counts: Counter[str] = Counter()
+        self._due = 0.0  # when the next word of anybody is heard
 
     async def attend(
         self, kind: str, texts: AsyncIterable[str | bytes], send: Send, *, news: bool = False
@@ -58,10 +62,17 @@ class Attendant:
                 else:
                     self._controls.hear(driver, said)
                     await self._answer(driver, said, send)
+                await self._pause()
         finally:
             self._controls.leave(driver)
             if telling is not None:
                 telling.cancel()
+
+    async def _pause(self) -> None:
+        """Wait until it is a driver's turn to say another word."""
+        now = asyncio.get_running_loop().time()
+        self._due = max(self._due, now) + _BETWEEN_ALL
+        await asyncio.sleep(max(_BETWEEN, self._due - now))
 
     async def _answer(self, driver: str, said: DriverWord, send: Send) -> None:
         if said.kind == NEWS:

@@ -97,9 +97,11 @@ class DriveServer:
             writer.write(f"{text}\n".encode())
             await writer.drain()
 
-        with suppress(ConnectionError, ValueError):  # a line that is too long
-            await self._attendant.attend("program", _lines(reader), send)
-        writer.close()
+        try:
+            with suppress(ConnectionError, ValueError):  # a line that is too long
+                await self._attendant.attend("program", _lines(reader), send)
+        finally:
+            writer.close()
 
     def __enter__(self) -> Self:
         return self

@@ -29,12 +29,12 @@ from quadriga.recordings.traces import (
 )
 from quadriga.recordings.truth import distance
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.writer import END, RECORDING
+from quadriga.shared.recording.writer import END, LOST, RECORDING
 from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.shared.runtime.histogram import QUANTILES
 from quadriga.shared.wire.codes import FALL, code_of
 from quadriga.shared.wire.messages import Status
-from quadriga.shared.wire.topics import STATE
+from quadriga.shared.wire.topics import COMMAND, STATE
 
 __all__ = ["RECORDING", "SUMMARY", "kept_summary", "steady_from", "summarise", "summary_of"]
 
@@ -249,6 +249,7 @@ def _traffic(traces: Traces) -> dict[str, Any]:
         "real_time_factor": world / ((last - first) / 1e9) if last > first else None,
         "messages": sum(traces.messages.values()),
         "messages_per_topic": dict(traces.messages),
+        "lost": _count_lost(traces),
         "gaps": sum(gaps.values()),
         "gaps_per_topic": gaps,
         "repeated": repeated_ticks(traces.ticks),
@@ -256,6 +257,13 @@ def _traffic(traces: Traces) -> dict[str, Any]:
         "invalid_per_topic": dict(traces.invalid),
         "cut": traces.cut,
     }
+
+
+def _count_lost(traces: Traces) -> int:
+    """Messages that the recorder missed; a controller of one's own need not answer every tick."""
+    lost = traces.notes.get(LOST, {})
+    foreign = f"/{COMMAND.name}" if traces.config.team.controller else " "
+    return sum(int(count) for key, count in lost.items() if not key.endswith(foreign))
 
 
 def _rmse(error: Array) -> dict[str, float | None]:

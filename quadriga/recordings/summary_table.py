@@ -55,6 +55,8 @@ def list_figures(s: Mapping[str, Any]) -> list[tuple[str, str]]:
     counted = _count_all(s["counters"])
     if counted:
         shown.append(("counted by the agents", counted))
+    if s.get("lost"):
+        shown.append(("lost", f"{s['lost']:,} messages that did not reach the recorder"))
     if s["end"]:
         shown.append(("end", s["end"]))
     shown += [(f"{robot} stopped", reason) for robot, reason in s["stop_reasons"].items()]

@@ -33,5 +33,10 @@ class DrivePage:
         if not (self._waits and self._path.exists()):
             return
         with suppress(OSError, BusError), ControlLink(self._path) as link:
-            self._console.print(f"drive from {link.ask(WHERE).get('url')}", markup=False)
+            page, _, token = str(link.ask(WHERE).get("url")).partition("?")
+            # The token drives the team: it goes to no file.
+            rest = (
+                f"?{token}" if self._console.is_terminal else "; `quadriga drive` tells its token"
+            )
+            self._console.print(f"drive from {page}{rest}", markup=False, soft_wrap=True)
             self._waits = False

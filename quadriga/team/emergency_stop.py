@@ -86,7 +86,8 @@ class EmergencyStop:
                 "emergency stop",
                 f"no {', '.join(absent)} on the bus after {SEARCH:g} s",
                 f"all of {', '.join(sorted(self.wanted))}",
-                f"{others} heard it at once; another bus.endpoint, team.name or team.robots?",
+                f"sent to {others} at once, no word yet of {', '.join(self._unconfirmed())}; "
+                "another bus.endpoint, team.name or team.robots?",
             )
         if not self._talk.follow(lambda: not self._unconfirmed(), _PATIENCE):
             described = self._talk.describe().replace("\n", ", ")
@@ -94,7 +95,8 @@ class EmergencyStop:
                 "emergency stop",
                 f"no word of {', '.join(self._unconfirmed())} after {_PATIENCE:g} s; {described}",
                 "all stopped",
-                "all of them have got the message: cut the power of a robot that moves",
+                "cut the power of a robot that moves; `quadriga doctor` tells whether the router "
+                "has denied the stop",
             )
         return (
             f"stopped {', '.join(self._talk.agents)} within {1e3 * (monotonic() - pressed):.0f} ms:"
@@ -161,10 +163,10 @@ def wait_and_stop(config: Config, reason: str, keyboard: int, say: Say) -> bool:
 
 
 def _describe_wait(reached: frozenset[str], wanted: frozenset[str]) -> str:
-    """Who has been stopped, and whom the stop still has to reach."""
-    stopped = f"stopped {', '.join(sorted(reached))}" if reached else "nobody hears it yet"
+    """To whom the stop has been sent, and whom it still has to reach."""
+    sent = f"sent to {', '.join(sorted(reached))}" if reached else "nobody hears it yet"
     absent = ", ".join(sorted(wanted - reached))
-    return f"emergency stop: {stopped}; waiting for {absent}, at most {SEARCH:g} s"
+    return f"emergency stop: {sent}; waiting for {absent}, at most {SEARCH:g} s"
 
 
 def _describe(there: frozenset[str], wanted: frozenset[str]) -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import secrets
 import socket
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
+from hashlib import sha256
 from typing import Any, Final
 
 from quadriga.shared.bus.reach import OPEN, try_endpoint
@@ -35,16 +36,36 @@ def with_free_endpoint(config: Config, given: Mapping[str, Any]) -> Config:
     if "endpoint" in given.get("bus", {}):
         endpoint = config.bus.endpoint
         if try_endpoint(endpoint).code == OPEN:
-            cause = "another team walks there? without bus.endpoint each walk finds a place"
-            expected = "an endpoint of its own"
-            raise ConfigError(
-                "bus.endpoint", f"{endpoint}, where something listens", expected, cause
-            )
+            raise _taken_error(f"{endpoint}, where something listens")
         return config
     endpoint, listen = free_endpoint(), config.bus.listen
     if endpoint.startswith(_IPV6) and listen == BusConfig().listen:
         listen = f"{_IPV6}:0"
     return replace(config, bus=replace(config.bus, endpoint=endpoint, listen=listen))
+
+
+@contextmanager
+def endpoint_claimed(config: Config) -> Iterator[None]:
+    """Within the block no other walk of this computer has this team's place: of two one is refused.
+
+    In client mode a place is the router's endpoint and the team's name.
+
+    Raises:
+        ConfigError: another walk has it.
+    """
+    bus, team = config.bus, config.team.name
+    place = bus.endpoint if bus.mode == "peer" else f"{bus.endpoint}, team {team!r}"
+    with socket.socket(socket.AF_UNIX) as claim:
+        try:  # a name without a file: it is gone with the process, however that ends
+            claim.bind(f"\0quadriga-{sha256(place.encode()).hexdigest()}")
+        except OSError:
+            raise _taken_error(f"{place}, where another walk begins or goes on") from None
+        yield
+
+
+def _taken_error(got: str) -> ConfigError:
+    cause = "another team walks there? without bus.endpoint each walk finds a place"
+    return ConfigError("bus.endpoint", got, "an endpoint of its own", cause)
 
 
 def free_endpoint() -> str:

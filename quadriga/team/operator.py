@@ -86,7 +86,9 @@ def run(config: Config, stopped: Callable[[], bool] | None = None, view: str = "
         port = config.reference.page_port if controls.drivable else None
         with DriveServer(controls, port, _socket_path(team), view) as server:
             if server.url:
-                print(f"drive from {server.url}", flush=True)
+                # The token drives the team, and this may be a log that others read.
+                page = server.url.partition("?")[0]
+                print(f"page to drive from: {page}; `quadriga drive` tells its token", flush=True)
             joined = join(bus, config, stopped)
             if not joined:
                 return

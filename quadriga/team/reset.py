@@ -38,7 +38,7 @@ def reset_team(config: Config, by: str, *, stand: bool, tell: Say = keep_quiet) 
         talk.await_all("release")
         release(Reset(*talk.time, truncate_text(by, _LONGEST_NAME)))
         names = ", ".join(talk.agents)
-        tell(f"released {names}; waiting until all stand, at most {_UP:g} s")
+        tell(f"release sent to {names}; waiting until all stand, at most {_UP:g} s")
         talk.statuses.clear()  # what came before the release says nothing
         stands = talk.follow(lambda: talk.all_are(STAND, WALK), _UP)
         if stand or not stands:

@@ -5,49 +5,46 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ConfigError, name_file_errors
 from quadriga.shared.recording.writer import RECORDING
 from quadriga.shared.runtime.clock import format_local, wall_ns
 
 RUNS: Final = Path("runs")
+_OWN: Final = 0o700  # permissions of a run folder: logs and recordings are nobody else's
 CONFIG: Final = "config.toml"  # the configuration in force, in a run folder
 
 
-def make_run_dir(out: Path | None) -> Path:
-    """A new run folder, or an existing one without a recording.
+def make_run_dir(out: Path | None, config: Config | None = None) -> Path:
+    """A run folder, open to its user alone, that no other walk has.
 
     Args:
         out: the folder; None takes `runs/<date>-<time>`, with a number if there is one already.
+        config: is written to its `config.toml`. Whoever creates that file has the folder, so of
+            two walks that begin at once one is refused.
 
     Raises:
-        ConfigError: it holds a recording already, or cannot be made.
+        ConfigError: another walk, or a user, has left a recording or a configuration there, or it
+            cannot be made.
     """
     if out is not None and (out / RECORDING).exists():
         raise ConfigError(f"--out {out}", "a folder with a recording", "a new folder")
     with name_file_errors(ConfigError, f"--out {out or RUNS}", "a folder that can be made"):
         if out is None:
-            return _make_dated_folder()
-        out.mkdir(parents=True, exist_ok=True)
+            out = _make_dated_folder()
+        else:
+            out.mkdir(_OWN, parents=True, exist_ok=True)
+        if config is not None:
+            try:
+                with (out / CONFIG).open("x", encoding="utf-8") as file:
+                    file.write(to_toml(config))
+            except FileExistsError:
+                cause = "a walk that goes on or has failed, or a file that you wrote"
+                raise ConfigError(
+                    f"--out {out}", f"a folder with a {CONFIG}", "a new folder", cause
+                ) from None
     return out
-
-
-def check_own_config(given: Path | None, out: Path | None) -> None:
-    """Refuse to write the configuration in force over the file that a user wrote.
-
-    Args:
-        given: the file of `--config`.
-        out: the folder asked for.
-
-    Raises:
-        ConfigError: it is `config.toml` in that folder.
-    """
-    if given is not None and out is not None and given.resolve() == (out / CONFIG).resolve():
-        raise ConfigError(
-            f"--out {out}",
-            f"the folder of --config {given}",
-            "another folder",
-            f"the configuration in force is written to its {CONFIG}",
-        )
 
 
 def _make_dated_folder() -> Path:
@@ -56,7 +53,7 @@ def _make_dated_folder() -> Path:
     while True:
         run_dir = RUNS / (f"{name}-{number}" if number > 1 else name)
         try:
-            run_dir.mkdir(parents=True)
+            run_dir.mkdir(_OWN, parents=True)
         except FileExistsError:
             number += 1
         else:

@@ -49,9 +49,9 @@ def say_folder(run_dir: Path, console: Console) -> None:
 
 
 def has_failed(summary: dict[str, Any]) -> bool:
-    """Whether a robot of the summary fell, or stopped before the end though nobody said so."""
+    """Whether a robot fell or stopped though nobody said so, or the recorder lost messages."""
     reasons = summary["stop_reasons"].values()
-    return bool(summary["fell"]) or not all(map(is_commanded, reasons))
+    return bool(summary["fell"] or summary["lost"]) or not all(map(is_commanded, reasons))
 
 
 def check_end(summary: dict[str, Any]) -> None:

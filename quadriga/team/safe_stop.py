@@ -8,6 +8,7 @@ from quadriga.agents.modes import DAMPING, ESTOP, STAND
 from quadriga.shared import members
 from quadriga.shared.config.sections import Config
 from quadriga.shared.wire.codec import truncate_text
+from quadriga.shared.wire.codes import STOP_ASKED
 from quadriga.shared.wire.messages import SafeStop
 from quadriga.shared.wire.topics import STOP
 from quadriga.team.talk import Say, TeamTalk, keep_quiet
@@ -29,7 +30,8 @@ def stop_safely(
         tell: is told what is done, before what comes of it.
 
     Returns:
-        Whether all stand, and the walk is over if it was to be; and what each robot does.
+        Whether who drives time has said that it was asked, all stand, and the walk is over if it
+        was to be; and what each robot does.
 
     Raises:
         BusError: the bus cannot be opened, or some agents or plants are not there: then nobody is
@@ -38,13 +40,26 @@ def stop_safely(
     with TeamTalk(config, members.STOP, tell) as talk:
         say = talk.publisher(STOP)
         talk.await_all("stop")
+        talk.events.clear()
         say(SafeStop(*talk.time, truncate_text(reason, _LONGEST_REASON), ends))
         asked = f"asked {', '.join(talk.agents)}; waiting until"
         if not ends:
             tell(f"{asked} all stand, at most {_PATIENCE:g} s")
-            stands = talk.follow(lambda: talk.all_are(STAND, DAMPING, ESTOP), _PATIENCE)
-            return stands, talk.describe()
+            stand = (STAND, DAMPING, ESTOP)
+            talk.follow(lambda: _is_heard(talk) and talk.all_are(*stand), _PATIENCE)
+            return _is_heard(talk) and talk.all_are(*stand), talk.describe() + _doubt(talk)
         tell(f"{asked} the walk is over, at most {_END_PATIENCE:g} s")
         over = talk.follow(lambda: any(e.kind == "stop" for e in talk.events), _END_PATIENCE)
         end = "the walk is over" if over else f"the walk is not over after {_END_PATIENCE:g} s"
-        return over, f"{talk.describe()}\n{end}"
+        return over and _is_heard(talk), f"{talk.describe()}\n{end}{_doubt(talk)}"
+
+
+def _is_heard(talk: TeamTalk) -> bool:
+    """Whether who drives time has said that the team was asked to stop."""
+    return any(event.code == STOP_ASKED for event in talk.events)
+
+
+def _doubt(talk: TeamTalk) -> str:
+    """What is said where nobody has acknowledged the stop."""
+    doubt = "nobody has said that it heard the stop: has the router denied it? `quadriga doctor`"
+    return "" if _is_heard(talk) else f"\n{doubt}"

@@ -11,11 +11,9 @@ from rich.console import Console
 
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import OPERATOR
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.scheduling import valid_priority
 from quadriga.shared.runtime.signals import stop_flag
 from quadriga.shared.wire.codes import FAULT_ENDS
@@ -25,12 +23,13 @@ from quadriga.sim_server.world.payload import build_loads
 from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.team.controller_program import check_controller
 from quadriga.team.drive_page import DrivePage
+from quadriga.team.endpoint import endpoint_claimed
 from quadriga.team.forked import end_fork_server
 from quadriga.team.launch import Launch, ProcessSpec, expect_launch, process_table
 from quadriga.team.plants import check_plant
 from quadriga.team.progress import WalkProgress
 from quadriga.team.registry import team_registered
-from quadriga.team.run_folder import CONFIG, make_run_dir
+from quadriga.team.run_folder import make_run_dir
 from quadriga.team.spectator import view_beside
 from quadriga.view.port import url_of
 from quadriga.warm_up import warm_up
@@ -97,19 +96,19 @@ def walk(
         late = f"{event.kind} {event.robot} {event.detail} at {event.tick / 1000:g} s"
         end = f"the walk ends at {config.world.seconds:g} s"
         console.print(f"will not come: {late}, {end}", markup=False, highlight=False)
-    run_dir = make_run_dir(out)
+    run_dir = make_run_dir(out, config)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
     warm_up(config, console)
     predictor, sha256 = None, ""
     if find_kind(config.planner.kind).needs_predictor:
         predictor, sha256 = _take_predictor(config, run_dir, console)
-    write_text(run_dir / CONFIG, to_toml(config))
     # By another name of this computer, so that the browser draws it in a process of its own: the
     # page to drive from must not be silent while the scene is drawn.
     url = "" if view is None else url_of(view, "localhost")
     rows = process_table(config, run_dir, predictor, sha256, armed=armed, view=url)
     with (
         stop_flag() as stopped,
+        endpoint_claimed(config),
         team_registered(config, run_dir),
         view_beside(run_dir, view, console),
     ):

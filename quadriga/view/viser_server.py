@@ -12,7 +12,7 @@ import websockets.asyncio.server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from quadriga.shared.security.own_page import LOOPBACK, UNHEARD, is_of_own_page
+from quadriga.shared.security.own_page import FRAMED_BY, LOOPBACK, UNHEARD, is_of_own_page
 from quadriga.view.port import HOST, PageAddress, check_port, taken_error
 
 _FORBIDDEN: Final = 403
@@ -79,6 +79,8 @@ def _refusing_foreigners(names: Collection[str]) -> Iterator[None]:
             if not is_of_own_page(request.headers, names):
                 return connection.respond(_FORBIDDEN, "only for this view's own page\n")
             answered: Response | None = process_request(connection, request)
+            if answered is not None:
+                answered.headers["Content-Security-Policy"] = FRAMED_BY
             return answered
 
         return usual(*args, process_request=answer, **options | {"logger": UNHEARD})

@@ -11,13 +11,16 @@ from quadriga.shared.wire.about import About
 
 VERSION: Final = "version"
 CONFIGURATION: Final = "configuration"
+MESSAGES: Final = "messages"
 PREDICTOR: Final = "predictor"
 CODE: Final = "code"
 LIBRARIES: Final = "libraries"
-REFUSED: Final = frozenset({VERSION, CONFIGURATION, PREDICTOR})  # no team walks with these
+# No team walks with these.
+REFUSED: Final = frozenset({VERSION, MESSAGES, CONFIGURATION, PREDICTOR})
 
 REMEDIES: Final[Mapping[str, str]] = {
     VERSION: "install the same version of quadriga on all computers",
+    MESSAGES: "the versions are the same and the messages are not: install the same files",
     CONFIGURATION: "all processes of a team read the same file: copy it, give the same options",
     PREDICTOR: "copy the predictor's file and name it with --predictor, or fit both by the same "
     "code",
@@ -67,7 +70,10 @@ def disagreements(process: About, norm: TeamNorm) -> tuple[Disagreement, ...]:
         got, wanted = process.version or "not installed", lead.version or "not installed"
         return (Disagreement(VERSION, got, wanted, lead.name),)
     found = list[Disagreement]()
+    own, its = _by_name(process.messages, " "), _by_name(lead.messages, " ")
+    shared = own.keys() & its.keys()  # topics of a plug-in need not be known to all
     for what, mine, theirs in (
+        (MESSAGES, {n: own[n] for n in shared}, {n: its[n] for n in shared}),
         (CONFIGURATION, _by_name(process.config, "="), _by_name(lead.config, "=")),
         (LIBRARIES, _by_name(process.libraries, " "), _by_name(lead.libraries, " ")),
     ):

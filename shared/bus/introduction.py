@@ -21,6 +21,7 @@ from quadriga.shared.runtime.scheduling import REALTIME, has_priority
 from quadriga.shared.runtime.system_clock import read_clocks
 from quadriga.shared.wire.about import ABOUT, STARTED, About, scheduling_of, stage_of
 from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.schema import message_forms
 
 _NO_LIBRARY: Final = ("machine", PROJECT)
 
@@ -74,6 +75,7 @@ def describe_process(config: Config, name: str, predictor_sha256: str = "") -> A
         code=code_digest(),
         libraries=tuple(f"{k} {v}" for k, v in versions.items() if k not in _NO_LIBRARY),
         config=agreed_keys(config),
+        messages=message_forms(),
         predictor=predictor_sha256,
         stage=STARTED,
         scheduling=scheduling_of(wanted=False, granted=False, stage=STARTED),

@@ -17,6 +17,7 @@ from quadriga.shared.bus.mailbox import INBOX, Mailbox
 from quadriga.shared.bus.newest import Newest
 from quadriga.shared.bus.presence import Presence
 from quadriga.shared.bus.router_wait import RouterWait
+from quadriga.shared.bus.standstill import Standstill
 from quadriga.shared.bus.trust import check_trust
 from quadriga.shared.bus.zenoh_settings import member_settings, opening_error, router_settings
 from quadriga.shared.bus.zenoh_threads import one_thread_receives, staying_attached
@@ -57,7 +58,7 @@ class Bus:
         self._me = str(session.info.zid())
         self._inbox: Mailbox[zenoh.Sample] = Mailbox(INBOX)
         self._oversized: SimpleQueue[None] = SimpleQueue()  # counts what several threads drop
-        self._presence = Presence(self._me)
+        self._presence, self.standstill = Presence(self._me), Standstill()
         self._declared: dict[str, zenoh.LivelinessToken] = {}
         self._closed = False
         tokens, ack = f"{team}/*/*/*", f"{team}/{name}/{RECEIVED}"
@@ -182,10 +183,8 @@ class Bus:
     def subscribe(self, key: str, *, largest: int = 0) -> None:
         """Feed what others publish on `key` (may hold `*` and `**`) into the inbox.
 
-        Args:
-            key: of the team.
-            largest: payloads of more bytes are dropped as they arrive, before anybody has looked
-                at the inbox, and counted in `oversized`; 0: none are.
+        Payloads of more than `largest` bytes (0: any) are dropped as they arrive and counted in
+        `oversized`.
         """
 
         def put(sample: zenoh.Sample) -> None:
@@ -207,10 +206,9 @@ class Bus:
         return self._inbox.dropped
 
     def collect(self, *keys: str) -> Callable[[], list[Arrival]]:
-        """Keep what others publish on `keys` apart from the inbox, each with when it arrived.
+        """Keep what others publish on `keys` apart from the inbox, each with when it was received.
 
-        That is noted by the thread that receives it, so it does not matter when it is looked at:
-        the function returned gives all that have come since it was called last, oldest first.
+        The function returned gives all that have come since it was called last, oldest first.
         """
         kept: SimpleQueue[Arrival] = SimpleQueue()
 
@@ -229,10 +227,7 @@ class Bus:
         return Newest(self._hear(key, zenoh.handlers.RingChannel(most)).try_recv)
 
     def answer(self, key: str, call: Callable[[], bytes]) -> None:
-        """Answer whoever asks on `key` with what `call()` gives.
-
-        The thread that receives messages calls it, so it must be quick and never raise.
-        """
+        """Answer who asks on `key` with `call()`: in the receiving thread, quick, never raising."""
         self._declarations.append(
             self._session.declare_queryable(key, _direct(lambda query: query.reply(key, call())))
         )
@@ -262,17 +257,22 @@ class Bus:
 
     def get(self, timeout: float) -> Packet | None:
         """The oldest packet of the inbox, waiting at most `timeout` seconds for one."""
+        self.standstill.look()
         sample = self._inbox.take(timeout)
+        self.standstill.look()
         return None if sample is None else _packet(sample)
 
     def drain(self) -> list[Packet]:
         """Everything in the inbox, oldest first, without waiting."""
+        self.standstill.look()
         return [_packet(sample) for sample in self._inbox.drain()]
 
     def declare(self, stage: str) -> None:
         """Tell everyone that this process has reached `stage`; again has no effect."""
         if stage in self._declared:
             return
+        if stage == READY:
+            self.standstill.begin()
         key = f"{self.team}/{self.name}/{stage}/{self._me}"
         self._declared[stage] = self._session.liveliness().declare_token(key)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from datetime import UTC, datetime
 
 
 def monotonic() -> float:
@@ -75,3 +76,8 @@ class Rate:
             self.lost += now - self._next
             self._next = now
         return late
+
+
+def utc_now() -> datetime:
+    """The time by which certificates are made and judged here."""
+    return datetime.fromtimestamp(1e-9 * wall_ns(), UTC)

@@ -12,11 +12,14 @@ from typing import Final
 
 from quadriga.shared.config.endpoints import host_and_port
 from quadriga.shared.errors import ConfigError, system_reason
+from quadriga.shared.runtime.clock import utc_now
+from quadriga.shared.security.certificate import EXPIRED as EXPIRED
+from quadriga.shared.security.certificate import NOT_YET_VALID as NOT_YET_VALID
+from quadriga.shared.security.certificate import read_certificate
 from quadriga.shared.security.tls import TlsFiles
 
 TRUSTED: Final = "trusted"
 UNREACHABLE: Final = "unreachable"  # nobody answers there
-EXPIRED: Final = "expired"  # its certificate is
 UNTRUSTED: Final = "untrusted"  # its certificate is of another authority, or for another address
 REFUSED: Final = "refused"  # it does not accept ours
 
@@ -24,10 +27,11 @@ _TIMEOUT: Final = 2.0  # s, for the connection and for each answer
 # s, in which a listener that does not accept our certificate says so: it does that afterwards.
 _VERDICT: Final = 0.3
 _LOOK: Final = 0.02  # s
-_HAS_EXPIRED: Final = (9, 10)  # OpenSSL's: a certificate is not valid yet, or no longer
+_DATES: Final = {9: NOT_YET_VALID, 10: EXPIRED}  # OpenSSL's codes
 CAUSES: Final = {
     UNREACHABLE: "is the router there (`quadriga router`), and does the name resolve?",
     EXPIRED: "`quadriga certs renew router`, or a clock that is wrong",
+    NOT_YET_VALID: "a clock that is wrong, here or where it was made",
     UNTRUSTED: "another authority's, or the router was not made for this address: "
     "`quadriga certs make --router HOST`",
     REFUSED: "our certificate has expired or is another authority's: `quadriga certs show`",
@@ -53,7 +57,12 @@ def shake_hands(endpoint: str, files: TlsFiles) -> Handshake:
         ConfigError: the endpoint is malformed, or the files cannot be used.
     """
     host, port = host_and_port(endpoint)
-    context = _context(files)
+    context, now = _context(files), utc_now()
+    held = read_certificate(files.certificate)
+    if held.state(now) == NOT_YET_VALID:  # the other side would say that it has expired
+        return Handshake(
+            NOT_YET_VALID, f"ours is valid from {held.begins:%F %T}, now is {now:%F %T}"
+        )
     try:
         with (
             socket.create_connection((host, port), _TIMEOUT) as link,
@@ -61,8 +70,7 @@ def shake_hands(endpoint: str, files: TlsFiles) -> Handshake:
         ):
             return _await_verdict(secured)
     except ssl.SSLCertVerificationError as error:
-        outcome = EXPIRED if error.verify_code in _HAS_EXPIRED else UNTRUSTED
-        return Handshake(outcome, error.verify_message)
+        return Handshake(_DATES.get(error.verify_code, UNTRUSTED), error.verify_message)
     except ssl.SSLError as error:
         return Handshake(REFUSED, (error.reason or str(error)).lower().replace("_", " "))
     except ConnectionResetError:

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import PROBE, ROUTER
-from quadriga.shared.security.roll import identity_of
+from quadriga.shared.security.roll import identity_of, split_common_name
 
 AUTHORITY: Final = "authority.pem"
 CERTIFICATE: Final = "certificate.pem"
@@ -55,17 +55,27 @@ def tls_files(certificates: str, process: str) -> TlsFiles:
         process: its name on the bus.
 
     Raises:
-        ConfigError: one is missing, or others may read the key.
+        ConfigError: one is missing or empty, others may read the key, or the certificate is
+            somebody else's.
     """
     identity = identity_of(process)
     files = TlsFiles.within(identity_folder(Path(certificates).absolute(), identity))
+    copy = f"copy the folder {identity} to this machine"
     for path in (files.authority, files.certificate, files.key):
-        if not path.is_file():
-            cause = f"`quadriga certs make` makes it; copy the folder {identity} to this machine"
-            raise ConfigError(str(path), "no such file", f"the certificates of {identity}", cause)
+        if not path.is_file() or not path.stat().st_size:
+            got = "an empty file" if path.is_file() else "no such file"
+            cause = f"`quadriga certs make` makes it; {copy}"
+            raise ConfigError(str(path), got, f"the certificates of {identity}", cause)
     if files.key.stat().st_mode & _OTHERS:
         mode = f"mode {files.key.stat().st_mode & 0o777:o}"
         raise ConfigError(str(files.key), mode, "600", "others may read this private key")
+    # Imported here: 0.1 s, which processes without certificates need not wait for.
+    from quadriga.shared.security.certificate import read_certificate
+
+    name = read_certificate(files.certificate).name
+    if split_common_name(name)[0] != identity:  # the router would silently deny what it says
+        got, cause = f"the certificate {name!r}", f"copied under another name? {copy}"
+        raise ConfigError(str(files.certificate), got, f"one of {identity}", cause)
     return files
 
 

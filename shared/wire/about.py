@@ -56,6 +56,7 @@ class About(Message):
     config: tuple[str, ...] = plain(
         list, "section.key=value in JSON of all keys that a team shares; of long values a digest"
     )
+    messages: tuple[str, ...] = plain(list, "name of each topic and digest of its messages' form")
     predictor: str = plain(str, "digest of its predictor; empty: none")
     stage: str = plain(str, "started, here, warming-up or ready")
     scheduling: str = plain(str, "realtime, ordinary or refused")

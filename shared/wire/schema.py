@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import fields
+from functools import cache
+from hashlib import sha256
 from typing import Any
 
 from quadriga.shared.wire.messages import Message
+from quadriga.shared.wire.topics import TABLE
 
 _PLAIN = {
     bool: "boolean",
@@ -15,6 +19,22 @@ _PLAIN = {
     list: "array",
     dict: "object",
 }
+
+
+@cache
+def message_forms() -> tuple[str, ...]:
+    """Name of each topic of this process, and digest of the form that its messages have."""
+    return tuple(
+        f"{topic.name} {sha256(json.dumps(_form(topic.type)).encode()).hexdigest()[:12]}"
+        for topic in TABLE
+    )
+
+
+def _form(kind: type[Message]) -> dict[str, Any]:
+    """What two processes must have in common to read each other's messages, without prose."""
+    names = ("const", "type", "x-shape", "x-unit", "x-frame")
+    properties = json_schema(kind)["properties"].items()
+    return {name: [has.get(key) for key in names] for name, has in properties}
 
 
 def json_schema(kind: type[Message]) -> dict[str, Any]:

@@ -16,9 +16,9 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509.oid import NameOID
 
 from quadriga.certs.authority import Authority, Pair, Subject
-from quadriga.certs.certificate import is_signed, read_certificate
 from quadriga.certs.folder import CertificateFolder
 from quadriga.shared.members import ROUTER
+from quadriga.shared.security.certificate import is_signed, read_certificate
 from quadriga.shared.security.roll import format_numbers
 from quadriga.shared.security.tls import AUTHORITY, CERTIFICATE
 from tests.fuzz.damage import damage

@@ -18,13 +18,13 @@ from typing import Any
 import zenoh
 
 from quadriga.certs.folder import CertificateFolder
-from quadriga.certs.secured import certificates_of, secure, utc_now
+from quadriga.certs.secured import certificates_of, secure
 from quadriga.faults.security.attacks import client_settings
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
-from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.clock import monotonic, sleep, utc_now
 from quadriga.shared.security.tls import TlsFiles, tls_files
 from quadriga.team.endpoint import free_endpoint
 

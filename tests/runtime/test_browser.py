@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from quadriga.drive.driver_words import WHERE
+from quadriga.drive.find import open_link
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.runtime.clock import monotonic
@@ -98,8 +100,9 @@ def wants_controls(second: Page, page: Page) -> None:
 
 
 def url_of(team: Team) -> str:
-    team.await_log("operator", "drive from http://")
-    return team.log("operator").partition("drive from ")[2].split()[0]
+    team.await_log("operator", "page to drive from: http://")
+    with open_link(team.config.team.name) as link:
+        return str(link.ask(WHERE)["url"])
 
 
 def test_a_team_is_driven_stopped_and_released_from_a_page(

@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 
 from quadriga.certs.folder import CertificateFolder
-from quadriga.certs.secured import utc_now
 from quadriga.doctor.examine import examine
 from quadriga.doctor.report import DoctorReport, to_json
 from quadriga.shared.bus.barrier import await_members
@@ -21,6 +20,7 @@ from quadriga.shared.bus.introduction import Introduction
 from quadriga.shared.bus.watch import Watch
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.errors import BusError
+from quadriga.shared.runtime.clock import utc_now
 from tests.runtime.fortress import LONG_AGO, NOW, WAIT, Fortress, make_fortress, serving, stranger
 
 

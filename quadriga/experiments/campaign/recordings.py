@@ -24,6 +24,7 @@ from quadriga.report.page import PAGE
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, ProcessError
+from quadriga.team.run_folder import CONFIG
 from quadriga.team.run_report import report_folder
 
 RECORDINGS: Final = "recordings"
@@ -94,7 +95,8 @@ def record_trial(config: Config, run_dir: Path, fitted: Fitted) -> Figures:
     Raises:
         ProcessError: a process failed.
     """
-    (run_dir / RECORDING).unlink(missing_ok=True)  # of a walk that was interrupted
+    for name in (RECORDING, CONFIG):  # of a walk that was interrupted
+        (run_dir / name).unlink(missing_ok=True)
     walk = walk_over_bus(config, run_dir, fitted.path, fitted.sha256)
     if fitted.path is not None:
         copy_predictor(fitted.path, run_dir)

@@ -11,7 +11,6 @@ from quadriga.experiments.trial.figures_of_merit import Walk
 from quadriga.recordings.summary import RECORDING
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ProcessError, RecordingError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import robot_names
@@ -20,7 +19,7 @@ from quadriga.shared.wire.messages import Measurement
 from quadriga.shared.wire.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS, TRUTH
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
-from quadriga.team.run_folder import CONFIG, make_run_dir
+from quadriga.team.run_folder import make_run_dir
 
 FAILED: Final = "controller-failed"  # begins the reason of a stop
 _NEEDED: Final = {topic.name for topic in (TRUTH, REFERENCE, MEASUREMENT, PLAN, STATUS, EVENT)}
@@ -43,8 +42,7 @@ def walk_over_bus(config: Config, run_dir: Path, predictor: Path | None, sha256:
     """
     bus = replace(config.bus, endpoint=free_endpoint())
     config = replace(config, bus=bus, recorder=replace(config.recorder, enabled=True))
-    make_run_dir(run_dir)
-    (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
+    make_run_dir(run_dir, config)
     failed: ProcessError | None = None
     with Launch(process_table(config, run_dir, predictor, sha256), run_dir / "logs") as launch:
         try:

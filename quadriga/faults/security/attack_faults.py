@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final, TypeAlias
 
-from quadriga.certs.secured import secure, utc_now
+from quadriga.certs.secured import secure
 from quadriga.faults.aftermath import read_log
 from quadriga.faults.fault import Draw, FaultScene, SetStage, Stage, TeamFault
 from quadriga.faults.security import attacks
@@ -22,6 +22,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError, RecordingError
 from quadriga.shared.members import ROUTER
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.clock import utc_now
 from quadriga.shared.runtime.installed import PYTHON
 from quadriga.shared.security.audit_line import parse_refusals
 

@@ -9,13 +9,14 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.certs.folder import CertificateFolder
-from quadriga.certs.secured import certificates_of, utc_now
+from quadriga.certs.secured import certificates_of
 from quadriga.faults.fault import Draw
 from quadriga.faults.security.attack import Attack, Knock, StockClient
 from quadriga.shared.config.endpoints import host_and_port
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import LAUNCHER, OBSERVER, OPERATOR, RECORDER, RESUME, SIM
 from quadriga.shared.robot.conventions import N_JOINTS, robot_names
+from quadriga.shared.runtime.clock import utc_now
 from quadriga.shared.security.caps import largest
 from quadriga.shared.security.tls import TlsFiles, tls_files, tls_settings
 from quadriga.shared.wire.codec import encode

@@ -15,8 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-from quadriga.certs.certificate import read_certificate
-from quadriga.certs.secured import certificates_of, secure, utc_now
+from quadriga.certs.secured import certificates_of, secure
 from quadriga.faults.aftermath import read_log
 from quadriga.faults.fault import Draw, FaultScene, Stage, TeamFault
 from quadriga.faults.outcome import describe_outcome, moment_at
@@ -26,8 +25,9 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.members import ROUTER
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.runtime.clock import sleep, wall_ns
+from quadriga.shared.runtime.clock import sleep, utc_now, wall_ns
 from quadriga.shared.security.audit_line import AuditLine, parse_refusals
+from quadriga.shared.security.certificate import read_certificate
 from quadriga.shared.security.refusals import EXPIRED
 from quadriga.shared.security.roll import split_common_name
 from quadriga.shared.security.tls import tls_files

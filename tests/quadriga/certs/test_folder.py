@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import base64
+import re
 import stat
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from shutil import copy, copytree
 
 import pytest
 
 from quadriga.certs.authority import Authority, Pair
-from quadriga.certs.certificate import read_certificate
 from quadriga.certs.folder import CertificateFolder
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.security.certificate import read_certificate
 from quadriga.shared.security.roll import MOST_VALID, read_numbers
 from quadriga.shared.security.tls import tls_files
 
@@ -29,6 +32,10 @@ def folder(tmp_path: Path) -> CertificateFolder:
 
 def names(folder: CertificateFolder) -> dict[str, str]:
     return {each.identity: each.certificate.name for each in folder.standings()}
+
+
+def states(folder: CertificateFolder) -> dict[str, str]:
+    return {each.identity: each.state(NOW) for each in folder.standings()}
 
 
 def revoked(folder: CertificateFolder) -> dict[str, int]:
@@ -62,6 +69,48 @@ def test_a_certificate_that_is_not_there_is_one_clear_error(folder: CertificateF
         tls_files(str(folder.path), "r9")
 
 
+@pytest.mark.parametrize("name", ["certificate.pem", "authority.pem", "key.pem"])
+def test_an_empty_file_is_named(folder: CertificateFolder, name: str) -> None:
+    (folder.path / "r1" / name).write_bytes(b"")
+    with pytest.raises(ConfigError, match=rf"r1/{name}: got an empty file"):
+        tls_files(str(folder.path), "r1")
+
+
+def test_what_is_not_pem_is_said_to_be_that(folder: CertificateFolder) -> None:
+    (folder.path / "authority.key").write_bytes(b"")
+    with pytest.raises(ConfigError, match="authority of the team: got an empty file"):
+        folder.renew((), (), NOW, 1.0)
+    (folder.path / "r1" / "certificate.pem").write_text("key\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"r1/certificate\.pem: got text that is not PEM"):
+        folder.standings()
+
+
+def test_a_folder_that_was_copied_under_another_name_is_refused(folder: CertificateFolder) -> None:
+    """Its process would be let in, and whatever it says denied without a word."""
+    copytree(folder.path / "r2", folder.path / "r1", dirs_exist_ok=True)
+    with pytest.raises(ConfigError, match=r"got the certificate 'r2\.1', expected one of r1"):
+        tls_files(str(folder.path), "r1")
+    assert states(folder)["r1"] == "somebody else's (r2)"
+
+
+def test_a_certificate_of_another_authority_is_not_valid(
+    folder: CertificateFolder, tmp_path: Path
+) -> None:
+    other = CertificateFolder(tmp_path / "other", ROLL)
+    other.make("team", (), NOW, 30.0)
+    copy(other.path / "r1" / "certificate.pem", folder.path / "r1" / "certificate.pem")
+    assert states(folder) == dict.fromkeys(ROLL, "valid") | {"r1": "another authority's"}
+
+
+def test_one_not_yet_valid_is_not_expired(folder: CertificateFolder) -> None:
+    made = NOW + timedelta(days=2)
+    folder.renew(["r1"], (), made, 30.0)
+    standing = folder.standings()[0]
+    days = (-1, 1, 31)
+    found = [standing.state(made + timedelta(days=k)) for k in days]
+    assert found == ["not yet valid", "valid", "expired"]
+
+
 def test_days_are_left_until_it_expires(folder: CertificateFolder) -> None:
     held = read_certificate(folder.path / "r1" / "certificate.pem")
     assert held.days_left(NOW) == pytest.approx(30.0)
@@ -90,6 +139,13 @@ def test_renewed_a_certificate_has_the_next_number_and_none_is_revoked(
     assert folder.renew(["r1"], (), NOW, 30.0) == ["r1.2"]
     assert folder.renew((), (), NOW, 30.0) == ["r1.3", *(f"{name}.2" for name in ROLL[1:])]
     assert revoked(folder) == {}
+
+
+def test_two_that_renew_at_once_give_two_numbers(folder: CertificateFolder) -> None:
+    with ThreadPoolExecutor(4) as pool:
+        given = pool.map(lambda _: folder.renew(["r1", "r2"], (), NOW, 30.0), range(4))
+    made = {name for names in given for name in names}
+    assert made == {f"{name}.{k}" for name in ("r1", "r2") for k in range(2, 6)}
 
 
 def test_revoked_are_all_that_were_given_so_far(folder: CertificateFolder) -> None:
@@ -134,9 +190,10 @@ def test_without_the_authority_nothing_is_renewed(tmp_path: Path) -> None:
         CertificateFolder(tmp_path, ROLL).renew(["r1"], (), NOW, 1.0)
 
 
-def test_an_address_that_is_none_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"--router: got 'räuter'"):
-        CertificateFolder(tmp_path / "certs", ROLL).make("team", ["räuter"], NOW, 1.0)
+@pytest.mark.parametrize("host", ["räuter", "*", "a" * 300, "*.lab", "10.0.0.300", "-a.lab", ""])
+def test_an_address_that_is_none_is_refused(tmp_path: Path, host: str) -> None:
+    with pytest.raises(ConfigError, match=rf"--router: got {re.escape(repr(host[:80]))}"):
+        CertificateFolder(tmp_path / "certs", ROLL).make("team", [host], NOW, 1.0)
 
 
 def packed(pem: bytes) -> bytes:

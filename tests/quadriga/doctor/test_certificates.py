@@ -8,15 +8,16 @@ from typing import Any
 
 import pytest
 
-from quadriga.certs.certificate import Certificate
 from quadriga.doctor.certificates import HeldCertificate, check_certificates
 from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE
+from quadriga.shared.security.certificate import Certificate
 
 NOW = datetime(2026, 11, 26, tzinfo=UTC)
 
 
 def held(days: float = 100.0, name: str = "r2", number: int = 1) -> HeldCertificate:
-    certificate = Certificate(f"{name}.{number}", (), NOW + timedelta(days=days))
+    end = NOW + timedelta(days=days)
+    certificate = Certificate(f"{name}.{number}", (), end - timedelta(days=365), end)
     return HeldCertificate(name, certificate, signed=True, key_mode=0o600)
 
 
@@ -32,6 +33,8 @@ def test_good_ones_are_one_line_with_the_first_that_expires() -> None:
     [
         (held(13.9), "certificate-expiring", NOTE),
         (held(-0.1), "certificate-expired", BAD),
+        (held(400.0), "certificate-not-yet-valid", BAD),
+        (replace(held(name="r1"), identity="r2"), "certificate-untrusted", BAD),
         (replace(held(), signed=False), "certificate-untrusted", BAD),
         (replace(held(), key_mode=0o640), "key-open", BAD),
         (replace(held(), key_mode=None), "certificate-unreadable", BAD),

@@ -74,5 +74,5 @@ def test_every_code_is_documented() -> None:
     codes = {*values, LINK} - words
     assert {"not-started", "warming-up", "governor", "packages", "link"} <= codes
     assert {code for code in codes if f"`{code}`" not in DOC} == set()
-    kinds = ("version", "configuration", "predictor", "code", "libraries")
+    kinds = ("version", "messages", "configuration", "predictor", "code", "libraries")
     assert all(f"`{absence.DIFFERS}{kind}`" in DOC for kind in kinds)

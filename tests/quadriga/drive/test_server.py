@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import socket
 import stat
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event as Flag
 from threading import Thread
-from typing import Any
+from typing import Any, cast
 from urllib.error import HTTPError
 from urllib.parse import urlsplit
 from urllib.request import Request, urlopen
@@ -22,8 +23,10 @@ from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 from websockets.typing import Origin
 
+from quadriga.drive.attend import Attendant
 from quadriga.drive.client import ControlLink
 from quadriga.drive.controls import DriveControls
+from quadriga.drive.driver_words import DriverWord
 from quadriga.drive.server import DriveServer
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.load import load
@@ -89,6 +92,53 @@ def drive(link: Connection, *, held: bool = True) -> None:
     link.send(
         json.dumps({"kind": "drive", "held": held, "vx": 0.4, "vy": 0, "wz": 0, "height": 0.26})
     )
+
+
+class _Heard:
+    """Controls of a team that stops at once; `heard` has the kinds of what is said."""
+
+    robots, plant_each = (), False
+
+    def __init__(self) -> None:
+        self.heard: list[str] = []
+
+    def hear(self, _driver: str, said: DriverWord) -> None:
+        self.heard.append(said.kind)
+
+    def leave(self, driver: str) -> None: ...
+
+    def statuses(self) -> dict[str, Status]:
+        return {}
+
+    def events(self) -> tuple[Event, ...]:
+        return (Event.of(0, ESTOPPED, "", ""),)
+
+
+def test_a_flood_of_drivers_does_not_delay_a_stop() -> None:
+    """They have begun before it, and each has more to say than is heard in a second."""
+    controls, flooders = _Heard(), 30
+    attendant = Attendant(cast(DriveControls, controls))
+
+    async def says(kind: str, times: int) -> AsyncIterator[str]:
+        for _ in range(times):
+            yield json.dumps({"kind": kind})
+
+    async def send(_text: str) -> None: ...
+
+    async def press() -> None:
+        floods = [
+            asyncio.ensure_future(attendant.attend("page", says("take", 1000), send))
+            for _ in range(flooders)
+        ]
+        await asyncio.sleep(0.05)
+        heard = len(controls.heard)
+        await attendant.attend("stop button", says("estop", 1), send)
+        assert controls.heard[heard] == "estop"
+        for flood in floods:
+            flood.cancel()
+
+    asyncio.run(press())
+    assert flooders < len(controls.heard) < 500 * flooders, "what they say waits"
 
 
 def test_only_this_computers_own_page_with_its_token_is_served(

@@ -16,6 +16,7 @@ from quadriga.recordings.falls import find_falls
 from quadriga.recordings.summary import summary_of
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import build_truth_trace
+from quadriga.shared.recording.writer import LOST
 from quadriga.shared.wire.codes import ESTOPPED, FALL, LOWERED, RESET
 from quadriga.shared.wire.messages import Event
 from quadriga.sim_server.world.world import World
@@ -110,6 +111,9 @@ def test_a_walk_that_was_stopped_has_not_failed(walk: Walk) -> None:
     *before, last = traces.statuses["r1"]
     for reason, failed in (("estop:dog", False), ("stopped:lunch", False), ("peer-lost:r2", True)):
         own = (*before, replace(last, mode="estop", reason=reason))
-        summary = summary_of(replace(traces, statuses={**traces.statuses, "r1": own}))
+        ended = replace(traces, statuses={**traces.statuses, "r1": own})
+        summary = summary_of(ended)
         assert has_failed(summary) is failed
+        lossy = replace(ended, notes={LOST: {"team/r1/state": "57336"}})
+        assert has_failed(summary_of(lossy)), "the recorder did not hear all"
     assert np.isfinite(summary["distance"])

@@ -127,8 +127,8 @@ def test_who_is_not_there_is_named_and_the_others_stop(
     monkeypatch.setattr(emergency_stop, "SEARCH", 0.3)
     monkeypatch.setattr(emergency_stop, "_LONG", 0.1)
     told = list[str]()
-    match = r"no r1 on the bus after 0.3 s.*\(sim heard it at once"
+    match = r"no r1 on the bus after 0.3 s.*\(sent to sim at once, no word yet of r1, plant;"
     with pytest.raises(BusError, match=match):
         stop_team(config, "dog", print, told.append)
-    assert told == ["emergency stop: stopped sim; waiting for r1, at most 0.3 s"]
+    assert told == ["emergency stop: sent to sim; waiting for r1, at most 0.3 s"]
     assert team[SIM].get(WAIT) is not None

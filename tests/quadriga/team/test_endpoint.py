@@ -5,13 +5,15 @@ from __future__ import annotations
 import errno
 import secrets
 import socket
+from contextlib import nullcontext
+from dataclasses import replace
 
 import pytest
 
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.errors import ConfigError
-from quadriga.team.endpoint import free_endpoint, with_free_endpoint
+from quadriga.team.endpoint import endpoint_claimed, free_endpoint, with_free_endpoint
 
 WAIT = 10.0  # s
 
@@ -63,3 +65,17 @@ def test_no_team_walks_where_another_one_does() -> None:
         with pytest.raises(ConfigError, match="where something listens, expected an endpoint of"):
             with_free_endpoint(config, given)
         assert with_free_endpoint(config, {}).bus.endpoint != config.bus.endpoint
+
+
+@pytest.mark.parametrize("mode", ["peer", "client"])
+def test_of_two_walks_of_one_name_at_one_endpoint_the_second_is_refused(mode: str) -> None:
+    config = Config(bus=BusConfig(mode=mode, endpoint=free_endpoint()))
+    other = replace(config, team=replace(config.team, name="other"))
+    refused = pytest.raises(ConfigError, match="where another walk begins")
+    with endpoint_claimed(config):
+        with refused, endpoint_claimed(config):
+            pass
+        with nullcontext() if mode == "client" else refused, endpoint_claimed(other):
+            pass  # teams of two names have one router
+    with endpoint_claimed(config):
+        pass

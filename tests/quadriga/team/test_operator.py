@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import suppress
 from pathlib import Path
 from threading import Event as Flag
@@ -9,7 +10,10 @@ from threading import Thread
 from typing import cast
 
 import pytest
+from rich.console import Console
 
+from quadriga.drive.driver_words import WHERE
+from quadriga.drive.find import open_link
 from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus, Packet
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
@@ -19,6 +23,7 @@ from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.wire.codec import MAX_TEXT, MAX_TICK, decode, encode
 from quadriga.shared.wire.messages import Clock, EStop, Event, Message, Reference
 from quadriga.shared.wire.topics import CLOCK, ESTOP, EVENT, REFERENCE
+from quadriga.team.drive_page import DrivePage
 from quadriga.team.emergency_stop import stop_team
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.operator import TeamTicks, reference_at, run
@@ -50,6 +55,28 @@ def test_a_trace_is_followed_from_the_first_step_on(tmp_path: Path) -> None:
     assert [r.vx for r in asked] == pytest.approx([0.0, 0.0, 0.05, 0.4, 0.0, 0.4])
     assert (asked[3].vy, asked[3].wz) == pytest.approx((0.2, -0.2))
     assert asked[3].height == Config().reference.height
+
+
+def test_the_token_to_drive_with_is_in_no_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    config = load(None, {"bus.endpoint": free_endpoint(), "reference.driver": "hand"})
+    tokens = []
+
+    def stopped() -> bool:
+        if not tokens:
+            with open_link() as link:
+                tokens.append(link.ask(WHERE)["url"].partition("?token=")[2])
+            page = DrivePage(config, os.getpid(), Console(force_terminal=False))
+            page.tell_once()
+        return True
+
+    run(config, stopped)
+    said = capsys.readouterr()
+    assert len(tokens[0]) > 16
+    assert said.out.count("http://127.0.0.1:") == 2, "the operator's, and that of who started it"
+    assert tokens[0] not in said.out + said.err
 
 
 @pytest.mark.parametrize("late", [False, True])

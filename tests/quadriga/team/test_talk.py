@@ -17,9 +17,12 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import SIM
+from quadriga.shared.wire import messages
 from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.codes import STOP_ASKED
 from quadriga.shared.wire.messages import SafeStop, Status
-from quadriga.shared.wire.topics import STATUS, STOP
+from quadriga.shared.wire.topics import EVENT, STATUS, STOP
+from quadriga.team import safe_stop
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.talk import TeamTalk
 
@@ -47,16 +50,22 @@ def test_a_word_is_repeated_for_a_second_and_to_those_who_turn_up_later() -> Non
 
 
 @contextmanager
-def robot_that_is(mode: str, config: Config) -> Iterator[None]:
-    """A plant and an agent that say how the robot is, and hear whatever is said."""
+def robot_that_is(mode: str, config: Config, *, deaf: bool = False) -> Iterator[None]:
+    """A plant and an agent that say how the robot is, and hear whatever is said, or nothing."""
     nothing, over = np.zeros(0), Event()
     status = Status(5, 5_000_000, mode, "", "kalman", {}, {}, nothing, nothing)
     with Bus.open(config.bus, "team", SIM) as plant, Bus.open(config.bus, "team", "r1") as agent:
-        put = agent.publisher(STATUS.key("team", "r1"))
+        put, announce = (
+            agent.publisher(STATUS.key("team", "r1")),
+            plant.publisher(EVENT.key("team")),
+        )
+        plant.subscribe(STOP.key("team"))
 
         def say_so() -> None:
             while not over.wait(0.05):
                 put(encode(status))
+                if plant.drain() and not deaf:
+                    announce(encode(messages.Event.of(5, STOP_ASKED, "", "operator")))
 
         thread = Thread(target=say_so)
         thread.start()
@@ -78,7 +87,7 @@ def robot_that_is(mode: str, config: Config) -> Iterator[None]:
             ("reset", "--by", "ann"),
             "walk",
             [
-                "released r1; waiting until all stand, at most 15 s",
+                "release sent to r1; waiting until all stand, at most 15 s",
                 "asked r1 to go on; waiting until all walk, at most ",
             ],
         ),
@@ -104,3 +113,15 @@ def test_a_person_is_told_what_is_done_before_what_comes_of_it(
     assert len(told) == len(begins)
     for line, begin in zip(told, begins, strict=True):
         assert line.startswith(f"quadriga: {begin}")
+
+
+def test_a_stop_that_nobody_acknowledges_has_not_stopped_a_team_that_stands(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A router may have denied it; the robots stand for a reason of their own, and will walk on."""
+    monkeypatch.setattr(safe_stop, "_PATIENCE", 0.5)
+    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint()})
+    with robot_that_is("stand", config, deaf=True):
+        done, said = safe_stop.stop_safely(config, "dog", ends=False)
+    assert not done
+    assert said.startswith("r1: stand\n")

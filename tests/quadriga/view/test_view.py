@@ -63,6 +63,8 @@ def test_a_page_of_another_origin_is_refused() -> None:
     with viewing(str(RECORDING)) as (_, url):
         own = url.removeprefix("http://")
         assert b"<html" in urlopen(url).read()
+        framed_by = urlopen(url).headers["Content-Security-Policy"]
+        assert framed_by == "frame-ancestors 'self' http://127.0.0.1:* http://localhost:*"
         for headers in ({"Host": "evil.example"}, {"Origin": "http://evil.example"}):
             with pytest.raises(HTTPError, match="403"):
                 urlopen(Request(url, headers=headers))

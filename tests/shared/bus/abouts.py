@@ -20,6 +20,7 @@ SIM: Final = About(
     code="0123456789abcdef",
     libraries=("python 3.11.7", "numpy 2.4.0"),
     config=('team.name="team"', "world.seed=5", 'world.mode="lockstep"'),
+    messages=("state 5c", "command 3f"),
     predictor="",
     stage=READY,
     scheduling=ORDINARY,

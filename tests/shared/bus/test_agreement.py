@@ -43,6 +43,13 @@ def test_a_key_that_only_one_has_is_named_and_many_are_counted() -> None:
     assert wanted == 'team.name "team", world.mode "lockstep", world.seed 5 and 5 more'
 
 
+def test_a_topic_whose_messages_have_another_form_is_named_and_one_of_a_plugin_is_none() -> None:
+    said = ("state 5c", "command 00", "wind 11")
+    assert found(messages=said) == [("messages", "command 00", "command 3f", "sim")]
+    with pytest.raises(BusError, match="messages of r2 in team 'team': got command 00"):
+        refuse("r2", "team", disagreements(about("r2", messages=said), NORM))
+
+
 def test_predictors_are_compared_with_the_first_that_plans_where_both_have_one() -> None:
     assert found(predictor="cd" * 32) == [("predictor", "cd" * 6, "ab" * 6, "r1")]
     assert disagreements(about("r2", predictor="cd" * 32), TeamNorm(SIM)) == ()

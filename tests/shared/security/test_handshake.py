@@ -18,6 +18,7 @@ from quadriga.shared.runtime.clock import wall_ns
 from quadriga.shared.security.handshake import (
     CAUSES,
     EXPIRED,
+    NOT_YET_VALID,
     REFUSED,
     TRUSTED,
     UNREACHABLE,
@@ -135,6 +136,15 @@ def test_our_certificate_has_expired(tmp_path: Path) -> None:
     assert "expired" in found.detail
 
 
+def test_a_certificate_that_is_not_yet_valid(tmp_path: Path) -> None:
+    path, early = made(tmp_path / "certs"), NOW + timedelta(days=2)
+    CertificateFolder(path, ROLL).renew(["router"], (), early, 1.0)
+    with listener(files_of(path, "router")) as endpoint:
+        assert shake_hands(endpoint, files_of(path, "r1")).outcome == NOT_YET_VALID
+    CertificateFolder(path, ROLL).renew(["r1"], (), early, 1.0)
+    assert shake_hands("tls/127.0.0.1:1", files_of(path, "r1")).outcome == NOT_YET_VALID
+
+
 def test_a_key_that_is_not_the_certificate_s(ours: Path) -> None:
     ours_r1, router = files_of(ours, "r1"), files_of(ours, "router")
     with pytest.raises(ConfigError, match="a certificate, its key"):
@@ -142,4 +152,4 @@ def test_a_key_that_is_not_the_certificate_s(ours: Path) -> None:
 
 
 def test_every_failure_has_a_likely_cause() -> None:
-    assert CAUSES.keys() == {UNREACHABLE, EXPIRED, UNTRUSTED, REFUSED}
+    assert CAUSES.keys() == {UNREACHABLE, EXPIRED, UNTRUSTED, REFUSED, NOT_YET_VALID}

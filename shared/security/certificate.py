@@ -16,6 +16,10 @@ from cryptography.x509.oid import NameOID
 
 from quadriga.shared.errors import ConfigError, name_file_errors
 
+VALID: Final = "valid"
+NOT_YET_VALID: Final = "not yet valid"
+EXPIRED: Final = "expired"
+
 # What is raised on bytes that are no certificate, or one that nobody can use.
 UNREADABLE: Final = (
     ValueError,
@@ -34,16 +38,24 @@ class Certificate:
     Attributes:
         name: its common name.
         hosts: at which its owner listens.
+        begins: from when on it is valid.
         expires: when it is not valid any more.
     """
 
     name: str
     hosts: tuple[str, ...]
+    begins: datetime
     expires: datetime
 
     def days_left(self, now: datetime) -> float:
         """Until it expires; negative afterwards."""
         return (self.expires - now) / timedelta(days=1)
+
+    def state(self, now: datetime) -> str:
+        """`VALID`, `NOT_YET_VALID` or `EXPIRED`."""
+        if now < self.begins:
+            return NOT_YET_VALID
+        return VALID if now < self.expires else EXPIRED
 
 
 def read_certificate(path: Path) -> Certificate:
@@ -58,9 +70,9 @@ def read_certificate(path: Path) -> Certificate:
             names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
             hosts = _hosts_of(found)
     except UNREADABLE as error:
-        raise _damaged(path, error) from None
+        raise _damaged(path, str(error)) from None
     name = str(names[0].value) if names else ""
-    return Certificate(name, hosts, found.not_valid_after_utc)
+    return Certificate(name, hosts, found.not_valid_before_utc, found.not_valid_after_utc)
 
 
 def is_signed(path: Path, authority: Path) -> bool:
@@ -92,7 +104,7 @@ def _load(path: Path) -> x509.Certificate:
     try:
         return load_certificate(text)
     except UNREADABLE as error:
-        raise _damaged(path, error) from None
+        raise _damaged(path, describe_pem_error(text, error)) from None
 
 
 @contextmanager
@@ -103,8 +115,15 @@ def _without_warnings() -> Iterator[None]:
         yield
 
 
-def _damaged(path: Path, error: Exception) -> ConfigError:
-    return ConfigError(str(path), str(error)[:200], "a certificate", "damaged?")
+def describe_pem_error(text: bytes, error: Exception) -> str:
+    """What is wrong with a PEM file; the library's words are about itself where there is no PEM."""
+    if b"-----BEGIN " in text:
+        return str(error)
+    return "text that is not PEM" if text.strip() else "an empty file"
+
+
+def _damaged(path: Path, got: str) -> ConfigError:
+    return ConfigError(str(path), got[:200], "a certificate", "damaged? `quadriga certs renew`")
 
 
 def _hosts_of(found: x509.Certificate) -> tuple[str, ...]:
