@@ -23,6 +23,7 @@ from quadriga.shared.wire.topics import TABLE, find_topic
 
 RECORD: Final = struct.Struct("<BQ")  # opcode, length
 BARE: Final = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)  # in chunks, and outside of any
+_LATEST: Final = (1 << 63) - 1  # ns: what MCAP has 64 bits for, tables have 63 and a sign
 LARGEST_CHUNK: Final = 1 << 27  # bytes unpacked; `recorder.chunk_kib` is half of that at most
 
 # What the MCAP library, LZ4 and Zstandard raise on bytes that are no record.
@@ -91,7 +92,8 @@ def messages_of(
         if key is not None:
             payload = chunk[at + _MESSAGE.size : end]
             head = envelope(payload)
-            yield ChunkEntry(key, -1 if head is None else head[0], log_time, payload)
+            tick = -1 if head is None else head[0]
+            yield ChunkEntry(key, tick, min(log_time, _LATEST), payload)
         at = end
 
 

@@ -95,7 +95,7 @@ class RecordingWriter:
         return {key: track for key, (_, track, _) in self._channels.items()}
 
     def write(self, key: str, payload: bytes, log_time_ns: int) -> None:
-        """Append one message as sent; `log_time_ns` is the wall clock at its reception."""
+        """Append one message as sent; `log_time_ns` is its reception, see `clock.log_ns`."""
         row = self._channels.get(key)
         if row is None:
             if not self.admission.admits_key(key, len(self._channels)):

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Final
+
+_EPOCH_NS: Final = time.time_ns() - time.monotonic_ns()  # at the start of this process
 
 
 def monotonic() -> float:
@@ -22,11 +25,19 @@ def thread_ns() -> int:
 
 
 def wall_ns() -> int:
-    """Nanoseconds since 1970: for log times and names of run folders, never for control.
+    """Nanoseconds since 1970: for names of run folders, never for control.
 
     The clocks of computers are compared by it where they say how exact it is.
     """
     return time.time_ns()
+
+
+def log_ns() -> int:
+    """Nanoseconds since 1970 for log times, by the wall clock as it was when this process began.
+
+    Who sets the wall clock during a walk moves none of them.
+    """
+    return _EPOCH_NS + time.monotonic_ns()
 
 
 def sleep(seconds: float) -> None:
