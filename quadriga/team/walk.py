@@ -14,6 +14,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import OPERATOR
 from quadriga.shared.planner_kinds import find_kind
+from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.scheduling import valid_priority
 from quadriga.shared.runtime.signals import stop_flag
 from quadriga.sim_server.world.payload import build_loads
@@ -89,7 +90,7 @@ def walk(
     predictor, sha256 = None, ""
     if find_kind(config.planner.kind).needs_predictor:
         predictor, sha256 = _take_predictor(config, run_dir, console)
-    (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
+    write_text(run_dir / CONFIG, to_toml(config))
     # By another name of this computer, so that the browser draws it in a process of its own: the
     # page to drive from must not be silent while the scene is drawn.
     url = "" if view is None else url_of(view, "localhost")

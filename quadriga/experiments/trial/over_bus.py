@@ -15,6 +15,7 @@ from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ProcessError, RecordingError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.wire.codes import with_detail
 from quadriga.shared.wire.messages import Measurement
 from quadriga.shared.wire.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS, TRUTH
@@ -44,7 +45,7 @@ def walk_over_bus(config: Config, run_dir: Path, predictor: Path | None, sha256:
     bus = replace(config.bus, endpoint=free_endpoint())
     config = replace(config, bus=bus, recorder=replace(config.recorder, enabled=True))
     make_run_dir(run_dir)
-    (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
+    write_text(run_dir / CONFIG, to_toml(config))
     failed: ProcessError | None = None
     with Launch(process_table(config, run_dir, predictor, sha256), run_dir / "logs") as launch:
         try:
