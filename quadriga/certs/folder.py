@@ -14,7 +14,7 @@ from typing import Final
 from quadriga.certs.authority import Authority, Pair, Subject
 from quadriga.shared.errors import ConfigError, did_you_mean, name_file_errors
 from quadriga.shared.members import ROUTER
-from quadriga.shared.runtime.atomic import atomic_write, write_text
+from quadriga.shared.runtime.atomic import atomic_write, write_bytes, write_text
 from quadriga.shared.security.certificate import Certificate, is_signed, read_certificate
 from quadriga.shared.security.roll import (
     MOST_VALID,
@@ -86,7 +86,7 @@ class CertificateFolder:
             else:
                 authority = Authority.create(team, now)
                 _write_private(self.path / _AUTHORITY_KEY, authority.pair.key)
-                (self.path / AUTHORITY).write_bytes(authority.pair.certificate)
+                write_bytes(self.path / AUTHORITY, authority.pair.certificate)
             without = [n for n in self._identities if not self._files(n).certificate.exists()]
             for name in without:
                 self._issue(authority, name, hosts if name == ROUTER else (), now, days)
@@ -205,8 +205,8 @@ class CertificateFolder:
         files = self._files(name)
         files.key.parent.mkdir(mode=_OWN, parents=True, exist_ok=True)
         _write_private(files.key, pair.key)
-        files.authority.write_bytes(authority.pair.certificate)
-        files.certificate.write_bytes(pair.certificate)
+        write_bytes(files.authority, authority.pair.certificate)
+        write_bytes(files.certificate, pair.certificate)
         return subject.name
 
     def _check(self, names: Iterable[str]) -> list[str]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from quadriga.commands.command import AddCommand, Given
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.runtime.atomic import write_text
 
 
 def add(add_command: AddCommand) -> None:
@@ -52,6 +53,6 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     print_tables([build_stop_table(figures)])
     if arguments.json is not None:
         with name_file_errors(ConfigError, f"--json {arguments.json}", "a file to write to"):
-            arguments.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+            write_text(arguments.json, json.dumps(figures, indent=1) + "\n")
     console.print(f"folder: {folder}", markup=False, highlight=False)
     return int(any(row["stopped"] < row["tries"] for row in figures.values()))

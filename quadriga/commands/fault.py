@@ -11,6 +11,7 @@ from quadriga.commands.command import AddCommand, Given
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.printable import printable_line
+from quadriga.shared.runtime.atomic import write_text
 
 _SHORTEST_S: Final = 0.5  # of a walk, as far as its own fault asks for no more
 
@@ -87,7 +88,7 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     if arguments.json is not None:
         with name_file_errors(ConfigError, f"--json {arguments.json}", "a file to write to"):
             text = json.dumps(rows, indent=1, ensure_ascii=False)
-            arguments.json.write_text(text + "\n", encoding="utf-8")
+            write_text(arguments.json, text + "\n")
     console.print(f"folder: {folder}", markup=False, highlight=False)
     return int(any("error" in row or row["falls_of_others"] for row in rows))
 

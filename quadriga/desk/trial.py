@@ -33,6 +33,7 @@ from quadriga.shared.members import SIM, plant_name
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Event, Status, Truth
 from quadriga.shared.wire.topics import EVENT, STATUS, topic_of
@@ -69,7 +70,7 @@ def run_trial(config: Config, fault: Fault, seed: int, folder: Path) -> dict[str
             config.bus, endpoint=free_endpoint(), mode="client" if routed else config.bus.mode
         ),
     )
-    (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
+    write_text(folder / CONFIG, to_toml(config))
     with SimulatedRobots(folder / CONFIG, config.team.robot, folder) as robots:
         with Launch(_rows(config, folder, routed), folder / "logs") as launch:
             trial = _Trial(config, fault, folder, robots, launch)
@@ -255,7 +256,7 @@ def walk_without_bridges(config: Config, seed: int, folder: Path) -> dict[str, A
         world=replace(config.world, seed=seed),
         bus=replace(config.bus, endpoint=free_endpoint()),
     )
-    (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
+    write_text(folder / CONFIG, to_toml(config))
     with Launch(_rows(config, folder, routed=False), folder / "logs") as launch:
         launch.watch(lambda: False)
     recording = Recording(folder / RECORDING)

@@ -16,6 +16,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, MessageError, name_file_errors
 from quadriga.shared.members import DOCTOR, has_lead
 from quadriga.shared.printable import printable_line
+from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.security.refusals import DENIED
@@ -82,9 +83,7 @@ class HealthFiles:
         with name_file_errors(ConfigError, f"--watch {self._folder}", expected):
             for health in found:
                 path = self._folder / health.name
-                partial = path.with_name(f".{health.name}.partial")
-                partial.write_text(f"{health.line}\n", encoding="utf-8")
-                partial.replace(path)
+                write_text(path, f"{health.line}\n")
                 self._written.add(path)
 
     def remove(self) -> None:

@@ -24,7 +24,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.writer import RECORDING, RecordingWriter
-from quadriga.shared.runtime.atomic import atomic_write
+from quadriga.shared.runtime.atomic import atomic_write, write_text
 from quadriga.shared.runtime.places import SOURCE
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.topics import SAMPLE_MS, STATE, TRUTH
@@ -75,7 +75,7 @@ def main(words: Sequence[str] | None = None) -> int:
         with tempfile.TemporaryDirectory() as folder:
             shrink_clip(walk_scenario(name, Path(folder) / "run"), clip)
         print(f"{clip}: {clip.stat().st_size / 1000:.0f} kB", flush=True)
-    PAGE.write_text(build_page(FOLDER), encoding="utf-8")
+    write_text(PAGE, build_page(FOLDER))
     return 0
 
 

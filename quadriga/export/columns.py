@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +14,7 @@ from quadriga.export.source import ExportedMessage
 
 TIMES: Final = ("tick", "stamp_ns", "log_time_ns")
 SAMPLE: Final = "sample"
+_LONGEST: Final = 200  # bytes of a file's name, of which systems permit 255
 
 TickReached = Callable[[int], None]  # called with the tick that an export has reached
 
@@ -63,5 +66,12 @@ def list_rows(item: ExportedMessage) -> Iterator[tuple[list[Any], list[float], l
 
 
 def table_file(out: Path, name: str, suffix: str) -> Path:
-    """The file of a key without its team: `r1/state` is r1.state.csv."""
-    return out / f"{name.replace('/', '.')}.{suffix}"
+    """The file of a key without its team: `r1/state` is r1.state.csv.
+
+    A key that no file can be called by is cut, and told from others by its checksum.
+    """
+    stem = re.sub(r"[\0/]", ".", name)
+    if "\0" in name or len(stem.encode()) > _LONGEST:
+        cut = stem.encode()[:_LONGEST].decode("utf-8", "ignore")
+        stem = f"{cut}-{zlib.crc32(name.encode()):08x}"
+    return out / f"{stem}.{suffix}"

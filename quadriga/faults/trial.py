@@ -27,6 +27,7 @@ from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ProcessError, RecordingError
 from quadriga.shared.members import LAUNCHER, SIM, has_lead
 from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.runtime.scheduling import go_first, leave_priority
 from quadriga.shared.wire.event_line import parse_events
@@ -64,7 +65,7 @@ def run_fault_trial(
         draw = Draw(robot or draw.robot, tick, seed, chosen=bool(robot))
     with fault.stage(_walk_config(config, fault, draw), draw, folder) as stage:
         config = stage.config
-        (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
+        write_text(folder / CONFIG, to_toml(config))
         rows = process_table(config, folder, predictor, "")
         if config.bus.mode == "client":
             rows = (router_row(config, folder), *rows)

@@ -24,6 +24,7 @@ from quadriga.identification.fit_tables import build_comparison, build_report_ta
 from quadriga.identification.predictors import build_provenance, ensure_data
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
+from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.tables import Table, print_tables
@@ -101,7 +102,7 @@ def report_fit(config: Config, dataset: Dataset, name: str) -> FitReport | Unfit
 def write_json(path: Path, body: Any) -> None:
     """Keep figures for other programs."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(body, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(body, indent=2, ensure_ascii=False) + "\n")
 
 
 def write_page(
@@ -112,7 +113,7 @@ def write_page(
     draw([report for report in reports if isinstance(report, FitReport)], figure)
     parts = [f"# {title}\n", *(sheet.to_markdown() for sheet in sheets)]
     parts.append(f"![Held-out error over the horizon]({figure.name})\n")
-    stem.with_suffix(".md").write_text("\n".join(parts), encoding="utf-8")
+    write_text(stem.with_suffix(".md"), "\n".join(parts))
 
 
 def _sheets(report: FitReport | Unfit, whole: bool = False) -> list[Table]:

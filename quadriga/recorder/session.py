@@ -18,7 +18,7 @@ from quadriga.shared.recording.admission import OVERSIZED
 from quadriga.shared.recording.mcap_chunk import name_of
 from quadriga.shared.recording.passed_over import PassedOver
 from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
+from quadriga.shared.runtime.clock import log_ns, monotonic, sleep
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Event
@@ -145,7 +145,7 @@ class Session:
         """Write all that has arrived; False if nothing came within `timeout` seconds."""
         first = self._bus.get(timeout)
         packets = () if first is None else (first, *self._bus.drain())
-        now, recorded, write = wall_ns(), self._keys, self._parts.write
+        now, recorded, write = log_ns(), self._keys, self._parts.write
         every = recorded.all
         for begin in range(0, len(packets), _SLICE):
             for key, payload in packets[begin : begin + _SLICE]:

@@ -16,7 +16,7 @@ from quadriga.shared.bus.zenoh_bus import POLL, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
-from quadriga.shared.runtime.clock import monotonic, wall_ns
+from quadriga.shared.runtime.clock import log_ns, monotonic
 from quadriga.shared.wire.envelope import envelope
 
 _PATIENCE: Final = 3.0  # s wall without a message after which a listener is shown where it listens
@@ -71,7 +71,7 @@ def entries_from_bus(
                     say(_format_silence(bus, config, keys))
                 yield None
                 continue
-            silent, now = False, wall_ns()
+            silent, now = False, log_ns()
             for key, payload in (first, *bus.drain()):
                 if _matches(patterns, key):
                     head = envelope(payload)

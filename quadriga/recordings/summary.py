@@ -31,6 +31,7 @@ from quadriga.recordings.truth import distance
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import END, LOST, RECORDING
 from quadriga.shared.robot.conventions import OUTPUTS, Array
+from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.histogram import QUANTILES
 from quadriga.shared.wire.codes import FALL, code_of
 from quadriga.shared.wire.messages import Status
@@ -59,7 +60,7 @@ def summarise(run_dir: Path, traces: Traces | None = None) -> dict[str, Any]:
     """
     summary = summary_of(traces or read_traces(Recording(run_dir / RECORDING)))
     text = json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False)
-    (run_dir / SUMMARY).write_text(text + "\n", encoding="utf-8")
+    write_text(run_dir / SUMMARY, text + "\n")
     return summary
 
 

@@ -32,6 +32,7 @@ from quadriga.report.trouble_figure import draw_trouble
 from quadriga.report.troubles import Trouble, find_troubles
 from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.planner_kinds import find_kind
+from quadriga.shared.runtime.atomic import write_text
 
 PAGE: Final = "report.html"
 _TROUBLES: Final = 6  # shown in full
@@ -58,7 +59,7 @@ def write_page(run: ReportedRun, path: Path, scene: str = "") -> Path:
     """
     clip = _read_clip(run.path)
     with name_file_errors(RecordingError, path, "a file that can be written"):
-        path.write_text(build_page(run, clip, scene), encoding="utf-8")
+        write_text(path, build_page(run, clip, scene))
     return path
 
 

@@ -25,6 +25,7 @@ from quadriga.shared.errors import BusError, ProcessError
 from quadriga.shared.members import OPERATOR
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.places import runtime_dir
 from quadriga.stop_times.figures import StopPress, find_stops
@@ -107,7 +108,7 @@ def _stop_in_one_walk(
     run = folder / f"walk-{number}"
     shutil.rmtree(run, ignore_errors=True)  # of an earlier call, which was interrupted
     run.mkdir(parents=True)
-    (run / CONFIG).write_text(to_toml(config), encoding="utf-8")
+    write_text(run / CONFIG, to_toml(config))
     port = free_port()
     table = process_table(config, run, predictor.file, predictor.sha256)
     chance = np.random.default_rng((config.world.seed, number))

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Self
@@ -32,6 +33,7 @@ _SEVERAL: Final = 2  # processes, from which on it pays to import once for all
 _LAST_WORDS: Final = 12  # lines of a failed process's log that are shown
 _LEAST_DISK: Final = 4096  # bytes, of a file's first block
 _LOOK: Final = 0.02  # s
+_LARGEST_LOG: Final = 1 << 26  # bytes; of a longer one the first half is kept, and what comes then
 _LAST_CHANCE: Final = 2.0  # s for who has not left by itself in time, before SIGKILL
 _ROUTER_GRACE: Final = 5.0  # s
 _EARLY: Final = 4.0  # s, by which others may leave before who drives time: it closes politely
@@ -226,9 +228,16 @@ class Launch:
         """Names of those that have ended since this was asked last.
 
         Raises:
-            ProcessError: some failed. Of several the first that a signal ended is named, since
-                others may complain that it is gone, else the first of the table.
+            ProcessError: the folder of the logs is gone, or some failed. Of several the first
+                that a signal ended is named, since others may complain that it is gone, else the
+                first of the table.
         """
+        if not self._logs.is_dir():
+            raise ProcessError(
+                str(self._logs), "a folder that was deleted", "one that stays while the team walks"
+            )
+        for name in self._running:
+            bound_log(self._logs / f"{name}.log")
         polled = {name: process.poll() for name, process in self._running.items()}
         ended = {name: status for name, status in polled.items() if status is not None}
         for name in ended:
@@ -245,7 +254,11 @@ class Launch:
         return ProcessError(f"process {name}", got, expected, last)
 
     def _last_words(self, name: str) -> str:
-        with (self._logs / f"{name}.log").open(encoding="utf-8", errors="replace") as log:
+        lines = deque[str]()
+        with (
+            suppress(FileNotFoundError),
+            (self._logs / f"{name}.log").open(encoding="utf-8", errors="replace") as log,
+        ):
             lines = deque(log, maxlen=_LAST_WORDS)
         words = "".join(f"  {line}" for line in lines).rstrip()
         none = "(none: the disk is full)" if _is_full(self._logs) else "(none)"
@@ -296,6 +309,14 @@ def _environment() -> dict[str, str]:
     return {**os.environ, **dict.fromkeys(_ONE_THREAD, "1"), "PYTHONIOENCODING": "utf-8"}
 
 
+def bound_log(log: Path) -> None:
+    """Cut a log that a process floods, and say so in it; processes write at its end."""
+    if log.exists() and log.stat().st_size > _LARGEST_LOG:
+        os.truncate(log, _LARGEST_LOG // 2)
+        with log.open("ab") as file:
+            file.write(b"\n(more was written here than a log may hold, and cut)\n")
+
+
 def _is_full(folder: Path) -> bool:
     """Whether nothing more can be written there, so that a process cannot say what is wrong."""
-    return shutil.disk_usage(folder).free < _LEAST_DISK
+    return folder.is_dir() and shutil.disk_usage(folder).free < _LEAST_DISK

@@ -11,6 +11,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import departures, to_toml
 from quadriga.shared.errors import ConfigError, name_file_errors
+from quadriga.shared.runtime.atomic import write_text
 from quadriga.team.run_folder import CONFIG
 
 ROWS: Final = "rows.jsonl"
@@ -73,7 +74,7 @@ def keep_config(config: Config, folder: Path) -> None:
     """
     path = folder / CONFIG
     if not path.is_file():
-        path.write_text(to_toml(config, without=(_SEED,)), encoding="utf-8")
+        write_text(path, to_toml(config, without=(_SEED,)))
         return
     changed = {name: (new, old) for name, new, old, _ in departures(config, load(path))}
     changed.pop(_SEED, None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import Field, fields
@@ -21,6 +22,10 @@ from quadriga.shared.robot.robots import ROBOTS
 from quadriga.shared.wire.codec import truncate_text
 
 _SHOWN: Final = 200  # characters of a value that is wrong
+_LARGEST: Final = 1 << 22  # bytes of a file: of a reference's trace, which has a line of its own
+_MANY_PARTS: Final = re.compile(
+    r"""(?<![\w-])(?:(?:[\w-]++|"(?:\\.|[^"\\\n])*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){100}"""
+)
 
 
 def load(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
@@ -158,8 +163,8 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises:
         ConfigError: it cannot be read, or is no TOML.
     """
-    with name_file_errors(ConfigError, path, "a readable TOML file"):
-        text = path.read_text(encoding="utf-8-sig")  # some editors begin with a mark
+    with name_file_errors(ConfigError, path, "a readable TOML file"), path.open("rb") as file:
+        text = file.read(_LARGEST + 1).decode("utf-8-sig")  # some editors begin with a mark
     try:
         return _parse_toml(str(path), text)
     except tomllib.TOMLDecodeError as error:
@@ -170,9 +175,14 @@ def _parse_toml(name: str, text: str) -> dict[str, Any]:
     """What a text says.
 
     Raises:
-        ConfigError: it is TOML, but nests too deeply or has a number of too many digits.
+        ConfigError: it is TOML, but nests too deeply or has a number of too many digits, or is
+            larger than any that is meant: the parser needs the square of a key's parts.
         tomllib.TOMLDecodeError: it is none.
     """
+    if len(text) > _LARGEST:
+        raise ConfigError(name, f"more than {_LARGEST:,} bytes", "a TOML file of some 25,000")
+    if _MANY_PARTS.search(text):
+        raise ConfigError(name, "a key of more than 100 parts", "section.key")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError:

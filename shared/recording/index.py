@@ -8,7 +8,7 @@ from pathlib import Path
 from mcap.reader import make_reader
 
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.recording.unpacking import CORRUPT
+from quadriga.shared.recording.mcap_chunk import CORRUPT
 
 
 def indexed_counts(path: Path) -> dict[str, int] | None:

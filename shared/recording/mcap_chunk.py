@@ -4,19 +4,34 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Container, Iterator
+import zlib
+from collections.abc import Callable, Container, Iterator, Mapping
 from io import BytesIO
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
+import lz4.frame
+import zstandard
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Schema
+from mcap.records import Channel, Chunk, Schema
 
 from quadriga.shared.recording.seal import newer_format_error
 from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.topics import TABLE, find_topic
 
 RECORD: Final = struct.Struct("<BQ")  # opcode, length
+BARE: Final = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)  # in chunks, and outside of any
+_LATEST: Final = (1 << 63) - 1  # ns: what MCAP has 64 bits for, tables have 63 and a sign
+LARGEST_CHUNK: Final = 1 << 27  # bytes unpacked; `recorder.chunk_kib` is half of that at most
+
+# What the MCAP library, LZ4 and Zstandard raise on bytes that are no record.
+CORRUPT: Final = (
+    McapError, struct.error, ValueError, RuntimeError, IndexError, EOFError, MemoryError,
+    OverflowError, zstandard.ZstdError,
+)  # fmt: skip
+
 _MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
 _KNOWN: Final = {f"quadriga.{topic.type.__name__}": topic.type.SCHEMA for topic in TABLE}
 
@@ -77,8 +92,62 @@ def messages_of(
         if key is not None:
             payload = chunk[at + _MESSAGE.size : end]
             head = envelope(payload)
-            yield ChunkEntry(key, -1 if head is None else head[0], log_time, payload)
+            tick = -1 if head is None else head[0]
+            yield ChunkEntry(key, tick, min(log_time, _LATEST), payload)
         at = end
+
+
+def content_of(chunk: Chunk) -> bytes:
+    """Content of a chunk.
+
+    Raises:
+        one of CORRUPT: it is damaged, or packed in another way than `UNPACK` knows.
+    """
+    if chunk.compression == "":
+        content: bytes = chunk.data
+    elif chunk.compression in UNPACK:
+        content = UNPACK[chunk.compression](chunk.data, chunk.uncompressed_size)
+    else:
+        raise ValueError(f"packed with {chunk.compression[:16]!r}")
+    if chunk.uncompressed_crc and zlib.crc32(content) != chunk.uncompressed_crc:
+        raise ValueError("its checksum is wrong")
+    return content
+
+
+def _unpack_lz4(packed: bytes, size: int) -> bytes:
+    """See `UNPACK`."""
+    _check_size(size)
+    decompressor = lz4.frame.LZ4FrameDecompressor()
+    content: bytes = decompressor.decompress(packed, max_length=size + 1)
+    return _checked(content, size)
+
+
+def _unpack_zstd(packed: bytes, size: int) -> bytes:
+    """See `UNPACK`."""
+    _check_size(size)
+    stated = zstandard.frame_content_size(packed)
+    if stated not in (size, -1):  # else as much would be allocated as the frame says
+        raise ValueError(f"a frame of {stated} bytes in a chunk of {size}")
+    content = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
+    return _checked(content, size)
+
+
+def _check_size(size: int) -> None:
+    if size > LARGEST_CHUNK:
+        raise ValueError(f"{size} bytes unpacked, at most {LARGEST_CHUNK} are read")
+
+
+def _checked(content: bytes, size: int) -> bytes:
+    if len(content) != size:
+        raise ValueError(f"{len(content)} bytes where {size} were packed")
+    return content
+
+
+# By the name of the packing: from packed bytes and the size that the chunk states to as many bytes,
+# or one of CORRUPT. No more than the stated size is ever allocated.
+UNPACK: Final[Mapping[str, Callable[[bytes, int], bytes]]] = MappingProxyType(
+    {"lz4": _unpack_lz4, "zstd": _unpack_zstd}
+)
 
 
 def check_schema(schema: Schema, path: str) -> None:

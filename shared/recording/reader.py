@@ -17,9 +17,16 @@ from mcap.records import Chunk, DataEnd, Footer, Metadata
 from mcap.writer import MCAP0_MAGIC
 
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.recording.mcap_chunk import RECORD, ChunkEntry, messages_of, stream
+from quadriga.shared.recording.mcap_chunk import (
+    BARE,
+    CORRUPT,
+    RECORD,
+    ChunkEntry,
+    content_of,
+    messages_of,
+    stream,
+)
 from quadriga.shared.recording.seal import unseal
-from quadriga.shared.recording.unpacking import CORRUPT, content_of
 from quadriga.shared.recording.writer import PROFILE
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Message
@@ -109,19 +116,20 @@ class Recording:
             file.seek(self._size - _END + RECORD.size + 4)
             end = file.read(RECORD.size + 20)
             footer = Footer.read(stream(end[RECORD.size :]))
-            if end[:1] != bytes([Opcode.FOOTER]) or not 0 < footer.summary_start < self._size:
+            start = footer.summary_start or self._size - _END + RECORD.size + 4  # 0: no summary
+            if end[:1] != bytes([Opcode.FOOTER]) or not _END < start < self._size:
                 raise self._damage_error("an index that is not where it should be")
-            file.seek(footer.summary_start - RECORD.size - 4)
+            file.seek(start - RECORD.size - 4)
             if file.read(RECORD.size) != RECORD.pack(Opcode.DATA_END, 4):
                 raise self._damage_error("content that does not end where it should")
             crc = DataEnd.read(stream(file.read(4))).data_section_crc
             summary = file.read(self._size - len(MCAP0_MAGIC) - 4 - file.tell())
             if footer.summary_crc and zlib.crc32(summary) != footer.summary_crc:
                 raise self._damage_error("an index that fails its checksum")
-            if not crc:  # as recordings of the first version are
+            if not crc:  # then those of the chunks must do
                 for _ in self._chunks():
                     pass
-            elif _crc(file, footer.summary_start - RECORD.size - 4) != crc:
+            elif _crc(file, start - RECORD.size - 4) != crc:
                 raise self._damage_error("content that fails its checksum")
         if self.cut:
             raise self._damage_error(self.cut)
@@ -168,8 +176,11 @@ class Recording:
         self.cut = f"the file ends at byte {self._size} in the middle of a record"
 
     def _chunks(self) -> Iterator[bytes]:
+        """The records in each chunk, and each of those outside of any."""
         for opcode, content in self._records():
-            if opcode == Opcode.CHUNK:
+            if opcode in BARE:
+                yield RECORD.pack(opcode, len(content)) + content
+            elif opcode == Opcode.CHUNK:
                 try:
                     inside = content_of(Chunk.read(stream(content)))
                 except CORRUPT as error:

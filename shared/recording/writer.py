@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
@@ -95,7 +96,7 @@ class RecordingWriter:
         return {key: track for key, (_, track, _) in self._channels.items()}
 
     def write(self, key: str, payload: bytes, log_time_ns: int) -> None:
-        """Append one message as sent; `log_time_ns` is the wall clock at its reception."""
+        """Append one message as sent; `log_time_ns` is its reception, see `clock.log_ns`."""
         row = self._channels.get(key)
         if row is None:
             if not self.admission.admits_key(key, len(self._channels)):
@@ -116,8 +117,16 @@ class RecordingWriter:
         self._mcap.metadata(name, dict(values))
 
     def flush(self) -> None:
-        """Close the open chunk, so that what was written so far survives a kill."""
+        """Close the open chunk, so that what was written so far survives a kill.
+
+        Raises:
+            RecordingError: the file was deleted.
+        """
         self._mcap.flush()
+        if not os.fstat(self._file.fileno()).st_nlink:
+            raise RecordingError(
+                self._file.name, "a file that was deleted", "one that stays while the team walks"
+            )
 
     def finish(self) -> None:
         """Write counters and index and close the file; a second call does nothing.

@@ -13,11 +13,16 @@ def atomic_write(path: Path) -> Iterator[Path]:
     """A path to write to, whose file becomes `path` when the block ends.
 
     It is on the disk before it has the name. If the block fails, or writes nothing, `path` stays
-    as it was. Two processes that write the same file do not disturb each other.
+    as it was. Two processes that write the same file do not disturb each other. A link goes on to
+    lead to the file; what is none, such as /dev/stdout, is written to as it is.
 
     Raises:
-        OSError: the file cannot be written.
+        OSError: the file cannot be written; it names `path`.
     """
+    if path.exists() and not path.is_file():
+        yield path
+        return
+    named, path = path, path.resolve()
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     try:
         yield partial
@@ -27,7 +32,7 @@ def atomic_write(path: Path) -> Iterator[Path]:
             partial.replace(path)
     except OSError as error:
         if error.filename in (None, str(partial)):  # of a full disk the system names no file
-            error.filename = str(path)
+            error.filename = str(named)
         raise
     finally:
         with suppress(OSError):  # where nothing can be written nothing can be removed

@@ -5,6 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime
+from typing import Final
+
+_EPOCH_NS: Final = time.time_ns() - time.monotonic_ns()  # at the start of this process
 
 
 def monotonic() -> float:
@@ -23,7 +26,7 @@ def thread_ns() -> int:
 
 
 def wall_ns() -> int:
-    """Nanoseconds since 1970: for log times and names of run folders, never for control.
+    """Nanoseconds since 1970: for names of run folders, never for control.
 
     The clocks of computers are compared by it where they say how exact it is.
     """
@@ -33,6 +36,14 @@ def wall_ns() -> int:
 def format_local(form: str, ns: int) -> str:
     """A time of `wall_ns` in the user's time zone, whatever TZ says, in a form of `strftime`."""
     return time.strftime(form, time.localtime(ns // 1_000_000_000))
+
+
+def log_ns() -> int:
+    """Nanoseconds since 1970 for log times, by the wall clock as it was when this process began.
+
+    Who sets the wall clock during a walk moves none of them.
+    """
+    return _EPOCH_NS + time.monotonic_ns()
 
 
 def sleep(seconds: float) -> None:

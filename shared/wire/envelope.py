@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import msgpack
 
-from quadriga.shared.wire.codec import MAX_INTEGER, MAX_TICK
+from quadriga.shared.wire.codec import MAX_BYTES, MAX_INTEGER, MAX_TICK
 
 _HEAD: Final = b"\xa6schema\x01\xa4tick"  # what `encode` writes after the map's own byte
 _TICK: Final = 1 + len(_HEAD)
@@ -41,6 +41,8 @@ def _read_unsigned(payload: bytes, at: int) -> tuple[int, int]:
 
 
 def _parse(payload: bytes) -> tuple[int, int] | None:
+    if len(payload) > MAX_BYTES:  # nobody's message, and parsed it may take a hundredfold
+        return None
     try:
         body: Any = msgpack.unpackb(payload)
     except (ValueError, TypeError, msgpack.exceptions.UnpackException):

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+from io import BytesIO
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mcap.writer import Writer
 
 from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.recording import seal as recording_seal
@@ -37,12 +39,17 @@ def test_each_file_that_is_none_gives_one_clear_error(
     small: Path, tmp_path: Path, run_command: RunCommand, monkeypatch: pytest.MonkeyPatch, verb: str
 ) -> None:
     whole = small.read_bytes()
-    path = tmp_path / "bad.mcap"
+    path, of_others = tmp_path / "bad.mcap", BytesIO()
+    writer = Writer(of_others)
+    writer.start()
+    writer.add_message(writer.register_channel("/odom", "cdr", 0), 1, b"\0\1", 1)
+    writer.finish()
     for content, message in (
         (None, "No such file"),
         (b"", "an empty file"),
         (b"PK\x03\x04 a zip of something" * 50, "hold nothing of a recording"),
         (whole.replace(b"quadriga", b"somebody")[:5000], "hold nothing of a recording"),
+        (of_others.getvalue(), "got a whole MCAP file of another program"),
     ):
         path.unlink(missing_ok=True)
         if content is not None:

@@ -16,6 +16,8 @@ from quadriga.export.source import Source
 from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.writer import RecordingWriter
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Event
 
 SMALL = """
 import resource, signal, sys
@@ -122,3 +124,16 @@ def test_what_somebody_else_writes_meanwhile_is_neither_mixed_nor_removed(
     assert "exists by now" in failed(capsys, file, "--to", "csv", "-o", out)
     assert [path.name for path in tmp_path.glob("*out*")] == ["out"]
     assert (out / "theirs").read_text() == "precious"
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_a_key_that_no_file_can_be_called_by_gets_one_all_the_same(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, form: str
+) -> None:
+    path, out = tmp_path / "run.mcap", tmp_path / "out"
+    with RecordingWriter(path, build_metadata(Config(), "")) as writer:
+        for robot in ("r1", "x" * 600, "x" * 601, "r\0", "r."):
+            writer.write(f"team/{robot}/event", encode(Event(1, 1, "fall", "r1", "", "fall")), 1)
+    assert main(["export", str(path), "--to", form, "-o", str(out)]) == 0
+    assert len(list(out.iterdir())) == 5
+    assert (out / f"r1.event.{form}").is_file()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -152,6 +153,35 @@ def test_nobody_is_started_twice(tmp_path: Path) -> None:
             running.restart("sim")
         with pytest.raises(ProcessError, match="process r9: got no row, expected one of sim"):
             running.restart("r9")
+
+
+def test_the_log_of_who_floods_it_is_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(launch, "_LARGEST_LOG", 1 << 20)
+    code = """
+import os
+size = 0
+while (now := os.fstat(1).st_size) >= size:
+    size = now
+    print("flood" * 10_000)
+print("last words")
+"""
+    with Launch([row("sim", code)], tmp_path) as running:
+        running.watch(never)
+    text = (tmp_path / "sim.log").read_text()
+    assert text.startswith("flood" * 10_000)
+    assert "cut)\n" in text
+    assert "last words\n" in text
+
+
+def test_a_folder_that_is_deleted_while_the_team_walks_is_named(tmp_path: Path) -> None:
+    def delete() -> bool:
+        shutil.rmtree(tmp_path / "logs")
+        return False
+
+    match = r"logs: got a folder that was deleted"
+    rows = [row("sim", LAST)]
+    with Launch(rows, tmp_path / "logs") as running, pytest.raises(ProcessError, match=match):
+        running.watch(delete)
 
 
 def test_the_table_starts_everyone_once_and_stops_the_recorder_last() -> None:

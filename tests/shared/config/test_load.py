@@ -247,3 +247,22 @@ def test_a_value_of_a_recording_without_end_is_one_short_error(value: object) ->
         with pytest.raises(ConfigError) as caught:
             build({"world": section})
         assert len(str(caught.value)) < 700
+
+
+@pytest.mark.parametrize(
+    ("text", "got"),
+    [
+        (".".join("a" * 50_000) + " = 1\n", "a key of more than 100 parts"),
+        ("[" + " . ".join(['"\\""', "'b'"] * 500) + "]\n", "a key of more than 100 parts"),
+        ("#" * 5_000_000, "more than 4,194,304 bytes"),
+    ],
+)
+def test_a_file_that_would_take_the_memory_is_refused_before_it_is_parsed(
+    tmp_path: Path, text: str, got: str
+) -> None:
+    (tmp_path / "team.toml").write_text(text)
+    with pytest.raises(ConfigError, match=got):
+        load(tmp_path / "team.toml")
+    longest = '[reference]\ntrace = "' + "0.5 0.25 0.1 0.0;" * 1000 + '"\n'
+    (tmp_path / "team.toml").write_text(longest)
+    assert len(load(tmp_path / "team.toml").reference.trace) == 17_000

@@ -215,3 +215,22 @@ def test_a_chunk_whose_checksum_is_right_but_which_holds_no_records_ends_the_rea
     recording = Recording(path)
     assert [entry.tick for entry in recording.entries()] == [3]
     assert "what are no records" in recording.cut
+
+
+def test_a_log_time_that_no_table_can_hold_is_read_as_the_latest_that_one_can(
+    tmp_path: Path,
+) -> None:
+    with RecordingWriter(tmp_path / "run.mcap", METADATA) as writer:
+        for log_time in (1, (1 << 63) - 1, 1 << 63, (1 << 64) - 1):
+            writer.write("team/estop", b"", log_time)
+    times = [entry.log_time_ns for entry in Recording(tmp_path / "run.mcap").entries()]
+    assert np.array(times, dtype=np.int64).tolist() == [1] + [(1 << 63) - 1] * 3
+
+
+def test_a_file_that_is_deleted_while_it_is_written_is_noticed(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "run.mcap", METADATA)
+    writer.flush()
+    (tmp_path / "run.mcap").unlink()
+    with pytest.raises(RecordingError, match=r"run\.mcap: got a file that was deleted"):
+        writer.flush()
+    writer.finish()

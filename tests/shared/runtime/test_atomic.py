@@ -52,6 +52,20 @@ def test_where_nothing_can_be_written_the_file_is_named_and_what_helps(
     assert ("free some room" in told.value.cause) == (number == errno.ENOSPC)
 
 
+def test_a_link_stays_one_what_is_no_file_is_written_to_and_an_error_names_the_path(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "file")
+    write_text(tmp_path / "link", "new")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "file").read_text() == "new"
+    write_text(Path("/dev/null"), "new")
+    assert Path("/dev/null").is_char_device()
+    with pytest.raises(OSError, match="No such file") as caught:
+        write_text(tmp_path / "no" / "file", "new")
+    assert caught.value.filename == str(tmp_path / "no" / "file")
+
+
 def test_nothing_written_is_nothing_replaced(tmp_path: Path) -> None:
     path = tmp_path / "figure.png"
     with atomic_write(path):
