@@ -5,13 +5,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
-from quadriga.commands.options import recording_path
+from quadriga.commands.options import named_path, recording_path
 
 _MORE: Final = "…"  # in a placeholder: other values are possible
-_PATHS: Final = (Path, recording_path)
+_PATHS: Final = (named_path, recording_path)
 _SEVERAL: Final = "|"  # between the values of a placeholder
 
 

@@ -105,12 +105,12 @@ def build_config_options(command: str, *, hidden: bool) -> argparse.ArgumentPars
             help="through the router at tls/HOST:PORT: sets bus.mode to client, and bus.endpoint",
         )
     for option, name in (KEYS | KEYS_OF.get(command, {})).items():
-        add(f"--{option}", dest=name, **_describe_key(name))
+        add(f"--{option}", dest=name, **describe_key(name))
     return options
 
 
 @cache
-def _describe_key(name: str) -> Mapping[str, Any]:
+def describe_key(name: str) -> Mapping[str, Any]:
     """Type, placeholder and help of the option of a key."""
     section, _, key = name.partition(".")
     group = getattr(_DEFAULTS, section)

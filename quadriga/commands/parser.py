@@ -12,7 +12,7 @@ from typing import Final
 
 from quadriga.commands.command import Run
 from quadriga.commands.command_table import GROUPS
-from quadriga.commands.config_options import build_config_options, read_config
+from quadriga.commands.config_options import build_config_options, describe_key, read_config
 from quadriga.commands.mistakes import check_words, refuse_strays
 from quadriga.commands.options import READ_AS
 from quadriga.commands.running import registered
@@ -111,15 +111,21 @@ def _parse(parser: CommandLine, typed: Sequence[str]) -> argparse.Namespace:
 
 
 def _refuse_repeats(command: argparse.ArgumentParser, typed: Sequence[str]) -> None:
-    """Refuse an option that is given twice, of which only the last one would count."""
-    actions = {option: action for action in command._actions for option in action.option_strings}
+    """Refuse an option of several values that is given twice: only the last one would count."""
+    several = [action for action in command._actions if _takes_several(action)]
+    actions = {option: action for action in several for option in action.option_strings}
     seen = set[argparse.Action]()
     for word in takewhile("--".__ne__, typed):
         action = actions.get(word.partition("=")[0])
         if action in seen:
-            raise ConfigError(word.partition("=")[0], "twice", "once, with all of its value")
-        if isinstance(action, argparse._StoreAction):
+            raise ConfigError(word.partition("=")[0], "twice", "once, with all of them")
+        if action is not None:
             seen.add(action)
+
+
+def _takes_several(action: argparse.Action) -> bool:
+    is_key = "." in action.dest
+    return action.nargs == "+" or (is_key and "commas" in describe_key(action.dest)["help"])
 
 
 @cache

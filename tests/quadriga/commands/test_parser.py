@@ -102,7 +102,8 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
         (["router", "--listen", "tcp/[::1]:0"], "--listen: got 'tcp/[::1]:0', expected a port"),
         (["walk", "--faults", "r1/imu stuck -4"], "world.faults: got start '-4' in"),
         (["walk", "--faults", "r1/imu off 1,r1/imu off 1"], "world.faults: got r1/imu off twice"),
-        (["walk", "--seed", "1", "--vx", "0.1", "--seed=2"], "--seed: got twice, expected once"),
+        (["walk", "--push", "x", "--vx", "0.1", "--push=y"], "--push: got twice, expected once"),
+        (["record", "--topics", "plan", "--topics", "state"], "--topics: got twice, expected once"),
     ],
 )
 def test_mistakes(
