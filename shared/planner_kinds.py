@@ -8,9 +8,10 @@ that whoever only reads a configuration imports no planner.
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -113,13 +114,49 @@ BUILT_IN: Final[Mapping[str, PlannerKind]] = {
 }
 
 
+_RECORDED: Final[dict[str, tuple[PlannerKind, str]]] = {}  # absent kinds, and where they are from
+
+
 def find_kind(name: str) -> PlannerKind:
     """The kind of planner of this name.
 
     Raises:
         ConfigError: no installed package has such a kind, or two have; or it cannot be imported.
     """
-    return BUILT_IN.get(name) or _find_plugin(name)
+    return BUILT_IN.get(name) or (_RECORDED[name][0] if absent_origin(name) else _find_plugin(name))
+
+
+def describe_plugin(name: str) -> str:
+    """What `stand_in` needs to know of a plug-in's kind, as JSON; "" of a built-in one."""
+    origin = plugin_origin(name)
+    return json.dumps({**asdict(find_kind(name)), "origin": origin}) if origin else ""
+
+
+def stand_in(name: str, described: str, options: str) -> None:
+    """Let recordings of a kind be read whose package is not installed: nothing can plan with it.
+
+    Args:
+        name: of the kind.
+        described: see `describe_plugin`; "" if that is not known.
+        options: of the recorded walk.
+    """
+    if name in installed_kinds():
+        return
+    try:
+        facts = dict(json.loads(described or "{}"))
+        origin = str(facts.pop("origin", "")) or f"the package that has {name!r}"
+        kind = PlannerKind(**{"title": "", "build": "", **facts, "name": name})
+        known = {str(key): float(value) for key, value in kind.options.items()}
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        kind, known, origin = PlannerKind(name, "", ""), {}, "a package that is not named"
+    given = {part.partition("=")[0]: math.nan for part in options.split()}
+    _RECORDED[name] = replace(kind, options={**given, **known}), origin
+
+
+def absent_origin(name: str) -> str:
+    """Where a kind is from that only stands in for one that is not installed; "" of any other."""
+    absent = name in _RECORDED and name not in installed_kinds()
+    return _RECORDED[name][1] if absent else ""
 
 
 def installed_kinds() -> tuple[str, ...]:
@@ -132,8 +169,11 @@ def load_builder(kind: PlannerKind, reference: str) -> Any:
     """What a kind's `build` or `build_team` names.
 
     Raises:
-        ConfigError: there is no such module or function, or it cannot be imported.
+        ConfigError: there is no such module or function, or it cannot be imported, or the kind is
+            that of a recording and not installed.
     """
+    if origin := absent_origin(kind.name):
+        raise ConfigError(_KEY, repr(kind.name), "a kind that is installed", f"install {origin}")
     module, _, name = reference.partition(":")
     try:
         return getattr(import_module(module), name)

@@ -8,10 +8,12 @@ from quadriga.recordings.metadata import read_counts, recorded_patterns, recorde
 from quadriga.recordings.survey import Survey, type_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import departures
+from quadriga.shared.planner_kinds import absent_origin
 from quadriga.shared.recording.admission import describe_refused
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.recording.writer import END
 from quadriga.shared.runtime.clock import format_local
+from quadriga.shared.robot.robots import ROBOTS
 from quadriga.tables import NOTHING, align_columns
 
 _EVENTS = 40  # as many are shown
@@ -58,14 +60,17 @@ def _about(s: Survey) -> Iterator[tuple[str, str]]:
             yield f"--{name}", " ".join(recorded_patterns(s.metadata, name)) or NOTHING
     if s.config is not None:
         c = s.config
-        robots = f"{c.team.robots} × {c.robot.title}"
+        known = c.team.robot in ROBOTS
+        kind = c.robot.title if known else f"{c.team.robot} (a robot that is not installed here)"
+        robots = f"{c.team.robots} × {kind}"
         yield (
             "team",
             f"{c.team.name}, {robots}, {c.world.mode}, "
             f"{c.world.scenario or c.world.terrain}, "
             f"seed {c.world.seed}",
         )
-        yield "planner", c.planner.kind
+        absent = absent_origin(c.planner.kind)
+        yield "planner", c.planner.kind + (f" (not installed here: {absent})" if absent else "")
         if c.team.controller:
             yield "controller", s.metadata.get("controller", c.team.controller)
     yield "falls", ", ".join(e.robot for e in s.events if e.kind == "fall") or "none"

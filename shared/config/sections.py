@@ -20,6 +20,7 @@ from quadriga.shared.config.team import (
     TeamConfig,
 )
 from quadriga.shared.config.world import WorldConfig
+from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.robots import ROBOTS
 from quadriga.shared.robot.spec import RobotSpec
 
@@ -65,8 +66,16 @@ class Config:
 
     @property
     def robot(self) -> RobotSpec:
-        """The kind of robot that the team is made of."""
-        return ROBOTS[self.team.robot]
+        """The kind of robot that the team is made of.
+
+        Raises:
+            ConfigError: it is that of a recording, and not known here.
+        """
+        kind = self.team.robot
+        if kind not in ROBOTS:
+            known = f"one of {', '.join(ROBOTS)}"
+            raise ConfigError("team.robot", repr(kind), known, "install what brings this robot")
+        return ROBOTS[kind]
 
     @property
     def feet_measure_newtons(self) -> bool:

@@ -3,28 +3,40 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import lru_cache
+from typing import Final
 
 from quadriga.shared.config.later import with_older_values
-from quadriga.shared.config.load import build
+from quadriga.shared.config.load import build, flatten
 from quadriga.shared.config.renamed import with_current_names
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, RecordingError
+from quadriga.shared.planner_kinds import stand_in
+from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.salvage import Salvage
+from quadriga.shared.robot.robots import ROBOTS
+
+PLUGIN: Final = (
+    "planner"  # in the metadata: what is known of the planner's kind without its package
+)
 
 
 def recorded_config(recording: Recording | Salvage) -> Config:
     """The configuration of a recorded run.
 
-    What its version did not know yet is as it was then, see `with_older_values`.
+    What its version did not know yet is as it was then, see `with_older_values`. A planner, or a
+    robot, of a package that is not installed keeps its name: messages can be read without it, and
+    whatever needs more of it raises ConfigError (`Config.robot`, `planner_kinds.load_builder`).
 
     Raises:
         RecordingError: the recording holds none, or one with keys or values that this version
             does not know.
     """
+    found = recording.metadata
     try:
-        return _build(recording.metadata.get("config_json", ""))
+        return _build(found.get("config_json", ""), found.get(PLUGIN, ""))
     except _NoConfigurationError:
         raise RecordingError(
             str(recording.path), "metadata without a configuration", "config_json in the metadata"
@@ -34,9 +46,7 @@ def recorded_config(recording: Recording | Salvage) -> Config:
             f"configuration of {recording.path}",
             f"{error.name} = {error.got}",
             error.expected,
-            error.cause
-            if error.name == "planner.kind"
-            else "recorded by another version of quadriga: use that one",
+            "recorded by another version of quadriga: use that one",
         ) from None
     except RecursionError:  # in the words about a value that nests as deeply as JSON permits
         raise RecordingError(
@@ -52,11 +62,19 @@ class _NoConfigurationError(Exception):
 
 
 @lru_cache(maxsize=8)  # every reader of a recording asks, and a configuration does not change
-def _build(text: str) -> Config:
+def _build(text: str, plugin: str) -> Config:
     try:
         sections = json.loads(text)
     except (ValueError, RecursionError):  # the latter for what nests too deeply
         raise _NoConfigurationError from None
     if not isinstance(sections, dict):
         raise _NoConfigurationError
-    return build(with_older_values(with_current_names(sections)))
+    given = with_older_values(with_current_names(sections))
+    keys = flatten(given)
+    kind, team, robot = keys.get("planner.kind"), given.get("team"), keys.get("team.robot")
+    if isinstance(kind, str) and kind.isprintable():
+        stand_in(kind, plugin, str(keys.get("planner.options", "")))
+    if isinstance(team, dict) and isinstance(robot, str) and robot not in ROBOTS:
+        config = build({**given, "team": {k: v for k, v in team.items() if k != "robot"}})
+        return replace(config, team=replace(config.team, robot=printable_line(robot)))
+    return build(given)

@@ -13,6 +13,7 @@ from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.recordings.checks.getting_up import Doubts, GettingUp
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import JOINT_NAMES, Array, Leg, robot_names
+from quadriga.shared.robot.robots import ROBOTS
 from quadriga.shared.wire.messages import Command, Plan
 
 TOLERANCE: Final = 1e-6  # N and N·m
@@ -80,7 +81,11 @@ class Torques:
         self._doubts = Doubts(self.finding, getting_up)
         self._stand = config.bridge.stand_kp, config.bridge.stand_kd
         self._damping = config.controller.damping
-        self._limit = config.robot.torque_limit
+        self._limit = np.full(len(JOINT_NAMES), np.inf)
+        if config.team.robot in ROBOTS:
+            self._limit = config.robot.torque_limit
+        else:
+            self.finding.notes.append(f"limits of {config.team.robot!r} are not known here")
         self._any_gains = bool(config.team.controller)
         self._largest = 0.0
 
