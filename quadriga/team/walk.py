@@ -86,8 +86,12 @@ def walk(
     run_dir = make_run_dir(out)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
     warm_up(config, console)
-    predictor, sha256 = None, ""
-    if find_kind(config.planner.kind).needs_predictor:
+    predictor, sha256, kind = None, "", find_kind(config.planner.kind)
+    if kind.needs_data:
+        from quadriga.identification.predictors import ensure_data
+
+        ensure_data(config, console)
+    if kind.needs_predictor:
         predictor, sha256 = _take_predictor(config, run_dir, console)
     (run_dir / CONFIG).write_text(to_toml(config), encoding="utf-8")
     # By another name of this computer, so that the browser draws it in a process of its own: the
