@@ -41,6 +41,7 @@ from quadriga.agents.modes import (
     stop_safely,
 )
 from quadriga.agents.planner.qp_solver import SolvedQp
+from quadriga.agents.planner.team_planner import Collected
 from quadriga.agents.planning.active_plan import setpoint_at
 from quadriga.agents.planning.interface import Expected, PlanningInputs
 from quadriga.agents.planning.operator_references import reference_at, remember_references
@@ -113,6 +114,7 @@ class Agent:
         predictor: the fitted predictor; None: without one, on nominal forces or on the plans of a
             central planner.
         clock_ns: read around the planner for `Outputs.planner_ns`; nothing else depends on it.
+        collected: reads the collected episodes, for agents that plan with them.
     """
 
     def __init__(
@@ -121,12 +123,13 @@ class Agent:
         robot: str,
         predictor: Predictor | None,
         clock_ns: Callable[[], int] = lambda: 0,
+        collected: Collected | None = None,
     ) -> None:
         self.config = config
         self.robot = robot
         self.index = robot_names(config.team.robots).index(robot)
         self._controller = Controller(config)
-        self._planning = build_planning(config, self.index, predictor, clock_ns)
+        self._planning = build_planning(config, self.index, predictor, clock_ns, collected)
         self._by_truth = config.estimator.kind == "truth"
         self._stand_ms, self._stance_ms = config.gait.stand_ms, config.gait.stance_ms
         self._height = config.reference.height

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
+from quadriga.agents.planner.team_planner import Collected
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.agents.shell import answer_states
@@ -23,6 +24,7 @@ def run(
     robot: str,
     predictor: Predictor | None,
     stopped: Callable[[], bool] | None = None,
+    collected: Collected | None = None,
 ) -> None:
     """Walk one robot until the walk ends or it is stopped.
 
@@ -34,6 +36,7 @@ def run(
         robot: the robot's name, r1 … rn.
         predictor: the fitted predictor; None walks on nominal forces.
         stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
+        collected: reads the collected episodes, for agents that plan with them.
 
     Raises:
         BusError: as `answer_states`.
@@ -42,10 +45,11 @@ def run(
     """
     stopped = stopped or stop_on_signals()
     use_one_blas_thread()
-    agent = Agent(config, robot, predictor, monotonic_ns)
+    agent = Agent(config, robot, predictor, monotonic_ns, collected)
 
     def rehearse(joined: str) -> None:
-        rehearse_in_time(config, Agent(config, robot, predictor), refuse=joined == STARTS)
+        rehearsed = Agent(config, robot, predictor, collected=collected)
+        rehearse_in_time(config, rehearsed, refuse=joined == STARTS)
         end_collection()
 
     inbox = Inbox(config, robot, agent.peers)

@@ -33,7 +33,8 @@ class PlannerKind:
         name: value of `planner.kind`.
         title: what it does, in a few words.
         build: "module:function" that builds an agent's planning part, a `PlanningInterface`, from
-            the configuration, the agent's place in the team, the predictor or None, and a clock.
+            the configuration, the agent's place in the team, the predictor or None, a clock, and,
+            of a kind that needs data, a function that reads the collected episodes.
         build_team: "module:function" that builds the `TeamPlanner` of a kind that is one process
             for the whole team, from the configuration, the predictor or None, and a function that
             reads the collected episodes; "" for all other kinds.

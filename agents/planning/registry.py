@@ -14,6 +14,7 @@ import quadriga.agents.planning.local
 import quadriga.agents.planning.remote  # noqa: F401
 from quadriga.agents.modes import WALK
 from quadriga.agents.planner.qp_solver import SolvedQp
+from quadriga.agents.planner.team_planner import Collected
 from quadriga.agents.planning.active_plan import ActivePlan, PlanCheck, add_plan
 from quadriga.agents.planning.interface import (
     Expected,
@@ -116,7 +117,11 @@ class CheckedPlanning(PlanningInterface[PlanningState]):
 
 
 def build_planning(
-    config: Config, index: int, predictor: Predictor | None, clock_ns: Callable[[], int]
+    config: Config,
+    index: int,
+    predictor: Predictor | None,
+    clock_ns: Callable[[], int],
+    collected: Collected | None = None,
 ) -> CheckedPlanning:
     """The planning part of one agent.
 
@@ -125,6 +130,7 @@ def build_planning(
         index: the agent's place in the team, 0-based.
         predictor: the fitted predictor; None: an agent that would plan with one does not plan.
         clock_ns: read around the planner for telemetry.
+        collected: reads the collected episodes, for a kind whose agents plan with them.
 
     Raises:
         ConfigError: the kind of planner is not installed, or cannot be imported.
@@ -132,5 +138,6 @@ def build_planning(
     kind = find_kind(config.planner.kind)
     planner: PlanningInterface[Any] = NominalPlanning()
     if predictor is not None or not kind.agents_predict:
-        planner = load_builder(kind, kind.build)(config, index, predictor, clock_ns)
+        data = (collected,) if kind.needs_data and not kind.central else ()
+        planner = load_builder(kind, kind.build)(config, index, predictor, clock_ns, *data)
     return CheckedPlanning(config, index, planner)

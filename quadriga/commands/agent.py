@@ -32,11 +32,12 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     if config.team.controller:
         _become_controller(arguments, config)
     from quadriga.agents import process  # compiled code, which a controller does not wait for
+    from quadriga.identification.central_planner import collected_of
 
     predictor = None
     if find_kind(config.planner.kind).agents_predict:
         predictor = load_predictor(config, arguments)
-    process.run(config, arguments.robot, predictor)
+    process.run(config, arguments.robot, predictor, collected=collected_of(config))
     return 0
 
 

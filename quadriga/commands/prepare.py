@@ -17,11 +17,14 @@ def run(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Compile, then print the predictor's file if the team plans."""
     from rich.console import Console
 
-    from quadriga.identification.predictors import ensure_predictor
+    from quadriga.identification.predictors import ensure_data, ensure_predictor
     from quadriga.warm_up import warm_up
 
     console = Console(stderr=True)
     warm_up(config, console)
-    if find_kind(config.planner.kind).needs_predictor:
+    kind = find_kind(config.planner.kind)
+    if kind.needs_data:
+        ensure_data(config, console)
+    if kind.needs_predictor:
         print(ensure_predictor(config, console))
     return 0

@@ -13,7 +13,7 @@ from quadriga.agents.planner.checked_predictor import load_checked
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.fit_report import reason
-from quadriga.identification.predictors import ensure_predictor
+from quadriga.identification.predictors import ensure_data, ensure_predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
 from quadriga.shared.planner_kinds import find_kind
@@ -52,8 +52,11 @@ def prepare_predictors(configs: Iterable[Config], console: Console) -> dict[Conf
     fitted: dict[Config, Fitted] = {}
     made: dict[tuple[Path, str], Fitted] = {}
     for config in configs:
-        if not find_kind(config.planner.kind).needs_predictor:
-            fitted[config] = Fitted()
+        kind = find_kind(config.planner.kind)
+        if kind.needs_data:
+            ensure_data(config, console)
+        if not kind.needs_predictor:
+            fitted[config] = Fitted(data=data_path(config) if kind.needs_data else None)
             continue
         # Gates are those of the planner, whose QP any of its keys may change, with the limits of
         # the configuration.

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from quadriga.agents.planner.team_planner import TeamPlanner
-from quadriga.agents.predictor.episode import Episode
+from quadriga.agents.planner.team_planner import Collected, TeamPlanner
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.cache import data_path
 from quadriga.identification.dataset import read_data
@@ -30,13 +28,16 @@ def build_central_planner(
         ConfigError: the kind is not installed, or cannot be imported.
     """
     use_one_blas_thread()
-    return choose_central_planner(
-        config, predictor, lambda: read_data(data or data_path(config)).training
-    )
+    return choose_central_planner(config, predictor, collected_of(config, data))
+
+
+def collected_of(config: Config, data: Path | None = None) -> Collected:
+    """What reads the collected episodes, from a file or by default from the cache's."""
+    return lambda: read_data(data or data_path(config)).training
 
 
 def choose_central_planner(
-    config: Config, predictor: Predictor | None, collected: Callable[[], Sequence[Episode]]
+    config: Config, predictor: Predictor | None, collected: Collected
 ) -> TeamPlanner:
     """The same with the collected episodes, which only a kind that needs them asks for."""
     kind = find_kind(config.planner.kind)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
-from quadriga.agents.planner.team_planner import TeamPlanner
+from quadriga.agents.planner.team_planner import Collected, TeamPlanner
 from quadriga.agents.planning.remote import central_latency
 from quadriga.agents.planning.team import Central, CentralState
 from quadriga.agents.predictor.predictor import Predictor
@@ -38,7 +38,10 @@ class Tick:
 
 
 def build_agents(
-    config: Config, predictor: Predictor | None, clock_ns: Callable[[], int] = lambda: 0
+    config: Config,
+    predictor: Predictor | None,
+    clock_ns: Callable[[], int] = lambda: 0,
+    collected: Collected | None = None,
 ) -> dict[str, Agent]:
     """The team's agents by name; they remember nothing, so that they may walk again and again.
 
@@ -46,6 +49,7 @@ def build_agents(
         config: the team's configuration; they do not look at its world.
         predictor: for agents that plan for themselves, or None.
         clock_ns: read around their planners, for `Outputs.planner_ns` alone.
+        collected: reads the collected episodes, for agents that plan with them.
 
     Raises:
         ConfigError: the team's agents are a controller of one's own, a process of its own.
@@ -59,7 +63,7 @@ def build_agents(
         )
     use_one_blas_thread()
     names = robot_names(config.team.robots)
-    return {name: Agent(config, name, predictor, clock_ns) for name in names}
+    return {name: Agent(config, name, predictor, clock_ns, collected) for name in names}
 
 
 class Rollout:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
+from quadriga.identification.central_planner import collected_of
 from quadriga.replay.agent_log import read_agent_log
 from quadriga.replay.breakpoint import Breakpoint
 from quadriga.replay.comparison import Comparison, ReplayedStep, ReplayVerdict
@@ -58,13 +59,19 @@ def replay_agent(
     job: ReplayJob,
     show: Show = lambda doing, tick: None,
     stop_at: Breakpoint | ProblemSaver | None = None,
+    *,
+    handed_over: bool = True,
 ) -> ReplayOutcome:
     """Replay one robot.
+
+    In the middle of each life an agent that is built anew goes on with what the first remembers:
+    of a planner that keeps state elsewhere the rest is not equal any more.
 
     Args:
         job: whose replay, and how.
         show: called with what is being done.
         stop_at: where to stop in the debugger, or what saves the QPs of a moment.
+        handed_over: whether another agent goes on in the middle of a plain replay.
 
     Raises:
         QuadrigaError: as `quadriga.replay.team_replay.replay`.
@@ -74,6 +81,8 @@ def replay_agent(
     recording = Recording(job.path)
     config = recorded_config(recording)
     recorded, current, changed = _build_agents(job, recording, config)
+    handed_over = handed_over and not changed and stop_at is None
+    second = _build_agents(job, recording, config)[0] if handed_over else current
     inbox = Inbox(config, job.robot, recorded.peers)
     log = read_agent_log(recording, config, recorded, inbox, lambda tick: show("reading", tick))
     curves = Curves(config.planner.applied) if changed else None
@@ -81,11 +90,13 @@ def replay_agent(
     paced = config.world.mode == "realtime"
     lives = split_lives(log, paced=paced, whole=recording.complete)
     begins = tuple(map(first_tick, lives))  # now: what is replayed is taken out of the logs
+    middles = [(begin + life.last) // 2 for begin, life in zip(begins, lives, strict=True)]
     with collector_off():  # a long log need not be looked through again and again
-        for life in lives:
+        for life, middle in zip(lives, middles, strict=True):
             inbox = Inbox(config, job.robot, recorded.peers)
             inputs = RecordedInputs(config, recorded, inbox, life)
-            _replay_steps(current, inputs, comparison, show, stop_at, changed=bool(changed))
+            agents = (current, second)
+            _replay_steps(agents, middle, inputs, comparison, show, stop_at, changed=bool(changed))
             if comparison.verdict.missing and not changed:
                 break  # nothing after it could be equal but by chance
             comparison.end_life(life)
@@ -109,9 +120,19 @@ def replay_agent(
         inputs="" if verdict.step is None else format_inputs(verdict.step),
         files=files,
         lives=begins,
+        stateful=handed_over and _is_stateful(job, verdict, middles),
     )
     verdict.step = None  # not to be carried between processes
     return outcome
+
+
+def _is_stateful(job: ReplayJob, verdict: ReplayVerdict, middles: Sequence[int]) -> bool:
+    """Whether the first difference is there only because another agent went on in the middle."""
+    first = verdict.first
+    if first is None or all(first.tick < middle for middle in middles):
+        return False
+    again = replay_agent(job, handed_over=False).verdict
+    return again.first is None or again.first.tick > first.tick
 
 
 def _check_reached(stop_at: Breakpoint | ProblemSaver, robot: str, last: int) -> None:
@@ -128,16 +149,19 @@ def _check_reached(stop_at: Breakpoint | ProblemSaver, robot: str, last: int) ->
 def _build_agents(job: ReplayJob, recording: Recording, config: Config) -> tuple[Agent, Agent, str]:
     """The agent as it was recorded, as it is now, and what was changed, as text."""
     predictor, same = find_predictor(recording, config, job.predictor)
-    recorded = Agent(config, job.robot, predictor)
+    recorded = Agent(config, job.robot, predictor, collected=collected_of(config))
     new = change_config(config, job.given)
     changed = format_changes(config, new) + ("" if same else f" predictor {job.predictor}")
-    current = Agent(new, job.robot, predictor) if changed else recorded
+    current = recorded
+    if changed:
+        current = Agent(new, job.robot, predictor, collected=collected_of(new))
     check_agents(recorded, current)
     return recorded, current, changed.strip()
 
 
 def _replay_steps(
-    agent: Agent,
+    agents: tuple[Agent, Agent],
+    middle: int,
     inputs: RecordedInputs,
     comparison: Comparison,
     show: Show,
@@ -147,15 +171,16 @@ def _replay_steps(
 ) -> None:
     """Step one life of the agent over all it took in; up to what is missing unless it is changed.
 
-    Its begin is as that of an agent that has just been started.
+    Its begin is as that of an agent that has just been started; the second goes on at the middle.
     """
-    memory = agent.initial()
+    memory = agents[0].initial()
     for step in inputs.steps():
         comparison.verdict.missing += [(step.tick, name) for name in step.missing]
         if step.missing and not changed:
             return
         if step.inputs is None:
             continue
+        agent = agents[step.tick >= middle]
         if step.tick % _SHOWN_EVERY == 0:
             show(f"replaying {agent.robot}", step.tick)
         if stop_at is not None:

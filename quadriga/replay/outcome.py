@@ -10,6 +10,10 @@ from typing import Final
 from quadriga.agents.inbox.intake_log import list_messages
 from quadriga.replay.comparison import COMPARED, ReplayedStep, ReplayVerdict
 
+_STATEFUL: Final = (
+    "the planner keeps state outside of what its `step` returns: before this, an agent built anew "
+    "went on with all that the first one remembered; one agent alone comes out equal"
+)
 _SHOWN: Final = 3  # messages missing from the recording that are named
 
 
@@ -26,6 +30,7 @@ class ReplayOutcome:
         inputs: what the agent took in at the first difference, in short.
         files: what was left behind: the figure of a change, the problem at a difference.
         lives: first tick of each process that the agent had: it may have been started again.
+        stateful: whether all would be equal up to there, had one agent made the whole replay.
     """
 
     robot: str
@@ -36,6 +41,7 @@ class ReplayOutcome:
     inputs: str = ""
     files: tuple[Path, ...] = ()
     lives: tuple[int, ...] = ()
+    stateful: bool = False
 
     @property
     def failed(self) -> bool:
@@ -66,6 +72,8 @@ def format_outcome(outcome: ReplayOutcome) -> str:
         lines.append(f"  changed: {outcome.changed}")
     if verdict.first is not None:
         lines.append(f"  first difference: {verdict.first}")
+        if outcome.stateful:
+            lines.append(f"  {_STATEFUL}")
         if outcome.inputs:
             lines.append(f"  inputs there: {outcome.inputs}")
     if verdict.missing:

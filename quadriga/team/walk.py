@@ -99,8 +99,12 @@ def walk(
     run_dir = make_run_dir(out, config)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
     warm_up(config, console)
-    predictor, sha256 = None, ""
-    if find_kind(config.planner.kind).needs_predictor:
+    predictor, sha256, kind = None, "", find_kind(config.planner.kind)
+    if kind.needs_data:
+        from quadriga.identification.predictors import ensure_data
+
+        ensure_data(config, console)
+    if kind.needs_predictor:
         predictor, sha256 = _take_predictor(config, run_dir, console)
     # By another name of this computer, so that the browser draws it in a process of its own: the
     # page to drive from must not be silent while the scene is drawn.

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
 from quadriga.agents.predictor.predictor import Predictor
+from quadriga.identification.central_planner import collected_of
 from quadriga.identification.rollout import Rollout, build_agents
 from quadriga.recordings.by_tick import by_tick
 from quadriga.replay.difference import Difference, find_difference
@@ -97,9 +98,10 @@ def walk_branch(
         RecordingError: the recorded walk does not come out again up to the moment.
         ConfigError: the changed world cannot be built.
     """
-    agents = build_agents(config, predictor)
+    agents = build_agents(config, predictor, collected=collected_of(config))
     if config != change.config or predictor is not change.predictor:
-        changed = build_agents(change.config, change.predictor)
+        data = collected_of(change.config)
+        changed = build_agents(change.config, change.predictor, collected=data)
         for name in change.robots:
             agents[name] = _TwinAgent(agents[name], changed[name], change.moment)
     references = _choose_references(recording, config, change)

@@ -13,7 +13,7 @@ from quadriga.agents.planner.team_planner import TeamPlanner
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.experiments.trial.figures_of_merit import Figures, compute_figures
 from quadriga.experiments.trial.in_process import build_timed_agents, roll_out
-from quadriga.identification.central_planner import build_central_planner
+from quadriga.identification.central_planner import build_central_planner, collected_of
 from quadriga.shared.config.sections import Config, WorldConfig
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.runtime.blas import use_one_blas_thread
@@ -36,12 +36,12 @@ def evaluate(config: Config, predictor: Path | None, data: Path | None = None) -
     fixed = replace(config, world=WorldConfig())
     central = find_kind(config.planner.kind).central
     team = _team_planner(fixed, predictor, data) if central else None
-    return compute_figures(roll_out(config, _agents(fixed, predictor), team))
+    return compute_figures(roll_out(config, _agents(fixed, predictor, data), team))
 
 
 @lru_cache(maxsize=1)  # those of three robots take 70 MB, with `planner.preset = "fast"` 280
-def _agents(config: Config, path: Path | None) -> Mapping[str, Agent]:
-    return build_timed_agents(config, _predictor(config, path))
+def _agents(config: Config, path: Path | None, data: Path | None) -> Mapping[str, Agent]:
+    return build_timed_agents(config, _predictor(config, path), collected_of(config, data))
 
 
 @lru_cache(maxsize=4)

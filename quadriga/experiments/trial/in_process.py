@@ -11,7 +11,7 @@ import numpy as np
 
 from quadriga.agents.agent import Agent
 from quadriga.agents.planner.planner import PlannerInputs
-from quadriga.agents.planner.team_planner import TeamPlanner, TeamResult
+from quadriga.agents.planner.team_planner import Collected, TeamPlanner, TeamResult
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.experiments.trial.figures_of_merit import Walk
 from quadriga.identification.rollout import Rollout, Tick, build_agents
@@ -32,15 +32,18 @@ from quadriga.team.operator import reference_at, references_of
 _SUMMED: Final = 100  # ticks whose work is summed up at once
 
 
-def build_timed_agents(config: Config, predictor: Predictor | None) -> dict[str, Agent]:
+def build_timed_agents(
+    config: Config, predictor: Predictor | None, collected: Collected | None = None
+) -> dict[str, Agent]:
     """The team's agents by name, whose planners are timed; they may walk again and again.
 
     Args:
         config: the team's configuration; they do not look at its world.
         predictor: None without a planner.
+        collected: reads the collected episodes, for agents that plan with them.
     """
     of_agents = predictor if find_kind(config.planner.kind).agents_predict else None
-    return build_agents(config, of_agents, monotonic_ns)
+    return build_agents(config, of_agents, monotonic_ns, collected)
 
 
 def roll_out(

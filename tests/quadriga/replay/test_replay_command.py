@@ -17,6 +17,7 @@ from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, predictor_sha256, save
 from quadriga.commands.parser import main
 from quadriga.recordings.metadata import build_metadata
+from quadriga.replay.outcome import format_outcome
 from quadriga.replay.recorded_predictor import PREDICTOR, copy_predictor, find_predictor
 from quadriga.replay.saved_qp import SavedQp
 from quadriga.replay.saved_qp import load as load_qp
@@ -30,6 +31,7 @@ from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Command, Reference
 from tests.a1 import standing
+from tests.plugins.kinds import install_module
 from tests.quadriga.replay.rewritten import rewritten
 
 REPORT = GateReport(1, {}, {}, 0.5, (0.1,), ((1.0,),), (0.3, 2.0), 0.1, 0.5, (), ())
@@ -145,6 +147,67 @@ def test_a_stop_that_could_not_be_read_is_handed_over_where_it_was_taken_in(tmp_
     (outcome,) = replay(run, (), {}, None, None, Console())
     assert outcome.verdict.exact
     assert outcome.verdict.equal["command"] == 5
+
+
+COUNTING = """
+from quadriga.agents.planning.interface import PlanningInterface, PlanningOutputs
+from quadriga.agents.planning.active_plan import PlanCheck
+from quadriga.shared.planner_kinds import PlannerKind
+from quadriga.shared.wire.messages import Plan
+import numpy as np
+
+KIND = PlannerKind("counting", "t", "quadriga_counting_module:Counting", needs_predictor=False,
+                   needs_data=True, options={"hidden": 0})
+
+
+class Counting(PlanningInterface):
+    def __init__(self, config, index, predictor, clock_ns, collected):
+        self.config, self.count = config, 0
+        self.nominal = PlanCheck(config, index).nominal
+        assert callable(collected)
+
+    def initial(self):
+        return 0
+
+    def step(self, count, inputs):
+        self.count, tick = self.count + 1, inputs.tick
+        shown = self.count if self.config.planner.option_values["hidden"] else count + 1
+        if tick % 40:
+            return count + 1, PlanningOutputs()
+        u = self.nominal(tick)
+        y = np.zeros((len(u), 6))
+        return count + 1, PlanningOutputs(Plan(tick, 0, tick // 40, u, y, str(shown), {}, 0))
+"""
+
+
+@pytest.mark.parametrize("hidden", [0, 1])
+def test_a_planner_that_keeps_state_in_its_instance_is_found_and_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hidden: int
+) -> None:
+    install_module(tmp_path, monkeypatch, "counting", COUNTING)
+    options = {"planner__kind": "counting", "planner__options": f"hidden={hidden}"}
+    run, config = tmp_path / "run.mcap", configured(**options)
+    agent = Agent(config, "r1", None, collected=list)
+    arrivals = Inbox(config, "r1", ())
+    memory, intake = agent.initial(), Intake(config, arrivals)
+    with RecordingWriter(run, build_metadata(config, "")) as to:
+        for tick in range(200):
+            inputs = arrivals.pop_inputs(standing(tick), awaited := agent.expected(tick))
+            if record := intake.record(tick - 1, inputs, awaited):
+                to.write("team/r1/inputs", encode(record), tick)
+            memory, outputs = agent.step(memory, inputs)
+            to.write("team/r1/state", encode(standing(tick)), tick)
+            to.write("team/r1/command", encode(outputs.command), tick)
+            if outputs.plan is not None:
+                to.write("team/r1/plan", encode(outputs.plan), tick)
+    (outcome,) = replay(run, (), {}, None, None, Console())
+    assert outcome.verdict.exact is not bool(hidden)
+    assert outcome.stateful is bool(hidden)
+    if hidden:
+        assert outcome.verdict.first is not None
+        assert outcome.verdict.first.tick == 120  # the first plan after the middle
+        assert outcome.verdict.equal["plan"] == 3
+        assert "keeps state outside" in format_outcome(outcome)
 
 
 def test_a_state_that_the_agent_did_not_believe_is_not_replayed(tmp_path: Path) -> None:
