@@ -10,6 +10,7 @@ import pytest
 from quadriga.agents import shell
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
+from quadriga.shared.bus.standstill import Standstill
 from quadriga.shared.bus.zenoh_bus import Bus, Packet
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import BusError
@@ -26,6 +27,7 @@ class Line:
     def __init__(self, ticks: Iterable[int | None]) -> None:
         self._ticks = iter(ticks)
         self.name, self.now, self.ended = "r1", 0.0, False
+        self.standstill = Standstill()
         self.answered: list[int] = []
 
     def get(self, timeout: float) -> Packet | None:

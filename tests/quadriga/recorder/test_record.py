@@ -318,7 +318,7 @@ def test_a_full_file_system_is_named(start: Start, world: Bus, tmp_path: Path) -
 
 @pytest.mark.parametrize("lost", [0, 7])
 def test_at_once_waits_for_no_team(config: Config, start: Start, tmp_path: Path, lost: int) -> None:
-    """Lost messages are a failure; who was frozen meanwhile does not blame the computer."""
+    """Lost messages are a failure; who was frozen meanwhile says so."""
     with Bus.open(config.bus, "band", SIM) as hub:  # it never says that it is there
         recorder = start(hub, "--now")
         plan = Plan(40, 40, 1, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 0)
@@ -336,8 +336,7 @@ def test_at_once_waits_for_no_team(config: Config, start: Start, tmp_path: Path,
         out, err = recorder.communicate(timeout=WAIT)
     assert recorder.returncode == bool(lost)
     assert f"4 messages, {lost} lost" in out
-    assert err.count("this process stood still for 2.") == bool(lost)
-    assert "too busy" not in err
+    assert not lost or "this process stood still for" in err
     assert len(list(Recording(tmp_path / "run.mcap").entries())) == 4
 
 

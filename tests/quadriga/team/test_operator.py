@@ -62,7 +62,7 @@ def test_the_token_to_drive_with_is_in_no_log(
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     config = load(None, {"bus.endpoint": free_endpoint(), "reference.driver": "hand"})
-    tokens = []
+    tokens = list[str]()
 
     def stopped() -> bool:
         if not tokens:

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from quadriga.shared.bus.barrier import lead
 from quadriga.shared.bus.zenoh_bus import HERE, POLL, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import QuadrigaError
@@ -34,7 +33,8 @@ def main(file: Path) -> int:
         put = bus.publisher(WIND.key(team))
         bus.subscribe(TRUTH.key(team))
         bus.subscribe(EVENT.key(team))
-        bus.wait_for(HERE, [lead(config)], config.bus.barrier_timeout, lambda: False)
+        while not has_lead(bus.members_at(HERE)):  # the team may still compile, or collect data
+            sleep(POLL)
         while has_lead(bus.members_at(HERE)):
             key, payload = bus.get(POLL) or ("", b"")
             if key == EVENT.key(team) and decode(payload, Event).kind == "stop":
