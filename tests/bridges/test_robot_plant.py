@@ -188,7 +188,7 @@ def test_how_often_the_counts_of_a_real_go1_change_is_reported() -> None:
 
     script = Go1(iter([True, False] * 1100))
     plant = RobotPlant(
-        config_of("go1"), "r1", script, guard=None, say=[].append, now=lambda: script.ms * 1e-3
+        config_of("go1"), "r1", script, guard=None, say=print, now=lambda: script.ms * 1e-3
     )
     with suppress(StopIteration):
         while True:
