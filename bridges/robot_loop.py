@@ -90,7 +90,8 @@ class RobotLoop:
         self.report: RobotReport | None = None
         self.report_at, self.arrived = -1, 0.0
         self._sent_at, self._warn_at = 0, 0
-        self.foot_refresh = self._foot_changes = self._foot_second = 0
+        self.foot_refresh = self._foot_changes = 0
+        self._foot_second = clock()
         self.estops: Callable[[], str] = str
         self.untold = list[tuple[int, BridgeMode, str]]()
         self.answers = Histogram(_ANSWER_BIN)
@@ -284,9 +285,11 @@ class RobotLoop:
         return True
 
     def _count_foot_changes(self, report: RobotReport) -> None:
-        if self.now - self._foot_second >= 1000:
-            self.foot_refresh = max(self.foot_refresh, self._foot_changes)
-            self._foot_second, self._foot_changes = self.now, 0
+        now = self._clock()
+        if now - self._foot_second >= 1.0:
+            rate = round(self._foot_changes / (now - self._foot_second))
+            self.foot_refresh = max(self.foot_refresh, rate)
+            self._foot_second, self._foot_changes = now, 0
         before = report if self.report is None else self.report
         self._foot_changes += not np.array_equal(report.foot, before.foot)
 

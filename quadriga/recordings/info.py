@@ -12,8 +12,8 @@ from quadriga.shared.planner_kinds import absent_origin
 from quadriga.shared.recording.admission import describe_refused
 from quadriga.shared.recording.sequence import TickTrack
 from quadriga.shared.recording.writer import END
-from quadriga.shared.runtime.clock import format_local
 from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.runtime.clock import format_local
 from quadriga.tables import NOTHING, align_columns
 
 _EVENTS = 40  # as many are shown

@@ -146,7 +146,7 @@ class Script:
     malformed = released = ""
 
     def __init__(self, speaks: Iterator[bool]) -> None:
-        self._speaks, self._tick, self._spoken = speaks, 0, False
+        self._speaks, self.ms, self._spoken = speaks, 0, False
         self.counters: Counter[str] = Counter()
 
     def pass_ms(self) -> None:
@@ -155,11 +155,11 @@ class Script:
         Raises:
             StopIteration: the script is at its end.
         """
-        self._tick, self._spoken = self._tick + 1, next(self._speaks) or self._spoken
+        self.ms, self._spoken = self.ms + 1, next(self._speaks) or self._spoken
 
     def receive(self) -> RobotReport | None:
         spoken, self._spoken = self._spoken, False
-        return standing(config_of(), tick=self._tick) if spoken else None
+        return standing(config_of(), tick=self.ms) if spoken else None
 
     def introduce(self) -> None: ...
 
@@ -216,7 +216,9 @@ def test_how_often_the_counts_of_a_real_go1_change_is_reported() -> None:
             return report and replace(report, foot=next(rows))
 
     script = Go1(iter([True, False] * 1100))
-    plant = RobotPlant(config_of("go1"), "r1", script, guard=None, say=list[str]().append)
+    plant = RobotPlant(
+        config_of("go1"), "r1", script, guard=None, say=print, now=lambda: script.ms * 1e-3
+    )
     with suppress(StopIteration):
         while True:
             plant.states()
