@@ -144,7 +144,6 @@ class Go2Driver:
         Raises:
             BridgeError: it does not.
         """
-        self._call(self._sport, rpc.API_VERSION, {}, _ANSWER, is_query=True)
         self._call(self._sport, rpc.STAND_DOWN, {}, _LETTING_GO)
         now = still = monotonic()
         deadline = now + _LETTING_GO
@@ -201,12 +200,14 @@ class Go2Driver:
     ) -> RpcMessage:
         """The response to a call.
 
-        The robot does what it is asked as often as it is asked. So it is asked once, when both
-        sides are linked; a query alone is repeated.
+        The robot does what it is asked as often as it is asked. So it is asked once, after it has
+        answered a query: it may not have found this side yet. Queries alone are repeated.
 
         Raises:
             BridgeError: there is none in time, or it is a refusal of what is no query.
         """
+        if not is_query:
+            self._call(service, rpc.API_VERSION, {}, _ANSWER, is_query=True)
         begun, asked = monotonic(), 0.0
         number = monotonic_ns()
         while (now := monotonic()) - begun < seconds:

@@ -30,7 +30,7 @@ class Go2Robot(Board):
     Attributes:
         controller: its own motion controller that has the motors; "" if none has.
         lets_go: whether that one lets go of the motors when it is asked to.
-        executed: calls that it has obeyed, each as often as it came.
+        executed: calls that it has answered, each as often as it came.
 
     Args:
         domain: of its network.
@@ -87,11 +87,11 @@ class Go2Robot(Board):
             self.executed.append(message.api)
             self._sport.send(message._replace(text="", code=rpc.OK))
         for message in self._switcher.receive():
+            self.executed.append(message.api)
             text, code = "", rpc.OK
             if message.api == rpc.CHECK_MODE:
                 text = json.dumps({"form": "0", "name": self.controller})
             elif message.api == rpc.RELEASE_MODE:
-                self.executed.append(message.api)
                 self.controller = "" if self.lets_go else self.controller
             elif message.api == rpc.SELECT_MODE:
                 self._boot()

@@ -29,7 +29,8 @@ def desk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
 
 def executed(desk: Desk) -> list[int]:
     """What the robot has done of what it was asked for, but for questions."""
-    return [api for api in desk.robot.executed if api != rpc.API_VERSION]
+    queries = (rpc.API_VERSION, rpc.CHECK_MODE)
+    return [api for api in desk.robot.executed if api not in queries]
 
 
 def test_before_it_takes_over_nothing_is_written(desk: Desk) -> None:
@@ -72,6 +73,9 @@ def test_a_controller_that_the_robot_does_not_have_is_named(
     expected = r"own controller: got 'normal', expected 'dance', which it is asked for"
     with pytest.raises(BridgeError, match=expected):
         desk.driver.give_back("dance")
+    calls = desk.robot.executed
+    assert calls[0] == rpc.API_VERSION, "it may not have found the bridge yet: a query shows it"
+    assert calls.count(rpc.SELECT_MODE) == 1
 
 
 def test_a_second_writer_is_refused_before_the_robots_own_controller_lets_go(desk: Desk) -> None:
