@@ -96,7 +96,7 @@ def walk(
     for event in check_walk(config):
         late = f"{event.kind} {event.robot} {event.detail} at {event.tick / 1000:g} s"
         end = f"the walk ends at {config.world.seconds:g} s"
-        console.print(f"will not come: {late}, {end}", markup=False, highlight=False)
+        console.print(f"will not come: {late}, {end}", markup=False, soft_wrap=True)
     run_dir = make_run_dir(out)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
     warm_up(config, console)
