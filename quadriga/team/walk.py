@@ -92,10 +92,7 @@ def walk(
         QuadrigaError: anything a user can put right before the walk begins.
     """
     expect_launch(config)
-    for event in check_walk(config):
-        late = f"{event.kind} {event.robot} {event.detail} at {event.tick / 1000:g} s"
-        end = f"the walk ends at {config.world.seconds:g} s"
-        console.print(f"will not come: {late}, {end}", markup=False, highlight=False)
+    _tell(check_walk(config), config.world.seconds, console)
     run_dir = make_run_dir(out, config)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
     warm_up(config, console)
@@ -133,6 +130,13 @@ def walk(
 
         summary = report_folder(run_dir, pictures=report is Report.PICTURES, console=console)
     return FELL if fallen or has_failed(summary) else OK
+
+
+def _tell(late: list[Event], end: float, console: Console) -> None:
+    for event in late:
+        what = f"{event.kind} {event.robot} {event.detail} at {event.tick / 1000:g} s"
+        text = f"will not come: {what}, the walk ends at {end:g} s"
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def _take_predictor(config: Config, run_dir: Path, console: Console) -> tuple[Path, str]:
