@@ -116,12 +116,19 @@ def _check_end(end: End | None, team: str, tick: int) -> None:
     """Complain if the walk was over for this plant because something vanished.
 
     Raises:
-        ProcessError: another plant, or the link to the router.
+        ProcessError: another plant, or the link to the router; or the simulation is unstable.
     """
     if end is None:
         return
     if end.code == codes.LINK_LOST:
         raise loss_error(Loss(*end), tick)
+    if end.code == codes.PLANT_FAILED:
+        raise ProcessError(
+            f"team {team!r} at {tick} ms",
+            end.detail,
+            "a simulation that stays bounded",
+            "gains, loads, pushes or faults that no simulation follows",
+        )
     if end.code == codes.PLANT_GONE:
         raise ProcessError(
             f"team {team!r}",

@@ -260,6 +260,8 @@ class PlantServer:
             self._send(event)
 
     def _note_fall(self, event: Event) -> None:
+        if event.code == codes.UNSTABLE:
+            self.time.end = End(codes.PLANT_FAILED, event.detail)
         if event.code in codes.DOWN:
             self._fallen.add(event.robot)
             # A robot that a bridge has stopped sinks: those yoked to it may not walk on.

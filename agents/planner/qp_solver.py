@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import daqp
 import numpy as np
@@ -31,6 +31,8 @@ _DAQP_STATUS: Final = MappingProxyType({
     1: SOLVED, -1: "infeasible", -2: "cycling", -3: "unbounded", -4: "iteration-limit",
     -5: "not-convex", -6: "overdetermined",
 })  # fmt: skip
+_SLACK: Final = 1e-9  # relative to the bounds: what is not told from rounding
+_FLAT: Final = 1e-4  # ‖Aᵀ y‖ over ‖y‖ of a certificate: OSQP's own tolerance
 _OSQP_INFEASIBLE: Final = (
     osqp.SolverStatus.OSQP_PRIMAL_INFEASIBLE,
     osqp.SolverStatus.OSQP_PRIMAL_INFEASIBLE_INACCURATE,
@@ -184,6 +186,36 @@ class OsqpSolver:
         high = self._problem.upper if upper is None else upper
         if (low > high).any():
             return no_solution(self._problem, "infeasible")
+        result = self._run(f, low, high)
+        if result.info.status_val in _OSQP_INFEASIBLE and not self._proves(result, low, high):
+            # A row of zeros that must be at most -1e-17, or two rows that exclude each other by
+            # as much, are a proof to OSQP. Judged is by the bounds as they are.
+            slack = _SLACK * (1.0 + np.maximum(np.abs(low), np.abs(high)))
+            slack[np.isinf(slack)] = _SLACK
+            result = self._run(f, low - slack, high + slack)
+        info = result.info
+        status = info.status.replace(" ", "-")
+        if info.status_val in _OSQP_INFEASIBLE:
+            status = "infeasible" if self._proves(result, low, high) else "inaccurate"
+        y = np.where(np.isinf(high), np.minimum(result.y, 0.0), result.y)
+        y = np.where(np.isinf(low), np.maximum(y, 0.0), y)
+        return judge(self._problem, f, result.x, y, status, int(info.iter), low, high)
+
+    def _proves(self, result: Any, low: Array, high: Array) -> bool:
+        """Whether a certificate y shows that low ≤ A x ≤ high has no solution.
+
+        It does if Aᵀ y = 0 and highᵀ y⁺ + lowᵀ y⁻ < 0, by more than bounds are rounded.
+        """
+        y = result.prim_inf_cert
+        up, down = np.maximum(y, 0.0), np.minimum(y, 0.0)
+        if up[np.isinf(high)].any() or down[np.isinf(low)].any():
+            return False
+        bounded = np.where(up > 0.0, high, np.where(down < 0.0, low, 0.0))
+        flat = np.abs(self._A.T @ y).max() <= _FLAT * np.abs(y).max()
+        return bool(flat and bounded @ y < -_SLACK * ((1.0 + np.abs(bounded)) @ np.abs(y)))
+
+    def _run(self, f: Array, low: Array, high: Array) -> Any:
+        """What OSQP answers."""
         solver = osqp.OSQP()
         solver.setup(
             self._P,
@@ -194,15 +226,12 @@ class OsqpSolver:
             verbose=False,
             eps_abs=1e-8,
             eps_rel=1e-9,
+            eps_dual_inf=1e-15,  # H is positive definite: no cost falls without end
             max_iter=20000,
             adaptive_rho=1,
             adaptive_rho_interval=50,  # by iterations, never by time
         )
-        result = solver.solve(raise_error=False)
-        info = result.info
-        status = "infeasible" if info.status_val in _OSQP_INFEASIBLE else info.status
-        status = status.replace(" ", "-")
-        return judge(self._problem, f, result.x, result.y, status, int(info.iter), low, high)
+        return solver.solve(raise_error=False)
 
 
 def _inversion_error(H: Array, inverse: Array) -> float:

@@ -2,26 +2,49 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
 
+_MOST: Final = 1e100
+
 
 def as_numbers(name: str, values: ArrayLike) -> Array:
-    """An array of finite numbers.
+    """An array of finite numbers, whose squares and their sums are finite too.
 
     Raises:
-        PredictorError: no numbers, NaN or infinity.
+        PredictorError: no real numbers, masked ones, NaN, infinity or numbers beyond 1e100.
     """
+    if np.ma.is_masked(values):
+        raise PredictorError(
+            name, "masked samples", "numbers", "split the data into episodes there"
+        )
+    if np.iscomplexobj(values):
+        raise PredictorError(name, "complex numbers", "real numbers")
     try:
         array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise PredictorError(name, "something else", "an array of numbers") from None
     if not np.isfinite(array).all():
         raise PredictorError(name, "NaN or infinity", "finite numbers", "samples that were lost?")
+    if (np.abs(array) > _MOST).any():
+        raise PredictorError(name, f"{np.abs(array).max():.3g}", f"numbers up to {_MOST:g}")
     return array
+
+
+def as_count(name: str, value: object) -> int:
+    """A number of samples, at least 1.
+
+    Raises:
+        PredictorError: anything else.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        raise PredictorError(name, repr(value), "a whole number of samples, at least 1")
+    return int(value)
 
 
 def as_signal(name: str, values: ArrayLike, shape: tuple[int, ...], *, single: bool) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,11 +10,9 @@ from numpy.typing import ArrayLike
 
 from quadriga.agents.predictor.hankel import columns
 from quadriga.agents.predictor.layout import Layout, everyone
-from quadriga.data_driven.signals import as_numbers, root_mean_squares
+from quadriga.data_driven.signals import as_count, as_numbers, root_mean_squares
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
-
-_HORIZON = "past and horizon"
 
 
 class Data:
@@ -86,10 +85,14 @@ class Data:
         """The layout of a predictor of this plant; its scales are the sizes of these signals.
 
         Raises:
-            PredictorError: no samples of the past or of the horizon, or no episode that long.
+            PredictorError: no whole numbers of samples, no episode that long, or an input that
+                never changes.
+
+        Warns:
+            UserWarning: signals with a mean beyond their standard deviation.
         """
-        if past < 1 or horizon < 1:
-            raise PredictorError(_HORIZON, f"{past} and {horizon} samples", "at least 1 of each")
+        past, horizon = as_count("past", past), as_count("horizon", horizon)
+        self._check_variation()
         if not columns(self.u, past + horizon):
             raise PredictorError(
                 "data",
@@ -107,6 +110,28 @@ class Data:
             root_mean_squares(self.y),
             everyone(self.agents),
         )
+
+    def _check_variation(self) -> None:
+        """Refuse an input that never changes, and warn of a working point that is not zero.
+
+        Raises:
+            PredictorError: a constant input, of which no fit tells what it does.
+        """
+        for name, signals in (("u", self.u), ("y", self.y)):
+            each = np.concatenate([x.reshape(len(x), -1) for x in signals])
+            mean, spread = each.mean(axis=0), each.std(axis=0)
+            still = spread <= 1e-12 * np.abs(each).max(axis=0)
+            if name == "u" and still.any():
+                which = np.flatnonzero(still).tolist()
+                raise PredictorError(
+                    f"data.{name}", f"columns {which} constant", "inputs that vary"
+                )
+            if (np.abs(mean) > spread)[~still].any():
+                warnings.warn(
+                    f"data.{name} has a mean beyond its standard deviation, and a fit has no "
+                    "intercept: hand in deviations from the working point",
+                    stacklevel=4,
+                )
 
     def scaled(self, layout: Layout) -> list[Array]:
         """Scaled signals of every episode, [u of all agents; y of all agents]."""

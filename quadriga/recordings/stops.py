@@ -1,4 +1,4 @@
-"""Why robots stopped that did not fall: as they say, and as the plant saw of who need not say."""
+"""Why robots stopped that did not fall: as they say, and as the plant saw of who does not say."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Final
 
 from quadriga.recordings.traces import Traces
 from quadriga.shared.wire.codes import BACK, GONE, SILENT, with_detail
+from quadriga.shared.wire.topics import COMMAND, STATE
 
 _LOST: Final = (GONE, SILENT)
 
@@ -13,17 +14,20 @@ _LOST: Final = (GONE, SILENT)
 def find_stops(traces: Traces) -> dict[str, str]:
     """By process why it does not walk at the end: the reason in its last status.
 
-    A controller of one's own need not say how it is. Where the plant's last word of it is that its
-    commands no longer come, that is the reason.
+    A process may be frozen, and a controller of one's own need not say how it is. Where the plant's
+    last word of a robot is that its commands no longer come, or none ever came, that is the reason.
     """
     last = {name: statuses[-1] for name, statuses in traces.statuses.items() if statuses}
     reasons = {name: status.reason for name, status in last.items() if status.reason}
-    return _find_lost(traces) | reasons if traces.config.team.controller else reasons
+    return _find_lost(traces) | reasons
 
 
 def _find_lost(traces: Traces) -> dict[str, str]:
     """Robots without commands at the end, and what the plant announced of that."""
-    lost = dict[str, str]()
+    team, count, lost = traces.config.team.name, traces.messages.get, dict[str, str]()
+    for name in traces.robots:
+        if count(STATE.key(team, name)) and not count(COMMAND.key(team, name)):
+            lost[name] = with_detail(SILENT, "it has never sent a command")
     for event in traces.events:
         if event.code in _LOST and event.robot in traces.robots:
             lost[event.robot] = with_detail(event.code, event.detail)

@@ -24,6 +24,7 @@ TERRAIN: Final = "terrain"
 PAYLOAD: Final = "payload"
 PUSH: Final = "push"
 FALL: Final = "fall"
+UNSTABLE: Final = "unstable"
 WEAK_MOTOR: Final = "weak-motor"
 FAULT_BEGINS: Final = "fault-begins"
 FAULT_ENDS: Final = "fault-ends"
@@ -65,6 +66,7 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         PAYLOAD: EventCode("payload", "a robot carries a load"),
         PUSH: EventCode("push", "a push of a robot begins"),
         FALL: EventCode("fall", "a robot fell"),
+        UNSTABLE: EventCode("fault", "the simulation is unstable: the walk ends at once"),
         WEAK_MOTOR: EventCode("fault", "a motor gives less torque from now on"),
         FAULT_BEGINS: EventCode("fault", "a fault that is made on purpose begins"),
         FAULT_ENDS: EventCode("fault", "a fault that was made on purpose is over"),

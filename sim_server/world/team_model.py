@@ -155,7 +155,7 @@ def _set_physics(spec: mujoco.MjSpec) -> None:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10.0
-    # An unstable simulation must end in a fall, not restart at the spawn.
+    # An unstable simulation must end the walk, not restart at the spawn.
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     spec.compiler.degree = False
 

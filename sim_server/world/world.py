@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
@@ -14,7 +15,7 @@ from quadriga.plant.protocol import Plant
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, N_LEGS, Array
-from quadriga.shared.wire.codes import FALL, FAULT_ASKED, LIES
+from quadriga.shared.wire.codes import FALL, FAULT_ASKED, LIES, UNSTABLE
 from quadriga.shared.wire.messages import Command, Event, State, Truth
 from quadriga.sim_server.terrain.relief import FOLLOW_MS
 from quadriga.sim_server.world import layout
@@ -29,6 +30,16 @@ _FALL_COSINE: Final = math.cos(1.0)  # of the angle between the trunk's z axis a
 _FALL_HEIGHT: Final = 0.12  # m, trunk origin above the mean terrain under the hips
 _RISEN: Final = 0.06  # m, above that height a robot is up again that was led down
 _DAMPED: Final = damp_joints(0)
+# Of positions, speeds or accelerations that are no numbers, or huge.
+_UNSTABLE: Final = slice(mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQACC + 1)
+
+
+def _warn(text: str) -> None:
+    print(f"MuJoCo: {text}", file=sys.stderr, flush=True)
+
+
+# By default MuJoCo leaves a file in the working directory.
+mujoco.set_mju_user_warning(_warn)
 
 
 class World(Plant):
@@ -104,7 +115,7 @@ class World(Plant):
         self._moving = self.team.terrain.relief.start(
             model, self.physics, n, config.robot.geometry.foot_radius
         )
-        self._settled = True
+        self._settled, self._unstable = True, self.physics.warning.number[_UNSTABLE]
         self._yoke_force = self._read_yoke_force()
         self._states = self._measure()
 
@@ -211,8 +222,14 @@ class World(Plant):
         return forces
 
     def _falls(self) -> list[Event]:
-        """An event for each robot that fell in this tick."""
-        events = []
+        """An event for each robot that fell in this tick; of an unstable simulation one for all."""
+        events = list[Event]()
+        if any(self._unstable.tolist()) or not math.isfinite(float(np.add.reduce(self._q, None))):
+            if self._down != self.names:
+                self._down = self.names
+                detail = "unstable simulation: positions, speeds or accelerations are no numbers"
+                events.append(Event.of(self.tick, UNSTABLE, "", f"{detail}, or huge"))
+            return events
         for i, (x, y, z, qw, qx, qy, qz) in enumerate(self._q[:, layout.POSE].tolist()):
             cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
             if cosine >= _FALL_COSINE and z >= self._surely_up:
@@ -229,8 +246,7 @@ class World(Plant):
                 )
             )
             name = self.names[i]
-            # With these comparisons a state that is not a number counts as a fall too.
-            may_tip = name in self._tipped or (name in self._stopped and math.isfinite(cosine))
+            may_tip = name in self._tipped or name in self._stopped
             level, high = cosine >= _FALL_COSINE, above >= _FALL_HEIGHT
             if name in self._lying and level and above >= _FALL_HEIGHT + _RISEN:
                 self._note_up(name)

@@ -9,10 +9,12 @@ import msgpack
 import numpy as np
 import pytest
 
+from quadriga.plant.process import _check_end
 from quadriga.plant.protocol import Plant
 from quadriga.plant.server import FALL_LINGER_MS, PlantServer
 from quadriga.shared.bus.standstill import Standstill
 from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.errors import ProcessError
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import MAX_TEXT, decode, encode
 from quadriga.shared.wire.messages import Clock, Command, Event, State
@@ -161,3 +163,14 @@ def test_what_is_forged_in_an_event_does_not_reach_the_terminal(
     said = capsys.readouterr().err
     assert "\x1b" not in said
     assert said.count("\n") == 1
+
+
+def test_an_unstable_simulation_ends_the_walk_at_once_and_is_an_error() -> None:
+    server, listener = served(robots=1)
+    cast("World", server.plant).physics.qvel[0] = np.nan
+    end = server.step({})
+    assert end is not None
+    assert end.code == codes.PLANT_FAILED
+    assert listener.events()[-1].code == codes.UNSTABLE
+    with pytest.raises(ProcessError, match="got unstable simulation: "):
+        _check_end(end, "team", 1)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.data_driven import Data, hankel, is_persistently_exciting
+from quadriga.data_driven import Data, fit, hankel, is_persistently_exciting
 from quadriga.shared.errors import PredictorError
 
 U, Y = np.random.default_rng(0).normal(size=(30, 2)), np.zeros((30, 1))
@@ -24,11 +24,23 @@ U, Y = np.random.default_rng(0).normal(size=(30, 2)), np.zeros((30, 1))
         ([U[:, None]], [Y], "as many samples and agents"),
         ([U * np.inf], [Y], r"data\.u: got NaN or infinity"),
         ([["a"]], [Y], "an array of numbers"),
+        ([U + 1j], [Y], r"data\.u: got complex numbers"),
+        ([np.ma.masked_less(U, 0.0)], [Y], r"data\.u: got masked samples"),
+        ([U * 1e200], [Y], r"data\.u: got .*e\+200, expected numbers up to"),
     ],
 )
 def test_data_that_do_not_belong_together_are_refused(u: Any, y: Any, text: str) -> None:
     with pytest.raises(PredictorError, match=text):
         Data(u, y)
+
+
+def test_a_constant_input_is_refused_and_a_mean_is_warned_of() -> None:
+    still = U.copy()
+    still[:, 1] = 7.3
+    with pytest.raises(PredictorError, match=r"data\.u: got columns \[1\] constant"):
+        fit(Data(still, Y), kind="ridge", past=2, horizon=2)
+    with pytest.warns(UserWarning, match=r"data\.y has a mean beyond .* no intercept"):
+        fit(Data(U, U[:, :1] + 5.0), kind="ridge", past=2, horizon=2)
 
 
 def test_data_are_copied_and_read_only() -> None:

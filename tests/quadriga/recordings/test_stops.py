@@ -12,6 +12,8 @@ from quadriga.recordings.traces import Traces, read_traces
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Event
+from quadriga.shared.wire.topics import COMMAND
+from quadriga.team.run_summary import has_failed
 
 
 @pytest.fixture(scope="module")
@@ -32,4 +34,14 @@ def test_what_the_plant_saw_counts_of_a_controller_of_ones_own(traces: Traces) -
         "r2": "gone:gone",
     }
     assert find_stops(with_events(traces, silent, back)) == {}
-    assert find_stops(with_events(traces, silent, controller="")) == {}
+    assert find_stops(with_events(traces, silent, controller="")) == {
+        "r1": "silent:silent for 10 s"
+    }
+
+
+def test_a_robot_that_never_sent_a_command_has_failed(traces: Traces) -> None:
+    key = COMMAND.key(traces.config.team.name, "r2")
+    mute = replace(traces, messages={k: n for k, n in traces.messages.items() if k != key})
+    stops = find_stops(with_events(mute, controller=""))
+    assert stops == {"r2": "silent:it has never sent a command"}
+    assert has_failed({"fell": False, "stop_reasons": stops})

@@ -251,17 +251,20 @@ def test_who_stands_astride_of_a_block_has_not_fallen() -> None:
     assert world.fallen() == ()
 
 
-def test_an_unstable_world_shows_as_a_fall_and_does_not_start_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("speed", [np.nan, 1e12])
+def test_an_unstable_world_is_named_and_does_not_start_again(
+    speed: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.chdir(tmp_path)  # MuJoCo leaves its log where it runs
+    monkeypatch.chdir(tmp_path)
     world = World(configured(1))
     stand(world, 100)
-    world.physics.qvel[0] = np.nan
+    world.physics.qvel[0] = speed
     mujoco.mj_forward(world.team.model, world.physics)
-    events = world.step({"r1": STAND})
-    assert [event.kind for event in events] == ["fall"]
-    assert np.isnan(world.truth().base_pos).any()
+    events = [*world.step({"r1": STAND}), *world.step({"r1": STAND})]
+    assert [(event.code, event.robot) for event in events] == [("unstable", "")]
+    assert world.fallen() == ("r1",)
+    assert not np.abs(world.truth().base_pos[0, 0]) < 1e6
+    assert not [*tmp_path.iterdir()]
 
 
 @pytest.mark.parametrize("terrain", TERRAINS)
