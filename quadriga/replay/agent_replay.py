@@ -62,16 +62,15 @@ def replay_agent(
     *,
     handed_over: bool = True,
 ) -> ReplayOutcome:
-    """Replay one robot.
+    """Replay one robot; in the middle of each life a second agent goes on with the first's memory.
 
-    In the middle of each life an agent that is built anew goes on with what the first remembers:
-    of a planner that keeps state elsewhere the rest is not equal any more.
+    Of a planner that keeps state elsewhere the rest is then not equal any more.
 
     Args:
         job: whose replay, and how.
         show: called with what is being done.
         stop_at: where to stop in the debugger, or what saves the QPs of a moment.
-        handed_over: whether another agent goes on in the middle of a plain replay.
+        handed_over: whether a second agent goes on in the middle, if nothing is changed.
 
     Raises:
         QuadrigaError: as `quadriga.replay.team_replay.replay`.
@@ -87,30 +86,22 @@ def replay_agent(
     log = read_agent_log(recording, config, recorded, inbox, lambda tick: show("reading", tick))
     curves = Curves(config.planner.applied) if changed else None
     comparison = Comparison(log, None if curves is None else curves.add)
-    paced = config.world.mode == "realtime"
-    lives = split_lives(log, paced=paced, whole=recording.complete)
+    lives = split_lives(log, paced=config.world.mode == "realtime", whole=recording.complete)
     begins = tuple(map(first_tick, lives))  # now: what is replayed is taken out of the logs
     middles = [(begin + life.last) // 2 for begin, life in zip(begins, lives, strict=True)]
     with collector_off():  # a long log need not be looked through again and again
         for life, middle in zip(lives, middles, strict=True):
             inbox = Inbox(config, job.robot, recorded.peers)
             inputs = RecordedInputs(config, recorded, inbox, life)
-            agents = (current, second)
+            agents = current, second
             _replay_steps(agents, middle, inputs, comparison, show, stop_at, changed=bool(changed))
             if comparison.verdict.missing and not changed:
                 break  # nothing after it could be equal but by chance
             comparison.end_life(life)
     verdict = comparison.finish()
     wall = monotonic() - begun
-    if stop_at is not None:
-        _check_reached(stop_at, job.robot, log.last)
-    files: tuple[Path, ...] = ()
-    if curves is not None:
-        files = (_draw_curves(job, curves, changed),)
-    elif verdict.first is not None:
-        files = _save_problem(job, current, verdict)
-    if stop_at is not None:
-        files += stop_at.files
+    drawn = () if curves is None else (_draw_curves(job, curves, changed),)
+    saved = () if stop_at is None else _files_of(stop_at, job.robot, log.last)
     outcome = ReplayOutcome(
         job.robot,
         verdict,
@@ -118,7 +109,7 @@ def replay_agent(
         seconds=(verdict.last + 1) / 1000,
         wall=wall,
         inputs="" if verdict.step is None else format_inputs(verdict.step),
-        files=files,
+        files=(*(drawn or _save_problem(job, current, verdict)), *saved),
         lives=begins,
         stateful=handed_over and _is_stateful(job, verdict, middles),
     )
@@ -135,8 +126,8 @@ def _is_stateful(job: ReplayJob, verdict: ReplayVerdict, middles: Sequence[int])
     return again.first is None or again.first.tick > first.tick
 
 
-def _check_reached(stop_at: Breakpoint | ProblemSaver, robot: str, last: int) -> None:
-    """Refuse a moment that the robot has not lived to see; `last` is its last tick.
+def _files_of(stop_at: Breakpoint | ProblemSaver, robot: str, last: int) -> tuple[Path, ...]:
+    """What was saved at a moment, if the robot has lived to see it; `last` is its last tick.
 
     Raises:
         ConfigError: it is after that.
@@ -144,6 +135,7 @@ def _check_reached(stop_at: Breakpoint | ProblemSaver, robot: str, last: int) ->
     if not stop_at.reached:
         got, expected = f"{stop_at.tick / 1000:g} s", f"a time up to {last / 1000:g} s"
         raise ConfigError(stop_at.option, got, expected, f"{robot} has no step after it")
+    return stop_at.files
 
 
 def _build_agents(job: ReplayJob, recording: Recording, config: Config) -> tuple[Agent, Agent, str]:

@@ -96,13 +96,7 @@ def walk(
     run_dir = make_run_dir(out, config)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
     warm_up(config, console)
-    predictor, sha256, kind = None, "", find_kind(config.planner.kind)
-    if kind.needs_data:
-        from quadriga.identification.predictors import ensure_data
-
-        ensure_data(config, console)
-    if kind.needs_predictor:
-        predictor, sha256 = _take_predictor(config, run_dir, console)
+    predictor, sha256 = _take_predictor(config, run_dir, console)
     # By another name of this computer, so that the browser draws it in a process of its own: the
     # page to drive from must not be silent while the scene is drawn.
     url = "" if view is None else url_of(view, "localhost")
@@ -139,12 +133,19 @@ def _tell(late: list[Event], end: float, console: Console) -> None:
         console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
-def _take_predictor(config: Config, run_dir: Path, console: Console) -> tuple[Path, str]:
-    """The file of the team's predictor, made if there is none, and its digest.
+def _take_predictor(config: Config, run_dir: Path, console: Console) -> tuple[Path | None, str]:
+    """The file of the team's predictor and its digest; it and its data are made if there are none.
 
     Raises:
         PredictorError: there is none that its gates accept.
     """
+    kind = find_kind(config.planner.kind)
+    if kind.needs_data:
+        from quadriga.identification.predictors import ensure_data
+
+        ensure_data(config, console)
+    if not kind.needs_predictor:
+        return None, ""
     from quadriga.agents.planner.checked_predictor import load_checked
     from quadriga.agents.predictor.store import predictor_sha256
     from quadriga.identification.cache import predictor_path
