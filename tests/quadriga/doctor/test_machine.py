@@ -96,7 +96,7 @@ def test_the_kernels_share_is_read_of_what_decides_it(
         (tmp_path / "cpu0/runtime").write_text(server)
     monkeypatch.setattr(readings, "_RT_RUNTIME", tmp_path / "runtime")
     monkeypatch.setattr(readings, "_FAIR", tmp_path)
-    monkeypatch.setattr(readings.platform, "release", lambda: release)
+    monkeypatch.setattr("platform.release", lambda: release)
     assert read_machine().reserved == pytest.approx(reserved)
 
 
