@@ -25,7 +25,7 @@ What simulated robots did that were reached through bridges and their own protoc
 
 A computer of two cores had to be the robots and the team. Walks were made one at a time, with the
 kernel's throttling of real-time processes switched off (`kernel.sched_rt_runtime_us = -1`), which
-else stops a bridge for 50 ms when a core is full.
+else stops a bridge for 50 ms when a core is full; Linux 6.18 does so all the same.
 
 """
 _WALK_NOTE: Final = """\
