@@ -51,9 +51,9 @@ def in_slow_motion(row: ProcessSpec, speed: float) -> ProcessSpec:
         row: of the launcher's table; it runs a module.
         speed: of the clocks, as a share of their own, at most 1.
     """
-    python, option, *words = row.command
-    assert option == "-m", row.command
-    return replace(row, command=(python, "-m", __name__, str(speed), *words))
+    module = row.command.index("-m") + 1  # without -P: this module lies in the working directory
+    words = (row.command[0], "-m", __name__, str(speed), *row.command[module:])
+    return replace(row, command=words)
 
 
 def read_speed(text: str) -> float:

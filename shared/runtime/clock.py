@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime
+from time import localtime, strftime
 from typing import Final
 
 _EPOCH_NS: Final = time.time_ns() - time.monotonic_ns()  # at the start of this process
@@ -35,7 +36,7 @@ def wall_ns() -> int:
 
 def format_local(form: str, ns: int) -> str:
     """A time of `wall_ns` in the user's time zone, whatever TZ says, in a form of `strftime`."""
-    return time.strftime(form, time.localtime(ns // 1_000_000_000))
+    return strftime(form, localtime(ns // 1_000_000_000))
 
 
 def log_ns() -> int:

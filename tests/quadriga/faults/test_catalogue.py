@@ -117,7 +117,7 @@ def test_the_clocks_of_one_process_go_wrong(name: str, tmp_path: Path) -> None:
         changed = [row.name for row in rows if stage.wrap(row) != row]
         assert len(changed) == 1
         (own,) = (row for row in rows if row.name == changed[0])
-        assert stage.wrap(own).command[4:] == own.command[2:]
+        assert stage.wrap(own).command[5:] == own.command[3:]
         assert (tmp_path / "clock").read_text(encoding="ascii") == "0 0"
         assert stage.detail.startswith(f"of {own.name}, by ")
         assert stage.robot in ("", own.name)

@@ -44,4 +44,4 @@ def test_a_robot_that_never_sent_a_command_has_failed(traces: Traces) -> None:
     mute = replace(traces, messages={k: n for k, n in traces.messages.items() if k != key})
     stops = find_stops(with_events(mute, controller=""))
     assert stops == {"r2": "silent:it has never sent a command"}
-    assert has_failed({"fell": False, "stop_reasons": stops})
+    assert has_failed({"fell": False, "lost": 0, "stop_reasons": stops})
