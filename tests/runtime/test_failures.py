@@ -230,7 +230,7 @@ def test_an_emergency_stop_waits_for_nobody(make_team: Make, watcher: Watcher) -
         running.watch(lambda: True)
     assert stop.returncode == 2
     assert "no r3 on the bus after 5 s" in errors
-    assert "r1, r2, sim heard it at once" in errors
+    assert "sent to r1, r2, sim at once" in errors
 
 
 @pytest.mark.parametrize("verb", [("sim",), ("operate",), ("record", "-o", "RUN")])

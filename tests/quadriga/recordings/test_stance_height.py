@@ -14,8 +14,10 @@ CONFIG = load(
     {
         "team.robots": 2,
         "planner.kind": "none",
-        # Two definitions are compared: offsets of sensors would be errors of their own.
+        # Two definitions are compared: offsets of sensors would be errors of their own, and so is
+        # what an estimator makes of offsets that are not there.
         "sensors.preset": "ideal",
+        "estimator.tilt_time": 0.0,
         "world.terrain": "boxes",
         "world.terrain_height": 0.08,
         "world.seed": 1600,
