@@ -20,11 +20,16 @@ _LINK: Final = "link"
 
 
 def consult_doctor(scene: FaultScene) -> None:
-    """Note what `quadriga doctor` finds wrong, by process, and with the way to the team."""
+    """Note what `quadriga doctor` finds wrong, by process, and with the way to the team.
+
+    Of a walk that has ended before the doctor had looked, nothing is noted.
+    """
     try:
         report = examine(scene.config, here=False)
     except (BusError, ConfigError) as error:
         scene.facts["doctor"] = {_LINK: error.got}
+        return
+    if not _has_world(scene):
         return
     found = {
         member.name: ", ".join(d.code for d in member.diagnoses if d.verdict == BAD)
