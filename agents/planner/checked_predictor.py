@@ -17,7 +17,6 @@ from quadriga.agents.planner.cooperation import OWN, cost_of
 from quadriga.agents.predictor.gate_report import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import REMEDY, Provenance, read
-from quadriga.shared.config.later import LATER_KEYS
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorFileError
 from quadriga.shared.planner_kinds import find_kind
@@ -99,9 +98,7 @@ def check_fitted_for(config: Config, path: Path, predictor: Predictor) -> None:
     got, expected = predictor.meta, PredictorMeta.of(config)
     pairs = [(name, getattr(got, name), getattr(expected, name)) for name in _MATCHED]
     fitted = dict(got.controller)
-    for k, wanted in expected.controller:
-        name = f"controller.{k}"
-        pairs.append((name, fitted.get(k, LATER_KEYS.get(name)), wanted))
+    pairs += [(f"controller.{k}", fitted.get(k), wanted) for k, wanted in expected.controller]
     for name, stored, wanted in pairs:
         if stored != wanted:
             raise PredictorFileError(

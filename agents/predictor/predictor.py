@@ -10,8 +10,6 @@ import numpy as np
 
 from quadriga.agents.predictor.episode import team_layout
 from quadriga.agents.predictor.layout import Layout, everyone
-from quadriga.shared.config.later import LATER_KEYS
-from quadriga.shared.config.renamed import with_current_names, with_first_names
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import neighbours
 from quadriga.shared.errors import PredictorError
@@ -19,9 +17,6 @@ from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 
 # Keys of the controller that act only in a failure and do not change the plant that is fitted.
 _SAFETY_KEYS: Final = ("damping", "fall_tilt", "max_failures")
-
-
-_FIRST_ROBOT: Final[str] = LATER_KEYS["team.robot"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +44,8 @@ class PredictorMeta:
     phase_ridge: float
     neighbours: str
     stand_ms: int  # where the gait's period, and with it phase 0, begins
-    robot: str = _FIRST_ROBOT
-    response: str = ""  # of 'periodic': the file of measured responses that stands for fitted ones
+    robot: str
+    response: str  # of 'periodic': the file of measured responses that stands for fitted ones
 
     @classmethod
     def of(cls, config: Config) -> PredictorMeta:
@@ -78,25 +73,17 @@ class PredictorMeta:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """A dictionary that can be written as JSON, with the controller's keys as first named.
-
-        The robot is left out if it is the one that all predictors were of once, the file of
-        responses if there is none. So neither a new name nor these keys change the file or the
-        digest of a predictor without them.
-        """
-        body = asdict(self) | with_first_names({"controller": dict(self.controller)})
-        usual = (("robot", _FIRST_ROBOT), ("response", ""))
-        return {k: v for k, v in body.items() if (k, v) not in usual}
+        """A dictionary that can be written as JSON."""
+        return asdict(self) | {"controller": dict(self.controller)}
 
     @classmethod
     def from_dict(cls, body: dict[str, Any]) -> PredictorMeta:
         """The inverse of `to_dict`.
 
         Raises:
-            TypeError, AttributeError: fields are missing, unknown or of another type.
+            KeyError, TypeError, AttributeError: fields are missing, unknown or of another type.
         """
-        controller = with_current_names({"controller": body.get("controller", {})})["controller"]
-        return cls(**body | {"controller": tuple(sorted(controller.items()))})
+        return cls(**body | {"controller": tuple(sorted(body["controller"].items()))})
 
     @property
     def layout(self) -> Layout:

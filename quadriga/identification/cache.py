@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from quadriga.identification.behaviour import behaviour
-from quadriga.shared.config.later import hashed_sections
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.runtime.clock import monotonic, sleep
@@ -45,7 +44,7 @@ def data_key(config: Config) -> str:
     }
     code = behaviour("quadriga.identification.sample_collection")
     libraries = {name: version(name) for name in _LIBRARIES}
-    return _digest([hashed_sections(sections), code, libraries])
+    return _digest([sections, code, libraries])
 
 
 def predictor_key(config: Config) -> str:
@@ -62,7 +61,7 @@ def predictor_key(config: Config) -> str:
         "planner": {k: planner[k] for k in ("N", "T_ini", "interface")},
     }
     code = behaviour("quadriga.identification.sample_fits")
-    return _digest([data_key(config), hashed_sections(sections), code])
+    return _digest([data_key(config), sections, code])
 
 
 def predictor_path(config: Config) -> Path:

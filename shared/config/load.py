@@ -13,7 +13,6 @@ from typing import Any, Final
 from quadriga.shared.config.check import check
 from quadriga.shared.config.presets import PRESETS, preset_keys
 from quadriga.shared.config.reference_trace import ROW_END, inline_trace
-from quadriga.shared.config.renamed import RENAMED, current_value
 from quadriga.shared.config.sections import Config
 from quadriga.shared.controller_line import KEY as CONTROLLER
 from quadriga.shared.errors import ConfigError, did_you_mean, name_file_errors
@@ -94,7 +93,6 @@ def build(given: Mapping[str, Any]) -> Config:
     for section, presets in PRESETS.items():
         keys = given.get(section, {})
         if isinstance(keys, dict):
-            keys = {key: current_value(f"{section}.{key}", value) for key, value in keys.items()}
             preset = keys.get("preset")
             beneath = presets.get(preset, {}) if isinstance(preset, str) else {}
             given = {**given, section: {**beneath, **keys}}
@@ -272,9 +270,5 @@ def _unit(meta: Mapping[str, Any]) -> str:
 
 
 def _unknown_name(name: str, known: list[str], what: str) -> ConfigError:
-    if name in RENAMED:
-        return ConfigError(
-            name, "a name of an earlier version", RENAMED[name], "the key was renamed, not changed"
-        )
     hint = did_you_mean(name, known) or f"known: {', '.join(known)}"
     return ConfigError(name, "an unknown name", f"{what} of the configuration", hint)

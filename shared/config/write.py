@@ -8,7 +8,6 @@ from collections.abc import Container, Iterator, Mapping
 from dataclasses import asdict, fields
 from typing import Any
 
-from quadriga.shared.config.later import hashed_sections
 from quadriga.shared.config.sections import Config
 
 
@@ -58,7 +57,7 @@ def config_sha256(config: Config) -> str:
     every walk takes a free port.
     """
     values = {name: value for name, value in asdict(config).items() if name != "bus"}
-    canonical = json.dumps(hashed_sections(values), sort_keys=True, separators=(",", ":"))
+    canonical = json.dumps(values, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(canonical.encode()).hexdigest()
 
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from typing import Final
 
-from quadriga.shared.config.later import with_older_values
 from quadriga.shared.config.load import build, flatten
-from quadriga.shared.config.renamed import with_current_names
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, RecordingError
 from quadriga.shared.planner_kinds import stand_in
@@ -26,7 +24,7 @@ PLUGIN: Final = (
 def recorded_config(recording: Recording | Salvage) -> Config:
     """The configuration of a recorded run.
 
-    What its version did not know yet is as it was then, see `with_older_values`. A planner, or a
+    A recording holds every key, so that no default of today stands for one of then. A planner, or a
     robot, of a package that is not installed keeps its name: messages can be read without it, and
     whatever needs more of it raises ConfigError (`Config.robot`, `planner_kinds.load_builder`).
 
@@ -69,12 +67,14 @@ def _build(text: str, plugin: str) -> Config:
         raise _NoConfigurationError from None
     if not isinstance(sections, dict):
         raise _NoConfigurationError
-    given = with_older_values(with_current_names(sections))
-    keys = flatten(given)
-    kind, team, robot = keys.get("planner.kind"), given.get("team"), keys.get("team.robot")
+    keys = flatten(sections)
+    for name in flatten(asdict(Config())):
+        if name not in keys:
+            raise ConfigError(name, "no value", "a value of every key")
+    kind, team, robot = keys.get("planner.kind"), sections.get("team"), keys.get("team.robot")
     if isinstance(kind, str) and kind.isprintable():
         stand_in(kind, plugin, str(keys.get("planner.options", "")))
     if isinstance(team, dict) and isinstance(robot, str) and robot not in ROBOTS:
-        config = build({**given, "team": {k: v for k, v in team.items() if k != "robot"}})
+        config = build({**sections, "team": {k: v for k, v in team.items() if k != "robot"}})
         return replace(config, team=replace(config.team, robot=printable_line(robot)))
-    return build(given)
+    return build(sections)

@@ -9,7 +9,6 @@ from typing import Any, Final, TypeVar
 
 from quadriga.experiments.plan import Group
 from quadriga.experiments.trial.origin import is_same_code
-from quadriga.shared.config.renamed import current_name, current_value
 from quadriga.shared.errors import ConfigError
 
 _T = TypeVar("_T", "GroupEntry", "SweepEntry", "Manifest")
@@ -88,7 +87,7 @@ class Manifest:
 
     @classmethod
     def from_dict(cls, body: Mapping[str, Any]) -> Manifest:
-        """The inverse of `asdict`, after JSON; keys of an earlier version have today's names.
+        """The inverse of `asdict`, after JSON.
 
         Raises:
             ValueError, KeyError, TypeError: it is something else.
@@ -99,17 +98,8 @@ class Manifest:
             _checked(GroupEntry(**{**g, "swept": tuple(g["swept"]), "seeds": tuple(g["seeds"])}))
             for g in body["groups"]
         )
-        sweeps = tuple(
-            _checked(SweepEntry(**{**sweep, "key": current_name(sweep["key"])}))
-            for sweep in body["sweeps"]
-        )
-        variants = {
-            variant: {
-                current_name(key): current_value(current_name(key), value)
-                for key, value in dict(keys).items()
-            }
-            for variant, keys in dict(body["variants"]).items()
-        }
+        sweeps = tuple(_checked(SweepEntry(**sweep)) for sweep in body["sweeps"])
+        variants = {variant: dict(keys) for variant, keys in dict(body["variants"]).items()}
         read = {"groups": groups, "sweeps": sweeps, "variants": variants}
         return _checked(cls(**{**body, "typed": tuple(body["typed"]), **read}))
 

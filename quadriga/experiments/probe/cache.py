@@ -24,7 +24,6 @@ from quadriga.experiments.probe.responses import (
 )
 from quadriga.identification.behaviour import behaviour
 from quadriga.progress import build_progress
-from quadriga.shared.config.later import hashed_sections
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.runtime.places import cache_file
@@ -48,7 +47,7 @@ def response_key(config: Config) -> str:
     sections["planner"] = {k: sections["planner"][k] for k in _OF_PLANNER}
     code = behaviour("quadriga.experiments.probe.sample_responses")
     libraries = {name: version(name) for name in _LIBRARIES}
-    parts = [hashed_sections(sections), code, libraries]
+    parts = [sections, code, libraries]
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
 
 

@@ -13,7 +13,6 @@ import pytest
 from quadriga.identification import cache
 from quadriga.identification.behaviour import behaviour
 from quadriga.identification.cache import await_predictor, data_key, predictor_key
-from quadriga.shared.config.renamed import RENAMED
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.runtime.places import cache_dir
@@ -105,15 +104,6 @@ def test_the_same_configuration_has_the_same_key() -> None:
     assert data_key(Config()) == data_key(Config())
     assert predictor_key(Config()) == predictor_key(Config())
     assert data_key(Config()) != predictor_key(Config())
-
-
-def test_new_names_of_keys_change_no_key(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = data_key(Config()), predictor_key(Config())
-    assert RENAMED
-    monkeypatch.setattr(cache, "hashed_sections", lambda sections: sections)
-    assert data_key(Config()) != before[0], "with today's names it would"
-    monkeypatch.undo()
-    assert (data_key(Config()), predictor_key(Config())) == before
 
 
 @pytest.mark.parametrize(("part", "predictor_alone"), [("collection", False), ("fits", True)])
