@@ -16,11 +16,8 @@ from quadriga.agents.controller.memory import Memory
 from quadriga.agents.controller.schedule import Schedule
 from quadriga.agents.controller.sensed import Sensed
 from quadriga.agents.controller.whole_body.problem import WholeBodyProblem, WholeBodySolution
-from quadriga.agents.counters import ENCODER_BRIDGED, IMU_BRIDGED, count
-from quadriga.agents.encoder_bridge import EncoderBridge
+from quadriga.agents.counters import count
 from quadriga.agents.healing import Healing, may_resume, ramp, step_healing
-from quadriga.agents.held_posture import HeldPosture
-from quadriga.agents.imu_bridge import ImuBridge, ImuState
 from quadriga.agents.modes import (
     DAMPING,
     ESTOP,
@@ -49,13 +46,12 @@ from quadriga.agents.planning.registry import PlanningState, build_planning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.rising import Rise, Rising
 from quadriga.agents.schedules import Schedules
-from quadriga.agents.sensor_loss import SensorLosses
 from quadriga.agents.step_io import Inputs as Inputs
 from quadriga.agents.step_io import Outputs as Outputs
 from quadriga.agents.tasks import Tasks
 from quadriga.agents.teammates import Teammates, TeamWatch, has_operator
+from quadriga.agents.validate import Validator
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.yokes import neighbours
 from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import with_detail
@@ -70,8 +66,8 @@ _LONGEST_DT: Final = 0.02  # s, after a gap in the ticks the filters advance by 
 class AgentState:
     """Everything the agent remembers between ticks.
 
-    `rise` is there while the robot gets up; `encoders` is known to `agents.encoder_bridge`, `held`
-    to `agents.held_posture`.
+    `rise` is there while the robot gets up; `readings` and `standing_since` are known to
+    `agents.validate`.
     """
 
     tick: int
@@ -85,9 +81,8 @@ class AgentState:
     healing: Healing = field(default_factory=Healing)
     team: Teammates = field(default_factory=Teammates)
     rise: Rise | None = None
-    imu: ImuState = field(default_factory=ImuState)
-    encoders: Array | None = None
-    held: Array | None = None
+    readings: Array | None = None
+    standing_since: Array | None = None
 
 
 @record
@@ -134,10 +129,7 @@ class Agent:
         self._stand_ms, self._stance_ms = config.gait.stand_ms, config.gait.stance_ms
         self._height = config.reference.height
         self._watch, self._rising = TeamWatch(config, robot), Rising(config)
-        yoked = neighbours(config.team.robots, config.team.yokes, self.index)
-        self._losses = SensorLosses(yoked=bool(yoked))
-        self._imu, self._encoders = ImuBridge(config.robot), EncoderBridge(config.robot)
-        self._posture = HeldPosture(config.robot)
+        self._validator = Validator(config, self.index)
         self._schedules = Schedules(config, self.index)
         self._tasks = Tasks(config)
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
@@ -231,10 +223,10 @@ class Agent:
         """Sense, plan, act. Each of them sees the mode after the stops that came up before it."""
         tick = inputs.state.tick
         dt = 1e-3 if state.tick < 0 else min(_LONGEST_DT, 1e-3 * (tick - state.tick))
-        imu, encoders, inputs, bridged = self._believe(state, inputs, dt)
+        read = self._validator.step(state.readings, inputs.state, 1e-3 * (tick - state.tick))
+        inputs = inputs if read.complete else replace(inputs, state=read.state)
         references = remember_references(state.references, inputs.references, tick)
-        loss = self._losses.find(imu.missing_ms, encoders)
-        course, healing = self._course(state, tick, loss.reason)
+        course, healing = self._course(state, tick, read.lost)
         team = self._look_around(state, inputs)
         followed = ramp(references, healing, tick)
         reference, reference_age = reference_at(followed, tick, self._height)
@@ -269,15 +261,17 @@ class Agent:
                 mode = resolve_stops(course, tick, stops)
 
         tau = solution.tau if not failures else state.last_tau  # the QP's, or the last good ones
-        held, posture = self._posture.step(state.held, mode, inputs.state, loss)
-        command = self._command(tick, tau, mode, posture, solved=not failures)
-        counters = count(state.counters, planned, solution, bridged)
+        if mode.name == STAND and not read.complete:
+            since, command = self._validator.stand(state.standing_since, read)
+        else:
+            since, command = None, self._command(tick, tau, mode, solved=not failures)
+        counters = count(state.counters, planned, solution, read)
         ages = {"reference": float(reference_age), **planned.ages_ms}
         said = (measurement, planned.plan, mode.name, mode.reason, counters, ages)
         outputs = Outputs(command, *said, planned.planner_ns)
-        whole = led and not loss.now and self._is_whole(tick, mode, team, planning)
+        whole = led and read.complete and self._is_whole(tick, mode, team, planning)
         healing = self._heal(healing, mode, inputs, whole=whole)
-        after = (references, tau, failures, counters, healing, team, None, imu, encoders, held)
+        after = (references, tau, failures, counters, healing, team, None, read.memory, since)
         new = AgentState(tick, mode, planning, acted.memory, *after)
         return new, outputs, (sensed, asked, acted)
 
@@ -330,19 +324,6 @@ class Agent:
             return Mode(WALK, tick), replace(healing, resumed=tick)
         return step_mode(mode, tick, stand_ms, ends), healing
 
-    def _believe(
-        self, state: AgentState, inputs: Inputs, dt: float
-    ) -> tuple[ImuState, Array, Inputs, tuple[str, ...]]:
-        """What is remembered of the sensors, what is believed of them, and of which not all is."""
-        read, ticks = inputs.state, inputs.state.tick - state.tick
-        encoders, believed = self._encoders.step(state.encoders, read, 1e-3 * ticks)
-        held = () if believed is read else (ENCODER_BRIDGED,)
-        imu, believed = self._imu.step(state.imu, believed, state.low_level, ticks, dt)
-        if believed is read:
-            return imu, encoders, inputs, ()
-        bridged = (*held, IMU_BRIDGED) if imu.bridged else held
-        return imu, encoders, replace(inputs, state=believed), bridged
-
     def _sense(self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float) -> Sensed:
         truth = inputs.truth
         # One that is lost or late is bridged by the filter.
@@ -374,15 +355,8 @@ class Agent:
         stance = self._schedules.at(begun, state.mode).stance
         return Measurement(tick, tick * 1_000_000, sensed.memory.mean_force, sensed.outputs, stance)
 
-    def _command(
-        self, tick: int, tau: Array, mode: Mode, posture: Array | None, *, solved: bool
-    ) -> Command:
-        """The motor command: torques, with damping where they are not this tick's, or damping.
-
-        The row of a `posture` comes before torques.
-        """
-        if posture is not None:
-            return Command.from_row(tick, tick * 1_000_000, posture)
+    def _command(self, tick: int, tau: Array, mode: Mode, *, solved: bool) -> Command:
+        """The motor command: torques, with damping where they are not this tick's, or damping."""
         row = np.zeros(60)  # tau, q_des, v_des, kp, kd
         passive = mode.passive
         if passive or not solved:

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Final
 
 from quadriga.agents.controller.whole_body.problem import UNCONSTRAINED, WholeBodySolution
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.planning.interface import PlanningOutputs
+from quadriga.agents.validate import Validated
 from quadriga.shared.wire.codes import code_of
 
-IMU_BRIDGED: Final = "imu_bridged"
-ENCODER_BRIDGED: Final = "encoder_bridged"
+IMU_INVALID: Final = "imu_invalid"
+ENCODER_INVALID: Final = "encoder_invalid"
 
 
 def count(
     counters: Mapping[str, int],
     planned: PlanningOutputs,
     solution: WholeBodySolution,
-    bridged: Sequence[str],
+    read: Validated,
 ) -> Mapping[str, int]:
     """The counters after a tick.
 
@@ -26,9 +27,10 @@ def count(
         counters: before it.
         planned: what planning came to.
         solution: of the whole-body QP.
-        bridged: counters of sensors of which something else was believed than was read.
+        read: the readings of its sensors.
     """
-    names = [*bridged]
+    invalid = ((IMU_INVALID, read.imu), (ENCODER_INVALID, bool(read.encoders)))
+    names = [name for name, counts in invalid if counts]
     if planned.plan is not None and planned.plan.status != SOLVED:
         names.append(f"plan_{code_of(planned.plan.status)}")
     names += planned.unusual

@@ -10,20 +10,12 @@ from collections.abc import Callable
 import numpy as np
 
 from quadriga.agents.agent import Agent, AgentState, Inputs
-from quadriga.agents.controller.maths.leg_kinematics import leg_kinematics
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.imu_bridge import BELIEVED_AFTER_MS
 from quadriga.agents.planning.team import Central, CentralState
 from quadriga.agents.time_grid import first_step, step_ms
+from quadriga.agents.validate import AGREES_MS, standing_torques
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import (
-    GRAVITY,
-    N_JOINTS,
-    N_LEGS,
-    N_OUTPUTS,
-    Array,
-    robot_names,
-)
+from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS, N_LEGS, N_OUTPUTS, robot_names
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Measurement, Reference, State
@@ -44,7 +36,7 @@ def rehearse(config: Config, agent: Agent, note: Callable[[], None] = lambda: No
     memory, lean = agent.initial(), _LEAN * config.controller.fall_tilt
     still = standing(config.robot, 0)
     upright = config.gait.stand_ms + SAMPLE_MS * config.planner.T_ini + 2 * step_ms(config)
-    for tick in range(upright + BELIEVED_AFTER_MS + 2 * step_ms(config) + 1):
+    for tick in range(upright + AGREES_MS + 2 * step_ms(config) + 1):
         sent = encode(_at(still, tick, lean if tick > upright else 0.0))
         inputs = Inputs(decode(sent, State), references=(_stay(config, tick),))
         memory, outputs = agent.step(memory, inputs)
@@ -76,16 +68,6 @@ def _stay(config: Config, tick: int = 0) -> Reference:
     return Reference(epoch, epoch * 1_000_000, 0.0, 0.0, 0.0, config.reference.height)
 
 
-def _standing_torques(robot: RobotSpec, force: float) -> Array:
-    """Torques, (12,), N·m, that press each foot on the ground with a force, N; legs weigh nothing.
-
-    τ = −Jᵀ f; a column of J is the foot's velocity at unit rate of a joint.
-    """
-    rates = np.tile(np.eye(3), N_LEGS)  # by joint of a leg
-    rising = [leg_kinematics(robot.q_stand, v, robot.geometry)[1][:, 2] for v in rates]
-    return -force * np.stack(rising, axis=1).ravel()
-
-
 def standing(robot: RobotSpec, tick: int, lean: float = 0.0) -> State:
     """What a robot that stands still on flat ground measures, or leans to its right, rad."""
     zero, share = np.zeros(N_JOINTS), robot.weight / N_LEGS
@@ -94,7 +76,7 @@ def standing(robot: RobotSpec, tick: int, lean: float = 0.0) -> State:
         0,
         robot.q_stand,
         zero,
-        _standing_torques(robot, share),
+        standing_torques(robot),
         np.zeros(4),
         np.zeros(3),
         np.array([0.0, 0.0, GRAVITY]),

@@ -291,7 +291,7 @@ def _is_believable(message: Message, robot: str, measurable: Array) -> bool:
     """Whether finite numbers can be meant, and for this robot.
 
     Sensors must be able to say what a state says, references be within limits, and the truth be of
-    this robot and its orientation of unit length. An IMU may fail, see `agents.imu_bridge`.
+    this robot and its orientation of unit length. Sensors may fail, see `agents.validate`.
     """
     if isinstance(message, State):
         return is_measurable(message.row, measurable)

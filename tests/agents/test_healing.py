@@ -18,8 +18,8 @@ from quadriga.agents.healing import (
     ramp,
     step_healing,
 )
-from quadriga.agents.imu_bridge import BELIEVED_AFTER_MS
 from quadriga.agents.modes import COMMANDED, LOSSES, STAND, STOPPING, WALK, Mode
+from quadriga.agents.validate import AGREES_MS
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
 from quadriga.shared.wire.codes import HALTS, INPUT_LOST, RESUMED
@@ -224,7 +224,7 @@ def test_an_emergency_stop_is_for_good_however_soon_a_robot_may_go_on() -> None:
 
 @pytest.mark.parametrize("auto", [False, True])
 def test_a_fall_or_an_emergency_stop_meanwhile_is_for_good(auto: bool) -> None:
-    lies = [{"state": tilted(tick, 1.2)} for tick in range(2000, 2000 + BELIEVED_AFTER_MS + 1)]
+    lies = [{"state": tilted(tick, 1.2)} for tick in range(2000, 2000 + AGREES_MS + 1)]
     for stops, mode in ((lies, "damping"), ([{"estop": EStop(2000, 0, "dog")}], "estop")):
         robot = stood(AUTO if auto else ALONE)
         assert [robot.step(**stop).mode for stop in stops][-1] == mode

@@ -1,0 +1,283 @@
+"""Which readings of a robot's sensors are valid, and what stands for those that are not.
+
+A reading is invalid that is no number, that is beyond what the sensor can measure, that jumps
+against its own rate, or, of an IMU, that stays the same to the last digit while its gyro turns, or
+says that gravity points upwards. The last valid one, at rest, takes its place. After `HOLD_MS` it
+counts as lost, and the robot stands, by its joints alone; yokes keep a robot level, and drag along
+one that stands, so that a yoked one does without for longer. A reading is valid again once it has
+agreed with itself for `AGREES_MS`, an encoder near to where it was valid last. An error that grows
+slowly, and a reading that is merely late, agree with themselves and pass.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from quadriga.agents.controller.maths.leg_reaction import foot_forces
+from quadriga.agents.controller.maths.rows import places, row_size
+from quadriga.agents.modes import ENCODER_LOST, IMU_LOST
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.yokes import neighbours
+from quadriga.shared.robot.conventions import GRAVITY, JOINT_NAMES, N_JOINTS, N_LEGS, Array
+from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.wire.codes import with_detail
+from quadriga.shared.wire.messages import Command, State
+
+HOLD_MS: Final = 20  # for which the last valid reading stands for invalid ones
+HOLD_YOKED_MS: Final = 600  # likewise, of a robot that is yoked to others
+AGREES_MS: Final = 5  # for which readings must agree once one did not
+
+_PAUSE: Final = 0.05  # s between two readings, after which anything may have happened
+_JUMP: Final = 0.1  # rad, of an angle or attitude against its rate, from one reading to the next
+_RETURN: Final = 0.5  # rad, from the last valid angle, within which one is valid again
+_FASTEST: Final = 20.0  # rad/s, of joints: where readings are missing, more may have happened
+_BEYOND: Final = 0.3  # rad beyond an end stop; encoders have an error of their zero
+_QUAT_NORM2: Final = (0.5, 2.0)  # |q|² of an attitude
+_ACCEL_MAX: Final = 150.0  # m/s²: accelerometers of such robots end at 16 g
+_UP_TIME: Final = 0.01  # s, time constant of the force that holds the trunk against gravity
+_UP_LEAST: Final = -3.0  # m/s²; nothing pulls a trunk down by so much for so long
+_TURNS: Final = 1e-3  # rad/s, of a gyro that says that the trunk moves
+_SAME_MS: Final = 20.0  # for which an IMU may read the same: it may be slower than the ticks
+_LEAD_MS: Final = 200.0  # from where the joints are to the stand: a swinging foot is soon down
+
+_IMU: Final = N_JOINTS  # index of the IMU behind the joints' encoders
+_Q, _V = State.CUTS["q_joint"], State.CUTS["v_joint"]
+_QUAT, _GYRO = State.CUTS["imu_quat_wxyz"], State.CUTS["imu_gyro"]
+_ACCEL: Final = State.CUTS["imu_accel"]
+_N_STATE: Final = max(cut.stop for cut in State.CUTS.values())
+
+
+class ValidationLayout(NamedTuple):
+    """Where the row of what is remembered keeps what.
+
+    Attributes:
+        read: the last state, as it was read, `State.row`.
+        valid: the last valid readings, likewise.
+        agrees: for how long each encoder, and the IMU, has agreed with itself, (13,), ms.
+        missing: for how long each has not been valid, (13,), ms.
+        same: for how long the IMU has read the same, ms.
+        up: specific force along the vertical by the IMU's own attitude, filtered, m/s².
+    """
+
+    read: slice
+    valid: slice
+    agrees: slice
+    missing: slice
+    same: int
+    up: int
+
+
+_ROW: Final = ValidationLayout(
+    **places(read=_N_STATE, valid=_N_STATE, agrees=N_JOINTS + 1, missing=N_JOINTS + 1, same=1, up=1)
+)
+
+
+class Validated(NamedTuple):
+    """What is known of the sensors after a tick.
+
+    Attributes:
+        memory: for the next tick, see `ValidationLayout`.
+        state: what was read, with the last valid readings in place of invalid ones.
+        imu: whether the IMU's reading is invalid now.
+        encoders: joints, of 0 … 11, whose encoder's reading is invalid now.
+        lost: why the robot can walk no more; "": it can.
+    """
+
+    memory: Array
+    state: State
+    imu: bool
+    encoders: tuple[int, ...]
+    lost: str
+
+    @property
+    def complete(self) -> bool:
+        """Whether all readings are valid."""
+        return not (self.imu or self.encoders)
+
+
+class Validator:
+    """Fixed data of how a robot's readings are checked, and of how it stands without some.
+
+    Args:
+        config: the team's configuration.
+        index: the robot's place in the team, 0-based.
+    """
+
+    def __init__(self, config: Config, index: int) -> None:
+        robot = config.robot
+        yoked = neighbours(config.team.robots, config.team.yokes, index)
+        self._hold_ms = HOLD_YOKED_MS if yoked else HOLD_MS
+        self._lower = np.array(robot.lower) - _BEYOND
+        self._upper = np.array(robot.upper) + _BEYOND
+        self._stand, self._standing_torque = robot.q_stand, standing_torques(robot)
+        self._kp, self._kd = config.bridge.stand_kp, config.bridge.stand_kd
+        # Compiled, or loaded, now and not in the first tick.
+        _validate(_first(np.zeros(_N_STATE)), np.zeros(_N_STATE), self._lower, self._upper, 1e-3)
+
+    def step(self, memory: Array | None, state: State, dt: float) -> Validated:
+        """Check the readings of a tick.
+
+        Args:
+            memory: of the tick before; None: there was none.
+            state: what was read.
+            dt: time since the last reading, s.
+        """
+        memory = _first(state.row) if memory is None else memory.copy()
+        if _validate(memory, state.row, self._lower, self._upper, dt):
+            return Validated(memory, state, imu=False, encoders=(), lost="")
+        missing = memory[_ROW.missing]
+        invalid = np.flatnonzero(missing > 0.0).tolist()
+        encoders = tuple(joint for joint in invalid if joint != _IMU)
+        row = state.row.copy()
+        if missing[_IMU]:
+            _level(row, memory[_ROW.valid])
+        for joint in encoders:
+            row[_Q][joint], row[_V][joint] = memory[_ROW.valid][_Q][joint], 0.0
+        valid = State.from_row(state.tick, state.stamp_ns, row)
+        return Validated(memory, valid, bool(missing[_IMU]), encoders, self._loss(missing))
+
+    def _loss(self, missing: Array) -> str:
+        """Why the robot can walk no more; "": it can."""
+        if missing[_IMU] > self._hold_ms:
+            return IMU_LOST
+        lost = np.flatnonzero(missing[:N_JOINTS] > self._hold_ms).tolist()
+        names = ",".join(JOINT_NAMES[joint].removesuffix("_joint") for joint in lost)
+        return with_detail(ENCODER_LOST, names) if lost else ""
+
+    def stand(self, since: Array | None, read: Validated) -> tuple[Array, Command]:
+        """Stand without an attitude, or a joint's angle: the motors lead their joints to the stand.
+
+        A motor without its angle cannot; it gives the torque that it has in the stand, and its rate is
+        no better known than its angle.
+
+        Args:
+            since: tick at which the robot began to stand so and its joints' angles then, (13,),
+                rad; None: it begins.
+            read: the readings of this tick.
+
+        Returns:
+            The new `since`, and the command.
+        """
+        state = read.state
+        since = np.concatenate([[state.tick], state.q_joint]) if since is None else since
+        share = min(1.0, (state.tick - since[0]) / _LEAD_MS)
+        smooth = share * share * (3.0 - 2.0 * share)
+        tau, lost = np.zeros(N_JOINTS), list(read.encoders)
+        kp, kd = np.full(N_JOINTS, self._kp), np.full(N_JOINTS, self._kd)
+        tau[lost], kp[lost], kd[lost] = self._standing_torque[lost], 0.0, 0.0
+        q_des = since[1:] + smooth * (self._stand - since[1:])
+        return since, Command(state.tick, state.stamp_ns, tau, q_des, np.zeros(N_JOINTS), kp, kd)
+
+
+def standing_torques(robot: RobotSpec) -> Array:
+    """Torques of the motors of a robot that stands on four feet, legs without mass, (12,), N·m."""
+    weight = np.array([0.0, 0.0, GRAVITY * robot.geometry.mass / N_LEGS])
+    torques = np.zeros(N_JOINTS)
+    for leg in range(N_LEGS):
+        joints = slice(3 * leg, 3 * leg + 3)
+        forces = np.empty((3, 3))  # of a unit torque of each joint
+        for joint in range(3):
+            unit = np.zeros(N_JOINTS)
+            unit[3 * leg + joint] = -1.0
+            forces[:, joint] = foot_forces(unit, robot.q_stand, robot.geometry)[leg]
+        torques[joints] = np.linalg.solve(forces, weight)
+    return torques
+
+
+def _first(row: Array) -> Array:
+    """What is remembered before the first tick: nothing is doubted, the trunk is level."""
+    memory = np.zeros(row_size(_ROW))
+    memory[_ROW.read] = memory[_ROW.valid] = row
+    memory[_ROW.agrees] = AGREES_MS
+    memory[_ROW.valid][_QUAT] = 1.0, 0.0, 0.0, 0.0
+    memory[_ROW.up] = GRAVITY
+    return memory
+
+
+@compiled
+def _validate(memory: Array, state: Array, lower: Array, upper: Array, dt: float) -> bool:
+    """Whether all readings of a tick are valid; `memory` is brought up to date."""
+    last, valid, ms = memory[_ROW.read], memory[_ROW.valid], 1e3 * dt
+    agrees, missing = memory[_ROW.agrees], memory[_ROW.missing]
+    resumed, whole = dt > _PAUSE, True
+    jump = _JUMP + _FASTEST * max(0.0, dt - 1e-3)
+    for index in range(N_JOINTS + 1):
+        if index == _IMU:
+            sound = _is_sound_imu(memory, state, dt, resumed)
+        else:
+            q, v, q0, v0 = state[_Q][index], state[_V][index], last[_Q][index], last[_V][index]
+            follows = abs(q - q0 - 0.5 * dt * (v + v0)) <= jump
+            near = missing[index] == 0.0 or abs(q - valid[_Q][index]) <= _RETURN
+            possible = lower[index] <= q <= upper[index] and np.isfinite(v)
+            sound = possible and (resumed or (follows and near))
+        agrees[index] = min(agrees[index] + ms, 1e6) if sound else 0.0
+        if agrees[index] < AGREES_MS:
+            missing[index] += ms
+            whole = False
+            continue
+        missing[index] = 0.0
+        if index == _IMU:
+            valid[_QUAT] = state[_QUAT]
+        else:
+            valid[_Q][index] = state[_Q][index]
+    last[:] = state
+    return whole
+
+
+@compiled
+def _is_sound_imu(memory: Array, state: Array, dt: float, resumed: bool) -> bool:
+    """Whether an IMU says what can be, and what follows from what it said before."""
+    last, quat, gyro, accel = memory[_ROW.read], state[_QUAT], state[_GYRO], state[_ACCEL]
+    same = True
+    for index in range(_QUAT.start, _ACCEL.stop):
+        same = same and state[index] == last[index]
+    memory[_ROW.same] = memory[_ROW.same] + 1e3 * dt if same else 0.0
+    if memory[_ROW.same] >= _SAME_MS and np.max(np.abs(gyro)) > _TURNS:
+        return False
+    if not (np.isfinite(np.sum(gyro)) and 0.0 < np.max(np.abs(accel)) < _ACCEL_MAX):
+        return False
+    if not _is_attitude(quat):
+        return False
+    up = np.sum(_vertical(quat) * accel)
+    memory[_ROW.up] += dt / (_UP_TIME + dt) * (up - memory[_ROW.up])
+    doubted = memory[_ROW.missing][_IMU] > 0.0  # one that falls freely feels hardly anything
+    if memory[_ROW.up] < (-_UP_LEAST if doubted else _UP_LEAST):
+        return False
+    if resumed or not _is_attitude(last[_QUAT]):
+        return resumed
+    # Half the sine of the angle between what follows by the gyro and what is read.
+    a, b, c = 0.25 * dt * (last[_GYRO] + gyro)
+    w, x, y, z = last[_QUAT]
+    expected = np.array(
+        [
+            w - x * a - y * b - z * c,
+            x + w * a + y * c - z * b,
+            y + w * b + z * a - x * c,
+            z + w * c + x * b - y * a,
+        ]
+    )
+    norms = np.sqrt(np.sum(expected * expected) * np.sum(quat * quat))
+    return bool(abs(np.sum(expected * quat)) >= np.cos(0.5 * _JUMP) * norms)
+
+
+@compiled
+def _is_attitude(quat_wxyz: Array) -> bool:
+    return bool(_QUAT_NORM2[0] < np.sum(quat_wxyz * quat_wxyz) < _QUAT_NORM2[1])
+
+
+@compiled
+def _level(row: Array, valid: Array) -> None:
+    """Put the last valid attitude into a state, at rest: gravity alone acts."""
+    row[_QUAT] = valid[_QUAT] / np.sqrt(np.sum(valid[_QUAT] * valid[_QUAT]))
+    row[_GYRO] = 0.0
+    row[_ACCEL] = GRAVITY * _vertical(valid[_QUAT])
+
+
+@compiled
+def _vertical(quat_wxyz: Array) -> Array:
+    """The vertical in the trunk's frame by an attitude, (3,)."""
+    w, x, y, z = quat_wxyz / np.sqrt(np.sum(quat_wxyz * quat_wxyz))
+    return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
