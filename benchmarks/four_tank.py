@@ -216,7 +216,7 @@ def closed_loops(names: Sequence[str], steps: int) -> list[ClosedLoop]:
     example = four_tank(noise=NOISE)
     planners: dict[str, Callable[[], TankPlanner]] = {
         "ours, spc": partial(OwnController, example),
-        "ours, causal": partial(OwnController, example, "causal", ridge=1e-4),
+        "ours, ridge": partial(OwnController, example, "ridge", ridge=1e-4),
         "ours, deepc": partial(OwnDeepc, example),
     }
     planners |= {name: partial(PEERS[name], example, NOISE) for name in names}

@@ -1,4 +1,4 @@
-"""Solutions of the normal equations without a penalty: pseudo-inverse (eq. 6) and LQ factors."""
+"""Solution of the normal equations without a penalty: the pseudo-inverse (eq. 6)."""
 
 from __future__ import annotations
 
@@ -24,48 +24,6 @@ Solve = Callable[[Array, Array], tuple[Array, float]]
 def solve_pinv(regression: Regression, layout: Layout) -> Solutions:
     """Y_f Z† = (Σ y zᵀ)(Σ z zᵀ)†, the solution of least norm where several are best."""
     return _solve_groups(regression, layout, _solve_least_norm)
-
-
-def solve_gamma(regression: Regression, layout: Layout) -> Solutions:
-    """γ-DDPC: with [Z_p; U_f; Y_f] = L Q, G = [L_31 L_32] [L_11 0; L_21 L_22]⁻¹, γ_3 = 0.
-
-    L is the Cholesky factor of the Gram matrix. If the rows of Z_p are not independent (data
-    without noise), L_11 belongs to an independent selection of them, found by pivoting.
-
-    Raises:
-        PredictorError: U_f is not exciting: L_22 is singular.
-    """
-
-    def solve(A: Array, b: Array) -> tuple[Array, float]:
-        past = len(A) * layout.past // layout.width
-        L_11, pivots, rank, _ = linalg.lapack.dpstrf(
-            A[:past, :past], tol=RANK_TOLERANCE * A.diagonal().max(), lower=1
-        )
-        rows = np.concatenate([pivots[:rank] - 1, np.arange(past, len(A))])
-        L_21 = linalg.solve_triangular(L_11[:rank, :rank], A[rows[:rank], past:], lower=True).T
-        rest = A[past:, past:] - L_21 @ L_21.T
-        floor = RANK_TOLERANCE * A.diagonal().max()
-        try:
-            L_22 = linalg.cholesky(rest, lower=True)
-            singular = bool(L_22.diagonal().min() ** 2 < floor)
-        except linalg.LinAlgError:
-            singular = True
-        if singular:
-            raise PredictorError(
-                "the data's future inputs",
-                "combinations of the past and of each other",
-                "inputs that excite every direction",
-                "more noise in the inputs (identification.noise), or more data",
-            )
-        L = np.zeros((len(rows), len(rows)))
-        L[:rank, :rank] = np.tril(L_11[:rank, :rank])
-        L[rank:, :rank], L[rank:, rank:] = L_21, L_22
-        x = np.zeros_like(b)
-        x[rows] = linalg.cho_solve((L, True), b[rows])
-        norm = float(np.linalg.norm(A[np.ix_(rows, rows)], 1))
-        return x, condition_number(norm, np.asfortranarray(L))
-
-    return _solve_groups(regression, layout, solve)
 
 
 def _solve_least_norm(A: Array, b: Array) -> tuple[Array, float]:

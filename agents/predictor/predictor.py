@@ -46,7 +46,6 @@ class PredictorMeta:
     controller: tuple[tuple[str, float | str | bool], ...]  # the low level that is part of G
     kind: str
     phases: int
-    phase_ridge: float
     neighbours: str
     stand_ms: int  # where the gait's period, and with it phase 0, begins
     robot: str = _FIRST_ROBOT
@@ -69,8 +68,7 @@ class PredictorMeta:
             block_weight=ident.block_weight,
             controller=tuple(sorted(controller.items())),
             kind=ident.predictor,
-            phases=ident.phases if ident.predictor == "phase" else 1,
-            phase_ridge=ident.phase_ridge,
+            phases=1,
             neighbours=ident.neighbours,
             stand_ms=config.gait.stand_ms,
             robot=config.team.robot,

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from quadriga.agents.predictor.layout import Layout
-from quadriga.agents.predictor.regression import Regression, past_first
+from quadriga.agents.predictor.regression import Regression
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
 
@@ -62,36 +62,6 @@ def solve_ridge(regression: Regression, layout: Layout, penalty: Penalty) -> Sol
         A = _add_penalty(regression.zz[np.ix_(rows, rows)], np.where(rows // W == i, light, heavy))
         norm, factor = _norm(A), factorise(A)
         x[i, rows] = linalg.cho_solve((factor, True), regression.zy[rows, i], check_finite=False)
-        condition = max(condition, condition_number(norm, factor))
-    return Solutions(x, condition)
-
-
-def solve_causal(regression: Regression, layout: Layout, penalty: Penalty) -> Solutions:
-    """Like `solve_ridge`, but [u_ini; y_ini] and u_0 … u_t alone explain y at sample t.
-
-    With columns in the order of time the normal equations of sample t are a leading block of
-    those of the last, and so are their Cholesky factors: one factor serves all N of them. A
-    robot's u_k is the mean force over the 10 ms that end with y_k, hence the direct feedthrough.
-
-    Raises:
-        PredictorError: a singular problem.
-    """
-    n, W, p = layout.agents, layout.width, layout.outputs
-    light, heavy = penalty.of(regression)
-    x, condition = np.zeros((n, n * W, layout.rows)), 0.0
-    for i, members in enumerate(layout.members):
-        rows = past_first(layout, members)
-        A = _add_penalty(regression.zz[np.ix_(rows, rows)], np.where(rows // W == i, light, heavy))
-        norm, factor = _norm(A), factorise(A)
-        half = linalg.solve_triangular(
-            factor, regression.zy[rows, i], lower=True, check_finite=False
-        )
-        for t in range(layout.N):
-            k = len(members) * (layout.past + layout.inputs * (t + 1))
-            at = slice(p * t, p * (t + 1))
-            x[i, rows[:k], at] = linalg.solve_triangular(
-                factor[:k, :k], half[:k, at], lower=True, trans=1, check_finite=False
-            )
         condition = max(condition, condition_number(norm, factor))
     return Solutions(x, condition)
 

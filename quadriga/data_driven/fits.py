@@ -7,19 +7,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from quadriga.agents.predictor.arx import solve_arx
-from quadriga.agents.predictor.layout import Layout
-from quadriga.agents.predictor.least_squares import solve_gamma, solve_pinv
+from quadriga.agents.predictor.least_squares import solve_pinv
 from quadriga.agents.predictor.regression import normal_equations, to_physical
-from quadriga.agents.predictor.ridge import Penalty, Solutions, solve_causal, solve_ridge
+from quadriga.agents.predictor.ridge import Penalty, solve_ridge
 from quadriga.data_driven.excitation import check_excitation
 from quadriga.data_driven.fitted_predictor import FittedPredictor
 from quadriga.data_driven.periodic import fit_periodic_blocks
 from quadriga.data_driven.trajectories import Data
 from quadriga.shared.errors import PredictorError, did_you_mean
 
-KINDS: Final = ("spc", "ridge", "gamma", "causal", "arx", "periodic")
-_WITHOUT_PENALTY: Final = ("spc", "gamma")
+KINDS: Final = ("spc", "ridge", "periodic")
 
 
 def fit(
@@ -37,10 +34,7 @@ def fit(
 
     - `spc`: subspace predictive control, the pseudo-inverse of eq. 6, of least norm;
     - `ridge`: least squares with a penalty, for less variance where data are noisy or few;
-    - `gamma`: γ-DDPC, LQ factors of the data; equal to `spc` where the outputs' past is noisy;
-    - `causal`: `ridge` in which no input acts backwards in time;
-    - `arx`: a one-step model, rolled out, for data from a feedback loop;
-    - `periodic`: a G of its own for each sample of a period, causal.
+    - `periodic`: a G of its own for each sample of a period, in which no input acts backwards.
 
     Signals are scaled by their root mean square before they are fitted, so that a ridge means the
     same for every plant.
@@ -50,7 +44,7 @@ def fit(
         kind: one of `KINDS`.
         past: T_ini, samples that tell the plant's state: at least its lag.
         horizon: N, samples to predict.
-        ridge: penalty per window on scaled columns, of `ridge`, `causal` and `arx`.
+        ridge: penalty per window on scaled columns, of `ridge`.
         peer_weight: of a plant of several agents: the penalty on what one does to another is this
             squared times as large.
         period: of `periodic`: samples after which the plant repeats itself; see `Data.first`.
@@ -66,9 +60,13 @@ def fit(
         actions = np.eye(data.inputs) if input_map is None else input_map
         blocks = fit_periodic_blocks(data, layout, period, actions)
         return FittedPredictor(kind, layout, blocks, data.single)
-    if kind in _WITHOUT_PENALTY or ridge == 0.0:
-        check_excitation(data, past + 1 if kind == "arx" else past + horizon)
-    solutions = _solve(data, kind, layout, Penalty(ridge, peer_weight))
+    if kind == "spc" or ridge == 0.0:
+        check_excitation(data, past + horizon)
+    regression = normal_equations(data.scaled(layout), layout)
+    if kind == "spc":
+        solutions = solve_pinv(regression, layout)
+    else:
+        solutions = solve_ridge(regression, layout, Penalty(ridge, peer_weight))
     blocks = to_physical(solutions.x, layout)[None]
     return FittedPredictor(kind, layout, blocks, data.single, solutions.condition)
 
@@ -89,16 +87,3 @@ def _check(kind: str, ridge: float, peer_weight: float, period: int | None) -> N
         raise PredictorError(
             "ridge, peer_weight", f"{ridge:g}, {peer_weight:g}", "not negative, and positive"
         )
-
-
-def _solve(data: Data, kind: str, layout: Layout, penalty: Penalty) -> Solutions:
-    signals = data.scaled(layout)
-    if kind == "arx":
-        return solve_arx(signals, layout, penalty)
-    regression = normal_equations(signals, layout)
-    if kind == "spc":
-        return solve_pinv(regression, layout)
-    if kind == "gamma":
-        return solve_gamma(regression, layout)
-    solve = solve_causal if kind == "causal" else solve_ridge
-    return solve(regression, layout, penalty)

@@ -23,9 +23,7 @@ from quadriga.shared.runtime.blas import use_one_blas_thread
 _ROBOTS: Final = 3
 _SAMPLES: Final = 400  # of an episode
 _STATES: Final = 8  # of each robot
-_KEYS: Final = {
-    "team.robots": _ROBOTS, "planner.N": 6, "planner.T_ini": 3, "identification.phases": 2,
-}  # fmt: skip
+_KEYS: Final = {"team.robots": _ROBOTS, "planner.N": 6, "planner.T_ini": 3}
 
 
 def samples() -> Iterator[Array]:

@@ -25,7 +25,7 @@ from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 _KEYS: Final = {
     "world.seed": 3, "world.seconds": 1.4, "world.scatter": 0.02, "gait.stand_ms": 100,
     "reference.ramp": 0.1, "reference.vx": 0.5, "reference.wz": 0.2, "planner.N": 10,
-    "planner.T_ini": 4, "identification.phases": 2,
+    "planner.T_ini": 4,
 }  # fmt: skip
 _NONE: Final = {"planner.kind": "none"}
 _SHORT: Final = {"world.seconds": 0.8}
@@ -55,7 +55,7 @@ _TRIALS: Final[tuple[dict[str, Any], ...]] = (
     },
     {
         "team.robots": 2, "planner.kind": "decentralised", "planner.adaptation": "recursive",
-        "planner.preset": "fast", "identification.predictor": "phase", "world.payload": 4.0,
+        "planner.preset": "fast", "world.payload": 4.0,
         "planner.output_bounds": "soft",
     },
     _SHORT | {

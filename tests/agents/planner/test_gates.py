@@ -276,7 +276,7 @@ def test_soft_bounds_leave_the_best_response_as_it_is(plant: Config) -> None:
 
 def phased(predictor: Predictor, *others: Array) -> Predictor:
     """The predictor with its own G in phase 0 and others in the following ones."""
-    meta = replace(predictor.meta, kind="phase", phases=1 + len(others))
+    meta = replace(predictor.meta, phases=1 + len(others))
     return Predictor(meta, np.concatenate([predictor.G, *others]))
 
 

@@ -13,11 +13,11 @@ from quadriga.shared.errors import PredictorFileError
 
 def test_what_is_saved_is_loaded(tmp_path: Path) -> None:
     example, path = four_tank(noise=0.002), tmp_path / "new" / "tanks.npz"
-    predictor = fit(example.data, "causal", 4, 8)
+    predictor = fit(example.data, "ridge", 4, 8)
     save(path, predictor)
     again = load(path)
     np.testing.assert_array_equal(again.blocks, predictor.blocks)
-    assert (again.kind, again.layout, again.single) == ("causal", predictor.layout, True)
+    assert (again.kind, again.layout, again.single) == ("ridge", predictor.layout, True)
     assert again.condition == predictor.condition
     assert [file.name for file in path.parent.iterdir()] == ["tanks.npz"]
 

@@ -36,7 +36,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder
 
 
-@pytest.mark.parametrize("kind", ["ridge", "phase"])
+@pytest.mark.parametrize("kind", ["ridge", "periodic"])
 def test_errors_over_the_horizon_make_up_the_error_of_the_gates(kind: str) -> None:
     data, config = dataset(), config_of(identification__predictor=kind)
     predictor = fit_predictor(data.training, PredictorMeta.of(config))
@@ -141,11 +141,11 @@ def test_every_predictor_is_compared_and_the_refused_ones_are_not_hidden(capsys:
 def test_what_cannot_be_fitted_at_all_is_a_row_with_the_reason() -> None:
     report = report_fit(config_of(), dataset(), "ridge")
     assert isinstance(report, FitReport)
-    singular = Unfit("arx", PredictorError("normal equations", "a pivot of 0", "positive"))
+    singular = Unfit("pinv", PredictorError("normal equations", "a pivot of 0", "positive"))
     table = build_comparison([report, singular])
     assert all(len(row) == len(table.columns) for row in table.rows)
-    assert (table.rows[1][0], table.rows[1][-1]) == ("arx", "no fit")
-    assert "arx: refused: normal equations a pivot of 0, not positive." in table.notes
+    assert (table.rows[1][0], table.rows[1][-1]) == ("pinv", "no fit")
+    assert "pinv: refused: normal equations a pivot of 0, not positive." in table.notes
     for sheet in build_report_tables(report, whole=True):
         assert all(len(row) == len(sheet.columns) for row in sheet.rows)
 

@@ -34,7 +34,7 @@ def config_of(robots: int) -> Config:
 
 def predictor_of(config: Config, phases: int = 1, seed: int = 0) -> Predictor:
     """A predictor of no physics at all."""
-    meta = replace(PredictorMeta.of(config), kind="phase", phases=phases)
+    meta = replace(PredictorMeta.of(config), phases=phases)
     n = config.team.robots
     random = np.random.default_rng(seed)
     return Predictor(meta, random.normal(size=(phases, n, n, 6 * N, meta.width)))
