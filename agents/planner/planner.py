@@ -171,11 +171,7 @@ class Planner:
         return self._peers.terms(before, selection, step, y_base)
 
     def step(
-        self,
-        state: PlannerState,
-        inputs: PlannerInputs,
-        peers: PeerTerms,
-        G_ii: Array | None = None,
+        self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
     ) -> tuple[PlannerState, PlanResult]:
         """Plan the horizon of one planning step, or plan it again with the peers' newer terms.
 
@@ -183,9 +179,8 @@ class Planner:
             state: the last plan.
             inputs: the agent's own data.
             peers: the peers' terms of eq. 11.
-            G_ii: replaces the predictor's own block; the step is then set up anew.
         """
-        setup = self._setup(inputs.step, G_ii)
+        setup = self._setup(inputs.step)
         if setup.compiled is not None and not peers.lost:
             result = self._plan_compiled(setup, setup.compiled, state, inputs, peers)
             if result is not None:
@@ -195,16 +190,12 @@ class Planner:
             return self._plan_by_solver(setup, state, inputs, peers)
 
     def problem_of(
-        self,
-        state: PlannerState,
-        inputs: PlannerInputs,
-        peers: PeerTerms,
-        G_ii: Array | None = None,
+        self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
     ) -> SolvedQp | None:
         """The QP of `step` for the same arguments; None if a peer is lost: then no QP is solved."""
         if peers.lost:
             return None
-        setup = self._setup(inputs.step, G_ii)
+        setup = self._setup(inputs.step)
         with np.errstate(over="ignore", invalid="ignore"):
             return self._solve(setup, state, inputs, peers, _free_response(setup, inputs, peers))
 
@@ -322,27 +313,22 @@ class Planner:
         y[T_ini - since :] = inputs.y_ini[T_ini - since :] - state.y[:since]
         return news
 
-    def phase(self, step: int) -> int:
-        """The contact phase of a planning step, which chooses the transition matrix."""
-        return phase_of(self._config, step, self._predictor.phases)
-
-    def _setup(self, step: int, G_ii: Array | None = None) -> _Setup:
-        """The set-up of a step: built anew if a `G_ii` is given, else from the memo."""
-        if G_ii is not None:
-            return self._build_setup(step, G_ii)
+    def _setup(self, step: int) -> _Setup:
+        """The set-up of a step of the gait's cycle, from the memo."""
         place = place_in(self._cycle, step)
         setup = self._setups.get(place)
         if setup is None:
-            own_block = self._predictor.block(self._index, self._index, self.phase(place))
-            setup = self._setups[place] = self._build_setup(place, own_block)
+            setup = self._setups[place] = self._build_setup(place)
         return setup
 
-    def _build_setup(self, step: int, G_ii: Array) -> _Setup:
+    def _build_setup(self, step: int) -> _Setup:
         past, weight = self._predictor.meta.past, self._config.robot.weight
         stance = horizon_stance(self._config, self._index, step)
         if self._cooperative:
             problem = build_team_problem(self._config, self._predictor, self._index, step)
         else:
+            phase = phase_of(self._config, step, self._predictor.phases)
+            G_ii = self._predictor.block(self._index, self._index, phase)
             problem = build_problem(
                 self._config.planner, weight, G_ii[:, past:], stance, G_ii[:, :past]
             )

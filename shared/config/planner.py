@@ -56,20 +56,6 @@ class PlannerConfig:
     exchanges: int = key(
         0, "-", "distributed: best responses to the peers' plans of the same step", low=0, high=8
     )
-    adaptation: str = key(
-        "none",
-        "-",
-        "recursive: each agent corrects the predicted effect of its own forces from measurements, "
-        "as under an unknown payload (distributed and decentralised)",
-        choices=("none", "recursive"),
-    )
-    forgetting: float = key(
-        0.995,
-        "1",
-        "adaptation: share of older information that a planning step keeps",
-        low=0.5,
-        high=1.0,
-    )
     latency_ms: int = key(
         8,
         "ms",

@@ -54,8 +54,8 @@ _TRIALS: Final[tuple[dict[str, Any], ...]] = (
         "planner.damping": 0.3, "planner.exchanges": 1, "planner.footholds": "planned",
     },
     {
-        "team.robots": 2, "planner.kind": "decentralised", "planner.adaptation": "recursive",
-        "planner.preset": "fast", "world.payload": 4.0,
+        "team.robots": 2, "planner.kind": "decentralised", "planner.preset": "fast",
+        "world.payload": 4.0,
         "planner.output_bounds": "soft",
     },
     _SHORT | {
