@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.agents.predictor.cyclic import cyclic_grams
 from quadriga.agents.predictor.hankel import columns, gram
 from quadriga.agents.predictor.layout import Layout, scales
 from quadriga.shared.robot.conventions import Array
@@ -40,22 +39,6 @@ def normal_equations(signals: Sequence[Array], layout: Layout) -> Regression:
     """
     L = layout.T_ini + layout.N
     return _split_by_agent(gram(signals, L), layout, columns(signals, L))
-
-
-def normal_equations_by_part(
-    signals: Sequence[Array], places: Sequence[int], part_of: NDArray[np.int64], layout: Layout
-) -> Iterator[Regression]:
-    """The regression over the windows that begin in each part of a cycle in turn.
-
-    Args:
-        signals: as in `normal_equations`.
-        places: of each episode's first window in the cycle.
-        part_of: part of every place of the cycle.
-        layout: of the predictor.
-    """
-    L = layout.T_ini + layout.N
-    for windows, S in cyclic_grams(signals, places, L, part_of):
-        yield _split_by_agent(S, layout, windows)
 
 
 def to_physical(x: Array, layout: Layout) -> Array:

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.predictor import PredictorMeta
-from quadriga.agents.predictor.regression import (
-    Regression,
-    normal_equations,
-    normal_equations_by_part,
-)
-from quadriga.agents.time_grid import gait_phase
+from quadriga.agents.predictor.regression import Regression, normal_equations
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.topics import SAMPLE_MS
 
 
 def scaled_signals(episodes: Sequence[Episode], meta: PredictorMeta) -> list[Array]:
@@ -36,34 +30,6 @@ def team_regression(episodes: Sequence[Episode], meta: PredictorMeta) -> Regress
         PredictorError: no data, too little, or of another team.
     """
     return normal_equations(scaled_signals(episodes, meta), meta.layout)
-
-
-def regressions_by_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Iterator[Regression]:
-    """The regression over the windows of each phase of the gait in turn.
-
-    A window's phase is that of the end of its [u_ini; y_ini], where a plan would begin.
-
-    Raises:
-        PredictorError: no data, too little, or of another team.
-    """
-    signals = scaled_signals(episodes, meta)
-    period = np.lcm(2 * meta.stance_ms, SAMPLE_MS) // SAMPLE_MS
-    starts = np.array([e.first_tick + SAMPLE_MS * (meta.T_ini - 1) for e in episodes])
-    origin = int(starts[0])
-    if ((starts - origin) % SAMPLE_MS).any():
-        raise PredictorError(
-            "episodes: first_tick",
-            f"{sorted({int(s) % SAMPLE_MS for s in starts})} modulo 10 ms",
-            "samples on one grid",
-        )
-    part_of = np.array(
-        [
-            gait_phase(origin + SAMPLE_MS * k, meta.stand_ms, meta.stance_ms, meta.phases)
-            for k in range(period)
-        ]
-    )
-    places = ((starts - origin) // SAMPLE_MS) % period
-    yield from normal_equations_by_part(signals, places.tolist(), part_of, meta.layout)
 
 
 def check_episodes(episodes: Sequence[Episode], meta: PredictorMeta) -> None:
