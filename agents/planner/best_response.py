@@ -34,8 +34,7 @@ def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
     """The linear map from all agents' present plans to their next, without inequality constraints.
 
     U_i ← −(1 − d) H_ii⁻¹ G_iiᵀ Q̄ Σ_{j≠i} G_ij U_j + d U_i over the stance legs of planning step
-    `step`, with the G of its phase and the damping d. H_ii is that of the QP that is solved; slacks
-    of soft bounds are left out, since they are zero where no bound is active.
+    `step`, with the G of its phase and the damping d. H_ii is that of the QP that is solved.
     Shape (s, s), s being the number of stance forces of the team (150 per robot at N = 25).
     """
     n, phase = predictor.meta.robots, phase_of(config, step, predictor.phases)
@@ -141,6 +140,5 @@ def _local_costs(config: Config, predictor: Predictor, step: int) -> list[_Local
         G_u = predictor.future_block(i, i, phase)
         stance = horizon_stance(config, i, step)
         problem = build_problem(config.planner, config.robot.weight, G_u, stance)
-        nv = len(problem.columns)
-        costs.append(_LocalCost(problem.H[:nv, :nv], problem.gradient, problem.columns))
+        costs.append(_LocalCost(problem.H, problem.gradient, problem.columns))
     return costs

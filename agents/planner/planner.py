@@ -266,7 +266,7 @@ class Planner:
             last, news = self._last(problem, state, inputs.step), self._news(state, inputs)
             f = stay_near_last(problem, f, self._new_share, last, news)
         else:
-            f = problem.pad(problem.gradient @ error)
+            f = problem.gradient @ error
         lower, upper = problem.bounds(error)
         solution = setup.solver.solve(f, lower, upper)
         return SolvedQp(
@@ -281,7 +281,7 @@ class Planner:
         """Mix a best response with a share of the last plan, which is nominal beyond its end.
 
         Both satisfy the constraints on forces; these are convex, so the mixture satisfies them too.
-        A last plan that would break hard bounds on outputs by now is not kept.
+        A last plan that would break bounds on outputs by now is not kept.
         """
         problem, x = solved.problem, solved.solution.x
         if not self._kept or self._cooperative or solved.solution.status != SOLVED:
@@ -289,8 +289,7 @@ class Planner:
         share, last = self._kept, self._last(problem, state, step)
         if not problem.keeps_outputs(last, solved.lower, solved.upper):
             return x
-        mixed = x.copy()
-        mixed[: len(last)] = (1.0 - share) * x[: len(last)] + share * last
+        mixed: Array = (1.0 - share) * x + share * last
         return mixed
 
     def _last(self, problem: PlannerProblem, state: PlannerState, step: int) -> Array:

@@ -99,19 +99,13 @@ class PlannerConfig:
         (20.0, 20.0, 60.0), "N", "largest planned deviation from the nominal force", low=0.0
     )
     output_bounds: str = key(
-        "none",
-        "-",
-        "whether planned outputs are bounded by output_max",
-        choices=("none", "soft", "hard"),
+        "none", "-", "whether planned outputs are bounded by output_max", choices=("none", "hard")
     )
     output_max: tuple[float, ...] = key(
         (0.03, 0.4, 0.3, 0.15, 0.15, 0.8),
         "m, m/s, m/s, rad, rad, rad/s",
         "largest planned deviation of z, vx, vy, roll, pitch, wz from what is commanded",
         low=1e-6,
-    )
-    output_weight: float = key(
-        100.0, "1", "soft output bounds: weight of their violation, times Q", low=1e-3, high=1e6
     )
     fade: tuple[float, ...] = key(
         (0.06, 0.5, 0.25, 2.0),

@@ -56,7 +56,7 @@ _TRIALS: Final[tuple[dict[str, Any], ...]] = (
     {
         "team.robots": 2, "planner.kind": "decentralised", "planner.preset": "fast",
         "world.payload": 4.0,
-        "planner.output_bounds": "soft",
+        "planner.output_bounds": "hard", "planner.output_max": (1.0,) * 6,
     },
     _SHORT | {
         "team.robots": 2, "planner.kind": "distributed", "planner.interface": "force",

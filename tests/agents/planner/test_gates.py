@@ -266,14 +266,6 @@ def test_a_plugin_that_responds_to_plans_is_held_against_the_radius(
         report.check(kind)
 
 
-def test_soft_bounds_leave_the_best_response_as_it_is(plant: Config) -> None:
-    """Their slacks are zero where no bound is active: the map has none."""
-    predictor = coupled(plant, seed=2, strength=1.0)
-    soft = replace(plant, planner=replace(plant.planner, output_bounds="soft"))
-    found, usual = (best_response_map(config, predictor, 20) for config in (soft, plant))
-    np.testing.assert_array_equal(found, usual)
-
-
 def phased(predictor: Predictor, *others: Array) -> Predictor:
     """The predictor with its own G in phase 0 and others in the following ones."""
     meta = replace(predictor.meta, phases=1 + len(others))
