@@ -79,13 +79,6 @@ class PlannerConfig:
         "outputs: all of them (the paper)",
         choices=("speeds", "outputs"),
     )
-    footholds: str = key(
-        "measured",
-        "-",
-        "velocity from which footholds are computed: measured, or planned until the middle of the "
-        "next stance, as far as the plan reaches",
-        choices=("measured", "planned"),
-    )
     N: int = key(25, "samples", "control horizon", low=4, high=100)
     T_ini: int = key(10, "samples", "estimation horizon", low=2, high=50)
     applied: int = key(4, "samples", "samples applied before the next plan", low=1, high=20)

@@ -43,7 +43,7 @@ KINDS: dict[str, dict[str, object]] = {
     "deepc": {"planner.kind": "deepc"},
     "cooperative": {"planner.cost": "team", "planner.exchanges": 1},
     "exchanged": {"planner.exchanges": 2, "planner.compensation": True, "planner.damping": 0.2},
-    "fast": {"planner.preset": "fast", "planner.footholds": "planned"},
+    "fast": {"planner.preset": "fast"},
 }
 
 

@@ -51,7 +51,7 @@ _TRIALS: Final[tuple[dict[str, Any], ...]] = (
     {"team.robots": 3, "planner.kind": "distributed", "world.push": "all:80:45:0.3:0.2"},
     {
         "team.robots": 2, "planner.kind": "distributed", "planner.compensation": True,
-        "planner.damping": 0.3, "planner.exchanges": 1, "planner.footholds": "planned",
+        "planner.damping": 0.3, "planner.exchanges": 1,
     },
     {
         "team.robots": 2, "planner.kind": "decentralised", "planner.preset": "fast",
