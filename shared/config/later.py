@@ -67,7 +67,6 @@ LATER_KEYS: Final[Mapping[str, Any]] = MappingProxyType(
         "sensors.foot_dropout_rate": 0.05,
         "sensors.foot_dropout_ms": 200.0,
         "estimator.tilt_time": 0.0,
-        "controller.kp_course": 0.0,
         "controller.mu_slippery": 2.0,
         "controller.foothold_inwards": 10.0,
         "controller.foot_load": "sensor",
