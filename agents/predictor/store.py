@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.predictor.gate_report import GateReport
+from quadriga.agents.predictor.gates import GateReport
 from quadriga.agents.predictor.periodic_predictor import FACTORS, PeriodicFactors, PeriodicPredictor
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.errors import PredictorFileError, name_file_errors

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.planner.acceptance import load_checked
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.fit_report import reason

@@ -10,8 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import gates_in_force
-from quadriga.agents.planner.gates import run_gates
+from quadriga.agents.planner.acceptance import gates_in_force, run_gates
 from quadriga.agents.predictor.fits import FITS
 from quadriga.agents.predictor.fits import fit as fit_predictor
 from quadriga.agents.predictor.predictor import PredictorMeta

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.gate_report import GateReport
-from quadriga.agents.predictor.held_out import predict_windows, window_phases
+from quadriga.agents.predictor.gates import GateReport, squared_errors
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance
 from quadriga.shared.errors import PredictorError, QuadrigaError
-from quadriga.shared.robot.conventions import N_OUTPUTS, OUTPUTS, Array
+from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 
@@ -114,24 +113,5 @@ def horizon_errors(predictor: Predictor, held_out: Sequence[Episode]) -> Horizon
     Raises:
         PredictorError: no held-out episode is long enough for a window.
     """
-    meta = predictor.meta
-    shape = (meta.robots, meta.N, N_OUTPUTS)
-    squares, naive, count = np.zeros(shape[1:]), np.zeros(shape[1:]), 0
-    for episode in held_out:
-        if episode.samples < meta.T_ini + meta.N:
-            continue
-        z, dy = episode.windows(meta.T_ini, meta.N)
-        error = predict_windows(predictor, window_phases(predictor, episode, z.shape[2]), z) - dy
-        squares += (error.reshape(*shape, -1) ** 2).mean(axis=0).sum(axis=-1)
-        for end in range(meta.T_ini, meta.T_ini + z.shape[2]):
-            held = episode.y[end : end + meta.N] - episode.y[end - 1]
-            naive += (held**2).mean(axis=1)
-        count += z.shape[2]
-    if count == 0:
-        raise PredictorError(
-            "held-out data",
-            "no episode that long",
-            f"at least {meta.T_ini + meta.N} samples",
-            "did every held-out walk end in a fall?",
-        )
-    return HorizonErrors(np.sqrt(squares / count), np.sqrt(naive / count))
+    _, squares, naive = squared_errors(predictor, held_out)
+    return HorizonErrors(np.sqrt(squares), np.sqrt(naive))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from quadriga.agents.predictor.peers_figures import LEFT_OUT, UNDERSTATED, Bounds, PeersFigures
+from quadriga.agents.predictor.gates import LEFT_OUT, UNDERSTATED, Bounds, PeersFigures
 from quadriga.identification.fit_report import FitReport, Unfit, reason
 from quadriga.shared.robot.conventions import OUTPUTS, robot_names
 from quadriga.shared.wire.topics import SAMPLE_MS

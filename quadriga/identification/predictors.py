@@ -8,10 +8,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import gates_in_force, load_checked
-from quadriga.agents.planner.gates import run_gates
+from quadriga.agents.planner.acceptance import gates_in_force, load_checked, run_gates
 from quadriga.agents.predictor.fits import fit as fit_predictor
-from quadriga.agents.predictor.gate_report import GateReport
+from quadriga.agents.predictor.gates import GateReport
 from quadriga.agents.predictor.measured_response import check_measured_plant
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, read, save, versions

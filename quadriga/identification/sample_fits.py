@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.planner.gates import run_gates
+from quadriga.agents.planner.acceptance import run_gates
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
 from quadriga.agents.predictor.fits import FITS, fit
 from quadriga.agents.predictor.predictor import PredictorMeta

@@ -14,7 +14,7 @@ import numpy as np
 
 from quadriga import data_driven
 from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.gate_report import GateReport
+from quadriga.agents.predictor.gates import GateReport
 from quadriga.agents.predictor.measured_response import (
     PulseResponses,
     fit_measured_response,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import check_fitted_for, gates_in_force
+from quadriga.agents.planner.acceptance import check_fitted_for, gates_in_force
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256, read
 from quadriga.experiments.variants import PREDICTORS

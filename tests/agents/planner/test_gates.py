@@ -13,16 +13,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate, linalg, optimize
 
-from quadriga.agents.planner.best_response import (
+from quadriga.agents.planner.acceptance import (
     are_same_costs,
     best_response_map,
     best_response_radius,
     probe_costs,
+    run_gates,
 )
-from quadriga.agents.planner.gates import height_gains, held_out_error, physical_height, run_gates
 from quadriga.agents.predictor.episode import Y_SCALE
 from quadriga.agents.predictor.fits import fit_ridge
-from quadriga.agents.predictor.gate_report import GateReport
+from quadriga.agents.predictor.gates import (
+    GateReport,
+    height_gains,
+    held_out_error,
+    physical_height,
+)
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config

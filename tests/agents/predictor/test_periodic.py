@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.planner.gates import coupling_table, held_out_error, run_gates
+from quadriga.agents.planner.acceptance import run_gates
 from quadriga.agents.predictor.episode import Y_SCALE, Episode
 from quadriga.agents.predictor.fits import fit
+from quadriga.agents.predictor.gates import coupling_table, held_out_error
 from quadriga.agents.predictor.periodic import fit_periodic
 from quadriga.agents.predictor.periodic_basis import phase_angles, wrench_map
 from quadriga.agents.predictor.periodic_predictor import PeriodicPredictor

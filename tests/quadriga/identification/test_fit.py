@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadriga.agents.planner.gates import held_out_error
 from quadriga.agents.predictor.fits import FITS
 from quadriga.agents.predictor.fits import fit as fit_predictor
+from quadriga.agents.predictor.gates import held_out_error
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.predictor.store import read
 from quadriga.commands.parser import main

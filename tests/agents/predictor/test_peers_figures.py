@@ -12,11 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.agents.planner.gates import run_gates
-from quadriga.agents.planner.peers_gate import peers_figures
+from quadriga.agents.planner.acceptance import run_gates
 from quadriga.agents.predictor.fits import fit_ridge
-from quadriga.agents.predictor.gate_report import GateReport
-from quadriga.agents.predictor.peers_figures import Bounds, PeersFigures
+from quadriga.agents.predictor.gates import Bounds, GateReport, PeersFigures, peers_figures
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
