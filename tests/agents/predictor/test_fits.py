@@ -15,9 +15,14 @@ from quadriga.agents.predictor.episode import Y_SCALE, Episode
 from quadriga.agents.predictor.fits import FITS, fit, fit_ridge
 from quadriga.agents.predictor.hankel import mosaic, split
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.regression import agents_first, scaled_blocks, to_physical
-from quadriga.agents.predictor.ridge import Penalty, solve_ridge
-from quadriga.agents.predictor.team_data import team_regression
+from quadriga.agents.predictor.regression import (
+    Penalty,
+    agents_first,
+    normal_equations,
+    scaled_blocks,
+    solve_ridge,
+    to_physical,
+)
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
@@ -153,7 +158,8 @@ def test_of_many_solutions_the_pseudo_inverse_takes_the_least() -> None:
 def test_shared_eliminations_solve_what_each_robot_would_alone(robots: int, weight: float) -> None:
     meta = meta_for(robots, block_weight=weight)
     data = [random_walk(robots, 400, 7, noise=0.3)]
-    regression, W = team_regression(data, meta), meta.width
+    signals = [np.concatenate(episode.scaled_deviations(), axis=1) for episode in data]
+    regression, W = normal_equations(signals, meta.layout), meta.width
     x = solve_ridge(regression, meta.layout, Penalty(1e-3, weight)).x
     for i in range(robots):
         penalty = 1e-3 * regression.windows * np.where(np.arange(robots) == i, 1.0, weight**2)

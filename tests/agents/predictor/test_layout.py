@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE
-from quadriga.agents.predictor.layout import Layout, everyone, scales
+from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Layout, everyone, scales
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.shared.config.sections import Config, TeamConfig
 

@@ -43,7 +43,7 @@ def with_peers(predictor: Predictor, factor: float, invented: float = 0.0) -> Pr
         own = G[:, i, i, :, past:]
         noise = random.normal(size=own.shape) * np.abs(own).mean(axis=2, keepdims=True)
         G[:, i, j, :, past:] += invented * noise
-    return replace(predictor, G=G)
+    return replace(predictor, parts=G)
 
 
 def figures_of(predictor: Predictor, team: Any, samples: int = 600) -> PeersFigures:

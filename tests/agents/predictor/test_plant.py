@@ -9,9 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quadriga.data_driven import KINDS, Data, fit, four_tank, hankel, judge
+from quadriga.agents.predictor.four_tank import four_tank
+from quadriga.agents.predictor.hankel import mosaic
+from quadriga.agents.predictor.plant import KINDS, Data, fit, judge
 from quadriga.shared.errors import PredictorError
-from tests.quadriga.data_driven.plants import Sizes, random_plant, record, split_window
+from tests.agents.predictor.plants import Sizes, random_plant, record, split_window
 
 SIZES = st.builds(
     Sizes,
@@ -44,24 +46,24 @@ def test_the_four_tanks_are_predicted_to_the_last_digits() -> None:
     unseen = example.plant
     u = np.random.default_rng(5).uniform(-1.0, 1.0, (34, 2))
     y = unseen.respond(u)
-    predictor = fit(example.data, "spc", example.past, example.horizon)
+    predictor = fit(example.data, "pinv", example.past, example.horizon)
     np.testing.assert_allclose(predictor.predict(u[:4], y[:4], u[4:]), y[4:], atol=1e-9)
 
 
 @pytest.mark.parametrize("sizes", [Sizes(1, 2, 1, 3), Sizes(2, 1, 2, 4)])
-def test_spc_is_the_pseudo_inverse_of_equation_6(sizes: Sizes) -> None:
+def test_pinv_is_the_pseudo_inverse_of_equation_6(sizes: Sizes) -> None:
     data = record(random_plant(sizes, 1), sizes, (160, 90), 2, noise=0.3)
     past, horizon = 3, 4
     flat = [
         (u.reshape(len(u), -1), y.reshape(len(y), -1)) for u, y in zip(data.u, data.y, strict=True)
     ]
-    U, Y = (hankel([pair[k] for pair in flat], past + horizon) for k in (0, 1))
+    U, Y = (mosaic([pair[k] for pair in flat], past + horizon) for k in (0, 1))
     m, p = sizes.agents * sizes.inputs, sizes.agents * sizes.outputs
     Z = np.vstack([U[: m * past], Y[: p * past], U[m * past :]])
     G = Y[p * past :] @ np.linalg.pinv(Z)
     past_u, past_y, future_u, _ = split_window(data, past, horizon)
     written = G @ np.concatenate([past_u.ravel(), past_y.ravel(), future_u.ravel()])
-    found = fit(data, "spc", past, horizon).predict(past_u, past_y, future_u)
+    found = fit(data, "pinv", past, horizon).predict(past_u, past_y, future_u)
     np.testing.assert_allclose(found.ravel(), written, atol=1e-9)
 
 
@@ -83,7 +85,7 @@ def test_a_plant_of_one_agent_needs_no_axis_of_agents() -> None:
     sizes = Sizes(1, 2, 3, 3)
     data = record(random_plant(sizes, 7), sizes, (200,), 8)
     flat = Data(data.u[0][:, 0], data.y[0][:, 0])
-    whole, single = (fit(each, "spc", 3, 4) for each in (data, flat))
+    whole, single = (fit(each, "pinv", 3, 4) for each in (data, flat))
     np.testing.assert_array_equal(whole.G, single.G)
     past_u, past_y, future_u, _ = split_window(data, 3, 4)
     np.testing.assert_array_equal(
@@ -128,7 +130,7 @@ DATA = record(random_plant(Sizes(1, 2, 1, 3), 1), Sizes(1, 2, 1, 3), (100,), 1, 
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"kind": "scp"}, "did you mean 'spc'"),
+        ({"kind": "pinw"}, "did you mean 'pinv'"),
         ({"past": 0}, "past: got 0, expected a whole number"),
         ({"past": 4.0}, r"past: got 4\.0, expected a whole number"),
         ({"horizon": "10"}, "horizon: got '10', expected a whole number"),
@@ -143,13 +145,13 @@ DATA = record(random_plant(Sizes(1, 2, 1, 3), 1), Sizes(1, 2, 1, 3), (100,), 1, 
     ],
 )
 def test_what_cannot_be_fitted_is_refused_by_name(changes: dict[str, Any], text: str) -> None:
-    arguments: dict[str, Any] = {"kind": "spc", "past": 3, "horizon": 4} | changes
+    arguments: dict[str, Any] = {"kind": "pinv", "past": 3, "horizon": 4} | changes
     with pytest.raises(PredictorError, match=text):
         fit(DATA, **arguments)
 
 
 def test_signals_that_do_not_fit_a_predictor_are_refused_by_name() -> None:
-    predictor = fit(DATA, "spc", 3, 4)
+    predictor = fit(DATA, "pinv", 3, 4)
     past_u, past_y, future_u, _ = split_window(DATA, 3, 4)
     with pytest.raises(
         PredictorError, match=r"past_u: got shape \(4, 1, 2\), expected \(3, 1, 2\)"

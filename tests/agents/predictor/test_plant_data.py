@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.data_driven import Data, fit, hankel, is_persistently_exciting
+from quadriga.agents.predictor.plant import Data, fit, is_persistently_exciting
 from quadriga.shared.errors import PredictorError
 
 U, Y = np.random.default_rng(0).normal(size=(30, 2)), np.zeros((30, 1))
@@ -55,22 +55,13 @@ def test_data_are_copied_and_read_only() -> None:
         Data(U, Y, first=[0, 1])
 
 
-def test_hankel_is_equation_2_of_all_episodes() -> None:
-    signal = np.arange(8.0).reshape(4, 2)
-    np.testing.assert_array_equal(
-        hankel(signal, 3), [[0, 2], [1, 3], [2, 4], [3, 5], [4, 6], [5, 7]]
-    )
-    both = hankel([signal, signal[:2], signal[1:]], 3)
-    np.testing.assert_array_equal(both, np.hstack([hankel(signal, 3), hankel(signal[1:], 3)]))
-    for wrong in (signal[:2], signal[:, 0], [signal, signal[:, :1]]):
-        with pytest.raises(PredictorError, match="signal"):
-            hankel(wrong, 3)
-
-
 def test_noise_excites_and_a_sine_does_not() -> None:
     assert is_persistently_exciting(U, 10)
     assert not is_persistently_exciting(U, 11)  # 20 columns, 22 rows
     assert is_persistently_exciting([U, U[::-1]], 11)
+    for wrong in (U[:1], U[:, 0], [U, U[:, :1]]):
+        with pytest.raises(PredictorError, match="signal"):
+            is_persistently_exciting(wrong, 3)
     sine = np.sin(0.3 * np.arange(60.0))[:, None]
     assert is_persistently_exciting(sine, 2)
     assert not is_persistently_exciting(sine, 3)

@@ -5,18 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quadriga.data_driven import (
-    DataDrivenController,
-    Deepc,
-    FourTank,
-    PlanBounds,
-    PlanWeights,
-    fit,
-    four_tank,
-)
+from quadriga.agents.predictor.control import DataDrivenController, Deepc, PlanBounds, PlanWeights
+from quadriga.agents.predictor.four_tank import FourTank, four_tank
+from quadriga.agents.predictor.plant import fit
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
-from tests.quadriga.data_driven.plants import Sizes, random_plant, record, split_window
+from tests.agents.predictor.plants import Sizes, random_plant, record, split_window
 
 
 def test_without_bounds_it_is_the_closed_form_of_equation_7() -> None:
@@ -59,7 +53,7 @@ def drive(
 
 def test_the_four_tanks_reach_their_levels() -> None:
     for build in (
-        lambda e: DataDrivenController(fit(e.data, "spc", e.past, e.horizon), e.weights),
+        lambda e: DataDrivenController(fit(e.data, "pinv", e.past, e.horizon), e.weights),
         lambda e: Deepc(e.data, e.past, e.horizon, e.weights),
     ):
         example = four_tank()
@@ -71,7 +65,7 @@ def test_the_four_tanks_reach_their_levels() -> None:
 def test_inputs_and_outputs_stay_within_their_bounds() -> None:
     bounds = PlanBounds(u_min=[-0.5, 0.2], u_max=1.4, y_max=[0.6, np.inf])
     example = four_tank()
-    predictor = fit(example.data, "spc", example.past, example.horizon)
+    predictor = fit(example.data, "pinv", example.past, example.horizon)
     u, y = drive(example, DataDrivenController(predictor, example.weights, bounds), 60)
     assert (u >= np.array([-0.5, 0.2]) - 1e-7).all()
     assert u.max() == pytest.approx(1.4, abs=1e-7)
@@ -81,7 +75,7 @@ def test_inputs_and_outputs_stay_within_their_bounds() -> None:
 
 def test_bounds_that_nothing_keeps_are_one_clear_error() -> None:
     example = four_tank()
-    predictor = fit(example.data, "spc", example.past, example.horizon)
+    predictor = fit(example.data, "pinv", example.past, example.horizon)
     bounds = PlanBounds(u_min=-0.1, u_max=0.1, y_min=[5.0, -np.inf])
     controller = DataDrivenController(predictor, example.weights, bounds)
     past = np.zeros((4, 2)), np.zeros((4, 2))

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadriga.data_driven import fit, four_tank, load, save
+from quadriga.agents.predictor.four_tank import four_tank
+from quadriga.agents.predictor.plant import fit, load, save
 from quadriga.shared.errors import PredictorFileError
 
 
@@ -26,13 +27,13 @@ def test_damaged_and_foreign_files_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "tanks.npz"
     with pytest.raises(PredictorFileError, match="no such file"):
         load(path)
-    save(path, fit(four_tank().data, "spc", 4, 8))
+    save(path, fit(four_tank().data, "pinv", 4, 8))
     content = path.read_bytes()
     path.write_bytes(content[: len(content) // 2])
     with pytest.raises(PredictorFileError, match="something else"):
         load(path)
     np.savez(path, document=np.array('{"format": "another"}'), blocks=np.zeros((1, 1)))
-    with pytest.raises(PredictorFileError, match="something else"):
+    with pytest.raises(PredictorFileError, match="format another"):
         load(path)
     path.write_bytes(content)
     with np.load(path) as archive:
@@ -40,4 +41,4 @@ def test_damaged_and_foreign_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(PredictorFileError, match="digest"):
         load(path)
     with pytest.raises(PredictorFileError, match="a file that can be written"):
-        save(tmp_path, fit(four_tank().data, "spc", 4, 8))
+        save(tmp_path, fit(four_tank().data, "pinv", 4, 8))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quadriga.data_driven.bounded_qp import BoundedQp
+from quadriga.agents.predictor.control import BoundedQp
 from quadriga.shared.errors import PredictorError
 
 

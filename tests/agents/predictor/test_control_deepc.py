@@ -12,21 +12,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.agents.planner.deepc_qp import DeepcWeights, eliminate
-from quadriga.agents.predictor.deepc import reduce_signals
-from quadriga.data_driven import (
-    Data,
+from quadriga.agents.predictor.control import (
     DataDrivenController,
     DataDrivenPlan,
     Deepc,
     PlanBounds,
     PlanWeights,
-    fit,
-    four_tank,
-    hankel,
 )
+from quadriga.agents.predictor.deepc import reduce_signals
+from quadriga.agents.predictor.four_tank import four_tank
+from quadriga.agents.predictor.hankel import mosaic
+from quadriga.agents.predictor.plant import Data, fit
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
-from tests.quadriga.data_driven.plants import Sizes, random_plant, record
+from tests.agents.predictor.plants import Sizes, random_plant, record
 
 PAST, HORIZON = 2, 3
 SIZES = st.builds(
@@ -79,7 +78,7 @@ class WrittenOut:
     @classmethod
     def of(cls, case: Case, weights: PlanWeights) -> WrittenOut:
         U, Y = (
-            hankel([x.reshape(len(x), -1) for x in xs], PAST + HORIZON)
+            mosaic([x.reshape(len(x), -1) for x in xs], PAST + HORIZON)
             for xs in (case.data.u, case.data.y)
         )
         (U_p, U_f), (Y_p, Y_f) = (np.split(X, [len(X) * PAST // (PAST + HORIZON)]) for X in (U, Y))
@@ -212,7 +211,7 @@ def test_without_noise_it_plans_what_spc_plans() -> None:
     past = u, example.plant.respond(u)
     weights = PlanWeights(Q=3.0, R=1e-2, lambda_g=1e-10, lambda_sigma=1e8)
     deepc = Deepc(example.data, 4, 12, weights)
-    predictor = fit(example.data, "spc", 4, 12)
+    predictor = fit(example.data, "pinv", 4, 12)
     references = example.reference, example.input_reference
     ours = DataDrivenController(predictor, weights).plan(*past, *references)
     plan = deepc.plan(*past, *references)
