@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from quadriga.agents.predictor.episode import Y_SCALE, Episode
 from quadriga.agents.predictor.fits import FITS, fit, fit_ridge
-from quadriga.agents.predictor.hankel import mosaic, split
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.predictor.regression import (
     Penalty,
-    agents_first,
     normal_equations,
     scaled_blocks,
     solve_ridge,
@@ -25,7 +21,7 @@ from quadriga.agents.predictor.regression import (
 )
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import Array
 
 Team = Callable[..., Any]
 T_INI, N = 3, 4
@@ -83,75 +79,6 @@ def random_walk(
         np.zeros((*shape, 6)),
         first_tick=410,
     )
-
-
-def relative_error(predictor: Predictor, episode: Episode) -> float:
-    """Largest error of all windows over the largest output, in scaled units."""
-    z, y = episode.windows(T_INI, N)
-    n, _, windows = y.shape
-    error, size = (
-        (array.reshape(n, N, 6, windows) / Y_SCALE[:, None])
-        for array in (predictor.predict(z) - y, y)
-    )
-    return float(np.abs(error).max() / np.abs(size).max())
-
-
-def assert_same(first: Predictor, second: Predictor, atol: float) -> None:
-    """Equal blocks in scaled units."""
-    ours, theirs = (scaled_blocks(p.G, p.meta.layout) for p in (first, second))
-    np.testing.assert_allclose(ours, theirs, atol=atol)
-
-
-@settings(max_examples=6, deadline=None)
-@given(seed=st.integers(0, 2**31), robots=st.integers(1, 3))
-def test_every_fit_reproduces_the_true_response(seed: int, robots: int) -> None:
-    data = [random_walk(robots, 120 + 130 * robots, seed, data=k) for k in (1, 2)]
-    # The fundamental lemma holds of these data: rank = m (T_ini + N) + order.
-    H = mosaic([np.concatenate(episode.scaled_deviations(), axis=1) for episode in data], T_INI + N)
-    assert np.linalg.matrix_rank(H) == 12 * robots * (T_INI + N) + 4 * robots
-    unseen = random_walk(robots, 60, seed, data=3)
-    for kind in [kind for kind in FITS if kind != "periodic"]:  # which shrinks: a test of its own
-        meta = meta_for(robots, kind=kind, ridge=1e-12, block_weight=1.0)
-        predictor = fit(data, meta)
-        assert predictor.meta.kind == kind
-        assert relative_error(predictor, unseen) < 1e-8, kind
-
-
-def fit_hankel(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """G = Y_f [U_p; Y_p; U_f]† (eq. 6) as the paper has it; forms the Hankel matrices.
-
-    The independent reference of the other fits; takes minutes where they take seconds.
-    """
-    u, y = zip(*(episode.scaled_deviations() for episode in episodes), strict=True)
-    parts = split(u, y, meta.T_ini, meta.N)
-    Z = np.concatenate([parts.U_p, parts.Y_p, parts.U_f])
-    G = parts.Y_f @ np.linalg.pinv(Z)
-    n, m, p = meta.robots, N_FORCES, N_OUTPUTS
-    past_u, past_y, future_u = np.split(
-        np.arange(len(Z)), [n * m * meta.T_ini, n * (m + p) * meta.T_ini]
-    )
-    columns_of = np.concatenate(
-        [agents_first(x, n, d) for x, d in ((past_u, m), (past_y, p), (future_u, m))], axis=1
-    ).ravel()
-    rows_of = agents_first(np.arange(len(G)), n, p)
-    x = G[rows_of[:, None, :], columns_of[:, None]]
-    plain = replace(meta, kind="pinv", phases=1, ridge=0.0, block_weight=1.0)
-    return Predictor(plain, to_physical(x, meta.layout)[None], float(np.linalg.cond(Z)) ** 2)
-
-
-@pytest.mark.parametrize("robots", [1, 2, 3])
-def test_the_pseudo_inverse_is_that_of_the_explicit_hankel_matrix(robots: int) -> None:
-    data = [random_walk(robots, 300, 5, noise=0.3, data=k) for k in (1, 2)]
-    reference = fit_hankel(data, meta_for(robots))
-    found = fit(data, meta_for(robots, kind="pinv"))
-    assert_same(found, reference, 1e-9)
-    assert found.condition == pytest.approx(reference.condition, rel=30)
-
-
-def test_of_many_solutions_the_pseudo_inverse_takes_the_least() -> None:
-    data = [random_walk(1, 300, 6)]
-    found, reference = fit(data, meta_for(1, kind="pinv")), fit_hankel(data, meta_for(1))
-    assert_same(found, reference, 1e-7)
 
 
 @pytest.mark.parametrize(("robots", "weight"), [(1, 160.0), (2, 1.0), (3, 160.0), (5, 1e4)])
