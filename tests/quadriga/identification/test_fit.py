@@ -6,9 +6,13 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from quadriga.agents.predictor.fits import FITS
 from quadriga.agents.predictor.fits import fit as fit_predictor
@@ -16,10 +20,17 @@ from quadriga.agents.predictor.gates import held_out_error
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.predictor.store import read
 from quadriga.commands.parser import main
+from quadriga.identification import fit_report
 from quadriga.identification.cache import predictor_path
-from quadriga.identification.fit import report_fit
-from quadriga.identification.fit_report import FitReport, Unfit, horizon_errors
-from quadriga.identification.fit_tables import build_comparison, build_report_tables
+from quadriga.identification.fit_report import (
+    FitReport,
+    HorizonErrors,
+    Unfit,
+    build_comparison,
+    build_report_tables,
+    horizon_errors,
+    report_fit,
+)
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import OUTPUTS
 from tests.quadriga.linear_data import arguments, config_of, dataset, put_data
@@ -155,3 +166,22 @@ def test_data_that_do_not_excite_are_an_error_not_a_report() -> None:
     still = tuple(replace(episode, u=episode.u_nominal.copy()) for episode in data.training)
     with pytest.raises(PredictorError, match="persistently exciting"):
         report_fit(config_of(identification__ridge=2e-6), replace(data, training=still), "ridge")
+
+
+def test_degrees_stand_beside_milliradians(monkeypatch: pytest.MonkeyPatch) -> None:
+    errors = HorizonErrors(np.full((5, 6), 0.02), np.full((5, 6), np.deg2rad(2.0)))
+    report = cast(FitReport, SimpleNamespace(name="ridge", refused=None, horizon=errors))
+    drawn = list[Figure]()
+    monkeypatch.setattr(fit_report, "save_png", lambda figure, _path: drawn.append(figure))
+    fit_report.draw([report], Path("fit.png"))
+    (figure,) = drawn
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+
+    def beside(axes: Any) -> list[str]:
+        return [label.get_text() for other in axes.child_axes for label in other.get_yticklabels()]
+
+    by_name = dict(zip(OUTPUTS, map(beside, figure.axes), strict=True))
+    assert not by_name["z"] + by_name["vx"] + by_name["vy"]
+    for name, sign in (("roll", "°"), ("pitch", "°"), ("wz", "°/s")):
+        assert f"2{sign}" in by_name[name]
