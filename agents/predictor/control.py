@@ -45,20 +45,21 @@ class PlanWeights:
     lambda_g: float = 1.0
     lambda_sigma: float = 1e5
 
-    def stages(self, layout: Layout) -> tuple[Array, Array]:
-        """Q of each output and R of each input of an agent, shapes (p,) and (m,).
+    def over_horizon(self, layout: Layout) -> tuple[Array, Array]:
+        """Q of the outputs and R of the inputs over the horizon, scaled, agents stacked.
 
         Raises:
             PredictorError: a weight of another shape, or not positive.
         """
         weights = []
-        for name, dim in (("Q", layout.outputs), ("R", layout.inputs)):
-            array = as_numbers(f"weights.{name}", getattr(self, name))
+        for name, scale in (("Q", layout.y_scale), ("R", layout.u_scale)):
+            array, dim = as_numbers(f"weights.{name}", getattr(self, name)), len(scale)
             if array.shape not in ((), (dim,)):
                 raise PredictorError(
                     f"weights.{name}", f"shape {array.shape}", f"a number, or {dim} of them"
                 )
-            weights.append(np.broadcast_to(array, (dim,)))
+            stage = np.broadcast_to(array, (dim,)) * np.array(scale) ** 2
+            weights.append(np.tile(stage, layout.agents * layout.N))
         Q, R = weights
         if Q.min() < 0.0 or not Q.any():
             raise PredictorError(
@@ -152,16 +153,8 @@ class DataDrivenController:
     ) -> None:
         layout = predictor.layout
         self._predictor = predictor
-        Q, R = weights.stages(layout)
-        steps = layout.agents * layout.N
-        self._Q = np.tile(Q * np.array(layout.y_scale) ** 2, steps)
-        self._R = np.tile(R * np.array(layout.u_scale) ** 2, steps)
-        u_low, u_high = bounds.over_horizon(layout, "u")
-        y_low, y_high = bounds.over_horizon(layout, "y")
-        self._rows = np.flatnonzero(np.isfinite(y_low) | np.isfinite(y_high))
-        self._lower = np.concatenate([u_low, y_low[self._rows]])
-        self._upper = np.concatenate([u_high, y_high[self._rows]])
-        self._problems = [self._build(phase) for phase in range(predictor.period)]
+        Q, self._R = weights.over_horizon(layout)
+        self._problems = [self._build(phase, Q, bounds) for phase in range(predictor.period)]
 
     def plan(
         self,
@@ -187,29 +180,28 @@ class DataDrivenController:
         """
         layout, single = self._predictor.layout, self._predictor.single
         given = _Asked.of(layout, (past_u, past_y), reference, input_reference, single=single)
-        problem = self._problems[phase % self._predictor.period]
+        G_past, problem = self._problems[phase % self._predictor.period]
         past = [part.reshape(layout.agents, -1) for part in (given.u_ini, given.y_ini)]
-        free = problem.G_past @ np.concatenate(past, axis=1).ravel()
+        free = G_past @ np.concatenate(past, axis=1).ravel()
         f = problem.gradient @ (free - given.reference) - self._R * given.input_reference
-        shift = np.concatenate([np.zeros(len(f)), free[self._rows]])
-        u, residual = problem.qp.solve(f, self._lower - shift, self._upper - shift)
-        y = free + problem.G_u @ u
+        u, y, residual = problem.solve(f, free)
         planned = _signal(u, layout, layout.u_scale, single=single)
         return DataDrivenPlan(
             planned, _signal(y, layout, layout.y_scale, single=single), None, None, residual
         )
 
-    def _build(self, phase: int) -> _PhaseProblem:
+    def _build(self, phase: int, Q: Array, bounds: PlanBounds) -> tuple[Array, _Problem]:
+        """Of one phase, scaled: the columns of G that multiply the past, and the problem in u."""
         layout = self._predictor.layout
         G = scaled_blocks(self._predictor.blocks[phase], layout)
         whole = G.transpose(0, 2, 1, 3)  # agent, its outputs, agent, its columns
         rows = layout.agents * layout.rows
         G_past = np.ascontiguousarray(whole[..., : layout.past]).reshape(rows, -1)
         G_u = np.ascontiguousarray(whole[..., layout.past :]).reshape(rows, -1)
-        gradient = G_u.T * self._Q
+        gradient = G_u.T * Q
         H = gradient @ G_u
         H.flat[:: len(H) + 1] += self._R
-        return _PhaseProblem(G_past, G_u, gradient, BoundedQp(H, G_u[self._rows]))
+        return G_past, _Problem(G_u, gradient, H, layout, bounds)
 
 
 class Deepc:
@@ -245,32 +237,19 @@ class Deepc:
         signals = data.scaled(layout)
         reduction = reduce_signals(signals, layout)
         self._layout, self._single = layout, data.single
-        n, N = layout.agents, layout.N
+        n = layout.agents
         past_u, self._past_y = n * layout.inputs * past, n * layout.outputs * past
         self._by_past = reduction.response[:, :past_u]
-        self._by_x = np.hstack([reduction.response[:, past_u:], reduction.spread])
-
-        Q, R = weights.stages(layout)
-        y_square = np.array(layout.y_scale) ** 2
-        Omega = np.concatenate(
-            [np.tile(weights.lambda_sigma * y_square, n * past), np.tile(Q * y_square, n * N)]
-        )
-        self._R = np.tile(R * np.array(layout.u_scale) ** 2, n * N)
+        by_x = np.hstack([reduction.response[:, past_u:], reduction.spread])
+        Q, self._R = weights.over_horizon(layout)
+        on_sigma = np.tile(weights.lambda_sigma * np.array(layout.y_scale) ** 2, n * past)
         effort = weights.lambda_g * reduction.inverse[past_u:]
         self._effort_past, k = effort[:, :past_u], len(effort)
-        self._gradient = self._by_x.T * Omega
-        H = self._gradient @ self._by_x
+        gradient = by_x.T * np.concatenate([on_sigma, Q])
+        H = gradient @ by_x
         H[:k, :k] += effort[:, past_u:]
         H.flat[:: len(H) + 1] += np.concatenate([self._R, np.full(len(H) - k, weights.lambda_g)])
-
-        u_low, u_high = bounds.over_horizon(layout, "u")
-        y_low, y_high = bounds.over_horizon(layout, "y")
-        bounded = np.flatnonzero(np.isfinite(y_low) | np.isfinite(y_high))
-        self._rows = self._past_y + bounded
-        free = np.full(len(H) - k, np.inf)
-        self._lower = np.concatenate([u_low, -free, y_low[bounded]])
-        self._upper = np.concatenate([u_high, free, y_high[bounded]])
-        self._qp = BoundedQp(H, self._by_x[self._rows])
+        self._problem = _Problem(by_x, gradient, H, layout, bounds)
         self._g_by_a, self._g_by_z = _combinations(signals, reduction)
 
     def plan(
@@ -284,12 +263,11 @@ class Deepc:
         layout, single = self._layout, self._single
         given = _Asked.of(layout, (past_u, past_y), reference, input_reference, single=single)
         past_part = self._by_past @ given.u_ini
-        f = self._gradient @ (past_part - np.concatenate([given.y_ini, given.reference]))
+        f = self._problem.gradient @ (past_part - np.concatenate([given.y_ini, given.reference]))
         k = len(self._R)
         f[:k] += self._effort_past @ given.u_ini - self._R * given.input_reference
-        shift = np.concatenate([np.zeros(len(f)), past_part[self._rows]])
-        x, residual = self._qp.solve(f, self._lower - shift, self._upper - shift)
-        outputs, u = past_part + self._by_x @ x, x[:k]
+        x, outputs, residual = self._problem.solve(f, past_part)
+        u = x[:k]
         sigma = outputs[: self._past_y] - given.y_ini
         g = self._g_by_a @ np.concatenate([given.u_ini, u]) + self._g_by_z @ x[k:]
         y = outputs[self._past_y :]
@@ -376,20 +354,36 @@ def _as_reference(name: str, values: ArrayLike, shape: tuple[int, ...], *, singl
     return as_signal(name, array, shape, single=single)
 
 
-class _PhaseProblem(NamedTuple):
-    """The QP of one phase, in scaled inputs and outputs.
+class _Problem:
+    """A QP in the inputs of the horizon and what else is free, with the outputs that come of it.
 
-    Attributes:
-        G_past: columns that multiply the past, shape (n p N, n (m + p) T_ini).
-        G_u: columns that multiply the inputs of the horizon, shape (n p N, n m N).
-        gradient: G_uᵀ Q.
-        qp: with the Hessian G_uᵀ Q G_u + R.
+    Args:
+        by_x: effect of x on the outputs, (rows, k); the last n p N rows are those of the horizon,
+            the first n m N unknowns its inputs.
+        gradient: by_xᵀ times the weights of the outputs.
+        H: Hessian, (k, k).
+        layout: of the plant.
+        bounds: of inputs and outputs.
     """
 
-    G_past: Array
-    G_u: Array
-    gradient: Array
-    qp: BoundedQp
+    def __init__(
+        self, by_x: Array, gradient: Array, H: Array, layout: Layout, bounds: PlanBounds
+    ) -> None:
+        u_low, u_high = bounds.over_horizon(layout, "u")
+        y_low, y_high = bounds.over_horizon(layout, "y")
+        bounded = np.flatnonzero(np.isfinite(y_low) | np.isfinite(y_high))
+        free = np.full(len(H) - len(u_low), np.inf)
+        self.gradient, self._by_x = gradient, by_x
+        self._rows = len(by_x) - len(y_low) + bounded
+        self._lower = np.concatenate([u_low, -free, y_low[bounded]])
+        self._upper = np.concatenate([u_high, free, y_high[bounded]])
+        self._qp = BoundedQp(H, by_x[self._rows])
+
+    def solve(self, f: Array, free: Array) -> tuple[Array, Array, float]:
+        """The best x for a linear term, the outputs with their free part, and the residual."""
+        shift = np.concatenate([np.zeros(len(f)), free[self._rows]])
+        x, residual = self._qp.solve(f, self._lower - shift, self._upper - shift)
+        return x, free + self._by_x @ x, residual
 
 
 class BoundedQp:

@@ -15,8 +15,7 @@ from quadriga.agents.predictor.measured_response import check_measured_plant
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, read, save, versions
 from quadriga.identification.cache import data_path, predictor_path
-from quadriga.identification.collect import collect
-from quadriga.identification.collection_plan import collection_seconds
+from quadriga.identification.collect import collect, collection_seconds
 from quadriga.identification.dataset import Dataset, check_excitation, read_data, write_data
 from quadriga.progress import build_progress
 from quadriga.shared.config.sections import Config
