@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import daqp
@@ -19,7 +20,7 @@ from quadriga.agents.predictor.control import (
     PlanBounds,
     PlanWeights,
 )
-from quadriga.agents.predictor.deepc import reduce_signals
+from quadriga.agents.predictor.deepc import reduce, reduce_signals
 from quadriga.agents.predictor.four_tank import four_tank
 from quadriga.agents.predictor.hankel import mosaic
 from quadriga.agents.predictor.plant import Data, fit
@@ -236,3 +237,36 @@ def test_what_cannot_be_planned_is_refused_by_name(changes: dict[str, Any], text
     arguments: dict[str, Any] = {"data": four_tank().data, "past": 4, "horizon": 26}
     with pytest.raises(PredictorError, match=text):
         Deepc(**(arguments | changes))
+
+
+Team = Callable[..., Any]
+T_INI, N = 2, 3
+
+
+def test_data_without_noise_have_the_rank_of_the_plant(linear_team: Team) -> None:
+    """Fundamental lemma: forces fill all their directions, outputs add one per state."""
+    for n in (1, 2):
+        plant = linear_team(n)
+        clean, noisy = (
+            reduce(
+                [plant.episode(samples * n, samples, noise=noise) for samples in (70, 55)], T_INI, N
+            )
+            for noise in (0.0, 0.3)
+        )
+        assert clean.spread.shape == (6 * n * (T_INI + N), 9 * n)
+        assert noisy.spread.shape == (6 * n * (T_INI + N), 6 * n * (T_INI + N))
+
+
+def test_short_or_dull_data_are_refused(linear_team: Team) -> None:
+    episode = linear_team(1).episode(40, 0)
+    with pytest.raises(PredictorError, match="persistently exciting of order 5"):
+        reduce([episode], T_INI, N)
+    still = linear_team(1).episode(200, 0)
+    u = still.u.copy()
+    u[:, :, 3] = still.u_nominal[:, :, 3]
+    with pytest.raises(PredictorError, match="persistently exciting"):
+        reduce([replace(still, u=u)], T_INI, N)
+    with pytest.raises(PredictorError, match="data of one team"):
+        reduce([], T_INI, N)
+    with pytest.raises(PredictorError, match="data of one team"):
+        reduce([still, linear_team(2).episode(200, 0)], T_INI, N)
