@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from quadriga.agents.predictor.episode import Layout, everyone
-from quadriga.agents.predictor.hankel import columns, excitation, windows
+from quadriga.agents.predictor.hankel import columns, windows
 from quadriga.agents.predictor.periodic import (
     Walked,
     draw_starts,
@@ -30,7 +30,7 @@ from quadriga.agents.predictor.periodic import (
     fit_factors,
     held_samples,
 )
-from quadriga.agents.predictor.regression import Penalty, fit_blocks
+from quadriga.agents.predictor.regression import Penalty, excitation, fit_blocks
 from quadriga.agents.predictor.store import name_damage, read_archive, write_archive
 from quadriga.shared.errors import PredictorError, did_you_mean
 from quadriga.shared.robot.conventions import Array
