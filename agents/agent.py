@@ -248,9 +248,7 @@ class Agent:
             mode = resolve_stops(course, tick, stops)
 
         setpoint = setpoint_at(planning.plans, tick)
-        task = self._tasks.build(
-            tick, mode, reference, setpoint, inputs.excitation, schedule.progress
-        )
+        task = self._tasks.build(tick, mode, reference, setpoint, inputs.excitation)
         new_sample = tick // SAMPLE_MS != state.tick // SAMPLE_MS
         acted = self._controller.act(sensed, schedule, task, dt, new_sample=new_sample)
         solution, failures = acted.solution, 0

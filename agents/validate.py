@@ -150,8 +150,8 @@ class Validator:
     def stand(self, since: Array | None, read: Validated) -> tuple[Array, Command]:
         """Stand without an attitude, or a joint's angle: the motors lead their joints to the stand.
 
-        A motor without its angle cannot; it gives the torque that it has in the stand, and its rate is
-        no better known than its angle.
+        A motor without its angle cannot: it gives the torque that it has in the stand, and no
+        damping, as its rate is no better known.
 
         Args:
             since: tick at which the robot began to stand so and its joints' angles then, (13,),

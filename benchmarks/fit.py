@@ -6,7 +6,7 @@ n = 5, T = 12,000 in 3 s and 0.5 GB; n = 10, T = 20,000 in 12 s (two cores).
 On a busy machine two BLAS threads wait for each other and one thread is faster:
 OMP_NUM_THREADS=1 python -m benchmarks.fit
 
-Run: python -m benchmarks.fit [--out FILE] [--kinds ridge causal …] [--sizes 5 10] [--repeats 3]
+Run: python -m benchmarks.fit [--out FILE] [--kinds ridge pinv …] [--sizes 5 10] [--repeats 3]
 """
 
 from __future__ import annotations

@@ -26,15 +26,9 @@ from benchmarks.four_tank_peers import (
     TankPlanner,
     is_installed,
 )
-from quadriga.data_driven import (
-    DataDrivenController,
-    Deepc,
-    FittedPredictor,
-    FourTank,
-    LinearPlant,
-    fit,
-    four_tank,
-)
+from quadriga.agents.predictor.control import DataDrivenController, Deepc
+from quadriga.agents.predictor.four_tank import FourTank, LinearPlant, four_tank
+from quadriga.agents.predictor.plant import PlantPredictor, fit
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
@@ -48,9 +42,9 @@ PlanOnce = Callable[[Array, Array], tuple[Array, Array]]
 class OwnController:
     """Eq. 7 with the predictor of one fit."""
 
-    def __init__(self, example: FourTank, kind: str = "spc", ridge: float = 1e-6) -> None:
+    def __init__(self, example: FourTank, kind: str = "pinv", ridge: float = 1e-6) -> None:
         self._example = example
-        self.predictor: FittedPredictor = fit(
+        self.predictor: PlantPredictor = fit(
             example.data, kind, example.past, example.horizon, ridge=ridge
         )
         self._controller = DataDrivenController(self.predictor, example.weights)
@@ -215,8 +209,8 @@ def closed_loops(names: Sequence[str], steps: int) -> list[ClosedLoop]:
     """Closed loops of ours and of all packages that are installed."""
     example = four_tank(noise=NOISE)
     planners: dict[str, Callable[[], TankPlanner]] = {
-        "ours, spc": partial(OwnController, example),
-        "ours, causal": partial(OwnController, example, "causal", ridge=1e-4),
+        "ours, pinv": partial(OwnController, example),
+        "ours, ridge": partial(OwnController, example, "ridge", ridge=1e-4),
         "ours, deepc": partial(OwnDeepc, example),
     }
     planners |= {name: partial(PEERS[name], example, NOISE) for name in names}

@@ -13,7 +13,7 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
-from quadriga.data_driven import FourTank
+from quadriga.agents.predictor.four_tank import FourTank
 from quadriga.shared.robot.conventions import Array
 
 _TOLERANCES: Final = (1e-13, 1e-11, 1e-9)

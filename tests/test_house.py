@@ -15,7 +15,6 @@ import pytest
 TOP: Final = Path(__file__).parents[1]
 WALLS: Final = ("agents", "plant", "shared", "sim_server")
 ROOTS: Final = (*WALLS, "quadriga", "benchmarks")
-LONGEST_FILE: Final = 400
 LONGEST_FUNCTION: Final = 60
 MOST_ARGUMENTS: Final = 8
 MOST_SKIPS: Final = 99  # matrices and tables that the formatter would tear apart
@@ -34,10 +33,6 @@ def trees() -> Mapping[Path, ast.Module]:
         for path in found
         if not any(parent.is_symlink() for parent in path.parents)
     }
-
-
-def lines(path: Path) -> int:
-    return len(path.read_text(encoding="utf-8").splitlines())
 
 
 def functions() -> Iterator[tuple[str, Function]]:
@@ -74,13 +69,6 @@ def test_walls_stand_at_the_top_and_are_linked_into_the_package(wall: str) -> No
     assert (TOP / wall / "__init__.py").is_file()
     assert link.is_symlink()
     assert link.resolve() == (TOP / wall).resolve()
-
-
-def test_no_file_is_long() -> None:
-    every = [*(TOP / path for path in trees()), *(TOP / "tests").rglob("*.py")]
-    assert len(every) > 300
-    long = {str(path.relative_to(TOP)): n for path in every if (n := lines(path)) > LONGEST_FILE}
-    assert not long
 
 
 def test_functions_fit_a_screen() -> None:

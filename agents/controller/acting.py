@@ -16,7 +16,6 @@ from quadriga.agents.controller.foot_targets import (
 )
 from quadriga.agents.controller.friction import update_mu_reduction
 from quadriga.agents.controller.maths.rigid_body import rigid_body_terms
-from quadriga.agents.controller.maths.rotation import from_yaw_frame
 from quadriga.agents.controller.maths.rows import places, row_size
 from quadriga.agents.controller.memory import MEMORY
 from quadriga.agents.controller.payload_estimate import add_load
@@ -52,7 +51,6 @@ class TaskLayout(NamedTuple):
 
     Attributes:
         deviation, v, wz, height, feedforward: see `Task`.
-        ahead: likewise; NaN for the velocity of now.
         dt: time since the last tick, s.
         new_sample: 1 if a sample of forces begins with this tick, else 0.
         tilt: see `Task`.
@@ -63,16 +61,13 @@ class TaskLayout(NamedTuple):
     wz: int
     height: int
     feedforward: int
-    ahead: slice
     dt: int
     new_sample: int
     tilt: slice
 
 
 TASK: Final = TaskLayout(
-    **places(
-        deviation=N_FORCES, v=2, wz=1, height=1, feedforward=1, ahead=2, dt=1, new_sample=1, tilt=2
-    )
+    **places(deviation=N_FORCES, v=2, wz=1, height=1, feedforward=1, dt=1, new_sample=1, tilt=2)
 )
 TASK_SIZE: Final = row_size(TASK)
 
@@ -145,9 +140,8 @@ def act(
     memory[MEMORY.mu_reduction] = update_mu_reduction(
         memory0[MEMORY.mu_reduction], contact, phase, feet, fixed.friction, dt
     )
-    ahead, ratio = task[TASK.ahead], body.mass / fixed.body.mass
-    v_expected = trunk.velocity if np.isnan(ahead[0]) else from_yaw_frame(ahead, trunk.R)
-    motion = MotionReference(v_expected, v_des, task[TASK.wz], ratio * fixed.feet.foothold_inwards)
+    inwards = body.mass / fixed.body.mass * fixed.feet.foothold_inwards
+    motion = MotionReference(trunk.velocity, v_des, task[TASK.wz], inwards)
     update_anchors(memory, phase, trunk, p_foot, fixed.feet, dt)
     swing = desired_accelerations(memory, phase, trunk, feet, motion, fixed.feet)
     goal = Goal(contact, push, swing, desired_forces(contact, deviation, trunk.R, body.mass))

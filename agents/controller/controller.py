@@ -7,7 +7,6 @@ functions that these calls are made of.
 
 from __future__ import annotations
 
-import math
 import struct
 from typing import Final
 
@@ -38,7 +37,7 @@ from quadriga.shared.robot.torque_speed import motor_curves
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.messages import State
 
-# The numbers of a task's row behind the deviation: v, wz, height, feedforward, ahead, …
+# The numbers of a task's row behind the deviation: v, wz, height, feedforward, …
 _NUMBERS: Final = struct.Struct(f"={TASK_SIZE - TASK.v.start}d")
 _NUMBERS_AT: Final = 8 * TASK.v.start
 
@@ -55,7 +54,6 @@ class Task:
         deviation: planned deviation from the nominal forces, (12,), N; that of legs scheduled to
             swing is not applied.
         feedforward: whether the deviation also becomes accelerations of the trunk.
-        ahead: velocity with which footholds count, (2,), m/s; None: the one of now.
         roll, pitch: of the trunk, rad.
     """
 
@@ -65,7 +63,6 @@ class Task:
     height: float
     deviation: Array
     feedforward: bool
-    ahead: Array | None = None
     roll: float = 0.0
     pitch: float = 0.0
 
@@ -174,9 +171,8 @@ def _row_of(task: Task, dt: float, new_sample: bool) -> Array:
     """A task as compiled code takes it, see `TaskLayout`."""
     row = np.empty(TASK_SIZE)
     row[TASK.deviation] = task.deviation
-    x, y = (math.nan, math.nan) if task.ahead is None else task.ahead
     # At once: each number that numpy is given by itself costs as much as this.
-    numbers = task.vx, task.vy, task.wz, task.height, task.feedforward, x, y, dt, new_sample
+    numbers = task.vx, task.vy, task.wz, task.height, task.feedforward, dt, new_sample
     tilt = task.roll, task.pitch
     _NUMBERS.pack_into(row, _NUMBERS_AT, *numbers, *tilt)  # type: ignore[arg-type]  # a buffer
     return row

@@ -9,22 +9,16 @@ import numpy as np
 from quadriga.agents.controller.maths.rotation import cross, heading, roll_pitch_yaw, wrap_angle
 from quadriga.agents.controller.sensed import TrunkState
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robot.conventions import GRAVITY, Array
 from quadriga.shared.runtime.jit import compiled
 
 _Z_LIMIT = 0.05  # m·s, height integrator
 _SPEED_LIMIT = 0.15  # m, speed integrator
 _YAW_LIMIT = 0.3  # rad, of the heading error that is acted on
-_COURSE_LIMIT = 0.2  # rad, of the course error that is acted on: a push soon passes
-_COURSE_SPEED = 0.1  # m/s, below which a desired velocity has no direction worth following
 
 
 class TrunkGains(NamedTuple):
-    """Gains of `feedback`: the keys of these names in the section `controller`, units there.
-
-    `kp_course` is 0 without yokes: nobody shares a course then.
-    """
+    """Gains of `feedback`: the keys of these names in the section `controller`, units there."""
 
     kp_z: float
     kd_z: float
@@ -38,7 +32,6 @@ class TrunkGains(NamedTuple):
     kd_yaw: float
     position_error_limit: float
     leak_xy: float
-    kp_course: float
 
 
 N_TRUNK_GAINS: Final = len(TrunkGains._fields)
@@ -46,9 +39,7 @@ N_TRUNK_GAINS: Final = len(TrunkGains._fields)
 
 def trunk_gains(config: Config) -> TrunkGains:
     """The gains that a configuration sets."""
-    gains = TrunkGains(*(getattr(config.controller, name) for name in TrunkGains._fields))
-    yoked = yoke_pairs(config.team.robots, config.team.yokes)
-    return gains if yoked else gains._replace(kp_course=0.0)
+    return TrunkGains(*(getattr(config.controller, name) for name in TrunkGains._fields))
 
 
 class TrunkReference(NamedTuple):
@@ -124,8 +115,7 @@ def feedback(
     height = min(_Z_LIMIT, max(-_Z_LIMIT, before.height + dt * z_error))
     out[2] = gains.kp_z * z_error - gains.kd_z * trunk.velocity[2] + gains.ki_z * height
     speed, position_error, out[:2] = _plane_feedback(before, gains, trunk, reference, c, s, dt)
-    wz = reference.wz + _course_rate(gains, trunk.velocity, v_des)
-    yaw = _desired_heading(before.yaw, rpy[2], wz, dt)
+    yaw = _desired_heading(before.yaw, rpy[2], reference.wz, dt)
     out[3:] = _attitude_feedback(gains, trunk, rpy, yaw, reference)
     return Integrators(height, speed, position_error, yaw), out, v_des
 
@@ -173,21 +163,6 @@ def _desired_heading(before: float, yaw: float, wz: float, dt: float) -> float:
     if wz * wrap_angle(before - yaw) > abs(wz) * _YAW_LIMIT:
         return before
     return wrap_angle(before + dt * wz)
-
-
-@compiled
-def _course_rate(gains: TrunkGains, velocity: Array, v_des: Array) -> float:
-    """How fast the heading turns towards the course over ground, rad/s.
-
-    Yoked robots share one course. One whose IMU's yaw has drifted is drawn along aslant to its
-    heading and pulls at the yokes. The angle between them, small, is the cross product of desired
-    and true velocity over the square of the desired one.
-    """
-    squared = v_des[0] * v_des[0] + v_des[1] * v_des[1]
-    if squared < _COURSE_SPEED * _COURSE_SPEED:
-        return 0.0
-    error: float = (v_des[0] * velocity[1] - v_des[1] * velocity[0]) / squared
-    return gains.kp_course * min(_COURSE_LIMIT, max(-_COURSE_LIMIT, error))
 
 
 @compiled

@@ -27,7 +27,7 @@ from scipy import linalg
 
 from quadriga.agents.planner.planner_qp import Condensed
 from quadriga.agents.predictor.deepc import Reduction
-from quadriga.agents.predictor.layout import Layout
+from quadriga.agents.predictor.episode import Layout
 from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import N_LEGS, Array

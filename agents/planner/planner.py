@@ -171,11 +171,7 @@ class Planner:
         return self._peers.terms(before, selection, step, y_base)
 
     def step(
-        self,
-        state: PlannerState,
-        inputs: PlannerInputs,
-        peers: PeerTerms,
-        G_ii: Array | None = None,
+        self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
     ) -> tuple[PlannerState, PlanResult]:
         """Plan the horizon of one planning step, or plan it again with the peers' newer terms.
 
@@ -183,9 +179,8 @@ class Planner:
             state: the last plan.
             inputs: the agent's own data.
             peers: the peers' terms of eq. 11.
-            G_ii: replaces the predictor's own block; the step is then set up anew.
         """
-        setup = self._setup(inputs.step, G_ii)
+        setup = self._setup(inputs.step)
         if setup.compiled is not None and not peers.lost:
             result = self._plan_compiled(setup, setup.compiled, state, inputs, peers)
             if result is not None:
@@ -195,16 +190,12 @@ class Planner:
             return self._plan_by_solver(setup, state, inputs, peers)
 
     def problem_of(
-        self,
-        state: PlannerState,
-        inputs: PlannerInputs,
-        peers: PeerTerms,
-        G_ii: Array | None = None,
+        self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
     ) -> SolvedQp | None:
         """The QP of `step` for the same arguments; None if a peer is lost: then no QP is solved."""
         if peers.lost:
             return None
-        setup = self._setup(inputs.step, G_ii)
+        setup = self._setup(inputs.step)
         with np.errstate(over="ignore", invalid="ignore"):
             return self._solve(setup, state, inputs, peers, _free_response(setup, inputs, peers))
 
@@ -275,7 +266,7 @@ class Planner:
             last, news = self._last(problem, state, inputs.step), self._news(state, inputs)
             f = stay_near_last(problem, f, self._new_share, last, news)
         else:
-            f = problem.pad(problem.gradient @ error)
+            f = problem.gradient @ error
         lower, upper = problem.bounds(error)
         solution = setup.solver.solve(f, lower, upper)
         return SolvedQp(
@@ -290,7 +281,7 @@ class Planner:
         """Mix a best response with a share of the last plan, which is nominal beyond its end.
 
         Both satisfy the constraints on forces; these are convex, so the mixture satisfies them too.
-        A last plan that would break hard bounds on outputs by now is not kept.
+        A last plan that would break bounds on outputs by now is not kept.
         """
         problem, x = solved.problem, solved.solution.x
         if not self._kept or self._cooperative or solved.solution.status != SOLVED:
@@ -298,8 +289,7 @@ class Planner:
         share, last = self._kept, self._last(problem, state, step)
         if not problem.keeps_outputs(last, solved.lower, solved.upper):
             return x
-        mixed = x.copy()
-        mixed[: len(last)] = (1.0 - share) * x[: len(last)] + share * last
+        mixed: Array = (1.0 - share) * x + share * last
         return mixed
 
     def _last(self, problem: PlannerProblem, state: PlannerState, step: int) -> Array:
@@ -322,27 +312,22 @@ class Planner:
         y[T_ini - since :] = inputs.y_ini[T_ini - since :] - state.y[:since]
         return news
 
-    def phase(self, step: int) -> int:
-        """The contact phase of a planning step, which chooses the transition matrix."""
-        return phase_of(self._config, step, self._predictor.phases)
-
-    def _setup(self, step: int, G_ii: Array | None = None) -> _Setup:
-        """The set-up of a step: built anew if a `G_ii` is given, else from the memo."""
-        if G_ii is not None:
-            return self._build_setup(step, G_ii)
+    def _setup(self, step: int) -> _Setup:
+        """The set-up of a step of the gait's cycle, from the memo."""
         place = place_in(self._cycle, step)
         setup = self._setups.get(place)
         if setup is None:
-            own_block = self._predictor.block(self._index, self._index, self.phase(place))
-            setup = self._setups[place] = self._build_setup(place, own_block)
+            setup = self._setups[place] = self._build_setup(place)
         return setup
 
-    def _build_setup(self, step: int, G_ii: Array) -> _Setup:
+    def _build_setup(self, step: int) -> _Setup:
         past, weight = self._predictor.meta.past, self._config.robot.weight
         stance = horizon_stance(self._config, self._index, step)
         if self._cooperative:
             problem = build_team_problem(self._config, self._predictor, self._index, step)
         else:
+            phase = phase_of(self._config, step, self._predictor.phases)
+            G_ii = self._predictor.block(self._index, self._index, phase)
             problem = build_problem(
                 self._config.planner, weight, G_ii[:, past:], stance, G_ii[:, :past]
             )

@@ -19,7 +19,6 @@ from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 
 NO_BOUNDS = "none"
-HARD = "hard"
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,27 +55,30 @@ class Condensed:
 
 @dataclass(frozen=True, slots=True)
 class PlannerProblem:
-    """The QP of one stance pattern; its unknowns are v and, with soft output bounds, slacks.
+    """The QP of one stance pattern in v.
 
     Attributes:
         condensed: cost and prediction.
-        H: the cost's Hessian with that of the slacks, shape (nx, nx).
         columns: place of each v in the stacked forces, shape (nv,).
-        A: rows of the friction cone, then of the output bounds, shape (m, nx).
-        lower, upper: bounds of [x; A x], shape (nx + m,); those of the output rows hold for a free
+        A: rows of the friction cone, then of the output bounds, shape (m, nv).
+        lower, upper: bounds of [v; A v], shape (nv + m,); those of the output rows hold for a free
             response that equals y_des.
         bounded: places of the outputs that the output rows bound, shape (mo,).
         slope: c of the friction pyramid |fx|, |fy| ≤ c fz.
     """
 
     condensed: Condensed
-    H: Array
     columns: NDArray[np.int64]
     A: Array
     lower: Array
     upper: Array
     bounded: NDArray[np.int64]
     slope: float
+
+    @property
+    def H(self) -> Array:
+        """The cost's Hessian, shape (nv, nv)."""
+        return self.condensed.H
 
     @property
     def gradient(self) -> Array:
@@ -86,16 +88,12 @@ class PlannerProblem:
         return self.condensed.gradient
 
     def linear_term(self, past: Array, y_des: Array) -> Array:
-        """The linear term f of the cost, zero for slacks. Shape (nx,)."""
-        return self.pad(self.condensed.F_past @ past + self.condensed.F_des @ y_des)
-
-    def pad(self, f: Array) -> Array:
-        """A linear term in v with zeros for the slacks. Shape (nx,)."""
-        slacks = len(self.H) - len(f)
-        return np.concatenate([f, np.zeros(slacks)]) if slacks else f
+        """The linear term f of the cost, shape (nv,)."""
+        f: Array = self.condensed.F_past @ past + self.condensed.F_des @ y_des
+        return f
 
     def bounds(self, error: Array) -> tuple[Array | None, Array | None]:
-        """Bounds of [x; A x] for a free response that is off y_des by `error`, shape (p N,).
+        """Bounds of [v; A v] for a free response that is off y_des by `error`, shape (p N,).
 
         None if they do not depend on the free response.
         """
@@ -108,7 +106,7 @@ class PlannerProblem:
         return lower, upper
 
     def keeps_outputs(self, v: Array, lower: Array, upper: Array) -> bool:
-        """Whether forces v, shape (nv,), keep the hard bounds on outputs; true if there are none.
+        """Whether forces v, shape (nv,), keep the bounds on outputs; true if there are none.
 
         Args:
             v: deviations of the forces of stance legs, N.
@@ -116,7 +114,7 @@ class PlannerProblem:
             upper: the same.
         """
         rows = len(self.bounded)
-        if not rows or len(self.H) > len(v):  # bounds with slacks are soft
+        if not rows:
             return True
         y = self.A[-rows:] @ v
         return bool((lower[-rows:] <= y).all() and (y <= upper[-rows:]).all())
@@ -184,41 +182,16 @@ def constrain(
     A = np.kron(np.eye(feet), pyramid)
     lower = [low.ravel(), np.full(4 * feet, -np.inf)]
     upper = [box.ravel(), np.repeat(c * nominal[:, 2], 4)]
-    H, bounded = condensed.H, np.zeros(0, dtype=np.int64)
+    bounded = np.zeros(0, dtype=np.int64)
     if config.output_bounds != NO_BOUNDS:
         limit = np.tile(config.output_max, len(stance))
         bounded = np.flatnonzero(np.isfinite(limit))
-        rows = condensed.Y_v[bounded]
-        if config.output_bounds == HARD:
-            A = np.concatenate([A, rows])
-            lower.append(-limit[bounded])
-            upper.append(limit[bounded])
-        else:
-            H, A, bounded = _soften(config, H, A, rows, bounded)
-            slacks = len(rows)
-            lower.insert(1, np.zeros(slacks))
-            upper.insert(1, np.full(slacks, np.inf))
-            nothing = np.full(slacks, np.inf)
-            lower += [-nothing, -limit[bounded[:slacks]]]
-            upper += [limit[bounded[:slacks]], nothing]
+        A = np.concatenate([A, condensed.Y_v[bounded]])
+        lower.append(-limit[bounded])
+        upper.append(limit[bounded])
     return PlannerProblem(
-        condensed, H, columns, A, np.concatenate(lower), np.concatenate(upper), bounded, c
+        condensed, columns, A, np.concatenate(lower), np.concatenate(upper), bounded, c
     )
-
-
-def _soften(
-    config: PlannerConfig, H: Array, A: Array, rows: Array, bounded: NDArray[np.int64]
-) -> tuple[Array, Array, NDArray[np.int64]]:
-    """One slack s ≥ 0 per bounded output: rows v − s ≤ max, rows v + s ≥ −max, cost w s²."""
-    nv, slacks = len(H), len(rows)
-    weighted = np.zeros((nv + slacks, nv + slacks))
-    weighted[:nv, :nv] = H
-    weighted.flat[nv * (nv + slacks + 1) :: nv + slacks + 1] = (
-        config.output_weight * np.array(config.Q)[bounded % N_OUTPUTS]
-    )
-    eye = np.eye(slacks)
-    A = np.block([[A, np.zeros((len(A), slacks))], [rows, -eye], [rows, eye]])
-    return weighted, A, np.concatenate([bounded, bounded])
 
 
 def stance_columns(stance: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -226,9 +199,8 @@ def stance_columns(stance: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.flatnonzero(np.repeat(stance, 3, axis=1))
 
 
-def unpack(problem: PlannerProblem, x: Array, y_free: Array) -> tuple[Array, Array]:
+def unpack(problem: PlannerProblem, v: Array, y_free: Array) -> tuple[Array, Array]:
     """Force deviations (N n, 12), swing legs zero, and output deviations (N n, 6) of a solution."""
-    v = x[: len(problem.columns)]
     dy = y_free + problem.condensed.Y_v @ v
     du = np.zeros(len(dy) // N_OUTPUTS * N_FORCES)
     du[problem.columns] = v

@@ -50,13 +50,10 @@ class Setpoint:
 
     Attributes:
         deviation: force deviation, (12,), N, yaw frame.
-        v_ref: vx, vy to follow at the ends of this sample and of those after it, (k, 2), m/s;
-            None without a plan.
-        y_ref: all outputs to follow at the end of this sample, (6,); None without a plan.
+        y_ref: outputs to follow at the end of this sample, (6,); None without a plan.
     """
 
     deviation: Array = field(default_factory=_NO_FORCE.copy)
-    v_ref: Array | None = None
     y_ref: Array | None = None
 
 
@@ -164,7 +161,6 @@ def setpoint_at(plans: tuple[ActivePlan, ...], tick: int) -> Setpoint:
         if plan.start <= tick:
             sample = (tick - plan.plan_tick) // SAMPLE_MS
             if 0 <= sample < len(plan.deviation):
-                outputs = plan.outputs[sample:]
-                return Setpoint(plan.deviation[sample], outputs[:, 1:3], outputs[0])
+                return Setpoint(plan.deviation[sample], plan.outputs[sample])
             break
     return _NO_SETPOINT

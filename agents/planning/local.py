@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import field, replace
 from typing import Final
 
-import numpy as np
-
 from quadriga.agents.modes import PEER_LOST, WALK, WINDOW_LOST, Mode
 from quadriga.agents.planner.cooperation import brings_forward, is_cooperative, relevant_peers
 from quadriga.agents.planner.neighbours import Neighbours
@@ -16,7 +14,6 @@ from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs, PlannerState
 from quadriga.agents.planner.qp_solver import SolvedQp
 from quadriga.agents.planning.active_plan import ActivePlan
-from quadriga.agents.planning.adaptation import Adapter
 from quadriga.agents.planning.fade import fade_factor, outputs_to_follow, plan_message
 from quadriga.agents.planning.interface import (
     NOTHING,
@@ -28,18 +25,15 @@ from quadriga.agents.planning.interface import (
 from quadriga.agents.planning.operator_references import base_of_window
 from quadriga.agents.planning.window import build_planner_inputs, is_gapless
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.predictor.recursive import Correction
 from quadriga.agents.time_grid import exchange_ms, first_step, owed_from, patience, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import with_detail
 from quadriga.shared.wire.messages import Measurement, Reference
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 WINDOW_GAP: Final = "window_gap"  # counter: no plan, a sample of the robot's own is missing
-UNLEARNT: Final = "window_not_learnt"  # counter: an agent that adapts refused a window
 
 
 @record
@@ -48,12 +42,11 @@ class LocalState:
 
     Attributes:
         peers: the peers' messages.
-        own: the agent's last samples, T_ini or, if it adapts, T_ini + N of them.
+        own: the agent's last samples, T_ini of them.
         newest: step and exchange of the newest plan.
         terms: what the peers will do, for planning step `terms_step`.
         inputs: what the plan of the present step was made of.
         planner: what the planner remembers.
-        correction: how the plant differs from the predictor's, if the agent adapts.
         begun: tick at which the robot began to walk, if that was not with its team; −1 else.
     """
 
@@ -64,7 +57,6 @@ class LocalState:
     terms_step: int = -1
     inputs: PlannerInputs | None = None
     planner: PlannerState = field(default_factory=PlannerState)
-    correction: Correction | None = None
     begun: int = -1
 
 
@@ -95,10 +87,6 @@ class LocalPlanning:
         self._first_step = first_step(config)
         self._neighbours = Neighbours(config, index, _coupled_peers(config, index, predictor))
         self._planner = Planner(config, index, predictor)
-        self._adapter = None
-        if config.planner.adaptation == "recursive":
-            self._adapter = Adapter(config, index, predictor)
-        self._kept = config.planner.T_ini if self._adapter is None else self._adapter.samples
 
     @property
     def peers(self) -> tuple[str, ...]:
@@ -139,8 +127,7 @@ class LocalPlanning:
         state, request, _ = self._take_in(state, inputs)
         if request is None:
             return None
-        G_ii = self._own_block(state.correction, request.inputs.step)
-        return self._planner.problem_of(state.planner, request.inputs, request.terms, G_ii)
+        return self._planner.problem_of(state.planner, request.inputs, request.terms)
 
     def is_whole(self, state: LocalState, tick: int) -> bool:
         """Whether its own window is whole, and its peers are heard and do not slow down."""
@@ -176,7 +163,8 @@ class LocalPlanning:
             state = replace(state, peers=peers)
             refused = (REFUSED,) * (peers.refused - before)
         if inputs.measurement is not None:
-            state = replace(state, own=(*state.own, inputs.measurement)[-self._kept :])
+            own = (*state.own, inputs.measurement)[-self._config.planner.T_ini :]
+            state = replace(state, own=own)
         # Between the ticks of plans and answers nothing is due but what arrivals make possible.
         idle = not arrived and inputs.tick % self._step_ms % self._exchange_ms
         if idle or inputs.mode.name != WALK:
@@ -193,7 +181,7 @@ class LocalPlanning:
         unusual: tuple[str, ...] = ()
         if rest == 0 and step >= self._first_step:
             if is_gapless(state.own, self._config.planner.T_ini, inputs.tick):
-                return self._request_plan(state, step, inputs)
+                return *self._request_plan(state, step, inputs), ()
             unusual = (WINDOW_GAP,)
         if off == 0 and 1 <= turn <= self._config.planner.exchanges:
             return state, self._request_answer(state, (step, turn), inputs.references), ()
@@ -207,20 +195,13 @@ class LocalPlanning:
 
     def _request_plan(
         self, state: LocalState, step: int, inputs: PlanningInputs
-    ) -> tuple[LocalState, _Request, tuple[str, ...]]:
+    ) -> tuple[LocalState, _Request]:
         terms = state.terms
         if state.terms_step != step:
             terms = self._terms(state, step, inputs.references)
         own = build_planner_inputs(self._config, step, inputs.tick, state.own, inputs.references)
-        correction = state.correction
-        unusual: tuple[str, ...] = ()
-        if self._adapter is not None:
-            correction, refused = self._adapter.learn_newest(
-                state.correction, state.own, inputs.tick, inputs.references
-            )
-            unusual = (UNLEARNT,) if refused else ()
-        state = replace(state, terms=terms, terms_step=step, inputs=own, correction=correction)
-        return state, _Request((step, 0), own, terms), unusual
+        state = replace(state, terms=terms, terms_step=step, inputs=own)
+        return state, _Request((step, 0), own, terms)
 
     def _request_answer(
         self, state: LocalState, serial: tuple[int, int], references: tuple[Reference, ...]
@@ -248,20 +229,12 @@ class LocalPlanning:
         base = base_of_window(self._config, end * self._step_ms, references, now)
         return self._planner.peer_terms(state.terms, selection, step, base)
 
-    def _own_block(self, correction: Correction | None, step: int) -> Array | None:
-        """The corrected G_ii; None where there is no correction, or it is not finite."""
-        if self._adapter is None or correction is None:
-            return None
-        G_ii = self._adapter.block(correction, self._planner.phase(step))
-        return G_ii if np.isfinite(G_ii).all() else None
-
     def _solve(
         self, state: LocalState, request: _Request, tick: int, unusual: tuple[str, ...]
     ) -> tuple[LocalState, PlanningOutputs]:
         config, own, terms = self._config.planner, request.inputs, request.terms
         begun = self._clock_ns()
-        G_ii = self._own_block(state.correction, own.step)
-        planner, result = self._planner.step(state.planner, own, terms, G_ii)
+        planner, result = self._planner.step(state.planner, own, terms)
         took = self._clock_ns() - begun if planner.solves > state.planner.solves else None
         factor = fade_factor(config, own.y_ini[-1] - own.y_des[0])
         plan_tick = own.step * self._step_ms

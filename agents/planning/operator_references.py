@@ -48,15 +48,8 @@ def base_of_window(
 
     For samples after the tick `now` it is that of `now`.
     """
-    return base_of_samples(config, end, config.planner.T_ini, references, now)
-
-
-def base_of_samples(
-    config: Config, end: int, count: int, references: tuple[Reference, ...], now: int | None = None
-) -> Array:
-    """The same for the last `count` samples, shape (count, 6)."""
     height = config.reference.height
-    ticks = range(end - SAMPLE_MS * (count - 1), end + 1, SAMPLE_MS)
+    ticks = range(end - SAMPLE_MS * (config.planner.T_ini - 1), end + 1, SAMPLE_MS)
     known = [tick if now is None else min(tick, now) for tick in ticks]
     first, last = (reference_at(references, tick, height)[0] for tick in (known[0], known[-1]))
     if first is last:  # as nearly always

@@ -21,9 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from quadriga.agents.predictor.episode import Episode, team_layout
+from quadriga.agents.predictor.episode import Episode, Layout, team_layout
 from quadriga.agents.predictor.hankel import gram
-from quadriga.agents.predictor.layout import Layout
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
 

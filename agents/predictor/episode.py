@@ -1,4 +1,4 @@
-"""Raw stacked data of one uninterrupted walk, and their deviations, which all fits use."""
+"""What a predictor is laid out for, and the data of a team: sizes, scales, episodes."""
 
 from __future__ import annotations
 
@@ -8,15 +8,73 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.predictor.hankel import windows
-from quadriga.agents.predictor.layout import Layout, everyone
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import N_FORCES, N_LEGS, N_OUTPUTS, Array
+from quadriga.shared.robot.robots import ROBOTS
 from quadriga.shared.wire.messages import Reference
 
 U_SCALE: Final = 10.0  # N
 Y_SCALE: Final = np.array([0.005, 0.1, 0.1, 0.02, 0.02, 0.2])  # m, m/s, m/s, rad, rad, rad/s
+N_WRENCH: Final = 6  # fx, fy, fz, mx, my, mz
+_FORCE_SCALE: Final = 40.0  # N: two stance feet with 20 N each
 SIGNALS: Final = ("u", "u_nominal", "y", "y_base")  # an episode's arrays
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How a predictor of any plant is laid out; nothing in it is about robots.
+
+    Attributes:
+        agents: n, parts of the plant with inputs and outputs of their own.
+        inputs: m, of each agent.
+        outputs: p, of each agent.
+        T_ini: samples of the past.
+        N: samples of the horizon.
+        u_scale: of an agent's inputs, m numbers; fits see inputs divided by them.
+        y_scale: of its outputs, p numbers.
+        members: of every agent: whose columns explain its outputs, in order, itself among them.
+    """
+
+    agents: int
+    inputs: int
+    outputs: int
+    T_ini: int
+    N: int
+    u_scale: tuple[float, ...]
+    y_scale: tuple[float, ...]
+    members: tuple[tuple[int, ...], ...]
+
+    @property
+    def past(self) -> int:
+        """Columns of a block that belong to [u_ini; y_ini]."""
+        return (self.inputs + self.outputs) * self.T_ini
+
+    @property
+    def width(self) -> int:
+        """W, columns of a block: length of one agent's [u_ini; y_ini; u]."""
+        return self.past + self.inputs * self.N
+
+    @property
+    def rows(self) -> int:
+        """Rows of a block: length of one agent's outputs over the horizon, p N."""
+        return self.outputs * self.N
+
+    def strangers(self, i: int) -> list[int]:
+        """Agents whose columns do not explain the outputs of agent `i`."""
+        return [j for j in range(self.agents) if j not in self.members[i]]
+
+
+def everyone(agents: int) -> tuple[tuple[int, ...], ...]:
+    """The `members` of a plant in which each agent's outputs may depend on all agents."""
+    return (tuple(range(agents)),) * agents
+
+
+def scales(layout: Layout) -> tuple[Array, Array]:
+    """Scales of one agent's [u_ini; y_ini; u], shape (W,), and y, shape (p N,)."""
+    u, y = np.array(layout.u_scale), np.array(layout.y_scale)
+    parts = [np.tile(u, layout.T_ini), np.tile(y, layout.T_ini), np.tile(u, layout.N)]
+    return np.concatenate(parts), np.tile(y, layout.N)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,3 +169,24 @@ def output_base(config: Config, reference: Reference) -> Array:
 def commanded_outputs(reference: Reference) -> Array:
     """The commanded outputs: z, vx, vy, 0, 0, wz. Shape (6,)."""
     return np.array([reference.height, reference.vx, reference.vy, 0.0, 0.0, reference.wz])
+
+
+def wrench_map(kind: str) -> Array:
+    """From the forces of four feet to their net wrench, in units of `_FORCE_SCALE`.
+
+    Moments are about the point on the ground under the trunk, with the feet under their hips; their
+    unit is that of the force times the distance of a foot from this point. So sideways forces alone
+    have no moment about the horizontal axes. Shape (6, 12).
+
+    Args:
+        kind: of robot, a key of `ROBOTS`.
+    """
+    feet = ROBOTS[kind].feet_under_hips
+    moments = np.zeros((3, N_LEGS, 3))
+    moments[0, :, 2] = feet[:, 1]
+    moments[1, :, 2] = -feet[:, 0]
+    moments[2, :, 0], moments[2, :, 1] = -feet[:, 1], feet[:, 0]
+    lever = float(np.linalg.norm(feet, axis=1).mean())
+    forces = np.tile(np.eye(3)[:, None], (1, N_LEGS, 1))
+    full = np.concatenate([forces, moments / lever]) / _FORCE_SCALE
+    return full.reshape(N_WRENCH, N_FORCES)

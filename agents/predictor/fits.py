@@ -1,25 +1,30 @@
-"""The fits of G by name, all on scaled deviations of one team's episodes."""
+"""The fits of a team's G by name, all on scaled deviations of its episodes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from quadriga.agents.predictor.arx import solve_arx
-from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.least_squares import solve_gamma, solve_pinv
-from quadriga.agents.predictor.periodic import fit_periodic
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.regression import to_physical
-from quadriga.agents.predictor.ridge import Penalty, Solutions, solve_causal, solve_ridge
-from quadriga.agents.predictor.team_data import (
-    regressions_by_phase,
-    scaled_signals,
-    team_regression,
+from quadriga.agents.predictor.episode import Y_SCALE, Episode, wrench_map
+from quadriga.agents.predictor.measured_response import fit_measured_response, read_pulse_responses
+from quadriga.agents.predictor.periodic import (
+    Walked,
+    draw_starts,
+    estimate_response,
+    fit_factors,
+    held_samples,
 )
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.regression import Penalty, fit_blocks
+from quadriga.shared.errors import PredictorError
+from quadriga.shared.robot.conventions import Array
+from quadriga.shared.wire.topics import SAMPLE_MS
+
+_COMMANDED: Final = (1, 2, 5)  # vx, vy, wz: outputs whose base moves with the reference
 
 Fit = Callable[[Sequence[Episode], PredictorMeta], Predictor]
 
@@ -39,8 +44,7 @@ def fit_pinv(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, or of another team.
     """
-    solutions = solve_pinv(team_regression(episodes, meta), meta.layout)
-    return _one_phase(solutions, _without_penalty(meta, "pinv"))
+    return _fit_one(episodes, replace(meta, kind="pinv", phases=1, ridge=0.0, block_weight=1.0))
 
 
 def fit_ridge(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
@@ -53,91 +57,83 @@ def fit_ridge(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
     """
-    solutions = solve_ridge(
-        team_regression(episodes, meta), meta.layout, _penalty(meta, meta.ridge)
-    )
-    return _one_phase(solutions, replace(meta, kind="ridge", phases=1))
+    return _fit_one(episodes, replace(meta, kind="ridge", phases=1))
 
 
-def fit_gamma(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """γ-DDPC: G from the LQ factors of [Z_p; U_f; Y_f] (see `solve_gamma`), without a penalty.
-
-    Raises:
-        PredictorError: no data, too little, of another team, or forces that do not excite.
-    """
-    solutions = solve_gamma(team_regression(episodes, meta), meta.layout)
-    return _one_phase(solutions, _without_penalty(meta, "gamma"))
+def _fit_one(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
+    check_episodes(episodes, meta)
+    signals = [np.concatenate(episode.scaled_deviations(), axis=1) for episode in episodes]
+    penalty = Penalty(meta.ridge, meta.block_weight)
+    return Predictor(meta, *fit_blocks(meta.kind, signals, meta.layout, penalty))
 
 
-def fit_causal(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """Block-weighted ridge with a block-lower-triangular U_f part: no force acts backwards.
+def fit_periodic(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
+    """G as a function of the gait's phase, causal, with peers by their net wrench; see `periodic`.
+
+    If there is a file of measured responses, these stand for fitted ones.
 
     Raises:
         PredictorError: no data, too little, of another team, or a singular problem.
+        PredictorFileError: the file of measured responses cannot be read, or is another team's.
     """
-    solutions = solve_causal(
-        team_regression(episodes, meta), meta.layout, _penalty(meta, meta.ridge)
-    )
-    return _one_phase(solutions, replace(meta, kind="causal", phases=1))
+    check_episodes(episodes, meta)
+    walks, hold = scale_episodes(episodes, meta)
+    if meta.response:
+        h = fit_measured_response(read_pulse_responses(Path(meta.response)), meta)
+    else:
+        step = float(np.diff(phase_angles(meta, 0, 2))[0] % (2.0 * np.pi))
+        h = estimate_response(walks, hold, meta.layout, step)
+    factors = fit_factors(walks, h, meta.layout, wrench_map(meta.robot))
+    phases = max(1, 2 * meta.stance_ms // SAMPLE_MS)
+    return Predictor(replace(meta, kind="periodic", phases=phases), factors)
 
 
-def fit_arx(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """One-step block-weighted ridge regression, rolled out over N steps by the whole team.
+FITS: Final[Mapping[str, Fit]] = {"pinv": fit_pinv, "ridge": fit_ridge, "periodic": fit_periodic}
 
-    With yoked neighbours only, the effect of a neighbour's neighbour within the horizon is left
-    out: G_ij is zero wherever i and j are not yoked.
+
+def scale_episodes(
+    episodes: Sequence[Episode], meta: PredictorMeta
+) -> tuple[tuple[Walked, ...], int]:
+    """The episodes scaled, by net wrenches, and for how many samples their forces are held."""
+    hold = held_samples([episode.deviations()[0] for episode in episodes])
+    walked = []
+    for episode in episodes:
+        du, dy = episode.deviations()
+        base = (episode.y_base / Y_SCALE)[..., list(_COMMANDED)]
+        angle = phase_angles(meta, episode.first_tick, episode.samples)
+        w = du @ wrench_map(meta.robot).T
+        walked.append(Walked(w, dy / Y_SCALE, base, angle, draw_starts(du, hold)))
+    return tuple(walked), hold
+
+
+def phase_angles(meta: PredictorMeta, first_tick: int, count: int) -> Array:
+    """Angle of the gait's phase at the starts of samples, the first of which ends at `first_tick`.
+
+    Shape (count,), rad; 0 where the gait begins (`PredictorMeta.stand_ms`).
+    """
+    starts = first_tick + SAMPLE_MS * (np.arange(count) - 1) - meta.stand_ms
+    period = 2 * meta.stance_ms
+    angles: Array = 2.0 * np.pi * (starts % period) / period
+    return angles
+
+
+def check_episodes(episodes: Sequence[Episode], meta: PredictorMeta) -> None:
+    """Refuse data that no fit for `meta` can use.
 
     Raises:
-        PredictorError: no data, too little, of another team, or a singular problem.
+        PredictorError: no data, too little, or of another team.
     """
-    signals = scaled_signals(episodes, meta)
-    solutions = solve_arx(signals, meta.layout, _penalty(meta, meta.ridge))
-    return _one_phase(solutions, replace(meta, kind="arx", phases=1))
-
-
-def fit_phase(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """One G for each phase of the gait, drawn towards the ridge fit of all data together.
-
-    Row i of phase p minimises over its own windows the error plus phase_ridge · M_p times the
-    block-weighted square of the departure from the pooled fit: a phase without data of its own gets
-    the pooled fit.
-
-    Raises:
-        PredictorError: no data, too little, of another team, or a singular problem.
-    """
-    layout = meta.layout
-    pooled = solve_ridge(team_regression(episodes, meta), layout, _penalty(meta, meta.ridge)).x
-    blocks, condition = [], 0.0
-    for regression in regressions_by_phase(episodes, meta):
-        if regression.windows == 0:
-            blocks.append(to_physical(pooled, layout))
-            continue
-        explained = np.einsum("ab,ibk->aik", regression.zz, pooled, optimize=True)
-        left = replace(regression, zy=regression.zy - explained)
-        solutions = solve_ridge(left, layout, _penalty(meta, meta.phase_ridge))
-        blocks.append(to_physical(pooled + solutions.x, layout))
-        condition = max(condition, solutions.condition)
-    return Predictor(replace(meta, kind="phase"), np.stack(blocks), condition)
-
-
-FITS: Final[Mapping[str, Fit]] = {
-    "pinv": fit_pinv,
-    "ridge": fit_ridge,
-    "gamma": fit_gamma,
-    "causal": fit_causal,
-    "arx": fit_arx,
-    "phase": fit_phase,
-    "periodic": fit_periodic,
-}
-
-
-def _penalty(meta: PredictorMeta, ridge: float) -> Penalty:
-    return Penalty(ridge, meta.block_weight)
-
-
-def _one_phase(solutions: Solutions, meta: PredictorMeta) -> Predictor:
-    return Predictor(meta, to_physical(solutions.x, meta.layout)[None], solutions.condition)
-
-
-def _without_penalty(meta: PredictorMeta, kind: str) -> PredictorMeta:
-    return replace(meta, kind=kind, phases=1, ridge=0.0, block_weight=1.0)
+    if not episodes:
+        raise PredictorError("episodes", "none", "at least one", "did every walk end in a fall?")
+    for episode in episodes:
+        if episode.robots != meta.robots:
+            raise PredictorError(
+                "episode", f"{episode.robots} robots", f"{meta.robots}", "data of another team"
+            )
+        if episode.samples < meta.T_ini + meta.N:
+            raise PredictorError(
+                "episode",
+                f"{episode.samples} samples",
+                f"at least {meta.T_ini + meta.N}",
+                "cut short by a fall",
+            )

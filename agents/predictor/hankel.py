@@ -26,8 +26,11 @@ def hankel(signal: Array, L: int) -> Array:
 
 
 def mosaic(signals: Iterable[Array], L: int) -> Array:
-    """The Hankel matrices of several episodes side by side; no column straddles two of them."""
-    return np.concatenate([hankel(signal, L) for signal in signals], axis=1)
+    """The Hankel matrices of several episodes side by side; no column straddles two of them.
+
+    Episodes shorter than L have no column.
+    """
+    return np.concatenate([hankel(signal, L) for signal in signals if len(signal) >= L], axis=1)
 
 
 @dataclass(frozen=True, slots=True)

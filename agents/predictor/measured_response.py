@@ -13,9 +13,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.agents.predictor.episode import Y_SCALE
-from quadriga.agents.predictor.periodic_basis import N_WRENCH, polynomials, wrench_map
-from quadriga.agents.predictor.periodic_response import DEGREE, spread_over_samples
+from quadriga.agents.predictor.episode import N_WRENCH, Y_SCALE, wrench_map
+from quadriga.agents.predictor.periodic import DEGREE, polynomials, spread_over_samples
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorFileError
@@ -55,7 +54,7 @@ class PulseResponses:
 
 def team_of(meta: PredictorMeta) -> dict[str, Any]:
     """What a team's true response depends on, of what a predictor's meta knows, as JSON has it."""
-    body = meta.to_dict() | {"robot": meta.robot}
+    body = meta.to_dict()
     known: dict[str, Any] = json.loads(json.dumps({name: body[name] for name in _TEAM}))
     return known
 

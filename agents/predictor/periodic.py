@@ -1,57 +1,334 @@
-"""The periodic fit: G as a function of the gait's phase, causal, with peers by their net wrench."""
+"""Periodic predictors: G as a function of the phase in a period, such as that of a gait.
+
+No input acts backwards, and inputs act through fewer numbers w = B u, such as the net wrench of
+four feet. The fit takes three steps, all on scaled signals: responses to w by local projections
+(`sum_folds`, `solve_lags`), which of them are real (`shrink`), and what follows from the past under
+nominal inputs (`fit_free`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+from scipy import linalg
 
-from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.layout import Layout
-from quadriga.agents.predictor.measured_response import fit_measured_response, read_pulse_responses
-from quadriga.agents.predictor.periodic_basis import phase_angles, wrench_map
-from quadriga.agents.predictor.periodic_data import Walked, scale_episodes
-from quadriga.agents.predictor.periodic_free import fit_free
-from quadriga.agents.predictor.periodic_predictor import PeriodicFactors, PeriodicPredictor
-from quadriga.agents.predictor.periodic_response import solve_lags, spread_over_samples, sum_folds
-from quadriga.agents.predictor.periodic_shrinkage import shrink
-from quadriga.agents.predictor.predictor import PredictorMeta
-from quadriga.agents.predictor.team_data import check_episodes
+from quadriga.agents.predictor.episode import Layout
+from quadriga.agents.predictor.regression import factorise
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.topics import SAMPLE_MS
 
-_LEAST_FOLDS = 3
+FACTORS: Final = ("response", "free", "wrench")  # arrays of a periodic predictor
+DEGREE: Final = 3  # of the polynomials of the phase in a response
+FREE_ORDER: Final = 1  # harmonics of the map from the past
+FOLDS: Final = 10
+_LEAST_FOLDS: Final = 3
+_ROUNDING: Final = 1e-6  # rad: an angle this much before a half begins is meant to be its begin
+_SAME: Final = 1e-9  # N of a robot: inputs that differ by less are held
+
+# Of the responses.
+_PAST: Final = 6  # samples before a pulse that explain what would have happened without it
+_MEAN_ORDER: Final = 5  # harmonics of the mean walk
+_COMMANDS: Final = 5  # places of the horizon at which the commanded outputs are looked at
+_RIDGE: Final = 1e-3  # per row, of all regressors
+_ROWS: Final = 4096  # rows held in memory at a time
+_SMOOTH: Final = 0.01  # weight of a bend over the lags against the response itself
+_SIGNIFICANT: Final = 3.0  # standard errors
+_SMALLEST: Final = 0.08  # of the own response: a smaller one of a peer is left out
+
+# Of what follows from the past.
+_HELD_OUT: Final = 0.2  # of the rows, to choose the penalties by
+_FREE_ROWS: Final = 2048  # rows held in memory at a time
+_WORTH: Final = 0.98  # of the error without peers: what that with them must be below
+# Candidate penalties per row: on everything, times this on harmonics, times this on peers.
+_RIDGES: Final = (1e-3, 1e-2, 1e-1)
+_ON_HARMONICS: Final = (1.0, 10.0)
+_ON_PEERS: Final = (np.inf, 1.0, 30.0)  # infinite: left out
 
 
-def fit_periodic(episodes: Sequence[Episode], meta: PredictorMeta) -> PeriodicPredictor:
-    """Responses to wrenches by local projections, shrunk, then what follows from the past.
+# ---- functions of the phase
 
-    See `periodic_response`, `periodic_shrinkage` and `periodic_free`. If there is a file of
-    measured responses, these stand for the projections.
+
+def harmonics(angle: Array, order: int) -> Array:
+    """1, √2 cos θ, √2 sin θ, …, √2 cos kθ, √2 sin kθ up to k = `order`: orthonormal over a period.
+
+    Args:
+        angle: θ, the phase as an angle, any shape, rad.
+        order: of the highest harmonic.
+
+    Returns:
+        Shape (*angle.shape, 2 order + 1).
+    """
+    k = np.arange(1, order + 1) * angle[..., None]
+    waves = np.sqrt(2.0) * np.stack([np.cos(k), np.sin(k)], axis=-1)
+    return np.concatenate(
+        [np.ones((*angle.shape, 1)), waves.reshape(*angle.shape, 2 * order)], axis=-1
+    )
+
+
+def polynomials(angle: Array, degree: int) -> Array:
+    """Legendre polynomials in each half of the period, orthonormal over the period.
+
+    Other feet stand in the other half: what a force does jumps from one half to the other.
+
+    Args:
+        angle: θ, the phase as an angle, any shape, rad.
+        degree: of the highest polynomial.
+
+    Returns:
+        Shape (*angle.shape, 2 degree + 2): those of the first half, then those of the second; each
+        is zero in the other half.
+    """
+    turned = np.mod(angle + _ROUNDING, 2.0 * np.pi)
+    half = (turned >= np.pi).astype(int)
+    within = 2.0 * (turned - np.pi * half) / np.pi - 1.0
+    size = np.sqrt(2.0 * (2.0 * np.arange(degree + 1) + 1.0))
+    values = legendre.legvander(within, degree) * size
+    second = half[..., None] == 1
+    return np.concatenate([np.where(second, 0.0, values), np.where(second, values, 0.0)], axis=-1)
+
+
+def _shift_polynomials(degree: int, angle: float) -> Array:
+    """M with polynomials(θ + angle) = polynomials(θ) M wherever both lie in the same half."""
+    inside = np.linspace(0.1, np.pi - angle - 0.1, 4 * (degree + 1))
+    theta = np.concatenate([inside, np.pi + inside])
+    now, later = polynomials(theta, degree), polynomials(theta + angle, degree)
+    M: Array = np.linalg.lstsq(now, later)[0].astype(np.float64)
+    return M
+
+
+# ---- the predictor
+
+
+@dataclass(frozen=True, slots=True)
+class PeriodicFactors:
+    """What a periodic G is made of, in physical units but for the scale of w.
+
+    Block (t, s) of G_ij at phase θ, which maps the inputs of sample s to the outputs of sample t,
+    is h_{t−s}(θ + s δ) B for t ≥ s and zero before: no input acts backwards. δ is what the phase
+    advances in a sample.
+
+    Attributes:
+        response: coefficients of h, what a w of a sample does l samples later, as polynomials of
+            the phase, (2d + 2, N, n pushing, w, n responding, p).
+        free: harmonics of the map from [w_ini; y_ini] to the outputs of the horizon,
+            (2q + 1, n responding, n, p N, (w + p) T_ini).
+        wrench: B, from the inputs to what they act by, of robots from the forces of four feet to
+            their net wrench, (w, m).
+    """
+
+    response: Array
+    free: Array
+    wrench: Array
+
+    def __post_init__(self) -> None:
+        for array in self.arrays().values():
+            array.setflags(write=False)
+
+    def arrays(self) -> Mapping[str, Array]:
+        """The factors, by name."""
+        return {name: getattr(self, name) for name in FACTORS}
+
+    def check(self, layout: Layout) -> None:
+        """Refuse factors of another team or plant.
+
+        Raises:
+            PredictorError: it names the first array whose shape does not fit.
+        """
+        n, N, w = layout.agents, layout.N, len(self.wrench)
+        ends = {
+            "response": (N, n, w, n, layout.outputs),
+            "free": (n, n, layout.rows, (w + layout.outputs) * layout.T_ini),
+            "wrench": (layout.inputs,),
+        }
+        for name, end in ends.items():
+            shape = getattr(self, name).shape
+            if shape[1:] != end:
+                raise PredictorError(f"predictor.{name}", f"shape {shape}", f"(…, {end})")
+
+    def couples(self, i: int, j: int) -> bool:
+        """Whether anything that agent j does has an effect on agent i."""
+        return bool(self.response[:, :, j, :, i].any() or self.free[:, i, j].any())
+
+    def block(self, i: int, j: int, phase: int, phases: int) -> Array:
+        """G_ij of one of `phases` equal parts of the period. Shape (p N, (m + p) T_ini + m N)."""
+        free, components = self.free[:, i, j], len(self.wrench)
+        T_ini = free.shape[2] // (components + self.response.shape[5])
+        angle = np.array(2.0 * np.pi * phase / phases)
+        past = np.tensordot(harmonics(angle, len(free) // 2), free, axes=1)
+        on_w = past[:, : components * T_ini].reshape(-1, T_ini, components) @ self.wrench
+        parts = on_w.reshape(len(past), -1), past[:, components * T_ini :]
+        return np.concatenate([*parts, self.future_block(i, j, phase, phases)], axis=1)
+
+    def future_block(self, i: int, j: int, phase: int, phases: int) -> Array:
+        """The columns of G_ij that multiply the future inputs. Shape (p N, m N)."""
+        response = self.response[:, :, j, :, i]
+        _, N, _, outputs = response.shape
+        angle = 2.0 * np.pi * (phase + np.arange(N)) / phases
+        h = np.tensordot(polynomials(angle, len(response) // 2 - 1), response, axes=1)
+        by_input = np.einsum("slwo,wu->slou", h, self.wrench)
+        block = np.zeros((N, outputs, N, self.wrench.shape[1]))
+        for s in range(N):
+            block[s:, :, s] = by_input[s, : N - s]
+        return block.reshape(N * outputs, -1)
+
+
+# ---- data
+
+
+class Walked(NamedTuple):
+    """One episode as the regressions see it, scaled.
+
+    Attributes:
+        w: what the inputs act by, a team's net wrenches, (T, n, w).
+        y: outputs, (T, n, p).
+        base: commanded outputs, (T, n, c); a plant without commands has none, c = 0.
+        angle: of the phase in the period at the sample's start, (T,), rad.
+        starts: samples with which a new draw of the inputs' noise begins, in order.
+    """
+
+    w: Array
+    y: Array
+    base: Array
+    angle: Array
+    starts: NDArray[np.int64]
+
+
+def held_samples(inputs: Sequence[Array]) -> int:
+    """For how many samples the inputs are held, everywhere in the data: 1 or more.
+
+    Args:
+        inputs: of each episode, shape (T, n, m).
+    """
+    held = 0
+    for u in inputs:
+        held = int(np.gcd.reduce(np.append(np.diff(_changes(u)), held)))
+    return max(1, held)
+
+
+def draw_starts(u: Array, hold: int) -> NDArray[np.int64]:
+    """Samples with which a draw of the noise begins; none in an episode without noise."""
+    changes = _changes(u)
+    if not len(changes):
+        return changes
+    return np.arange(int(changes[0]) % hold, len(u), hold)
+
+
+def _changes(u: Array) -> NDArray[np.int64]:
+    """Samples whose inputs are not those of the sample before."""
+    flat = u.reshape(len(u), -1)
+    changes: NDArray[np.int64] = 1 + np.flatnonzero(
+        np.abs(np.diff(flat, axis=0)).max(axis=1) > _SAME
+    )
+    return changes
+
+
+def _past_rows(walk: Walked, at: NDArray[np.int64], length: int) -> Array:
+    """[w; y] of the `length` samples before each of the samples `at`, oldest first.
+
+    Shape (len(at), n, length · (w + p)): per agent all w, then all outputs.
+    """
+    places = at[:, None] + np.arange(-length, 0)
+    parts = [
+        np.swapaxes(x[places], 1, 2).reshape(len(at), x.shape[1], -1) for x in (walk.w, walk.y)
+    ]
+    return np.concatenate(parts, axis=2)
+
+
+def _forced(walk: Walked, at: NDArray[np.int64], degree: int) -> Array:
+    """W of all agents at samples `at` times the polynomials there. (len(at), columns)."""
+    w, values = walk.w[at].reshape(len(at), -1), polynomials(walk.angle[at], degree)
+    return (values[:, :, None] * w[:, None, :]).reshape(len(at), -1)
+
+
+def _outputs_of(walk: Walked, at: NDArray[np.int64]) -> Array:
+    """Outputs of all agents at samples `at`. Shape (len(at), p n)."""
+    y: Array = walk.y[at].reshape(len(at), walk.y.shape[1] * walk.y.shape[2])
+    return y
+
+
+def _chunks(
+    walks: Sequence[Walked], first: int, ahead: int, size: int, *, starts: bool
+) -> Iterator[tuple[Walked, NDArray[np.int64]]]:
+    """Samples with `first` samples before them and `ahead` from them on, at most `size` at a time.
+
+    Args:
+        walks: episodes.
+        first: samples needed before.
+        ahead: samples needed from the sample on.
+        size: most samples in one piece.
+        starts: only samples with which a new draw of the noise begins.
+    """
+    for walk in walks:
+        at = np.arange(first, len(walk.w) - ahead + 1)
+        if starts:
+            at = walk.starts[(walk.starts >= first) & (walk.starts <= len(walk.w) - ahead)]
+        for begin in range(0, len(at), size):
+            yield walk, at[begin : begin + size]
+
+
+class Sums(NamedTuple):
+    """Sums over rows of a regression with K regressors z; the third is one of the fit at hand.
+
+    Attributes:
+        zz: Σ z zᵀ, (K, K).
+        zy: Σ z yᵀ for each lag: of responses (N, K, p n), of the map from the past (K, N, n, p).
+        third: of responses Σ z (later draw)ᵀ for each later draw, (draws, K, kw), kw being the
+            regressors of the pulse; of the map from the past Σ y² over all lags, (n, p).
+        rows: how many.
+    """
+
+    zz: Array
+    zy: Array
+    third: Array
+    rows: int
+
+    def plus(self, other: Sums) -> Sums:
+        """The sums over the rows of both."""
+        zz, zy, third = self.zz + other.zz, self.zy + other.zy, self.third + other.third
+        return Sums(zz, zy, third, self.rows + other.rows)
+
+    def less(self, other: Sums) -> Sums:
+        """The sums over the rows of this one that are not the other's."""
+        zz, zy, third = self.zz - other.zz, self.zy - other.zy, self.third - other.third
+        return Sums(zz, zy, third, self.rows - other.rows)
+
+
+# ---- the fit
+
+
+def fit_factors(
+    walks: Sequence[Walked], h: Array, layout: Layout, wrench: Array
+) -> PeriodicFactors:
+    """What G is made of: the responses, and by them what follows from the past.
+
+    Args:
+        walks: scaled episodes.
+        h: coefficients of the response to a sample's w, scaled, (k, N, n, w, n, p).
+        layout: of the predictor.
+        wrench: from an agent's inputs to what they act by, (w, m).
 
     Raises:
-        PredictorError: no data, too little, of another team, or a singular problem.
-        PredictorFileError: the file of measured responses cannot be read, or is another team's.
+        PredictorError: a singular problem.
     """
-    check_episodes(episodes, meta)
-    walks, hold = scale_episodes(episodes, meta)
-    if meta.response:
-        h = fit_measured_response(read_pulse_responses(Path(meta.response)), meta)
-    else:
-        step = float(np.diff(phase_angles(meta, 0, 2))[0] % (2.0 * np.pi))
-        h = estimate_response(walks, hold, meta.layout, step)
-    factors = fit_factors(walks, h, meta.layout, wrench_map(meta.robot))
-    phases = max(1, 2 * meta.stance_ms // SAMPLE_MS)
-    return PeriodicPredictor(replace(meta, kind="periodic", phases=phases), factors)
+    n, y_scale = layout.agents, np.array(layout.y_scale)
+    peers = np.array([[j in layout.members[i] for j in range(n)] for i in range(n)])
+    free = fit_free(walks, h, layout.T_ini, peers)
+    # w keeps its scale.
+    columns = np.concatenate([np.ones(len(wrench) * layout.T_ini), np.tile(y_scale, layout.T_ini)])
+    physical = free * np.tile(y_scale, layout.N)[:, None] / columns
+    return PeriodicFactors(h * y_scale, physical, wrench)
 
 
 def estimate_response(
     walks: Sequence[Walked], hold: int, layout: Layout, angle_step: float
 ) -> Array:
-    """Coefficients of the response to a sample's wrench, scaled. (k, N, n, w, n, p).
+    """Coefficients of the response to a sample's w, scaled. (k, N, n, w, n, p).
 
     Args:
         walks: scaled episodes.
@@ -71,34 +348,279 @@ def estimate_response(
             "enough to be divided",
             "collect more: identification.seconds",
         )
-    total = sum(folds[1:], folds[0])
+    total = folds[0]
+    for fold in folds[1:]:
+        total = total.plus(fold)
     estimate = solve_lags(total, n, hold)
-    without = np.stack([solve_lags(total - fold, n, hold) for fold in folds])
-    tested = shrink(estimate, without)
-    response = tested.response
+    without = np.stack([solve_lags(total.less(fold), n, hold) for fold in folds])
+    response, _ = shrink(estimate, without)
     for i in range(n):
         response[:, :, layout.strangers(i), :, i] = 0.0
     return spread_over_samples(response, hold, angle_step)
 
 
-def fit_factors(
-    walks: Sequence[Walked], h: Array, layout: Layout, wrench: Array
-) -> PeriodicFactors:
-    """What G is made of: the responses, and by them what follows from the past.
+# ---- responses: one regression for each lag
+#
+# For every sample t with which a new draw w_t of the noise begins, and every lag l,
+#
+#     y_{t+l} − Σ_s g_{l−s}(θ_{t+s}) w_{t+s} = g_l(θ_t) w_t + c_l z_t + e,   s = S, 2S, … ≤ l,
+#
+# with the later draws' responses subtracted as they are known from smaller lags. z_t holds what
+# came before t. The noise is drawn independently of all that, so g is unbiased whatever z_t leaves
+# out; what z_t explains only lowers the variance. All lags have the same regressors: one
+# factorisation.
+
+
+def sum_folds(walks: Sequence[Walked], N: int, hold: int) -> list[Sums]:
+    """Sums of the regression over `FOLDS` parts of the walks, one after the other in time.
 
     Args:
         walks: scaled episodes.
-        h: coefficients of the response to a sample's wrench, scaled, (k, N, n, w, n, p).
-        layout: of the predictor.
-        wrench: from an agent's inputs to what they act by, (w, m).
+        N: lags.
+        hold: for how many samples each draw of the noise is held, S.
+    """
+    total = sum(len(at) for _, at in _chunks(walks, _PAST, N, _ROWS, starts=True))
+    size = max(1, min(_ROWS, -(-total // FOLDS)))
+    folds: list[Sums | None] = [None] * FOLDS
+    seen = 0
+    for walk, at in _chunks(walks, _PAST, N, size, starts=True):
+        fold = min(FOLDS - 1, seen * FOLDS // max(total, 1))
+        part, before = _sum_response_rows(walk, at, N, hold), folds[fold]
+        folds[fold] = part if before is None else before.plus(part)
+        seen += len(at)
+    return [fold for fold in folds if fold is not None]
+
+
+def _sum_response_rows(walk: Walked, at: NDArray[np.int64], N: int, hold: int) -> Sums:
+    pulse = _forced(walk, at, DEGREE)
+    ahead = at[:, None] + np.linspace(0, N, _COMMANDS + 1).astype(int)[1:] - 1
+    commands = walk.base[ahead] - walk.base[at - 1][:, None]
+    regressors = [
+        _past_rows(walk, at, _PAST).reshape(len(at), -1),
+        harmonics(walk.angle[at], _MEAN_ORDER),
+        commands[:, :, 0].reshape(len(at), -1),
+        pulse,
+    ]
+    z = np.concatenate(regressors, axis=1)
+    later = [_forced(walk, at + s, DEGREE) for s in range(hold, N, hold)]
+    kw = pulse.shape[1]
+    zw = np.stack([z.T @ w for w in later]) if later else np.zeros((0, z.shape[1], kw))
+    zy = np.stack([z.T @ _outputs_of(walk, at + lag) for lag in range(N)])
+    return Sums(z.T @ z, zy, zw, len(at))
+
+
+def solve_lags(sums: Sums, n: int, hold: int) -> Array:
+    """Coefficients of the responses g to a held draw. Shape (2 DEGREE + 2, N, n, w, n, p).
+
+    Axes: polynomial, lag, agent that pushes, component, agent that responds, output.
 
     Raises:
         PredictorError: a singular problem.
     """
-    n, y_scale = layout.agents, np.array(layout.y_scale)
-    peers = np.array([[j in layout.members[i] for j in range(n)] for i in range(n)])
-    free = fit_free(walks, h, layout.T_ini, peers)
-    # Wrenches keep their scale.
-    columns = np.concatenate([np.ones(len(wrench) * layout.T_ini), np.tile(y_scale, layout.T_ini)])
-    physical = free * np.tile(y_scale, layout.N)[:, None] / columns
-    return PeriodicFactors(h * y_scale, physical, wrench)
+    N, K, outputs = sums.zy.shape
+    kw = sums.third.shape[2]
+    penalised = sums.zz.copy(order="F")
+    penalised.flat[:: K + 1] += _RIDGE * sums.rows
+    factor = factorise(penalised)
+    g = np.zeros((N, kw, outputs))
+    for lag in range(N):
+        rest = sums.zy[lag].copy()
+        for draw in range(lag // hold):
+            rest -= sums.third[draw] @ g[lag - hold * (draw + 1)]
+        g[lag] = linalg.cho_solve((factor, True), rest, check_finite=False)[K - kw :]
+    return g.reshape(N, 2 * DEGREE + 2, n, -1, n, outputs // n).swapaxes(0, 1)
+
+
+def spread_over_samples(g: Array, hold: int, angle_step: float) -> Array:
+    """Responses h to single samples that add up to the responses g to S samples in a row.
+
+    g_l(θ) = Σ_m h_{l−m}(θ + m δ), m = 0 … S − 1: linear in the polynomials' coefficients. What it
+    leaves open is chosen smooth in the lag.
+
+    Args:
+        g: coefficients of the response to a held draw, (2 DEGREE + 2, N, …).
+        hold: S.
+        angle_step: δ, what the phase advances in a sample, rad.
+    """
+    if hold == 1:
+        return g
+    count, N = g.shape[:2]
+    shift = _shift_polynomials(count // 2 - 1, angle_step)
+    add = np.eye(count * N)
+    for m in range(1, hold):
+        add += np.kron(np.linalg.matrix_power(shift, m), np.eye(N, k=-m))
+    bend = np.kron(np.eye(count), np.diff(np.eye(N), n=2, axis=0)[1:])  # the first lag may jump
+    normal = add.T @ add + _SMOOTH * bend.T @ bend
+    h = linalg.solve(normal, add.T @ g.reshape(count * N, -1), assume_a="pos")
+    spread: Array = h.reshape(g.shape)
+    return spread
+
+
+# ---- which responses of peers are real
+#
+# Every fold of the data gives an estimate of its own (by the jackknife). Products of the estimates
+# of two different folds have the square of the true response as their mean, so they tell a response
+# from noise without knowing the noise; how far the folds scatter tells how much of a response's
+# square is noise.
+
+
+def shrink(estimate: Array, without: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Draw groups of a response towards zero by what of them is noise.
+
+    A group is one polynomial of the phase, at all lags, of one output's response to one component
+    of one agent's w. With v the variance of its estimate x̂, it is multiplied by
+    max(0, 1 − v/|x̂|²) (James and Stein). A peer's effect on an output as a whole is left out if it
+    is not significant, or small against the agent's own.
+
+    Args:
+        estimate: from all data, (k, N, n pushing, w, n responding, p).
+        without: from all folds but one, (F, k, N, n, w, n, p).
+
+    Returns:
+        The response, of the shape of `estimate`, and whether each output of agent i responds to
+        agent j at all, (n responding, n pushing, p).
+    """
+    F = len(without)
+    deviation = without - without.mean(axis=0)
+    variance = (F - 1) / F * (deviation**2).sum(axis=0)
+    square, noise = (x.sum(axis=1, keepdims=True) for x in (estimate**2, variance))
+    tiny = np.finfo(float).tiny
+    factor = np.clip(1.0 - noise / np.maximum(square, tiny), 0.0, 1.0)
+    response = estimate * factor
+    weight = 1.0 / np.sqrt(np.maximum(noise, tiny))
+    kept = _is_significant((F * estimate - (F - 1) * without) * weight)
+    size = np.einsum("kljwio,kljwio->jio", response, response)
+    own = np.einsum("iio->io", size)
+    kept &= size.transpose(1, 0, 2) > _SMALLEST**2 * own[:, None]
+    kept[np.arange(len(kept)), np.arange(len(kept))] = True
+    return response * kept.transpose(1, 0, 2)[None, None, :, None], kept
+
+
+def _is_significant(folds: Array) -> NDArray[np.bool_]:
+    """Whether an effect is real, from each fold's own estimate over its error. (n, n, p)."""
+    F, n = len(folds), folds.shape[3]
+    flat = np.moveaxis(folds, (3, 5, 6), (1, 2, 3)).reshape(F, n, n, folds.shape[-1], -1)
+    first, second = np.triu_indices(F, 1)
+    pairs = (flat[first] * flat[second]).sum(axis=-1)  # (pairs, pushing, responding, output)
+    error = np.sqrt((pairs**2).mean(axis=0) / len(pairs))
+    significant: NDArray[np.bool_] = pairs.mean(axis=0) > _SIGNIFICANT * error
+    return significant.transpose(1, 0, 2)
+
+
+# ---- what follows from the past
+#
+# What the inputs of the horizon do is subtracted first, by the responses already known. The
+# penalties are chosen for each output by the error on the last part of the data, from a fit to the
+# rest.
+
+
+def fit_free(walks: Sequence[Walked], h: Array, T_ini: int, peers: NDArray[np.bool_]) -> Array:
+    """The map as harmonics. Shape (2 FREE_ORDER + 1, n responding, n, p N, (w + p) T_ini).
+
+    Args:
+        walks: scaled episodes.
+        h: coefficients of the response to a sample's w, (k, N, n, w, n, p).
+        T_ini: samples of the past.
+        peers: whose past may matter to whom, (n responding, n).
+
+    Raises:
+        PredictorError: a singular problem.
+    """
+    train, rest = _sum_free_parts(walks, h, T_ini)
+    both = train.plus(rest)
+    waves, (_, N, n, w, _, p) = 2 * FREE_ORDER + 1, h.shape
+    width = (w + p) * T_ini
+    wave, agent, _ = np.indices((waves, n, width)).reshape(3, -1)
+    x = np.zeros((n, p, waves * n * width, N))
+    for i in range(n):
+        columns = np.flatnonzero(peers[i][agent] | (agent == i))
+        candidates = _penalties(agent[columns] == i, wave[columns] > 0)
+        for penalty, outputs in _choose_penalties(train, rest, i, candidates, columns):
+            solution = _solve_free(both, i, penalty, columns, outputs)
+            for place, output in enumerate(outputs):
+                x[i, output, columns] = solution[:, :, place]
+    blocks = x.reshape(n, p, waves, n, width, N).transpose(2, 0, 3, 5, 1, 4)
+    return blocks.reshape(waves, n, n, N * p, width)
+
+
+def _sum_free_parts(walks: Sequence[Walked], h: Array, T_ini: int) -> tuple[Sums, Sums]:
+    """Sums over the first part of the rows and over the last."""
+    _, N, n, w, _, p = h.shape
+    K = (2 * FREE_ORDER + 1) * n * (w + p) * T_ini
+    total = sum(len(at) for _, at in _chunks(walks, T_ini, N, _FREE_ROWS, starts=False))
+    parts = [Sums(np.zeros((K, K)), np.zeros((K, N, n, p)), np.zeros((n, p)), 0)] * 2
+    seen = 0
+    for walk, at in _chunks(walks, T_ini, N, _FREE_ROWS, starts=False):
+        part = int(seen >= (1.0 - _HELD_OUT) * total)
+        past = _past_rows(walk, at, T_ini).reshape(len(at), -1)
+        waves = harmonics(walk.angle[at], FREE_ORDER)
+        z = (waves[:, :, None] * past[:, None, :]).reshape(len(at), -1)
+        y = np.stack([_outputs_of(walk, at + lag) for lag in range(N)], axis=1)
+        y = (y - _forced_outputs(walk, at, h)).reshape(len(at), -1)
+        yy = (y**2).sum(axis=0).reshape(N, n, p).sum(axis=0)
+        parts[part] = parts[part].plus(Sums(z.T @ z, (z.T @ y).reshape(K, N, n, p), yy, len(at)))
+        seen += len(at)
+    return parts[0], parts[1]
+
+
+def _forced_outputs(walk: Walked, at: NDArray[np.int64], h: Array) -> Array:
+    """What w from samples `at` on does to the outputs there. Shape (len(at), N, p n)."""
+    count, N, n, components, _, p = h.shape
+    rows = h.transpose(1, 0, 2, 3, 4, 5).reshape(N, count * n * components, n * p)
+    y = np.zeros((len(at), N, n * p))
+    for s in range(N):
+        w = _forced(walk, at + s, count // 2 - 1)
+        later = rows[: N - s].transpose(1, 0, 2).reshape(w.shape[1], -1)
+        y[:, s:] += (w @ later).reshape(len(at), N - s, -1)
+    return y
+
+
+def _penalties(own: NDArray[np.bool_], harmonic: NDArray[np.bool_]) -> list[Array]:
+    """Candidates for the penalties per row on the regressors of one agent's outputs.
+
+    Args:
+        own: regressors that are the agent's own.
+        harmonic: regressors that change with the phase.
+    """
+    weights = _ON_PEERS[:1] if own.all() else _ON_PEERS
+    return [
+        ridge * np.where(harmonic, on_harmonics, 1.0) * np.where(own, 1.0, on_peers)
+        for on_peers, ridge, on_harmonics in product(weights, _RIDGES, _ON_HARMONICS)
+    ]
+
+
+def _choose_penalties(
+    train: Sums, rest: Sums, i: int, candidates: list[Array], columns: NDArray[np.int64]
+) -> list[tuple[Array, list[int]]]:
+    """Each penalty that is best for some of agent `i`'s outputs, and those outputs.
+
+    Peers count only where they lower the error by more than chance does.
+    """
+    every = list(range(train.zy.shape[3]))
+    if not (train.rows and rest.rows):
+        return [(candidates[0], every)]
+    zz, zy = rest.zz[np.ix_(columns, columns)], rest.zy[columns, :, i]
+    errors = []
+    for penalty in candidates:
+        x = _solve_free(train, i, penalty, columns, every)
+        squares = (np.tensordot(zz, x, axes=1) - 2.0 * zy) * x
+        errors.append(rest.third[i] + squares.sum(axis=(0, 1)))
+    table, alone = np.array(errors), len(_RIDGES) * len(_ON_HARMONICS)
+    table[alone:] /= _WORTH**2
+    best = np.argmin(table, axis=0)
+    return [(candidates[k], np.flatnonzero(best == k).tolist()) for k in np.unique(best)]
+
+
+def _solve_free(
+    sums: Sums, i: int, penalty: Array, columns: NDArray[np.int64], outputs: list[int]
+) -> Array:
+    """Solution for some outputs of agent `i`. Shape (len(columns), N, len(outputs))."""
+    counted = np.isfinite(penalty)
+    some = columns[counted]
+    A = sums.zz[np.ix_(some, some)].copy(order="F")
+    A.flat[:: len(A) + 1] += penalty[counted] * sums.rows
+    b = sums.zy[some][:, :, i, outputs]
+    solution = linalg.cho_solve((factorise(A), True), b.reshape(len(some), -1), check_finite=False)
+    x = np.zeros((len(columns), *b.shape[1:]))
+    x[counted] = solution.reshape(b.shape)
+    return x

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.predictor.episode import team_layout
-from quadriga.agents.predictor.layout import Layout, everyone
+from quadriga.agents.predictor.episode import Layout, everyone, team_layout
+from quadriga.agents.predictor.periodic import PeriodicFactors
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import neighbours
 from quadriga.shared.errors import PredictorError
@@ -27,25 +27,27 @@ class PredictorMeta:
         kind: name of the fit, a key of `quadriga.agents.predictor.fits.FITS`.
         phases: parts of the gait's period with a G of their own (see `time_grid.gait_phase`).
         neighbours: "all", or "yoked": G_ij is zero unless i and j are yoked.
+        controller: the low level, which is part of G.
+        stand_ms: where the gait's period, and with it phase 0, begins.
+        response: of 'periodic': the file of measured responses that stands for fitted ones.
     """
 
     robots: int
+    robot: str
     N: int
     T_ini: int
     interface: str
     yokes: str
     alternate_phase: bool
     stance_ms: int
-    ridge: float
-    block_weight: float
-    controller: tuple[tuple[str, float | str | bool], ...]  # the low level that is part of G
+    stand_ms: int
+    controller: tuple[tuple[str, float | str | bool], ...]
     kind: str
     phases: int
-    phase_ridge: float
     neighbours: str
-    stand_ms: int  # where the gait's period, and with it phase 0, begins
-    robot: str
-    response: str  # of 'periodic': the file of measured responses that stands for fitted ones
+    ridge: float
+    block_weight: float
+    response: str = ""
 
     @classmethod
     def of(cls, config: Config) -> PredictorMeta:
@@ -54,21 +56,20 @@ class PredictorMeta:
         ident = config.identification
         return cls(
             robots=config.team.robots,
+            robot=config.team.robot,
             N=config.planner.N,
             T_ini=config.planner.T_ini,
             interface=config.planner.interface,
             yokes=config.team.yokes,
             alternate_phase=config.team.alternate_phase,
             stance_ms=config.gait.stance_ms,
-            ridge=ident.ridge,
-            block_weight=ident.block_weight,
+            stand_ms=config.gait.stand_ms,
             controller=tuple(sorted(controller.items())),
             kind=ident.predictor,
-            phases=ident.phases if ident.predictor == "phase" else 1,
-            phase_ridge=ident.phase_ridge,
+            phases=1,
             neighbours=ident.neighbours,
-            stand_ms=config.gait.stand_ms,
-            robot=config.team.robot,
+            ridge=ident.ridge,
+            block_weight=ident.block_weight,
             response=config.response_file,
         )
 
@@ -81,7 +82,7 @@ class PredictorMeta:
         """The inverse of `to_dict`.
 
         Raises:
-            KeyError, TypeError, AttributeError: fields are missing, unknown or of another type.
+            TypeError, AttributeError, KeyError: fields are missing, unknown or of another type.
         """
         return cls(**body | {"controller": tuple(sorted(body["controller"].items()))})
 
@@ -97,7 +98,7 @@ class PredictorMeta:
     @property
     def width(self) -> int:
         """Columns of a block: length of one robot's [u_ini; y_ini; u]."""
-        return (N_FORCES + N_OUTPUTS) * self.T_ini + N_FORCES * self.N
+        return self.past + N_FORCES * self.N
 
     @property
     def past(self) -> int:
@@ -111,36 +112,55 @@ class Predictor:
 
     Attributes:
         meta: what it was fitted for.
-        G: shape (P, n, n, 6 N, 18 T_ini + 12 N), read-only, one for each of the P phases; rows
-            and columns are time-major (sample 0's twelve forces, sample 1's twelve, …), N and m,
-            m/s, rad, rad/s.
+        parts: G itself, shape (P, n, n, 6 N, 18 T_ini + 12 N), read-only, one for each of the P
+            phases; rows and columns are time-major (sample 0's twelve forces, sample 1's twelve,
+            …), N and m, m/s, rad, rad/s. Or the factors of a periodic one, of which blocks are
+            expanded when they are asked for.
         condition: number of the regression it was fitted by, penalty included; None: unknown.
+
+    Raises:
+        PredictorError: arrays of other shapes.
     """
 
     meta: PredictorMeta
-    G: Array
+    parts: Array | PeriodicFactors
     condition: float | None = None
 
     def __post_init__(self) -> None:
+        if isinstance(self.parts, PeriodicFactors):
+            self.parts.check(self.meta.layout)
+            return
         n = self.meta.robots
         expected = (self.meta.phases, n, n, N_OUTPUTS * self.meta.N, self.meta.width)
-        if self.G.shape != expected:
-            raise PredictorError("predictor.G", f"shape {self.G.shape}", f"{expected}")
-        self.G.setflags(write=False)
+        if self.parts.shape != expected:
+            raise PredictorError("predictor.G", f"shape {self.parts.shape}", f"{expected}")
+        self.parts.setflags(write=False)
 
     @property
     def phases(self) -> int:
         """P, the number of phases with a G of their own; `time_grid.phase_of` chooses."""
         return self.meta.phases
 
+    @property
+    def G(self) -> Array:
+        """All blocks at once, (P, n, n, 6 N, W); large if it is periodic."""
+        if not isinstance(self.parts, PeriodicFactors):
+            return self.parts
+        robots, phases = range(self.meta.robots), range(self.phases)
+        return np.array([[[self.block(i, j, p) for j in robots] for i in robots] for p in phases])
+
     def block(self, i: int, j: int, phase: int = 0) -> Array:
         """G_ij of a phase, the effect of agent j on agent i. Shape (6 N, 18 T_ini + 12 N)."""
-        block: Array = self.G[phase, i, j]
+        if isinstance(self.parts, PeriodicFactors):
+            return self.parts.block(i, j, phase, self.phases)
+        block: Array = self.parts[phase, i, j]
         return block
 
     def future_block(self, i: int, j: int, phase: int = 0) -> Array:
         """The columns of G_ij that multiply the future forces. Shape (6 N, 12 N)."""
-        block: Array = self.G[phase, i, j, :, self.meta.past :]
+        if isinstance(self.parts, PeriodicFactors):
+            return self.parts.future_block(i, j, phase, self.phases)
+        block: Array = self.parts[phase, i, j, :, self.meta.past :]
         return block
 
     def row(self, i: int, phase: int = 0) -> Array:
@@ -150,16 +170,18 @@ class Predictor:
 
     def couples(self, i: int, j: int) -> bool:
         """Whether anything that robot j does has an effect on robot i."""
-        return bool(self.G[:, i, j].any())
+        if isinstance(self.parts, PeriodicFactors):
+            return self.parts.couples(i, j)
+        return bool(self.parts[:, i, j].any())
 
     @property
     def nbytes(self) -> int:
         """Memory of what it is made of."""
-        return self.G.nbytes
+        return sum(array.nbytes for array in self.arrays().values())
 
     def arrays(self) -> Mapping[str, Array]:
         """What it is made of, by name: with the meta all that a file must hold."""
-        return {"G": self.G}
+        return self.parts.arrays() if isinstance(self.parts, PeriodicFactors) else {"G": self.parts}
 
     def predict(self, z: Array, phase: int = 0) -> Array:
         """Predicted output deviations of the whole team.
@@ -183,10 +205,8 @@ def check_sizes(config: Config, predictor: Predictor) -> None:
         PredictorError: it is of another team or horizon.
     """
     meta, planner = predictor.meta, config.planner
-    got, expected = (
-        (meta.robots, meta.N, meta.T_ini),
-        (config.team.robots, planner.N, planner.T_ini),
-    )
+    got = meta.robots, meta.N, meta.T_ini
+    expected = config.team.robots, planner.N, planner.T_ini
     if got != expected:
         raise PredictorError(
             "predictor", f"(robots, N, T_ini) = {got}", f"{expected}", "of another team?"

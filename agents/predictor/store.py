@@ -1,11 +1,12 @@
-"""Predictor files: G, what it was fitted for, its provenance, and the figures of its gates."""
+"""Predictor files: what a predictor is made of, what it was fitted for, and where it comes from."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
@@ -13,15 +14,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.predictor.gate_report import GateReport
-from quadriga.agents.predictor.periodic_predictor import FACTORS, PeriodicFactors, PeriodicPredictor
+from quadriga.agents.predictor.gates import GateReport
+from quadriga.agents.predictor.periodic import FACTORS, PeriodicFactors
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.shared.errors import PredictorFileError, name_file_errors
+from quadriga.shared.errors import PredictorError, PredictorFileError, name_file_errors
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.shared.runtime.npz import UNREADABLE, open_npz
 
-FORMAT: Final = 2
+FORMAT: Final = 3
 _PACKAGES: Final = ("quadriga", "numpy", "scipy", "mujoco", "pin", "daqp")
 REMEDY: Final = "fit one with `quadriga fit`"
 
@@ -68,12 +69,7 @@ def versions() -> dict[str, str]:
 
 def predictor_sha256(predictor: Predictor) -> str:
     """Digest of G and its meta: equal predictors have equal digests, however they were stored."""
-    arrays = [np.ascontiguousarray(array, dtype="<f8") for array in predictor.arrays().values()]
-    head = json.dumps(
-        [predictor.meta.to_dict(), *(array.shape for array in arrays)], sort_keys=True
-    )
-    content = b"".join(array.tobytes() for array in arrays)
-    return hashlib.sha256(head.encode() + b"\0" + content).hexdigest()
+    return digest_of(predictor.meta.to_dict(), predictor.arrays())
 
 
 def save(path: Path, predictor: Predictor, provenance: Provenance) -> str:
@@ -85,49 +81,75 @@ def save(path: Path, predictor: Predictor, provenance: Provenance) -> str:
     Raises:
         PredictorFileError: the file cannot be written.
     """
-    digest = predictor_sha256(predictor)
-    document = {
-        "format": FORMAT,
-        "sha256": digest,
-        "meta": predictor.meta.to_dict(),
-        "provenance": asdict(provenance),
-    }
-    with name_file_errors(PredictorFileError, path, "a file that can be written"):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_write(path) as partial, partial.open("wb") as file:
-            text = np.array(json.dumps(document, sort_keys=True))
-            np.savez(file, allow_pickle=False, document=text, **predictor.arrays())
-    return digest
+    meta, about = predictor.meta.to_dict(), {"provenance": asdict(provenance)}
+    return write_archive(path, meta, predictor.arrays(), about)
 
 
 def read(path: Path) -> tuple[Predictor, Provenance]:
     """Read a predictor file whatever it was fitted for (to show what is in it).
 
     Raises:
-        PredictorFileError: no such file, not a predictor, or corrupt.
+        PredictorFileError: no such file, not a predictor of a team, or corrupt.
     """
-    try:
+    meta, arrays, about = read_archive(path)
+    with name_damage(path):
+        provenance = Provenance.from_dict(about["provenance"])
+        parts: Array | PeriodicFactors
+        if "G" in arrays:
+            parts = arrays["G"]
+        else:
+            parts = PeriodicFactors(**{name: arrays[name] for name in FACTORS})
+        return Predictor(
+            PredictorMeta.from_dict(meta), parts, provenance.gates.condition
+        ), provenance
+
+
+# ---- files of predictors, of teams and of any plant
+
+
+def digest_of(meta: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:
+    """Digest of what a predictor was fitted for and of its arrays."""
+    content = [np.ascontiguousarray(array, dtype="<f8") for array in arrays.values()]
+    head = json.dumps([meta, *(array.shape for array in content)], sort_keys=True)
+    return hashlib.sha256(
+        head.encode() + b"\0" + b"".join(a.tobytes() for a in content)
+    ).hexdigest()
+
+
+def write_archive(
+    path: Path, meta: dict[str, Any], arrays: Mapping[str, Array], about: dict[str, Any]
+) -> str:
+    """Write meta, arrays and what else is known; returns the digest of meta and arrays.
+
+    Raises:
+        PredictorFileError: the file cannot be written.
+    """
+    digest = digest_of(meta, arrays)
+    document = {"format": FORMAT, "sha256": digest, "meta": meta, **about}
+    with name_file_errors(PredictorFileError, path, "a file that can be written"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_write(path) as partial, partial.open("wb") as file:
+            text = np.array(json.dumps(document, sort_keys=True))
+            np.savez(file, allow_pickle=False, document=text, **arrays)
+    return digest
+
+
+def read_archive(path: Path) -> tuple[dict[str, Any], dict[str, Array], dict[str, Any]]:
+    """Meta, arrays and the whole document of a file of `write_archive`.
+
+    Raises:
+        PredictorFileError: no such file, another format, or corrupt.
+    """
+    with name_damage(path):
         with open_npz(path) as archive:
             document = json.loads(str(archive["document"]))
-            names = FACTORS if "response" in archive.files else ("G",)
+            names = [name for name in archive.files if name != "document"]
             arrays = {name: np.asarray(archive[name], dtype=np.float64) for name in names}
         if document["format"] != FORMAT:
             raise PredictorFileError(
                 f"predictor {path}", f"format {document['format']}", f"format {FORMAT}", REMEDY
             )
-        meta = PredictorMeta.from_dict(document["meta"])
-        provenance = Provenance.from_dict(document["provenance"])
-        predictor = _build(meta, arrays, provenance.gates.condition)
-        unchanged = document["sha256"] == predictor_sha256(predictor)
-    except FileNotFoundError:
-        raise PredictorFileError(f"predictor {path}", "no such file", "a file", REMEDY) from None
-    except UNREADABLE as error:
-        raise PredictorFileError(
-            f"predictor {path}",
-            f"something else ({type(error).__name__})",
-            "a predictor that quadriga wrote",
-            f"truncated or not a predictor: delete it; {REMEDY}",
-        ) from None
+        unchanged = document["sha256"] == digest_of(document["meta"], arrays)
     if not unchanged:
         raise PredictorFileError(
             f"predictor {path}",
@@ -135,10 +157,26 @@ def read(path: Path) -> tuple[Predictor, Provenance]:
             "an unchanged file",
             f"corrupt: delete it; {REMEDY}",
         )
-    return predictor, provenance
+    return document["meta"], arrays, document
 
 
-def _build(meta: PredictorMeta, arrays: dict[str, Array], condition: float | None) -> Predictor:
-    if "G" in arrays:
-        return Predictor(meta, arrays["G"], condition)
-    return PeriodicPredictor(meta, PeriodicFactors(**arrays), condition)
+@contextmanager
+def name_damage(path: Path) -> Iterator[None]:
+    """Turn whatever damaged bytes raise into an error that names the file.
+
+    Raises:
+        PredictorFileError: no such file, or no predictor.
+    """
+    try:
+        yield
+    except PredictorFileError:
+        raise
+    except FileNotFoundError:
+        raise PredictorFileError(f"predictor {path}", "no such file", "a file", REMEDY) from None
+    except (*UNREADABLE, PredictorError) as error:
+        raise PredictorFileError(
+            f"predictor {path}",
+            f"something else ({type(error).__name__})",
+            "a predictor that quadriga wrote",
+            f"truncated or not a predictor: delete it; {REMEDY}",
+        ) from None

@@ -23,7 +23,7 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Fit unless there is a predictor, and report on it; collect data unless there are some."""
     from rich.console import Console
 
-    from quadriga.identification.fit import fit_and_report
+    from quadriga.identification.fit_report import fit_and_report
 
     print(fit_and_report(config, Console(stderr=True), every=arguments.all))
     return 0

@@ -9,11 +9,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.planner.acceptance import load_checked
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.identification.cache import data_path, predictor_path
-from quadriga.identification.fit_report import reason
-from quadriga.identification.predictors import ensure_data, ensure_predictor
+from quadriga.identification.predictors import ensure_data, ensure_predictor, reason
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
 from quadriga.shared.planner_kinds import find_kind

@@ -20,8 +20,8 @@ _LOOK: Final = 0.2  # s, between two looks for a file that another process write
 _LIBRARIES: Final = ("mujoco", "pin", "numpy", "numba", "daqp", "example-robot-data")
 # Keys of the identification that the walks do not depend on, only what is made of them.
 _FITTED: Final = (
-    "preset", "predictor", "neighbours", "phases", "phase_ridge", "ridge", "block_weight",
-    "max_radius", "max_peers_harm", "gain_range", "response",
+    "preset", "predictor", "neighbours", "ridge", "block_weight", "max_radius", "max_peers_harm",
+    "gain_range", "response",
 )  # fmt: skip
 
 

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.predictor.episode import SIGNALS, Episode
-from quadriga.agents.predictor.excitation import excitation
 from quadriga.agents.predictor.hankel import required_samples
+from quadriga.agents.predictor.regression import excitation
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
 from quadriga.shared.robot.conventions import N_FORCES, Array

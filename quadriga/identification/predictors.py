@@ -8,21 +8,19 @@ from pathlib import Path
 
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import gates_in_force, load_checked
-from quadriga.agents.planner.gates import run_gates
+from quadriga.agents.planner.acceptance import gates_in_force, load_checked, run_gates
 from quadriga.agents.predictor.fits import fit as fit_predictor
-from quadriga.agents.predictor.gate_report import GateReport
+from quadriga.agents.predictor.gates import GateReport
 from quadriga.agents.predictor.measured_response import check_measured_plant
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, read, save, versions
 from quadriga.identification.cache import data_path, predictor_path
-from quadriga.identification.collect import collect
-from quadriga.identification.collection_plan import collection_seconds
+from quadriga.identification.collect import collect, collection_seconds
 from quadriga.identification.dataset import Dataset, check_excitation, read_data, write_data
-from quadriga.identification.fit_report import refusal
 from quadriga.progress import build_progress
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
+from quadriga.shared.errors import PredictorError, QuadrigaError
 from quadriga.shared.runtime.blas import use_one_blas_thread
 
 
@@ -36,8 +34,7 @@ def ensure_predictor(config: Config, console: Console) -> Path:
     if path.is_file():
         load_checked(path, config)
         return path
-    dataset = ensure_data(config, console)
-    fit(config, dataset, path, console)
+    fit(config, ensure_data(config, console), path, console)
     return path
 
 
@@ -55,14 +52,13 @@ def fit_or_read(config: Config, console: Console) -> tuple[Predictor, GateReport
         predictor, origin = read(path)
         return predictor, gates_in_force(origin.gates, config, predictor)
     dataset = ensure_data(config, console)
-    use_one_blas_thread()
     check_excitation(config, dataset.training)
     with console.status(f"fitting the predictor {config.identification.predictor}"):
-        predictor = _fit_to(dataset, config)
-        gates = run_gates(config, predictor, dataset.held_out)
-    if refusal(gates, config.planner.kind) is None:
-        save(path, predictor, build_provenance(config, dataset, gates))
-    return predictor, gates
+        predictor = fit_now(config, dataset)
+        origin = judge_now(config, dataset, predictor)
+    if refusal(origin.gates, config.planner.kind) is None:
+        save(path, predictor, origin)
+    return predictor, origin.gates
 
 
 def ensure_data(config: Config, console: Console) -> Dataset:
@@ -99,29 +95,52 @@ def fit(config: Config, dataset: Dataset, path: Path, console: Console) -> tuple
     Raises:
         PredictorError: too little data, not exciting, or refused by a gate.
     """
-    use_one_blas_thread()
     check_excitation(config, dataset.training)
     with console.status("fitting the predictor"):
-        predictor = _fit_to(dataset, config)
-        report = run_gates(config, predictor, dataset.held_out)
-    if report.peers is not None and (found := report.peers.describe()):
+        predictor = fit_now(config, dataset)
+        origin = judge_now(config, dataset, predictor)
+    gates = origin.gates
+    if gates.peers is not None and (found := gates.peers.describe()):
         console.print(f"effect of peers as predicted: {found}; see `quadriga fit`", highlight=False)
-    report.check(config.planner.kind)
-    return save(path, predictor, build_provenance(config, dataset, report)), report
+    gates.check(config.planner.kind)
+    return save(path, predictor, origin), gates
 
 
-def _fit_to(dataset: Dataset, config: Config) -> Predictor:
+def fit_now(config: Config, dataset: Dataset) -> Predictor:
+    """The predictor of a configuration, fitted to these data.
+
+    Raises:
+        PredictorError: too little data, or a singular problem.
+        PredictorFileError: configured responses that are missing, or of another team.
+    """
+    use_one_blas_thread()
     check_measured_plant(config)
     return fit_predictor(dataset.training, PredictorMeta.of(config))
 
 
-def build_provenance(config: Config, dataset: Dataset, report: GateReport) -> Provenance:
-    """Where a predictor fitted now comes from."""
+def judge_now(config: Config, dataset: Dataset, predictor: Predictor) -> Provenance:
+    """Where a predictor fitted now comes from, with the figures of its gates."""
     return Provenance(
         config_digest=config_sha256(config),
         seeds=dataset.seeds,
         samples=tuple(episode.samples for episode in dataset.training),
         held_out=tuple(episode.samples for episode in dataset.held_out),
         versions=versions(),
-        gates=report,
+        gates=run_gates(config, predictor, dataset.held_out),
     )
+
+
+def refusal(gates: GateReport, kind: str) -> PredictorError | None:
+    """The gate that refuses a predictor for a kind of planner, None if all accept it."""
+    try:
+        gates.check(kind)
+    except PredictorError as error:
+        return error
+    return None
+
+
+def reason(refused: QuadrigaError | None) -> str:
+    """Why something was refused, in a few words, or ""."""
+    if refused is None:
+        return ""
+    return f"{refused.name.removeprefix('predictor: ')} {refused.got}, not {refused.expected}"

@@ -8,8 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.agents.predictor.episode import SIGNALS
-from quadriga.identification.collect import collect_episode
-from quadriga.identification.collection_plan import PlannedEpisode
+from quadriga.identification.collect import PlannedEpisode, collect_episode
 from quadriga.shared.config.load import load
 from quadriga.shared.robot.conventions import Array
 

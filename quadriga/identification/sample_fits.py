@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.planner.gates import run_gates
+from quadriga.agents.planner.acceptance import run_gates
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
 from quadriga.agents.predictor.fits import FITS, fit
 from quadriga.agents.predictor.predictor import PredictorMeta
@@ -23,9 +23,7 @@ from quadriga.shared.runtime.blas import use_one_blas_thread
 _ROBOTS: Final = 3
 _SAMPLES: Final = 400  # of an episode
 _STATES: Final = 8  # of each robot
-_KEYS: Final = {
-    "team.robots": _ROBOTS, "planner.N": 6, "planner.T_ini": 3, "identification.phases": 2,
-}  # fmt: skip
+_KEYS: Final = {"team.robots": _ROBOTS, "planner.N": 6, "planner.T_ini": 3}
 
 
 def samples() -> Iterator[Array]:

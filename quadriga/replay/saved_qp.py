@@ -133,7 +133,7 @@ def _save_planner(qp: SolvedQp, about: str) -> SavedQp:
         np.minimum(qp.upper, _FAR),
         qp.solution.x,
         f"planner's QP of {about}, {qp.solution.status}: x is the force deviations of the "
-        "stance legs over the horizon [N], then slacks",
+        "stance legs over the horizon [N]",
     )
 
 

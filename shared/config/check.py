@@ -156,18 +156,14 @@ def _check_planner(planner: PlannerConfig, world: WorldConfig) -> None:
 
 
 def _check_cooperation(planner: PlannerConfig) -> None:
-    """What a plan for the whole team cannot heed: other agents' outputs, and their corrections."""
-    for name, value in (
-        ("output_bounds", planner.output_bounds),
-        ("adaptation", planner.adaptation),
-    ):
-        if value != "none":
-            raise ConfigError(
-                f"planner.{name}",
-                f"{value!r} with planner.cost 'team'",
-                "'none', or planner.cost = 'own'",
-                "each agent would plan with bounds or a G of its own that its peers do not know",
-            )
+    """What a plan for the whole team cannot heed: other agents' outputs."""
+    if planner.output_bounds != "none":
+        raise ConfigError(
+            "planner.output_bounds",
+            f"{planner.output_bounds!r} with planner.cost 'team'",
+            "'none', or planner.cost = 'own'",
+            "each agent would plan with bounds that its peers do not know",
+        )
 
 
 def _check_plants(config: Config) -> None:

@@ -54,11 +54,10 @@ class IdentificationConfig:
     predictor: str = key(
         "periodic",
         "-",
-        "the fit of G; pinv: the paper's; ridge: regularised, block-weighted; gamma: LQ "
-        "factorisation; causal: no force acts on outputs before it; arx: one-step model rolled "
-        "out; phase: one G for each part of the gait's period; periodic: a function of the gait's "
-        "phase, causal, with peers' forces by their net wrench",
-        choices=("ridge", "pinv", "gamma", "causal", "arx", "phase", "periodic"),
+        "the fit of G; pinv: the paper's; ridge: regularised, block-weighted; periodic: a function "
+        "of the gait's phase, in which no force acts on outputs before it, with peers' forces by "
+        "their net wrench",
+        choices=("ridge", "pinv", "periodic"),
     )
     response: str = key(
         "",
@@ -73,16 +72,7 @@ class IdentificationConfig:
         "yoked: robots that are not yoked to each other are taken to be uncoupled",
         choices=("all", "yoked"),
     )
-    phases: int = key(2, "1", "parts of the gait's period of the predictor 'phase'", low=1, high=40)
     ridge: float = key(1e-3, "1", "ridge per data column", low=1e-12, high=1e3)
-    phase_ridge: float = key(
-        30.0,
-        "1",
-        "predictor 'phase': ridge on the difference between the fit of a phase and that of all "
-        "data",
-        low=1e-12,
-        high=1e6,
-    )
     block_weight: float = key(
         160.0, "1", "extra penalty weight w (as w²) on the columns of peers", low=1.0, high=1e4
     )

@@ -128,14 +128,6 @@ class ControllerConfig:
     kd_tilt: float = key(60.0, "1/s", "roll and pitch rate", low=0.0, high=1e3)
     kp_yaw: float = key(100.0, "1/s²", "yaw", low=0.0, high=1e4)
     kd_yaw: float = key(20.0, "1/s", "yaw rate", low=0.0, high=1e3)
-    kp_course: float = key(
-        0.0,
-        "1/s",
-        "rate at which a yoked robot that walks turns its heading towards its course over ground; "
-        "0: it keeps the heading of its IMU, which drifts",
-        low=0.0,
-        high=2.0,
-    )
     kp_swing: float = key(400.0, "1/s²", "swing foot", low=0.0, high=1e4)
     kd_swing: float = key(40.0, "1/s", "swing foot rate", low=0.0, high=1e3)
     contact_detection: bool = key(True, "-", "early touchdown becomes stance, a lost foot descends")

@@ -56,20 +56,6 @@ class PlannerConfig:
     exchanges: int = key(
         0, "-", "distributed: best responses to the peers' plans of the same step", low=0, high=8
     )
-    adaptation: str = key(
-        "none",
-        "-",
-        "recursive: each agent corrects the predicted effect of its own forces from measurements, "
-        "as under an unknown payload (distributed and decentralised)",
-        choices=("none", "recursive"),
-    )
-    forgetting: float = key(
-        0.995,
-        "1",
-        "adaptation: share of older information that a planning step keeps",
-        low=0.5,
-        high=1.0,
-    )
     latency_ms: int = key(
         8,
         "ms",
@@ -93,13 +79,6 @@ class PlannerConfig:
         "outputs: all of them (the paper)",
         choices=("speeds", "outputs"),
     )
-    footholds: str = key(
-        "measured",
-        "-",
-        "velocity from which footholds are computed: measured, or planned until the middle of the "
-        "next stance, as far as the plan reaches",
-        choices=("measured", "planned"),
-    )
     N: int = key(25, "samples", "control horizon", low=4, high=100)
     T_ini: int = key(10, "samples", "estimation horizon", low=2, high=50)
     applied: int = key(4, "samples", "samples applied before the next plan", low=1, high=20)
@@ -113,19 +92,13 @@ class PlannerConfig:
         (20.0, 20.0, 60.0), "N", "largest planned deviation from the nominal force", low=0.0
     )
     output_bounds: str = key(
-        "none",
-        "-",
-        "whether planned outputs are bounded by output_max",
-        choices=("none", "soft", "hard"),
+        "none", "-", "whether planned outputs are bounded by output_max", choices=("none", "hard")
     )
     output_max: tuple[float, ...] = key(
         (0.03, 0.4, 0.3, 0.15, 0.15, 0.8),
         "m, m/s, m/s, rad, rad, rad/s",
         "largest planned deviation of z, vx, vy, roll, pitch, wz from what is commanded",
         low=1e-6,
-    )
-    output_weight: float = key(
-        100.0, "1", "soft output bounds: weight of their violation, times Q", low=1e-3, high=1e6
     )
     fade: tuple[float, ...] = key(
         (0.06, 0.5, 0.25, 2.0),

@@ -30,12 +30,12 @@ _SOFT: Final = MappingProxyType(
 )  # fmt: skip
 
 # Replans every 10 ms, and weighs more what feed-forward can still correct on a stiff low level.
-# Peers' plans are held, and what was learned is kept, as long as with the usual rate. With these
-# weights best responses of three robots would not converge undamped.
+# Peers' plans are held as long as with the usual rate. With these weights best responses of three
+# robots would not converge undamped.
 _FAST: Final = MappingProxyType(
     {
         "applied": 1, "latency_ms": 1, "Q": (1.2e7, 1e5, 6e5, 2.4e6, 2e6, 3e3),
-        "max_peer_age": 12, "hold_steps": 20, "forgetting": 0.99875,
+        "max_peer_age": 12, "hold_steps": 20,
     }
 )  # fmt: skip
 

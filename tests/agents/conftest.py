@@ -11,7 +11,7 @@ import pytest
 from scipy import linalg
 
 from quadriga.agents.gait import scheduled_stance
-from quadriga.agents.planner.gates import run_gates
+from quadriga.agents.planner.acceptance import run_gates
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.fits import fit_ridge
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta

@@ -183,15 +183,12 @@ def test_a_few_failures_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not outputs.command.kd.any()
 
 
-PLANNERS = pytest.mark.parametrize(
-    "planner", ["", "none", "recursive"], ids=["bare", "plans", "adapts"]
-)
+PLANNERS = pytest.mark.parametrize("planner", [False, True], ids=["bare", "plans"])
 
 
 @PLANNERS
-def test_finite_but_absurd_rates_of_joints_are_not_believed_and_no_crash(planner: str) -> None:
-    config = replace(ALONE, planner=replace(ALONE.planner, adaptation=planner or "none"))
-    robot, twin = (Robot(config, planner=bool(planner)) for _ in range(2))
+def test_finite_but_absurd_rates_of_joints_are_not_believed_and_no_crash(planner: bool) -> None:
+    robot, twin = (Robot(ALONE, planner=planner) for _ in range(2))
     robot.run(400)
     twin.run(400)
     outputs = robot.step(over_the_bus(replace(standing(400), v_joint=np.full(12, 1e200))))
@@ -203,7 +200,6 @@ def test_finite_but_absurd_rates_of_joints_are_not_believed_and_no_crash(planner
         assert not outputs.plan.status.startswith("nominal:")
         assert np.isfinite(outputs.plan.u).all()
         assert np.abs(outputs.plan.y).max() < 1.0
-        assert "window_not_learnt" not in outputs.counters
     for _ in range(ALONE.controller.max_failures):
         outputs = robot.step()
         assert np.isfinite(outputs.command.tau).all()
@@ -222,9 +218,8 @@ def test_finite_but_absurd_rates_of_joints_are_not_believed_and_no_crash(planner
     ],
     ids=["turning", "acceleration", "less acceleration"],
 )
-def test_a_finite_but_absurd_imu_is_invalid(absurd: State, planner: str) -> None:
-    config = replace(ALONE, planner=replace(ALONE.planner, adaptation=planner or "none"))
-    robot = Robot(config, planner=bool(planner))
+def test_a_finite_but_absurd_imu_is_invalid(absurd: State, planner: bool) -> None:
+    robot = Robot(ALONE, planner=planner)
     last = robot.run(400).command.tau
     outputs = robot.step(over_the_bus(absurd))
     np.testing.assert_allclose(outputs.command.tau, last, atol=10.0)

@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.four_tank import agreement
 from benchmarks.four_tank_peers import HOW_TO_INSTALL, PEERS, is_installed
-from quadriga.data_driven import four_tank
+from quadriga.agents.predictor.four_tank import four_tank
 
 TOP = Path(__file__).parents[2]
 
@@ -41,5 +41,5 @@ def test_the_page_names_what_is_missing_and_compares_the_rest(tmp_path: Path) ->
     assert list(found["missing"]) == missing
     assert all(f"{name} is not installed: " in done.stdout for name in missing)
     names = [loop["name"] for loop in found["closed_loops"]]
-    assert names[:3] == ["ours, spc", "ours, causal", "ours, deepc"]
+    assert names[:3] == ["ours, pinv", "ours, ridge", "ours, deepc"]
     assert all(loop["cost"] > 0.0 for loop in found["closed_loops"])

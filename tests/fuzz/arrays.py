@@ -12,9 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga import data_driven
 from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.gate_report import GateReport
+from quadriga.agents.predictor.gates import GateReport
 from quadriga.agents.predictor.measured_response import (
     PulseResponses,
     fit_measured_response,
@@ -22,11 +21,12 @@ from quadriga.agents.predictor.measured_response import (
     team_of,
     write_pulse_responses,
 )
+from quadriga.agents.predictor.plant import Data, PlantPredictor
+from quadriga.agents.predictor.plant import fit as fit_plant
+from quadriga.agents.predictor.plant import load as load_fitted
+from quadriga.agents.predictor.plant import save as save_fitted
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, predictor_sha256, read, save
-from quadriga.data_driven.fitted_predictor import FittedPredictor
-from quadriga.data_driven.store import load as load_fitted
-from quadriga.data_driven.store import save as save_fitted
 from quadriga.experiments.probe.responses import (
     Repetition,
     average,
@@ -148,7 +148,7 @@ def library_predictors(folder: Path) -> Archives:
     y = np.zeros((200, 1, 1))
     for k in range(1, 200):
         y[k] = 0.8 * y[k - 1] + u[k - 1]
-    fitted: FittedPredictor = data_driven.fit(data_driven.Data(u, y), "ridge", 2, 3)
+    fitted: PlantPredictor = fit_plant(Data(u, y), "ridge", 2, 3)
     return Archives(folder / "library.npz", lambda path: save_fitted(path, fitted), load_fitted)
 
 

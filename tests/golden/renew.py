@@ -21,7 +21,7 @@ import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.planner.acceptance import load_checked
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256, save
 from quadriga.identification.predictors import ensure_predictor

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.planner.acceptance import load_checked
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.mcap_chunk import ChunkEntry
 from quadriga.shared.recording.reader import Recording

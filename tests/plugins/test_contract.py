@@ -163,7 +163,7 @@ def test_plans_and_setpoints_are_finite(name: str, robot: int) -> None:
         setpoint = setpoint_at(call.after.plans, call.inputs.tick)
         assert setpoint.deviation.shape == (12,)
         assert np.isfinite(setpoint.deviation).all()
-        assert setpoint.v_ref is None or np.isfinite(setpoint.v_ref).all()
+        assert setpoint.y_ref is None or np.isfinite(setpoint.y_ref).all()
 
 
 @every_kind

@@ -20,7 +20,7 @@ OPTIONS: dict[str, Any] = {
     "identification.predictor": "ridge",
     "identification.order_per_robot": 9, "identification.max_radius": 10.0,
     "identification.max_peers_harm": 1000.0, "identification.gain_range": [0.1, 3.0],
-    "identification.ridge": 1e-6, "identification.phases": 2, "reference.ramp": 0.0,
+    "identification.ridge": 1e-6, "reference.ramp": 0.0,
 }  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import load_checked as load_predictor
+from quadriga.agents.planner.acceptance import load_checked as load_predictor
 from quadriga.agents.planning.operator_references import AHEAD_MS
 from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.identification.central_planner import build_central_planner
@@ -43,7 +43,7 @@ KINDS: dict[str, dict[str, object]] = {
     "deepc": {"planner.kind": "deepc"},
     "cooperative": {"planner.cost": "team", "planner.exchanges": 1},
     "exchanged": {"planner.exchanges": 2, "planner.compensation": True, "planner.damping": 0.2},
-    "fast": {"planner.preset": "fast", "planner.footholds": "planned"},
+    "fast": {"planner.preset": "fast"},
 }
 
 

@@ -43,13 +43,6 @@ def heading(R: Array) -> tuple[float, float]:
 
 
 @compiled
-def from_yaw_frame(plane: Array, R: Array) -> Array:
-    """A horizontal vector (2,) of the yaw frame of R in the frame that R leads to. Shape (3,)."""
-    c, s = heading(R)
-    return np.array([c * plane[0] - s * plane[1], s * plane[0] + c * plane[1], 0.0])
-
-
-@compiled
 def cross(a: Array, b: Array) -> Array:
     """Vector product of two vectors of shape (3,)."""
     return np.array(

@@ -11,7 +11,7 @@ from quadriga.experiments.trial.evaluate import evaluate
 from quadriga.experiments.trial.figures_of_merit import Figures
 from quadriga.experiments.trial.origin import code_and_libraries, foreign_origin, is_same_code
 from quadriga.experiments.trial.outcome import TrialOutcome, build_outcome
-from quadriga.identification.fit_report import reason
+from quadriga.identification.predictors import reason
 from quadriga.shared.config.reference_trace import trace_sha256
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256

@@ -21,7 +21,7 @@ from quadriga.experiments.probe.outcome import ProbeOutcome, build_outcome
 from quadriga.experiments.probe.probe_figure import draw_probe
 from quadriga.experiments.probe.probe_tables import build_details, build_overall
 from quadriga.experiments.probe.probed import Probed
-from quadriga.identification.fit import write_json
+from quadriga.identification.fit_report import write_json
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.atomic import write_text
 

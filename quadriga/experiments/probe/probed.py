@@ -8,12 +8,11 @@ from pathlib import Path
 
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import check_fitted_for, gates_in_force
+from quadriga.agents.planner.acceptance import check_fitted_for, gates_in_force
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256, read
 from quadriga.experiments.variants import PREDICTORS
-from quadriga.identification.fit_report import reason, refusal
-from quadriga.identification.predictors import fit_or_read
+from quadriga.identification.predictors import fit_or_read, reason, refusal
 from quadriga.shared.config.load import build, overlay
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError

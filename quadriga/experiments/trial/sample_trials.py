@@ -25,7 +25,7 @@ from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
 _KEYS: Final = {
     "world.seed": 3, "world.seconds": 1.4, "world.scatter": 0.02, "gait.stand_ms": 100,
     "reference.ramp": 0.1, "reference.vx": 0.5, "reference.wz": 0.2, "planner.N": 10,
-    "planner.T_ini": 4, "identification.phases": 2,
+    "planner.T_ini": 4,
 }  # fmt: skip
 _NONE: Final = {"planner.kind": "none"}
 _SHORT: Final = {"world.seconds": 0.8}
@@ -51,12 +51,12 @@ _TRIALS: Final[tuple[dict[str, Any], ...]] = (
     {"team.robots": 3, "planner.kind": "distributed", "world.push": "all:80:45:0.3:0.2"},
     {
         "team.robots": 2, "planner.kind": "distributed", "planner.compensation": True,
-        "planner.damping": 0.3, "planner.exchanges": 1, "planner.footholds": "planned",
+        "planner.damping": 0.3, "planner.exchanges": 1,
     },
     {
-        "team.robots": 2, "planner.kind": "decentralised", "planner.adaptation": "recursive",
-        "planner.preset": "fast", "identification.predictor": "phase", "world.payload": 4.0,
-        "planner.output_bounds": "soft",
+        "team.robots": 2, "planner.kind": "decentralised", "planner.preset": "fast",
+        "world.payload": 4.0,
+        "planner.output_bounds": "hard", "planner.output_max": (1.0,) * 6,
     },
     _SHORT | {
         "team.robots": 2, "planner.kind": "distributed", "planner.interface": "force",

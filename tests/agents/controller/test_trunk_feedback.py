@@ -19,7 +19,7 @@ from quadriga.agents.controller.trunk_feedback import (
     feedforward,
     trunk_gains,
 )
-from quadriga.shared.config.sections import Config, ControllerConfig, TeamConfig
+from quadriga.shared.config.sections import Config, ControllerConfig
 from quadriga.shared.robot.conventions import GRAVITY, Array
 from tests.a1 import STAND_HEIGHT
 from tests.agents.controller.parts import initial_integrators, rigid, trunk_acceleration, trunk_at
@@ -174,39 +174,6 @@ def test_the_heading_is_integrated_around_the_circle() -> None:
         state, push, _ = trunk_acceleration(state, GAINS, BODY, estimate, task, 0.0, ALL, 1e-3)
     assert state.yaw == pytest.approx(3.2 - 2 * np.pi)
     assert push[5] == pytest.approx(0.2 * CONFIG.kp_yaw + CONFIG.kd_yaw)
-
-
-def follow_course(course: float, speed: float, seconds: float, vx: float = 0.5) -> float:
-    """The desired heading of a robot that moves in one direction whatever its heading, rad."""
-    gains = GAINS._replace(kp_course=0.2)
-    state, task = REST, replace(NOTHING, vx=vx)
-    velocity = speed * np.array([np.cos(course), np.sin(course), 0.0])
-    for _ in range(round(seconds / 0.01)):
-        estimate = turned(standing_pose().estimate, state.yaw)._replace(velocity=velocity)
-        state, _, _ = trunk_acceleration(state, gains, BODY, estimate, task, 0.0, ALL, 0.01)
-    return state.yaw
-
-
-@given(st.floats(-0.15, 0.15), st.floats(0.1, 10.0))
-@settings(deadline=None, max_examples=10)
-def test_the_heading_turns_towards_the_course(course: float, seconds: float) -> None:
-    """The error e obeys de/dt = −kp_course sin e: tan(e/2) decays at that rate."""
-    error = course - follow_course(course, 0.5, seconds)
-    expected = 2.0 * np.arctan(np.tan(course / 2.0) * np.exp(-0.2 * seconds))
-    assert error == pytest.approx(expected, rel=0.01, abs=1e-9)
-
-
-def test_a_robot_follows_its_course_backwards_too_and_no_further_than_a_limit() -> None:
-    assert follow_course(np.pi - 0.1, 0.5, 30.0, vx=-0.5) == pytest.approx(-0.1, abs=1e-3)
-    assert follow_course(np.pi / 2.0, 3.0, 1.0) == pytest.approx(0.2 * 0.2)
-
-
-def test_without_yokes_or_a_speed_there_is_no_course_to_follow() -> None:
-    assert follow_course(0.1, 0.5, 10.0, vx=0.09) == 0.0
-    controller = ControllerConfig(kp_course=0.2)
-    assert trunk_gains(Config(controller=controller)).kp_course == 0.2
-    alone = Config(controller=controller, team=TeamConfig(robots=1))
-    assert trunk_gains(alone).kp_course == 0.0
 
 
 @pytest.mark.parametrize("wz", [-1.0, 1.0])

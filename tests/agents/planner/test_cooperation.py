@@ -12,12 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import linalg
 
-from quadriga.agents.planner.best_response import (
+from quadriga.agents.planner.acceptance import (
     are_same_costs,
     best_response_radius,
     iteration_radius,
     probe_costs,
     radius_limit,
+    run_gates,
 )
 from quadriga.agents.planner.cooperation import (
     cooperative_radius,
@@ -27,7 +28,6 @@ from quadriga.agents.planner.cooperation import (
     relevant_peers,
     team_hessian,
 )
-from quadriga.agents.planner.gates import run_gates
 from quadriga.agents.planner.neighbours import HELD, LOST, SHIFTED, PeerData, PeerSelection
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs

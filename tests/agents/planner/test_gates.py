@@ -13,16 +13,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate, linalg, optimize
 
-from quadriga.agents.planner.best_response import (
+from quadriga.agents.planner.acceptance import (
     are_same_costs,
     best_response_map,
     best_response_radius,
     probe_costs,
+    run_gates,
 )
-from quadriga.agents.planner.gates import height_gains, held_out_error, physical_height, run_gates
 from quadriga.agents.predictor.episode import Y_SCALE
 from quadriga.agents.predictor.fits import fit_ridge
-from quadriga.agents.predictor.gate_report import GateReport
+from quadriga.agents.predictor.gates import (
+    GateReport,
+    height_gains,
+    held_out_error,
+    physical_height,
+)
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
@@ -266,17 +271,9 @@ def test_a_plugin_that_responds_to_plans_is_held_against_the_radius(
         report.check(kind)
 
 
-def test_soft_bounds_leave_the_best_response_as_it_is(plant: Config) -> None:
-    """Their slacks are zero where no bound is active: the map has none."""
-    predictor = coupled(plant, seed=2, strength=1.0)
-    soft = replace(plant, planner=replace(plant.planner, output_bounds="soft"))
-    found, usual = (best_response_map(config, predictor, 20) for config in (soft, plant))
-    np.testing.assert_array_equal(found, usual)
-
-
 def phased(predictor: Predictor, *others: Array) -> Predictor:
     """The predictor with its own G in phase 0 and others in the following ones."""
-    meta = replace(predictor.meta, kind="phase", phases=1 + len(others))
+    meta = replace(predictor.meta, phases=1 + len(others))
     return Predictor(meta, np.concatenate([predictor.G, *others]))
 
 

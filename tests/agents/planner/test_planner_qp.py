@@ -174,7 +174,6 @@ def test_osqp_tells_bounds_that_nothing_keeps_to_from_rounding(bound: float, sta
     empty = np.zeros((0, 3))
     problem = PlannerProblem(
         Condensed(H, empty.T, empty.T, empty, empty),
-        H,
         np.arange(3),
         np.array([np.zeros(3), row]),
         np.concatenate([-nothing, [-np.inf, -np.inf]]),

@@ -21,7 +21,7 @@ def test_the_latest_permitted_plan_is_in_force_until_the_next(
     for tick in range(30 * every):
         if tick % every == 0:
             plans = add_plan(plans, ActivePlan(tick + latency_ms, tick, *plan))
-        gaps += tick >= latency_ms and setpoint_at(plans, tick).v_ref is None
+        gaps += tick >= latency_ms and setpoint_at(plans, tick).y_ref is None
     if gaps:
         with pytest.raises(ConfigError, match=r"planner\.latency_ms"):
             load(None, keys)

@@ -198,7 +198,7 @@ def test_the_planned_speeds_are_handed_on_with_the_plan() -> None:
     walker = Walker()
     outputs = walker.walk(FIRST, slow)
     assert outputs.plan is not None
-    np.testing.assert_array_equal(walker.applied().v_ref, outputs.plan.y[:, 1:3])
+    np.testing.assert_array_equal(walker.applied().y_ref, outputs.plan.y[0])
 
 
 @pytest.mark.parametrize(("excess", "share"), [(1.25, 0.75), (1.5, 0.5), (2.0, 0.0), (3.0, 0.0)])
@@ -212,12 +212,11 @@ def test_the_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for(
     full, faded = Walker(wide).walk(FIRST, y), wary.walk(FIRST, y)
     assert full.plan is not None
     assert faded.plan is not None
-    v_ref = wary.applied().v_ref
-    assert v_ref is not None
-    wish = ON_COURSE[1:3]
-    expected = wish + share * (full.plan.y[:, 1:3] - wish)
-    np.testing.assert_allclose(v_ref, expected, atol=1e-12)
-    assert np.abs(faded.plan.y[:, 1:3] - expected).max() > 1e-3
+    y_ref = wary.applied().y_ref
+    assert y_ref is not None
+    expected = ON_COURSE + share * (full.plan.y[0] - ON_COURSE)
+    np.testing.assert_allclose(y_ref, expected, atol=1e-12)
+    assert np.abs(faded.plan.y[0, 1:3] - expected[1:3]).max() > 1e-3
 
 
 def test_a_fallback_follows_the_speeds_asked_for() -> None:
@@ -227,7 +226,7 @@ def test_a_fallback_follows_the_speeds_asked_for() -> None:
     outputs = walker.walk(FIRST, y)
     assert outputs.plan is not None
     assert outputs.plan.status == "nominal:infeasible"
-    np.testing.assert_array_equal(walker.applied().v_ref, np.tile(ON_COURSE[1:3], (25, 1)))
+    np.testing.assert_array_equal(walker.applied().y_ref, ON_COURSE)
     assert outputs.plan.y[0, 1] < 0.25  # nominal forces alone do not mend it at once
 
 
@@ -249,7 +248,7 @@ def test_a_plan_of_absurd_samples_is_nominal_by_name_and_follows_what_is_asked_f
     np.testing.assert_array_equal(outputs.plan.u, nominal)
     np.testing.assert_array_equal(outputs.plan.y, np.tile(ON_COURSE, (25, 1)))
     assert not walker.applied().deviation.any()
-    np.testing.assert_array_equal(walker.applied().v_ref, np.tile(ON_COURSE[1:3], (25, 1)))
+    np.testing.assert_array_equal(walker.applied().y_ref, ON_COURSE)
 
 
 @pytest.mark.parametrize("absurd", [1e39, 1e300, np.nan])

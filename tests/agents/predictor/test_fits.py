@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from quadriga.agents.planner.gates import held_out_error
 from quadriga.agents.predictor.episode import Y_SCALE, Episode
-from quadriga.agents.predictor.fits import FITS, fit, fit_causal, fit_gamma, fit_phase, fit_ridge
-from quadriga.agents.predictor.hankel import mosaic, split
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.regression import agents_first, scaled_blocks, to_physical
-from quadriga.agents.predictor.ridge import Penalty, solve_ridge
-from quadriga.agents.predictor.team_data import regressions_by_phase, team_regression
+from quadriga.agents.predictor.fits import FITS, fit, fit_ridge
+from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.regression import (
+    Penalty,
+    normal_equations,
+    scaled_blocks,
+    solve_ridge,
+    to_physical,
+)
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robot.conventions import Array
 
 Team = Callable[..., Any]
 T_INI, N = 3, 4
@@ -81,83 +81,12 @@ def random_walk(
     )
 
 
-def relative_error(predictor: Predictor, episode: Episode) -> float:
-    """Largest error of all windows over the largest output, in scaled units."""
-    z, y = episode.windows(T_INI, N)
-    n, _, windows = y.shape
-    error, size = (
-        (array.reshape(n, N, 6, windows) / Y_SCALE[:, None])
-        for array in (predictor.predict(z) - y, y)
-    )
-    return float(np.abs(error).max() / np.abs(size).max())
-
-
-def assert_same(first: Predictor, second: Predictor, atol: float) -> None:
-    """Equal blocks in scaled units."""
-    ours, theirs = (scaled_blocks(p.G, p.meta.layout) for p in (first, second))
-    np.testing.assert_allclose(ours, theirs, atol=atol)
-
-
-@settings(max_examples=6, deadline=None)
-@given(seed=st.integers(0, 2**31), robots=st.integers(1, 3))
-def test_every_fit_reproduces_the_true_response(seed: int, robots: int) -> None:
-    data = [random_walk(robots, 120 + 130 * robots, seed, data=k) for k in (1, 2)]
-    # The fundamental lemma holds of these data: rank = m (T_ini + N) + order.
-    H = mosaic([np.concatenate(episode.scaled_deviations(), axis=1) for episode in data], T_INI + N)
-    assert np.linalg.matrix_rank(H) == 12 * robots * (T_INI + N) + 4 * robots
-    unseen = random_walk(robots, 60, seed, data=3)
-    for kind in [kind for kind in FITS if kind != "periodic"]:  # which shrinks: a test of its own
-        meta = meta_for(
-            robots, kind=kind, ridge=1e-12, block_weight=1.0, phases=4 if kind == "phase" else 1
-        )
-        predictor = fit(data, meta)
-        assert predictor.meta.kind == kind
-        assert relative_error(predictor, unseen) < 1e-8, kind
-
-
-def fit_hankel(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """G = Y_f [U_p; Y_p; U_f]† (eq. 6) as the paper has it; forms the Hankel matrices.
-
-    The independent reference of the other fits; takes minutes where they take seconds.
-    """
-    u, y = zip(*(episode.scaled_deviations() for episode in episodes), strict=True)
-    parts = split(u, y, meta.T_ini, meta.N)
-    Z = np.concatenate([parts.U_p, parts.Y_p, parts.U_f])
-    G = parts.Y_f @ np.linalg.pinv(Z)
-    n, m, p = meta.robots, N_FORCES, N_OUTPUTS
-    past_u, past_y, future_u = np.split(
-        np.arange(len(Z)), [n * m * meta.T_ini, n * (m + p) * meta.T_ini]
-    )
-    columns_of = np.concatenate(
-        [agents_first(x, n, d) for x, d in ((past_u, m), (past_y, p), (future_u, m))], axis=1
-    ).ravel()
-    rows_of = agents_first(np.arange(len(G)), n, p)
-    x = G[rows_of[:, None, :], columns_of[:, None]]
-    plain = replace(meta, kind="pinv", phases=1, ridge=0.0, block_weight=1.0)
-    return Predictor(plain, to_physical(x, meta.layout)[None], float(np.linalg.cond(Z)) ** 2)
-
-
-@pytest.mark.parametrize("robots", [1, 2, 3])
-def test_pseudo_inverse_and_lq_are_that_of_the_explicit_hankel_matrix(robots: int) -> None:
-    data = [random_walk(robots, 300, 5, noise=0.3, data=k) for k in (1, 2)]
-    reference = fit_hankel(data, meta_for(robots))
-    for kind in ("pinv", "gamma"):
-        found = fit(data, meta_for(robots, kind=kind))
-        assert_same(found, reference, 1e-9)
-        assert found.condition == pytest.approx(reference.condition, rel=30)
-
-
-def test_of_many_solutions_the_pseudo_inverse_takes_the_least() -> None:
-    data = [random_walk(1, 300, 6)]
-    found, reference = fit(data, meta_for(1, kind="pinv")), fit_hankel(data, meta_for(1))
-    assert_same(found, reference, 1e-7)
-
-
 @pytest.mark.parametrize(("robots", "weight"), [(1, 160.0), (2, 1.0), (3, 160.0), (5, 1e4)])
 def test_shared_eliminations_solve_what_each_robot_would_alone(robots: int, weight: float) -> None:
     meta = meta_for(robots, block_weight=weight)
     data = [random_walk(robots, 400, 7, noise=0.3)]
-    regression, W = team_regression(data, meta), meta.width
+    signals = [np.concatenate(episode.scaled_deviations(), axis=1) for episode in data]
+    regression, W = normal_equations(signals, meta.layout), meta.width
     x = solve_ridge(regression, meta.layout, Penalty(1e-3, weight)).x
     for i in range(robots):
         penalty = 1e-3 * regression.windows * np.where(np.arange(robots) == i, 1.0, weight**2)
@@ -167,90 +96,10 @@ def test_shared_eliminations_solve_what_each_robot_would_alone(robots: int, weig
         np.testing.assert_allclose(x[i], direct, atol=1e-10)
 
 
-def test_the_causal_fit_lets_no_force_act_before_its_time() -> None:
-    data = [random_walk(2, 400, 8, noise=0.3)]
-    meta = meta_for(2, ridge=1e-2, block_weight=5.0)
-    causal, free = fit_causal(data, meta), fit_ridge(data, meta)
-    for i in range(2):
-        for j in range(2):
-            forced = causal.future_block(i, j).reshape(N, 6, N, 12)
-            for t in range(N):
-                assert not forced[t, :, t + 1 :].any()
-                assert forced[t, :, t].any()  # direct feedthrough
-            assert free.future_block(i, j).reshape(N, 6, N, 12)[0, :, 1:].any()
-
-
-def test_each_sample_of_the_causal_fit_is_its_own_regression() -> None:
-    """Sample t from explicit windows without the forces after it, penalised alike."""
-    data = random_walk(2, 400, 8, noise=0.3)
-    meta = meta_for(2, ridge=1e-2, block_weight=5.0)
-    blocks = scaled_blocks(fit_causal([data], meta).G, meta.layout)[0]
-    raw, y = data.windows(T_INI, N)
-    z_scale = np.r_[np.full(36, 10.0), np.tile(Y_SCALE, T_INI), np.full(48, 10.0)]
-    z = raw / z_scale[:, None]
-    for t in (0, 2):
-        kept = meta.past + 12 * (t + 1)
-        Z = z[:, :kept].reshape(2 * kept, -1)
-        Y = y[1, 6 * t : 6 * t + 6] / Y_SCALE[:, None]
-        penalty = 1e-2 * Z.shape[1] * np.repeat([25.0, 1.0], kept)
-        own = np.linalg.solve(Z @ Z.T + np.diag(penalty), Z @ Y.T).T.reshape(6, 2, kept)
-        for j in range(2):
-            np.testing.assert_allclose(
-                blocks[1, j, 6 * t : 6 * t + 6, :kept], own[:, j], atol=1e-10
-            )
-
-
-def test_the_regressions_of_all_phases_add_up_to_the_whole() -> None:
-    data = [random_walk(1, T, 9, noise=0.1, data=T) for T in (300, 6, 7, 90)]
-    data = [replace(e, first_tick=310 + 70 * k) for k, e in enumerate(data)]
-    for phases in (1, 3, 10, 40):
-        meta = meta_for(1, kind="phase", phases=phases)
-        parts = list(regressions_by_phase(data[:1] + data[2:], meta))
-        whole = team_regression(data[:1] + data[2:], meta)
-        assert len(parts) == phases
-        assert sum(part.windows for part in parts) == whole.windows
-        np.testing.assert_allclose(sum(part.zz for part in parts), whole.zz, atol=1e-9)
-        np.testing.assert_allclose(sum(part.zy for part in parts), whole.zy, atol=1e-9)
-
-
-def test_the_regression_of_a_phase_is_of_the_windows_that_end_their_past_in_it() -> None:
-    data = replace(random_walk(1, 200, 10, noise=0.1), first_tick=350)
-    meta = meta_for(1, kind="phase", phases=4)  # 100 ms each
-    z, _ = data.windows(T_INI, N)
-    z = z[0] / np.r_[np.full(36, 10.0), np.tile(Y_SCALE, T_INI), np.full(48, 10.0)][:, None]
-    ends = 350 + 10 * (T_INI - 1 + np.arange(z.shape[1]))
-    for phase, part in enumerate(regressions_by_phase([data], meta)):
-        mine = z[:, (ends - 300) % 400 // 100 == phase]
-        assert part.windows == mine.shape[1]
-        np.testing.assert_allclose(part.zz, mine @ mine.T, atol=1e-9)
-
-
-def test_a_periodic_plant_is_predicted_better_phase_by_phase() -> None:
-    """Forces that act three times as much in one half of the gait as in the other."""
-
-    def trot(k: int, B: Array) -> Array:
-        return B * (1.5 if (110 + 10 * k) % 400 < 200 else 0.5)
-
-    data = [random_walk(1, 4000, 11, B=trot, data=1, noise=0.01)]
-    unseen = [random_walk(1, 400, 11, B=trot, data=2, noise=0.01)]
-    meta = meta_for(1, kind="phase", phases=10, phase_ridge=1e-3)
-    pooled, phased = fit_ridge(data, meta), fit_phase(data, meta)
-    assert phased.G.shape == (10, *pooled.G.shape[1:])
-    errors = [held_out_error(p, unseen)[3] for p in (pooled, phased)]
-    assert errors[1] < 0.5 * errors[0]
-
-
-def test_phases_that_may_not_depart_are_the_pooled_fit() -> None:
-    data = [random_walk(2, 500, 12, noise=0.3)]
-    meta = meta_for(2, kind="phase", phases=4, phase_ridge=1e9)
-    pooled, phased = fit_ridge(data, meta), fit_phase(data, meta)
-    np.testing.assert_allclose(phased.G, np.repeat(pooled.G, 4, axis=0), atol=1e-7)
-
-
 @pytest.mark.parametrize("kind", FITS)
 def test_robots_that_are_not_yoked_are_uncoupled_if_asked(kind: str) -> None:
     data = [random_walk(3, 500, 13, noise=0.1)]
-    whole = meta_for(3, kind=kind, phases=2 if kind == "phase" else 1, block_weight=2.0)
+    whole = meta_for(3, kind=kind, block_weight=2.0)
     yoked = fit(data, replace(whole, yokes="chain", neighbours="yoked"))
     for i in range(3):
         for j in range(3):
@@ -276,15 +125,10 @@ def test_a_robot_without_strangers_is_fitted_as_if_alone_with_its_neighbours() -
         np.testing.assert_allclose(chain.block(1, j), three.block(1, j), atol=1e-10)
 
 
-def test_forces_that_do_not_excite_are_refused_where_the_fit_needs_them() -> None:
+def test_forces_that_do_not_excite_are_refused_without_a_penalty() -> None:
     data = random_walk(1, 400, 15, noise=0.1)
     dead = data.u.copy()
     dead[:, 0, 5] = 0.0
-    with pytest.raises(PredictorError, match="inputs that excite every direction"):
-        fit_gamma([replace(data, u=dead)], meta_for(1))
-    few = [random_walk(1, 60, 15, noise=0.1)]  # fewer windows than rows
-    with pytest.raises(PredictorError, match="inputs that excite every direction"):
-        fit_gamma(few, meta_for(1))
     with pytest.raises(PredictorError, match=r"a larger ridge \(identification\.ridge\)"):
         fit_ridge([replace(data, u=dead)], meta_for(1, ridge=0.0))
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.agents.predictor.excitation import excitation
 from quadriga.agents.predictor.hankel import columns, gram, hankel, mosaic, required_samples, split
+from quadriga.agents.predictor.regression import excitation
 
 SEED = st.integers(0, 2**32 - 1)
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from quadriga.agents.predictor.fits import fit_periodic
 from quadriga.agents.predictor.measured_response import (
     PulseResponses,
     check_measured_plant,
@@ -20,7 +21,6 @@ from quadriga.agents.predictor.measured_response import (
     team_of,
     write_pulse_responses,
 )
-from quadriga.agents.predictor.periodic import fit_periodic
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.experiments.probe.pulses import pulse_forces

@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.planner.gates import coupling_table, held_out_error, run_gates
-from quadriga.agents.predictor.episode import Y_SCALE, Episode
-from quadriga.agents.predictor.fits import fit
-from quadriga.agents.predictor.periodic import fit_periodic
-from quadriga.agents.predictor.periodic_basis import phase_angles, wrench_map
-from quadriga.agents.predictor.periodic_predictor import PeriodicPredictor
-from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.planner.acceptance import run_gates
+from quadriga.agents.predictor.episode import Y_SCALE, Episode, wrench_map
+from quadriga.agents.predictor.fits import fit, fit_periodic, phase_angles
+from quadriga.agents.predictor.gates import coupling_table, held_out_error
+from quadriga.agents.predictor.periodic import PeriodicFactors
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, predictor_sha256, read, save, versions
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
@@ -95,7 +94,7 @@ def true_block(team: Trotters, meta: PredictorMeta, i: int, j: int, phase: int) 
     return truth
 
 
-def found_block(predictor: PeriodicPredictor, i: int, j: int, phase: int) -> Array:
+def found_block(predictor: Predictor, i: int, j: int, phase: int) -> Array:
     """The same of a predictor."""
     scaled = predictor.future_block(i, j, phase) / np.tile(Y_SCALE, N)[:, None]
     found: Array = scaled * stance_columns_of(j, phase)
@@ -121,20 +120,18 @@ def chain() -> Trotters:
 
 
 @pytest.fixture(scope="module")
-def fitted(chain: Trotters) -> PeriodicPredictor:
+def fitted(chain: Trotters) -> Predictor:
     return fit_periodic([chain.episode(seed, 4000) for seed in (1, 2)], meta_of(3))
 
 
 @pytest.fixture
-def provenance(chain: Trotters, fitted: PeriodicPredictor) -> Provenance:
+def provenance(chain: Trotters, fitted: Predictor) -> Provenance:
     config = replace(CONFIG, team=replace(CONFIG.team, robots=3))
     gates = run_gates(config, fitted, [chain.episode(8, 100)])
     return Provenance("abc", (1,), (4000,), (100,), versions(), gates)
 
 
-def test_the_response_at_every_phase_is_the_true_one(
-    chain: Trotters, fitted: PeriodicPredictor
-) -> None:
+def test_the_response_at_every_phase_is_the_true_one(chain: Trotters, fitted: Predictor) -> None:
     for i, j in ((0, 0), (1, 1), (2, 2), *chain.coupled):
         truth = [true_block(chain, fitted.meta, i, j, phase) for phase in range(0, 40, 4)]
         found = [found_block(fitted, i, j, phase) for phase in range(0, 40, 4)]
@@ -142,9 +139,7 @@ def test_the_response_at_every_phase_is_the_true_one(
         assert error < (0.12 if i == j else 0.25)
 
 
-def test_peers_that_have_no_effect_have_exactly_none(
-    chain: Trotters, fitted: PeriodicPredictor
-) -> None:
+def test_peers_that_have_no_effect_have_exactly_none(chain: Trotters, fitted: Predictor) -> None:
     for i in range(3):
         for j in range(3):
             block = fitted.future_block(i, j, 7).reshape(N, 6, -1)
@@ -157,7 +152,7 @@ def test_peers_that_have_no_effect_have_exactly_none(
                 assert not has_effect.any()
 
 
-def test_no_force_acts_backwards(fitted: PeriodicPredictor) -> None:
+def test_no_force_acts_backwards(fitted: Predictor) -> None:
     for phase in (0, 13):
         block = fitted.future_block(1, 0, phase).reshape(N, 6, N, 12)
         for t in range(N):
@@ -165,9 +160,7 @@ def test_no_force_acts_backwards(fitted: PeriodicPredictor) -> None:
         assert block[N - 1, :, 0].any()
 
 
-def test_held_out_data_are_predicted_up_to_their_noise(
-    chain: Trotters, fitted: PeriodicPredictor
-) -> None:
+def test_held_out_data_are_predicted_up_to_their_noise(chain: Trotters, fitted: Predictor) -> None:
     exact = chain.episode(9, 600, noise=0.0)
     _, rmse, _, _ = held_out_error(fitted, [exact])
     forgetful = np.sqrt(np.mean(exact.y**2, axis=(0, 1)))
@@ -193,7 +186,7 @@ def test_strangers_are_left_out_if_only_yoked_robots_count() -> None:
             assert predictor.block(i, j, 3).any() == (abs(i - j) <= 1)
 
 
-def test_blocks_rows_and_the_whole_of_G_are_the_same(fitted: PeriodicPredictor) -> None:
+def test_blocks_rows_and_the_whole_of_G_are_the_same(fitted: Predictor) -> None:
     G = fitted.G
     assert G.shape == (40, 3, 3, 6 * N, fitted.meta.width)
     z = np.random.default_rng(0).normal(size=(3, fitted.meta.width))
@@ -216,25 +209,23 @@ def test_a_fit_is_repeated_to_the_last_bit(chain: Trotters) -> None:
     assert predictor_sha256(first) == predictor_sha256(second)
 
 
-def test_what_is_saved_is_read(
-    tmp_path: Path, fitted: PeriodicPredictor, provenance: Provenance
-) -> None:
+def test_what_is_saved_is_read(tmp_path: Path, fitted: Predictor, provenance: Provenance) -> None:
     digest = save(tmp_path / "periodic.npz", fitted, provenance)
     again, _ = read(tmp_path / "periodic.npz")
-    assert isinstance(again, PeriodicPredictor)
+    assert isinstance(again.parts, PeriodicFactors)
     assert predictor_sha256(again) == digest
     np.testing.assert_array_equal(again.block(1, 2, 17), fitted.block(1, 2, 17))
 
 
-def test_another_process_gets_the_same(fitted: PeriodicPredictor) -> None:
+def test_another_process_gets_the_same(fitted: Predictor) -> None:
     again = pickle.loads(pickle.dumps(fitted))
     assert predictor_sha256(again) == predictor_sha256(fitted)
     assert again.condition == fitted.condition
 
 
-def test_factors_of_another_team_are_refused(fitted: PeriodicPredictor) -> None:
+def test_factors_of_another_team_are_refused(fitted: Predictor) -> None:
     with pytest.raises(PredictorError, match=r"predictor\.response: got shape"):
-        PeriodicPredictor(meta_of(2), fitted.factors)
+        Predictor(meta_of(2), fitted.parts)
 
 
 def test_data_too_few_to_be_divided_are_refused() -> None:

@@ -9,17 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.periodic_basis import (
-    N_WRENCH,
-    harmonics,
-    phase_angles,
-    polynomials,
-    wrench_map,
-)
-from quadriga.agents.predictor.periodic_data import scale_episodes
-from quadriga.agents.predictor.periodic_response import spread_over_samples
-from quadriga.agents.predictor.periodic_shrinkage import shrink
+from quadriga.agents.predictor.episode import N_WRENCH, Episode, wrench_map
+from quadriga.agents.predictor.fits import phase_angles, scale_episodes
+from quadriga.agents.predictor.periodic import harmonics, polynomials, shrink, spread_over_samples
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.time_grid import gait_phase
 from quadriga.shared.config.sections import Config
@@ -117,10 +109,10 @@ def test_noise_is_no_effect_of_peers_and_what_is_clear_is_left_as_it_is(seed: in
     truth[:, :, 0, :, 1, 2] = 0.5 * random.normal(size=(5, 6, N_WRENCH))  # robot 1, output vy
     folds = truth + 0.02 * random.normal(size=(F, *shape))
     estimate = folds.mean(axis=0)
-    tested = shrink(estimate, (F * estimate - folds) / (F - 1))
+    response, kept = shrink(estimate, (F * estimate - folds) / (F - 1))
     expected = np.zeros((n, n, 6), dtype=bool)
     expected[range(n), range(n)] = True
     expected[1, 0, 2] = True
-    np.testing.assert_array_equal(tested.kept, expected)
-    assert np.linalg.norm(tested.response - truth) < 0.05 * np.linalg.norm(truth)
-    assert not tested.response[:, :, 1, :, 0].any()
+    np.testing.assert_array_equal(kept, expected)
+    assert np.linalg.norm(response - truth) < 0.05 * np.linalg.norm(truth)
+    assert not response[:, :, 1, :, 0].any()

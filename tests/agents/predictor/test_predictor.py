@@ -9,43 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
+from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Layout, everyone, scales
 from quadriga.agents.predictor.fits import fit_pinv, fit_ridge
 from quadriga.agents.predictor.hankel import split
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
+from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.shared.config.sections import Config, TeamConfig
 
 Team = Callable[..., Any]
 
 
 def meta_of(config: Config, **changes: Any) -> PredictorMeta:
     return replace(PredictorMeta.of(config), **changes)
-
-
-def unseen(team: Any, meta: PredictorMeta) -> tuple[Array, Array]:
-    """Windows of a trajectory that no fit has seen: z and the true answer."""
-    z, y = team.episode(60, seed=99).windows(meta.T_ini, meta.N)
-    return z, y
-
-
-def scaled_error(predictor: Predictor, z: Array, y: Array) -> float:
-    error = (predictor.predict(z) - y).reshape(len(y), predictor.meta.N, 6, -1)
-    return float(np.abs(error / Y_SCALE[:, None]).max())
-
-
-def test_the_pseudo_inverse_reproduces_the_true_response(small: Config, linear_team: Team) -> None:
-    team = linear_team(2)
-    predictor = fit_pinv([team.episode(900, 1), team.episode(500, 2)], meta_of(small))
-    assert scaled_error(predictor, *unseen(team, predictor.meta)) < 1e-8
-
-
-def test_a_tiny_ridge_reproduces_the_true_response(small: Config, linear_team: Team) -> None:
-    team = linear_team(2)
-    meta = meta_of(small, ridge=1e-10, block_weight=1.0)
-    predictor = fit_ridge([team.episode(900, 1), team.episode(500, 2)], meta)
-    assert scaled_error(predictor, *unseen(team, meta)) < 1e-6
 
 
 def test_the_response_to_a_pulse_is_the_plants(small: Config, linear_team: Team) -> None:
@@ -107,19 +81,6 @@ def test_block_weighted_ridge_solves_its_normal_equations(small: Config, linear_
             np.testing.assert_allclose(residual @ Z[j].T, penalty * rows[j], atol=1e-7)
 
 
-def test_block_weight_weakens_the_coupling_it_penalises(small: Config, linear_team: Team) -> None:
-    team = linear_team(2)
-    data = [team.episode(600, 5, noise=0.5)]
-    plain = fit_ridge(data, meta_of(small, block_weight=1.0))
-    weighted = fit_ridge(data, meta_of(small, block_weight=50.0))
-    assert np.linalg.norm(weighted.future_block(0, 1)) < 0.5 * np.linalg.norm(
-        plain.future_block(0, 1)
-    )
-    assert np.linalg.norm(weighted.future_block(0, 0)) > 0.8 * np.linalg.norm(
-        plain.future_block(0, 0)
-    )
-
-
 def test_fits_are_reproducible_and_read_only(small: Config, linear_team: Team) -> None:
     data = [linear_team(2).episode(300, 6, noise=0.3)]
     first, second = (fit_ridge(data, meta_of(small)) for _ in range(2))
@@ -128,16 +89,43 @@ def test_fits_are_reproducible_and_read_only(small: Config, linear_team: Team) -
         first.block(0, 1)[0, 0] = 1.0
 
 
-def test_data_that_cannot_be_fitted_are_refused_by_name(small: Config, linear_team: Team) -> None:
-    good = linear_team(2).episode(300, 7)
-    with pytest.raises(PredictorError, match="at least one"):
-        fit_ridge([], meta_of(small))
-    with pytest.raises(PredictorError, match=r"got 2 robots, expected 3 \(data of another team\)"):
-        fit_ridge([good], meta_of(small, robots=3))
-    short = Episode(good.u[:11], good.u_nominal[:11], good.y[:11], good.y_base[:11], 0)
-    with pytest.raises(PredictorError, match="got 11 samples, expected at least 12"):
-        fit_ridge([short], meta_of(small))
-    with pytest.raises(PredictorError, match=r"episode\.y: got NaN"):
-        replace(good, y=good.y * np.nan)
-    with pytest.raises(PredictorError, match=r"episode\.y_base: got shape"):
-        replace(good, y_base=good.y_base[:-1])
+TEAM = PredictorMeta.of(Config(team=TeamConfig(robots=4)))
+
+
+@pytest.mark.parametrize(
+    ("yokes", "neighbours", "members"),
+    [
+        ("chain", "all", everyone(4)),
+        ("complete", "yoked", everyone(4)),
+        ("chain", "yoked", ((0, 1), (0, 1, 2), (1, 2, 3), (2, 3))),
+        ("ring", "yoked", ((0, 1, 3), (0, 1, 2), (1, 2, 3), (0, 2, 3))),
+        ("none", "yoked", ((0,), (1,), (2,), (3,))),
+    ],
+)
+def test_members_are_the_robot_itself_and_whoever_explains_it(
+    yokes: str, neighbours: str, members: tuple[tuple[int, ...], ...]
+) -> None:
+    layout = replace(TEAM, yokes=yokes, neighbours=neighbours).layout
+    assert layout.members == members
+    assert layout.strangers(0) == [j for j in range(4) if j not in members[0]]
+
+
+def test_sizes_and_scales_are_the_team_s() -> None:
+    layout = TEAM.layout
+    assert (layout.agents, layout.width, layout.past) == (4, TEAM.width, TEAM.past)
+    assert layout.rows == 6 * TEAM.N
+    z_scale, y_scale = scales(layout)
+    np.testing.assert_array_equal(z_scale[: 12 * TEAM.T_ini], U_SCALE)
+    np.testing.assert_array_equal(
+        z_scale[12 * TEAM.T_ini : TEAM.past], np.tile(Y_SCALE, TEAM.T_ini)
+    )
+    np.testing.assert_array_equal(z_scale[TEAM.past :], U_SCALE)
+    np.testing.assert_array_equal(y_scale, np.tile(Y_SCALE, TEAM.N))
+
+
+def test_the_scales_of_any_plant_repeat_for_every_sample() -> None:
+    layout = Layout(1, 2, 1, 2, 3, (1.0, 10.0), (5.0,), everyone(1))
+    z_scale, y_scale = scales(layout)
+    assert z_scale.tolist() == [1, 10, 1, 10, 5, 5, 1, 10, 1, 10, 1, 10]
+    assert y_scale.tolist() == [5, 5, 5]
+    assert (layout.past, layout.width, layout.rows) == (6, 12, 3)

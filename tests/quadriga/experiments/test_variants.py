@@ -41,19 +41,19 @@ def test_every_fit_there_is_can_be_compared() -> None:
 def test_every_planner_walks_with_every_predictor_and_nobody_with_none() -> None:
     variants = parse_variants(["none,damped,mine:planner.N=20"], None)
     assert combine_with_predictors(variants, ()) == variants
-    found = combine_with_predictors(variants, ("arx", "plain"))
+    found = combine_with_predictors(variants, ("pinv", "plain"))
     assert [variant.name for variant in found] == [
         "none",
-        "damped+arx",
+        "damped+pinv",
         "damped+plain",
-        "mine+arx",
+        "mine+pinv",
         "mine+plain",
     ]
     assert found[0].keys == PLANNERS["none"]
     assert found[2].keys == {**PLANNERS["damped"], **PREDICTORS["plain"]}
     for names, message in (
         (("?",), r"--predictors: got '\?', .*ridge.*paper"),
-        (("arx",) * 2, "each"),
+        (("pinv",) * 2, "each"),
     ):
         with pytest.raises(ConfigError, match=message):
             combine_with_predictors(variants, names)
@@ -114,5 +114,5 @@ def test_a_controller_of_ones_own_has_no_predictor() -> None:
     mine = "mine:team.controller=python walk.py --fast"
     variants = parse_variants([f"damped,{mine}"], None)
     assert dict(variants[1].keys) == {"team.controller": "python walk.py --fast"}
-    found = combine_with_predictors(variants, ("arx",))
-    assert [variant.name for variant in found] == ["damped+arx", "mine"]
+    found = combine_with_predictors(variants, ("pinv",))
+    assert [variant.name for variant in found] == ["damped+pinv", "mine"]

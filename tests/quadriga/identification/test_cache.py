@@ -38,8 +38,6 @@ FITTED = {
         "preset",
         "predictor",
         "neighbours",
-        "phases",
-        "phase_ridge",
         "ridge",
         "block_weight",
         "max_radius",

@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.hankel import required_samples
 from quadriga.identification import collect as module
-from quadriga.identification.collect import build_dataset, collect, collect_episode
-from quadriga.identification.collection_plan import (
+from quadriga.identification.collect import (
     PlannedEpisode,
+    build_dataset,
+    collect,
+    collect_episode,
     collection_config,
     collection_seconds,
     plan_episodes,

@@ -6,20 +6,31 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
-from quadriga.agents.planner.gates import held_out_error
 from quadriga.agents.predictor.fits import FITS
 from quadriga.agents.predictor.fits import fit as fit_predictor
+from quadriga.agents.predictor.gates import held_out_error
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.predictor.store import read
 from quadriga.commands.parser import main
+from quadriga.identification import fit_report
 from quadriga.identification.cache import predictor_path
-from quadriga.identification.fit import report_fit
-from quadriga.identification.fit_report import FitReport, Unfit, horizon_errors
-from quadriga.identification.fit_tables import build_comparison, build_report_tables
+from quadriga.identification.fit_report import (
+    FitReport,
+    HorizonErrors,
+    Unfit,
+    build_comparison,
+    build_report_tables,
+    horizon_errors,
+    report_fit,
+)
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import OUTPUTS
 from tests.quadriga.linear_data import arguments, config_of, dataset, put_data
@@ -36,7 +47,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder
 
 
-@pytest.mark.parametrize("kind", ["ridge", "phase"])
+@pytest.mark.parametrize("kind", ["ridge", "periodic"])
 def test_errors_over_the_horizon_make_up_the_error_of_the_gates(kind: str) -> None:
     data, config = dataset(), config_of(identification__predictor=kind)
     predictor = fit_predictor(data.training, PredictorMeta.of(config))
@@ -141,11 +152,11 @@ def test_every_predictor_is_compared_and_the_refused_ones_are_not_hidden(capsys:
 def test_what_cannot_be_fitted_at_all_is_a_row_with_the_reason() -> None:
     report = report_fit(config_of(), dataset(), "ridge")
     assert isinstance(report, FitReport)
-    singular = Unfit("arx", PredictorError("normal equations", "a pivot of 0", "positive"))
+    singular = Unfit("pinv", PredictorError("normal equations", "a pivot of 0", "positive"))
     table = build_comparison([report, singular])
     assert all(len(row) == len(table.columns) for row in table.rows)
-    assert (table.rows[1][0], table.rows[1][-1]) == ("arx", "no fit")
-    assert "arx: refused: normal equations a pivot of 0, not positive." in table.notes
+    assert (table.rows[1][0], table.rows[1][-1]) == ("pinv", "no fit")
+    assert "pinv: refused: normal equations a pivot of 0, not positive." in table.notes
     for sheet in build_report_tables(report, whole=True):
         assert all(len(row) == len(sheet.columns) for row in sheet.rows)
 
@@ -155,3 +166,22 @@ def test_data_that_do_not_excite_are_an_error_not_a_report() -> None:
     still = tuple(replace(episode, u=episode.u_nominal.copy()) for episode in data.training)
     with pytest.raises(PredictorError, match="persistently exciting"):
         report_fit(config_of(identification__ridge=2e-6), replace(data, training=still), "ridge")
+
+
+def test_degrees_stand_beside_milliradians(monkeypatch: pytest.MonkeyPatch) -> None:
+    errors = HorizonErrors(np.full((5, 6), 0.02), np.full((5, 6), np.deg2rad(2.0)))
+    report = cast(FitReport, SimpleNamespace(name="ridge", refused=None, horizon=errors))
+    drawn = list[Figure]()
+    monkeypatch.setattr(fit_report, "save_png", lambda figure, _path: drawn.append(figure))
+    fit_report.draw([report], Path("fit.png"))
+    (figure,) = drawn
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+
+    def beside(axes: Any) -> list[str]:
+        return [label.get_text() for other in axes.child_axes for label in other.get_yticklabels()]
+
+    by_name = dict(zip(OUTPUTS, map(beside, figure.axes), strict=True))
+    assert not by_name["z"] + by_name["vx"] + by_name["vy"]
+    for name, sign in (("roll", "°"), ("pitch", "°"), ("wz", "°/s")):
+        assert f"2{sign}" in by_name[name]

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.planner.acceptance import load_checked
 from quadriga.agents.predictor.episode import SIGNALS
 from quadriga.agents.predictor.hankel import required_samples
 from quadriga.agents.predictor.store import read

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.planner.acceptance import load_checked
 from quadriga.recordings.gaps import missing_ticks, repeated_ticks
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config

@@ -12,7 +12,7 @@ from rich.console import Console
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
 from quadriga.agents.inbox.intake_log import Intake
-from quadriga.agents.predictor.gate_report import GateReport
+from quadriga.agents.predictor.gates import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import Provenance, predictor_sha256, save
 from quadriga.commands.parser import main

@@ -34,7 +34,7 @@ def config_of(robots: int) -> Config:
 
 def predictor_of(config: Config, phases: int = 1, seed: int = 0) -> Predictor:
     """A predictor of no physics at all."""
-    meta = replace(PredictorMeta.of(config), kind="phase", phases=phases)
+    meta = replace(PredictorMeta.of(config), phases=phases)
     n = config.team.robots
     random = np.random.default_rng(seed)
     return Predictor(meta, random.normal(size=(phases, n, n, 6 * N, meta.width)))
@@ -86,7 +86,7 @@ def test_a_wrong_phase_is_an_error() -> None:
     config = config_of(2)
     truth = truth_of(config, predictor_of(config, 2))
     swapped = predictor_of(config, 2)
-    swapped = replace(swapped, G=swapped.G[::-1].copy())
+    swapped = replace(swapped, parts=swapped.G[::-1].copy())
     figures = compare(truth.y, predict_responses(truth, swapped, config.gait)).overall
     assert min(value or 0.0 for value in figures["own_error"].values()) > 1.0
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.planner.acceptance import load_checked
 from quadriga.experiments.trial.figures_of_merit import Figures, compute_figures
 from quadriga.experiments.trial.in_process import build_timed_agents, roll_out
 from quadriga.experiments.trial.over_bus import walk_over_bus

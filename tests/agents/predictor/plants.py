@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from quadriga.data_driven import Data, LinearPlant
+from quadriga.agents.predictor.four_tank import LinearPlant
+from quadriga.agents.predictor.plant import Data
 from quadriga.shared.robot.conventions import Array
 
 

@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from quadriga.agents.planner import planner_qp
-from quadriga.agents.planner.checked_predictor import load_checked
+from quadriga.agents.planner.acceptance import load_checked
 from quadriga.agents.planner.planner_qp import Condensed
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.predictor.store import Provenance, save
+from quadriga.agents.predictor.store import Provenance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
@@ -106,16 +106,3 @@ def test_a_new_key_of_the_cost_is_gated_anew(
     assert (after.Q, after.R) == (before.Q, before.R)
     alone = replace(smooth, planner=replace(smooth.planner, kind="decentralised"))
     assert load_checked(stored, alone)[1].gates == before, "nobody answers anybody's plans"
-
-
-def test_a_file_without_probes_was_made_of_q_and_r_alone(
-    tmp_path: Path, plant: Config, fitted: tuple[Predictor, Provenance]
-) -> None:
-    """As earlier versions wrote it; that its radius is not computed again shows in its value."""
-    predictor, provenance = fitted
-    path = tmp_path / "old.npz"
-    old = replace(provenance.gates, cost_probes=(), radius=0.125)
-    save(path, predictor, replace(provenance, gates=old))
-    assert load_checked(path, plant)[1].gates == old
-    dear = replace(plant, planner=replace(plant.planner, R=(2.0, 2.0, 2.0)))
-    assert load_checked(path, dear)[1].gates.radius != 0.125

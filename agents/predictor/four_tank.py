@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.data_driven.plan import PlanWeights
-from quadriga.data_driven.trajectories import Data
+from quadriga.agents.predictor.control import PlanWeights
+from quadriga.agents.predictor.plant import Data
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
 

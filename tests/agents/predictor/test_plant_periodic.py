@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quadriga.data_driven import Data, DataDrivenController, PlanWeights, fit, judge
+from quadriga.agents.predictor.control import DataDrivenController, PlanWeights
+from quadriga.agents.predictor.plant import Data, fit, judge
 from quadriga.shared.robot.conventions import Array
 
 PERIOD, PAST, HORIZON, FORGETS = 20, 3, 6, 0.8

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from quadriga.data_driven import (
+from quadriga.agents.predictor.control import (
+    BoundedQp,
     DataDrivenController,
     Deepc,
-    FourTank,
     PlanBounds,
     PlanWeights,
-    fit,
-    four_tank,
 )
+from quadriga.agents.predictor.four_tank import FourTank, four_tank
+from quadriga.agents.predictor.plant import fit
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
-from tests.quadriga.data_driven.plants import Sizes, random_plant, record, split_window
+from tests.agents.predictor.plants import Sizes, random_plant, record, split_window
 
 
 def test_without_bounds_it_is_the_closed_form_of_equation_7() -> None:
@@ -59,7 +61,7 @@ def drive(
 
 def test_the_four_tanks_reach_their_levels() -> None:
     for build in (
-        lambda e: DataDrivenController(fit(e.data, "spc", e.past, e.horizon), e.weights),
+        lambda e: DataDrivenController(fit(e.data, "pinv", e.past, e.horizon), e.weights),
         lambda e: Deepc(e.data, e.past, e.horizon, e.weights),
     ):
         example = four_tank()
@@ -71,7 +73,7 @@ def test_the_four_tanks_reach_their_levels() -> None:
 def test_inputs_and_outputs_stay_within_their_bounds() -> None:
     bounds = PlanBounds(u_min=[-0.5, 0.2], u_max=1.4, y_max=[0.6, np.inf])
     example = four_tank()
-    predictor = fit(example.data, "spc", example.past, example.horizon)
+    predictor = fit(example.data, "pinv", example.past, example.horizon)
     u, y = drive(example, DataDrivenController(predictor, example.weights, bounds), 60)
     assert (u >= np.array([-0.5, 0.2]) - 1e-7).all()
     assert u.max() == pytest.approx(1.4, abs=1e-7)
@@ -81,7 +83,7 @@ def test_inputs_and_outputs_stay_within_their_bounds() -> None:
 
 def test_bounds_that_nothing_keeps_are_one_clear_error() -> None:
     example = four_tank()
-    predictor = fit(example.data, "spc", example.past, example.horizon)
+    predictor = fit(example.data, "pinv", example.past, example.horizon)
     bounds = PlanBounds(u_min=-0.1, u_max=0.1, y_min=[5.0, -np.inf])
     controller = DataDrivenController(predictor, example.weights, bounds)
     past = np.zeros((4, 2)), np.zeros((4, 2))
@@ -99,3 +101,28 @@ def test_a_plan_does_not_depend_on_the_plans_before_it() -> None:
     first = [controller.plan(*past, example.reference).u for past in pasts]
     again = [controller.plan(*past, example.reference).u for past in reversed(pasts)]
     np.testing.assert_array_equal(first, again[::-1])
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10_000), k=st.integers(1, 8), reach=st.floats(0.01, 2.0))
+def test_a_separable_problem_is_cut_off_at_its_bounds(seed: int, k: int, reach: float) -> None:
+    rng = np.random.default_rng(seed)
+    H, f = np.diag(rng.uniform(0.5, 2.0, k)), rng.normal(size=k)
+    qp = BoundedQp(H, np.zeros((0, k)))
+    x, residual = qp.solve(f, np.full(k, -reach), np.full(k, 0.5 * reach))
+    np.testing.assert_allclose(x, np.clip(-f / H.diagonal(), -reach, 0.5 * reach), atol=1e-9)
+    assert residual < 1e-8
+
+
+def test_the_nearest_point_of_a_half_plane() -> None:
+    qp, free = BoundedQp(np.eye(2), np.array([[1.0, 1.0]])), np.full(2, np.inf)
+    x, _ = qp.solve(np.zeros(2), np.append(-free, 2.0), np.append(free, np.inf))
+    np.testing.assert_allclose(x, [1.0, 1.0], atol=1e-9)
+
+
+def test_problems_without_an_answer_are_errors() -> None:
+    with pytest.raises(PredictorError, match="orders of magnitude apart"):
+        BoundedQp(np.diag([1.0, -1.0]), np.zeros((0, 2)))
+    qp = BoundedQp(np.eye(1), np.ones((1, 1)))
+    with pytest.raises(PredictorError, match="no solution"):
+        qp.solve(np.zeros(1), np.array([-1.0, 2.0]), np.array([1.0, 3.0]))

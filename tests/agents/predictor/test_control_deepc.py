@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import daqp
@@ -12,21 +13,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.agents.planner.deepc_qp import DeepcWeights, eliminate
-from quadriga.agents.predictor.deepc import reduce_signals
-from quadriga.data_driven import (
-    Data,
+from quadriga.agents.predictor.control import (
     DataDrivenController,
     DataDrivenPlan,
     Deepc,
     PlanBounds,
     PlanWeights,
-    fit,
-    four_tank,
-    hankel,
 )
+from quadriga.agents.predictor.deepc import reduce, reduce_signals
+from quadriga.agents.predictor.four_tank import four_tank
+from quadriga.agents.predictor.hankel import mosaic
+from quadriga.agents.predictor.plant import Data, fit
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robot.conventions import Array
-from tests.quadriga.data_driven.plants import Sizes, random_plant, record
+from tests.agents.predictor.plants import Sizes, random_plant, record
 
 PAST, HORIZON = 2, 3
 SIZES = st.builds(
@@ -79,7 +79,7 @@ class WrittenOut:
     @classmethod
     def of(cls, case: Case, weights: PlanWeights) -> WrittenOut:
         U, Y = (
-            hankel([x.reshape(len(x), -1) for x in xs], PAST + HORIZON)
+            mosaic([x.reshape(len(x), -1) for x in xs], PAST + HORIZON)
             for xs in (case.data.u, case.data.y)
         )
         (U_p, U_f), (Y_p, Y_f) = (np.split(X, [len(X) * PAST // (PAST + HORIZON)]) for X in (U, Y))
@@ -212,7 +212,7 @@ def test_without_noise_it_plans_what_spc_plans() -> None:
     past = u, example.plant.respond(u)
     weights = PlanWeights(Q=3.0, R=1e-2, lambda_g=1e-10, lambda_sigma=1e8)
     deepc = Deepc(example.data, 4, 12, weights)
-    predictor = fit(example.data, "spc", 4, 12)
+    predictor = fit(example.data, "pinv", 4, 12)
     references = example.reference, example.input_reference
     ours = DataDrivenController(predictor, weights).plan(*past, *references)
     plan = deepc.plan(*past, *references)
@@ -237,3 +237,36 @@ def test_what_cannot_be_planned_is_refused_by_name(changes: dict[str, Any], text
     arguments: dict[str, Any] = {"data": four_tank().data, "past": 4, "horizon": 26}
     with pytest.raises(PredictorError, match=text):
         Deepc(**(arguments | changes))
+
+
+Team = Callable[..., Any]
+T_INI, N = 2, 3
+
+
+def test_data_without_noise_have_the_rank_of_the_plant(linear_team: Team) -> None:
+    """Fundamental lemma: forces fill all their directions, outputs add one per state."""
+    for n in (1, 2):
+        plant = linear_team(n)
+        clean, noisy = (
+            reduce(
+                [plant.episode(samples * n, samples, noise=noise) for samples in (70, 55)], T_INI, N
+            )
+            for noise in (0.0, 0.3)
+        )
+        assert clean.spread.shape == (6 * n * (T_INI + N), 9 * n)
+        assert noisy.spread.shape == (6 * n * (T_INI + N), 6 * n * (T_INI + N))
+
+
+def test_short_or_dull_data_are_refused(linear_team: Team) -> None:
+    episode = linear_team(1).episode(40, 0)
+    with pytest.raises(PredictorError, match="persistently exciting of order 5"):
+        reduce([episode], T_INI, N)
+    still = linear_team(1).episode(200, 0)
+    u = still.u.copy()
+    u[:, :, 3] = still.u_nominal[:, :, 3]
+    with pytest.raises(PredictorError, match="persistently exciting"):
+        reduce([replace(still, u=u)], T_INI, N)
+    with pytest.raises(PredictorError, match="data of one team"):
+        reduce([], T_INI, N)
+    with pytest.raises(PredictorError, match="data of one team"):
+        reduce([still, linear_team(2).episode(200, 0)], T_INI, N)

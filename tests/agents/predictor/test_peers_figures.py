@@ -12,11 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.agents.planner.gates import run_gates
-from quadriga.agents.planner.peers_gate import peers_figures
+from quadriga.agents.planner.acceptance import run_gates
 from quadriga.agents.predictor.fits import fit_ridge
-from quadriga.agents.predictor.gate_report import GateReport
-from quadriga.agents.predictor.peers_figures import Bounds, PeersFigures
+from quadriga.agents.predictor.gates import Bounds, GateReport, PeersFigures, peers_figures
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
@@ -45,7 +43,7 @@ def with_peers(predictor: Predictor, factor: float, invented: float = 0.0) -> Pr
         own = G[:, i, i, :, past:]
         noise = random.normal(size=own.shape) * np.abs(own).mean(axis=2, keepdims=True)
         G[:, i, j, :, past:] += invented * noise
-    return replace(predictor, G=G)
+    return replace(predictor, parts=G)
 
 
 def figures_of(predictor: Predictor, team: Any, samples: int = 600) -> PeersFigures:
