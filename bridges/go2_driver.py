@@ -79,7 +79,7 @@ class Go2Driver:
 
     def send(self, targets: MotorTargets) -> None:
         """See `RobotDriver`. There is no writer of commands before `take_over`."""
-        sent = self._commands is not None and self._commands.write(go2.GO2.encode_command(targets))
+        sent = self._commands is not None and self._commands.send(go2.GO2.encode_command(targets))
         self.counters["sent" if sent else "unsent"] += 1
 
     def other_writers(self) -> int:

@@ -14,7 +14,7 @@ class Fault(NamedTuple):
     Attributes:
         name: on the command line and in tables.
         what: in words.
-        orders: what the simulated robot's desk is told, without the robot's name.
+        orders: commands to the emulated robot, without its name.
         processes: get `signal`: `PLANT`, `AGENT`, `GUARD` of the robot, or `ROUTER`.
         signal: SIGKILL or SIGSTOP.
         robot: whose fault it is: "" is any of them.

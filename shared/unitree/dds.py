@@ -311,7 +311,7 @@ class StructWriter:
         self._library, self.handle = participant.library, participant.writer(topic)
         self._sample = c.create_string_buffer(size)
 
-    def write(self, sample: bytes) -> bool:
+    def send(self, sample: bytes) -> bool:
         """Write; whether the library took it."""
         self._sample.raw = sample
         return bool(self._library.dds_write(self.handle, c.addressof(self._sample)) >= 0)

@@ -21,7 +21,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.robot.robots import ROBOTS
 from quadriga.shared.unitree.packets import SERVO
-from quadriga.sim_server.native.condition import RobotCondition
+from quadriga.sim_server.emulator.board import RobotStatus
 from quadriga.sim_server.world.world import World
 from tests.bridges.robots import holding
 
@@ -45,7 +45,7 @@ class Robot:
         self.world = World(self.config)
         self._supervisor = Supervisor(self.config.robot, self.config.bridge, SERVO)
         self.state = self._supervisor.initial(0, armed=True)
-        self._condition = RobotCondition((0,))
+        self._status = RobotStatus()
         self._on = holding(self.config)
         self.torque = 0.0
 
@@ -66,12 +66,12 @@ class Robot:
         for _ in range(15_000):
             tick = self.world.tick
             state, heat = self.world.states()["r1"], self.world.motors.heat[0]
-            report = self._condition.report(state, heat, self._on)
+            report = self._status.report(state, heat, self._on)
             inputs = SupervisorInputs(now=tick, report=report, report_age=0, wish=wish)
             self.state, supervised = self._supervisor.step(self.state, inputs)
             if self.state.mode in (end, BridgeMode.STOPPED):
                 return
-            command = self._condition.command(supervised.targets)
+            command = self._status.command(supervised.targets)
             self.world.step({} if command is None else {"r1": command})
             share = np.abs(self.world.motors.torque[0]) / self.config.robot.torque_limit
             self.torque = max(self.torque, float(share.max()))

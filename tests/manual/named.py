@@ -123,8 +123,8 @@ def _check_bench_stop(arguments: argparse.Namespace, _config: Config) -> None:
 
 
 def _check_sim(arguments: argparse.Namespace, config: Config) -> None:
-    if arguments.native and arguments.native != config.team.robot:
-        raise ConfigError("--as", repr(arguments.native), repr(config.team.robot))
+    if arguments.emulated and arguments.emulated != config.team.robot:
+        raise ConfigError("--as", repr(arguments.emulated), repr(config.team.robot))
 
 
 def _check_certs(arguments: argparse.Namespace, _config: Config) -> None:

@@ -52,7 +52,7 @@ def test_the_python_package_is_never_imported() -> None:
     """It would send type information for whatever is declared through it."""
     code = (
         "import sys; from quadriga.shared.unitree.dds import load_library; "
-        "import quadriga.bridges.go2_driver, quadriga.sim_server.native.go2_robot; "
+        "import quadriga.bridges.go2_driver, quadriga.sim_server.emulator.board; "
         "load_library(); print(any(name.split('.')[0] == 'cyclonedds' for name in sys.modules))"
     )
     done = subprocess.run(
@@ -70,7 +70,7 @@ def test_what_is_written_is_read_to_the_byte(participant: DdsParticipant) -> Non
     rows = random.normal(size=(5, 12))
     packet = go2.GO2.encode_command(MotorTargets(np.ones(12, np.uint8), *rows))
     assert reader.take() is None
-    assert writer.write(packet)
+    assert writer.send(packet)
     deadline = monotonic() + WAIT
     while (read := reader.take()) is None:
         assert monotonic() < deadline
@@ -79,7 +79,7 @@ def test_what_is_written_is_read_to_the_byte(participant: DdsParticipant) -> Non
     assert reader.take() is None
     witness = StructReader(participant, topic, go2.COMMAND.itemsize, of_others=True)
     packets = [bytes([k]) + packet[1:] for k in range(100)]
-    assert all([writer.write(sent) for sent in packets])
+    assert all([writer.send(sent) for sent in packets])
     sleep(0.05)  # a late process gets them all
     assert [reader.take() for _ in packets] == packets
     first = reader.writer
@@ -87,7 +87,7 @@ def test_what_is_written_is_read_to_the_byte(participant: DdsParticipant) -> Non
         foreign = StructWriter(other, command_topic(other), go2.COMMAND.itemsize)
         while witness.take() is None:
             assert monotonic() < deadline
-            foreign.write(packet)
+            foreign.send(packet)
             sleep(0.001)
         assert reader.take() == packet
         assert reader.writer == witness.writer != first

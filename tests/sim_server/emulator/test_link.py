@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from quadriga.shared.unitree import go2
 from quadriga.shared.unitree.packets import ON, MotorTargets, PacketError
-from quadriga.sim_server.native.link import Link, LinkFaults, Parcel
+from quadriga.sim_server.emulator.link import Link, LinkFaults, Parcel
 
 N = 4000
 SENDER = ("127.0.0.1", 8007)
@@ -41,7 +41,6 @@ some_faults = st.builds(
     reorder=shares,
     garbage=shares,
     delay=st.floats(0.0, 30.0),
-    jitter=st.floats(0.0, 10.0),
 )
 
 
@@ -93,17 +92,10 @@ def test_more_loss_loses_the_same_packets_and_some_more() -> None:
 
 
 @given(st.floats(0.0, 50.0), st.integers(0, 10))
-def test_a_delay_is_kept_to_the_millisecond_and_jitter_swaps_nobody(
-    delay: float, seed: int
-) -> None:
+def test_a_delay_is_kept_to_the_millisecond(delay: float, seed: int) -> None:
     parcels = PACKETS[:60]
     arrived = run(build(LinkFaults(delay=delay), seed), parcels)
     assert arrived == [(int(np.ceil(k + delay)), parcel) for k, parcel in enumerate(parcels)]
-    shaken = run(build(LinkFaults(delay=delay, jitter=9.0), seed), parcels)
-    assert [got for _, got in shaken] == parcels
-    waits = [now - k for k, (now, _) in enumerate(shaken)]
-    assert min(waits) >= delay
-    assert max(waits) <= delay + 10.0
 
 
 def test_swapped_packets_change_places_with_the_next() -> None:
@@ -131,8 +123,6 @@ def test_damage_leaves_a_structs_size_alone_and_no_codec_takes_it(keeps_size: bo
     assert (sizes == {len(packet)}) is keeps_size
 
 
-def test_an_empty_packet_can_be_damaged_and_all_can_be_forgotten() -> None:
-    link = build(LinkFaults(garbage=1.0, delay=5.0, reorder=1.0))
-    assert link.pass_on((Parcel(b""), Parcel(b""), Parcel(b"")), 0) == []
-    link.forget()
-    assert link.pass_on((), 100) == []
+def test_an_empty_packet_can_be_damaged() -> None:
+    link = build(LinkFaults(garbage=1.0))
+    assert len(link.pass_on((Parcel(b""),), 0)) == 1

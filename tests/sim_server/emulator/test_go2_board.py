@@ -1,4 +1,4 @@
-"""What befalls a simulated Go2, as its bridge's driver sees it over DDS on the loopback."""
+"""What befalls an emulated Go2, as its bridge's driver sees it over DDS on the loopback."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from quadriga.shared.config.load import load
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.unitree.remote import read_remote
 from quadriga.shared.wire.messages import Command
-from quadriga.sim_server.native.board import COMMANDS, REPORTS
-from quadriga.sim_server.native.go2_robot import Go2Robot
+from quadriga.sim_server.emulator.board import Go2Board, RobotStatus
+from quadriga.sim_server.emulator.link import LinkFaults
 from quadriga.sim_server.world.world import World
-from tests.bridges.robots import config_of, holding
+from tests.bridges.robots import config_of, holding, pressing
 
 WAIT = 10.0  # s
 TARGETS = holding(config_of("go2"), mode=np.ones(12, np.uint8))
 
 
-class Desk:
+class Bench:
     """A robot in a thread of its own, whose ticks go on, and a bridge's driver."""
 
     def __init__(self, domain: int) -> None:
-        self.robot = Go2Robot(domain, "lo", seed=(3,))
+        self.robot = Go2Board(domain, "lo", seed=(3,))
         self._state = World(load(overrides={"team.robots": 1})).states()["r1"]
         self._over = threading.Event()
         self.command: Command | None = None
@@ -77,74 +77,53 @@ def hasten(patch: pytest.MonkeyPatch) -> None:
     """Have robots and drivers take less time than real ones need."""
     for name in ("bridges.go2_driver._STILL_S", "bridges.go2_driver._WATCHED"):
         patch.setattr(f"quadriga.{name}", 0.1)
-    patch.setattr("quadriga.sim_server.native.go2_robot._MOTION_MS", 10)
+    patch.setattr("quadriga.sim_server.emulator.board._MOTION_MS", 10)
 
 
 @pytest.fixture
-def desk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
+def bench(monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     hasten(monkeypatch)
-    made = Desk(189)  # a domain of no other test
+    made = Bench(189)  # a domain of no other test
     made.driver.take_over()
     yield made
     made.close()
 
 
-def commands(desk: Desk) -> bool:
-    desk.driver.send(TARGETS)
-    return desk.command is not None and bool(desk.command.kp.any())
+def commands(bench: Bench) -> bool:
+    bench.driver.send(TARGETS)
+    return bench.command is not None and bool(bench.command.kp.any())
 
 
-def is_silent(desk: Desk) -> bool:
-    """Whether nothing comes for as long as a robot that is on would send fifty reports."""
-    desk.driver.receive()
-    sleep(0.1)
-    return desk.driver.receive() is None
-
-
-def test_a_second_writer_is_seen_damps_the_robot_and_goes(desk: Desk) -> None:
-    wait_until(lambda: commands(desk))
-    assert desk.driver.other_writers() == 0
-    desk.do(lambda: desk.robot.intrude(there=True))
-    wait_until(lambda: desk.driver.other_writers() == 1)
-    wait_until(lambda: desk.command is not None and not desk.command.kp.any())
-    desk.do(lambda: desk.robot.intrude(there=False))
+def test_a_second_writer_is_seen_damps_the_robot_and_goes(bench: Bench) -> None:
+    wait_until(lambda: commands(bench))
+    assert bench.driver.other_writers() == 0
+    bench.do(bench.robot.add_second_writer)
+    wait_until(lambda: bench.driver.other_writers() == 1)
+    wait_until(lambda: bench.command is not None and not bench.command.kp.any())
+    bench.do(bench.robot.clear)
     sleep(0.02)
-    desk.driver.other_writers()
-    wait_until(lambda: commands(desk))
-    assert desk.driver.other_writers() == 0
+    bench.driver.other_writers()
+    wait_until(lambda: commands(bench))
+    assert bench.driver.other_writers() == 0
 
 
-def test_damaged_structs_are_counted_on_both_sides(desk: Desk) -> None:
-    wait_until(lambda: commands(desk))
-    desk.do(lambda: desk.robot.disturb("garbage", 1.0, (COMMANDS, REPORTS)))
+def test_damaged_structs_are_counted_on_both_sides(bench: Bench) -> None:
+    wait_until(lambda: commands(bench))
+    bench.robot.inwards.faults = bench.robot.outwards.faults = LinkFaults(garbage=1.0)
 
     def counted() -> bool:
-        desk.driver.send(TARGETS)
-        desk.driver.receive()
-        return desk.robot.malformed > 3 and desk.driver.counters["malformed"] > 3
+        bench.driver.send(TARGETS)
+        bench.driver.receive()
+        return bench.robot.malformed > 3 and bench.driver.counters["malformed"] > 3
 
     wait_until(counted)
 
 
-def test_a_robot_that_was_off_has_its_own_controller_in_charge_again(desk: Desk) -> None:
-    wait_until(lambda: commands(desk))
-    desk.do(lambda: desk.robot.switch(on=False))
-    assert desk.command is None
-    wait_until(lambda: is_silent(desk))
-    desk.do(lambda: desk.robot.switch(on=True))
-    assert desk.robot.controller == "normal"
-    wait_until(lambda: desk.driver.receive() is not None)
-    for _ in range(50):  # ticks, far more than a command takes to come
-        assert not commands(desk), "its own controller has the motors"
-        desk.do(lambda: None)
-
-
-def test_buttons_and_battery_reach_the_bridge(desk: Desk) -> None:
-    desk.do(lambda: desk.robot.condition.press(frozenset({"L2", "B"}), None))
-    desk.do(lambda: desk.robot.condition.set_charge(8.0, 0))
+def test_buttons_and_battery_reach_the_bridge(bench: Bench) -> None:
+    bench.robot.status = RobotStatus(charge=8.0, remote=pressing("L2", "B"))
 
     def seen() -> bool:
-        report = desk.driver.receive()
+        report = bench.driver.receive()
         if report is None or report.battery is None:
             return False
         return read_remote(report.remote).pressed == {"L2", "B"} and report.battery.charge == 8

@@ -15,7 +15,7 @@ import numpy as np
 
 _DAMAGE: Final = 1  # of the seed: where and how packets are damaged
 _MOST_BITS: Final = 8  # that are flipped in a packet
-_DRAWS: Final = 5  # of a packet: loss, repetition, swap, damage, jitter
+_DRAWS: Final = 4  # of a packet: loss, repetition, swap, damage
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,6 @@ class LinkFaults:
         reorder: share that change places with the next one.
         garbage: share that arrive damaged: bits flipped, cut short, or nothing but chance.
         delay: of each packet, ms.
-        jitter: up to so much more, ms; it swaps nobody.
     """
 
     loss: float = 0.0
@@ -36,7 +35,6 @@ class LinkFaults:
     reorder: float = 0.0
     garbage: float = 0.0
     delay: float = 0.0
-    jitter: float = 0.0
 
 
 NO_FAULTS: Final = LinkFaults()
@@ -93,26 +91,20 @@ class Link:
         """When the next packet on its way arrives, ms; infinity: none is on its way."""
         return self._way[0][0] if self._way else float("inf")
 
-    def forget(self) -> None:
-        """Lose all that is on its way."""
-        self._way.clear()
-        self._passed = None
-
     def _send(self, parcel: Parcel, now: float) -> None:
         faults = self.faults
-        lost, twice, swapped, damaged, wait = self._chance.random(_DRAWS).tolist()
+        lost, twice, swapped, damaged = self._chance.random(_DRAWS).tolist()
         if lost < faults.loss:
             return
         if damaged < faults.garbage:
             parcel = parcel._replace(packet=self._damage(parcel.packet))
-        due = now + faults.delay + faults.jitter * wait
         copies = 2 if twice < faults.duplicate else 1
         if self._passed is None and swapped < faults.reorder:
             self._passed = parcel, copies
             return
-        self._queue(parcel, copies, due)
+        self._queue(parcel, copies, now + faults.delay)
         if self._passed is not None:
-            self._queue(*self._passed, due)
+            self._queue(*self._passed, now + faults.delay)
             self._passed = None
 
     def _queue(self, parcel: Parcel, copies: int, due: float) -> None:
