@@ -15,7 +15,6 @@ class BridgeMode(StrEnum):
     LIMP = "limp"  # motors off
     STANDING_UP = "standing-up"
     STANDING = "standing"
-    WEIGHING = "weighing"  # it stands, and presses with one diagonal of feet, then the other
     WALKING = "walking"  # the agent's commands, limited
     LYING_DOWN = "lying-down"
     TESTING = "testing"  # it hangs, and one joint after the other moves a little
@@ -28,23 +27,16 @@ class Wish(StrEnum):
 
     REST = "rest"
     STAND = "stand"
-    WEIGH = "weigh"
     WALK = "walk"
     LIE = "lie"
     TEST = "test"
 
 
-_UPRIGHT: Final = (
-    BridgeMode.STANDING_UP,
-    BridgeMode.STANDING,
-    BridgeMode.WEIGHING,
-    BridgeMode.WALKING,
-)
+_UPRIGHT: Final = (BridgeMode.STANDING_UP, BridgeMode.STANDING, BridgeMode.WALKING)
 BY_WISH: Final[Mapping[tuple[BridgeMode, Wish], BridgeMode]] = MappingProxyType(
     {
         (BridgeMode.LIMP, Wish.STAND): BridgeMode.STANDING_UP,
         (BridgeMode.LIMP, Wish.TEST): BridgeMode.TESTING,
-        (BridgeMode.STANDING, Wish.WEIGH): BridgeMode.WEIGHING,
         (BridgeMode.STANDING, Wish.WALK): BridgeMode.WALKING,
         **{(mode, Wish.LIE): BridgeMode.LYING_DOWN for mode in _UPRIGHT},
         **{(BridgeMode.TESTING, wish): BridgeMode.LETTING_GO for wish in Wish},
@@ -56,7 +48,6 @@ BY_WISH: Final[Mapping[tuple[BridgeMode, Wish], BridgeMode]] = MappingProxyType(
 BY_ITSELF: Final[Mapping[BridgeMode, BridgeMode]] = MappingProxyType(
     {
         BridgeMode.STANDING_UP: BridgeMode.STANDING,
-        BridgeMode.WEIGHING: BridgeMode.STANDING,
         BridgeMode.LYING_DOWN: BridgeMode.LETTING_GO,
         BridgeMode.TESTING: BridgeMode.LETTING_GO,
         BridgeMode.LETTING_GO: BridgeMode.LIMP,

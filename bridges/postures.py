@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.shared.config.bridge import BridgeConfig
-from quadriga.shared.robot.conventions import N_JOINTS, N_LEGS, Array
+from quadriga.shared.robot.conventions import N_JOINTS, Array
 from quadriga.shared.robot.motions import Motion, way_down, way_up
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.unitree.packets import OFF, MotorTargets
 
 DAMPING: Final = 3.0  # N·m·s/rad, of joints that are damped
 SINKING: Final = 8.0  # likewise, with which a robot on folded legs comes down on its belly
-_PRESSED: Final = 0.6  # of a foot's share of the weight that is put on it, or taken off
 
 
 def stand_up(q: Array, robot: RobotSpec, config: BridgeConfig) -> Motion:
@@ -31,22 +30,6 @@ def lie_down(q: Array, robot: RobotSpec, config: BridgeConfig) -> Motion:
 def stay(q: Array, seconds: float) -> Motion:
     """No motion for some time."""
     return Motion(np.stack([q, q]), np.array([seconds]))
-
-
-def press_by_diagonals(robot: RobotSpec, config: BridgeConfig) -> Motion:
-    """From the stand, the weight more on one diagonal of feet, then on the other, and back.
-
-    The trunk stays where it is: the forces that are added cancel each other. So robots that are
-    yoked do not pull at each other. A joint that is asked for an angle that is off by δτ / k_p
-    gives δτ more; for a foot that is under its hip, all of it is the calf's.
-    """
-    lever = robot.geometry.link * np.sin(robot.q_stand[1])  # m, of the foot from its knee
-    more = _PRESSED * robot.weight / N_LEGS * lever / config.stand_kp
-    first = robot.q_stand.copy()
-    first[2::3] += np.array([more, -more, -more, more])
-    second = 2.0 * robot.q_stand - first
-    postures = [robot.q_stand, first, first, second, second, robot.q_stand]
-    return Motion(np.stack(postures), np.cumsum([0.5, 0.4, 0.8, 0.4, 0.5]))
 
 
 def towards(q: Array, dq: Array, mode: int, config: BridgeConfig) -> MotorTargets:

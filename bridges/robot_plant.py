@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from quadriga.bridges.driver import RobotDriver
-from quadriga.bridges.foot_calibration import FootScales, fit_scales, to_newtons
 from quadriga.bridges.guard import Guard
 from quadriga.bridges.modes import BridgeMode, Wish
 from quadriga.bridges.robot_loop import TICK, Answer, RobotLoop
-from quadriga.bridges.statics import Statics
 from quadriga.plant.protocol import Plant
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.errors import CheckError
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.clock import Rate, monotonic
@@ -29,8 +25,6 @@ from quadriga.shared.wire.topics import SAMPLE_MS
 _SAMPLE_AGE: Final = 5  # ms, that a report may be old at a sample of which there is no newer one
 _REMEMBERED: Final = 64  # ticks, for which the arrival of their reports is known
 _NOTHING: Final = (-1, 0.0)
-_WATCH_MS: Final = 10  # between two reports by which feet are calibrated
-_STEADY_MS: Final = 300  # of standing, before the feet are calibrated
 
 
 class RobotPlant(Plant):
@@ -69,8 +63,6 @@ class RobotPlant(Plant):
         self._published_at = -1
         self._arrivals = [_NOTHING] * _REMEMBERED  # tick of a state, and when its report came
         self._yaw: float | None = None
-        self._statics = Statics(config.robot)  # loaded now, and not while the robot stands
-        self._scales: FootScales | None = None
 
     @property
     def mode(self) -> BridgeMode:
@@ -99,69 +91,28 @@ class RobotPlant(Plant):
             self._say(f"{name}: dry run, no motor is enabled; --armed commands the robot")
             return True
         self._loop.take_charge()
-        return (
-            self._lead(Wish.STAND, BridgeMode.STANDING_UP, stopped)
-            and self._stand_for(_STEADY_MS, stopped)
-            and self._calibrate_feet(stopped)
-        )
+        return self._stand_up(stopped)
 
-    def _lead(
-        self,
-        wish: Wish,
-        through: BridgeMode,
-        stopped: Callable[[], bool],
-        watch: Callable[[RobotReport], None] | None = None,
-    ) -> bool:
-        """Let the robot make a motion at whose end it stands; False if `stopped()` came first.
-
-        `watch` gets a report every `_WATCH_MS`.
+    def _stand_up(self, stopped: Callable[[], bool]) -> bool:
+        """Stand up; False if `stopped()` came first.
 
         Raises:
             CheckError: it stopped, or does not stand when it should.
         """
-        loop, began = self._loop, False
-        left = loop.left_ms
-        while not (began and loop.mode is BridgeMode.STANDING):
+        loop = self._loop
+        before, left = loop.mode, loop.left_ms
+        while loop.mode is not BridgeMode.STANDING:
             if stopped():
                 return False
             left -= 1
             if loop.mode is BridgeMode.STOPPED or left < 0:
-                got = loop.memory.reason or f"{through} for too long"
-                raise CheckError(f"robot {self.names[0]}: {through}", got, "a robot that stands")
-            loop.turn(None, wish)
-            if not began and loop.mode is through:
-                began, left = True, loop.left_ms
-            if watch is not None and loop.report is not None and loop.now % _WATCH_MS == 0:
-                watch(loop.report)
+                got = loop.memory.reason or f"{loop.mode} for too long"
+                name, stood = self.names[0], "a robot that stands"
+                raise CheckError(f"robot {name}: {BridgeMode.STANDING_UP}", got, stood)
+            loop.turn(None, Wish.STAND)
+            if loop.mode is not before:
+                before, left = loop.mode, loop.left_ms
             self._idle_rate.wait()
-        return True
-
-    def _stand_for(self, ms: int, stopped: Callable[[], bool]) -> bool:
-        for _ in range(ms):
-            if stopped():
-                return False
-            self.idle()
-        return True
-
-    def _calibrate_feet(self, stopped: Callable[[], bool]) -> bool:
-        """Learn what the feet's counts mean; False if `stopped()` came first."""
-        seen, team = list[tuple[Array, Array]](), self._config.team
-        alone = not yoke_pairs(team.robots, team.yokes)
-
-        def watch(report: RobotReport) -> None:
-            seen.append((report.foot, self._statics.foot_loads(report, alone=alone)))
-
-        if not self._lead(Wish.WEIGH, BridgeMode.WEIGHING, stopped, watch):
-            return False
-        self._scales = fit_scales([counts for counts, _ in seen], [loads for _, loads in seen])
-        name, dead = self.names[0], self._scales.dead
-        if dead:
-            self._say(f"{name}: {', '.join(dead)}: the sensor shows no load, and is not used")
-        scales = ", ".join(f"{scale:.2f}" for scale in self._scales.per_newton)
-        self._say(
-            f"{name}: feet calibrated, {scales} counts per N, "
-            f"new counts {self._loop.foot_refresh} times a second"
-        )
         return True
 
     def listen(self, estops: Callable[[], str]) -> None:
@@ -188,7 +139,7 @@ class RobotPlant(Plant):
         self._arrivals[tick % _REMEMBERED] = tick, loop.arrived
         if self._yaw is None:
             self._yaw = yaw_of(report.quat_wxyz)
-        return {self.names[0]: to_state(report, tick, self._yaw, self._scales)}
+        return {self.names[0]: to_state(report, tick, self._yaw)}
 
     def step(self, commands: Mapping[str, Command]) -> Sequence[Event]:
         """One millisecond of the walk; its first tells of the time before it, too."""
@@ -220,11 +171,7 @@ class RobotPlant(Plant):
 
     def describe(self, status: Status) -> Status:
         """With the bridge's mode and reason, and counters of the robot and of its packets."""
-        described = self._loop.describe(status)
-        if self._scales is None:
-            return described
-        dead = len(self._scales.dead)
-        return replace(described, counters={**described.counters, "feet_without_sensor": dead})
+        return self._loop.describe(status)
 
     def _take_changes(self) -> list[Event]:
         """What the bridge has changed since the last call."""
@@ -244,11 +191,11 @@ def yaw_of(quat_wxyz: Array) -> float:
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-def to_state(report: RobotReport, tick: int, yaw: float, scales: FootScales | None = None) -> State:
+def to_state(report: RobotReport, tick: int, yaw: float) -> State:
     """The message of a report at a tick of the team, its heading counted from `yaw`, rad.
 
     A robot's heading is its own, from where it was switched on. The robots of a team face the same
-    way when they start, so that is where all count from. Without `scales` its feet give raw counts.
+    way when they start, so that is where all count from. Its feet give raw counts.
     """
     w, x, y, z = report.quat_wxyz
     c, s = math.cos(0.5 * yaw), -math.sin(0.5 * yaw)
@@ -262,5 +209,5 @@ def to_state(report: RobotReport, tick: int, yaw: float, scales: FootScales | No
         turned,
         report.gyro,
         report.accel,
-        report.foot if scales is None else to_newtons(report.foot, scales),
+        report.foot,
     )

@@ -1,4 +1,4 @@
-"""What a bridge lets its robot do: ten states, a command a millisecond, every reason to stop.
+"""What a bridge lets its robot do: nine states, a command a millisecond, every reason to stop.
 
 The supervisor knows no agent, bus or socket. It is told what the robot last said, what the agent
 last asked for and how old both are, and it gives the command that may be sent.
@@ -22,16 +22,7 @@ from quadriga.bridges.limits import (
     temperature_limits,
 )
 from quadriga.bridges.modes import BY_ITSELF, BY_WISH, BridgeMode, Wish
-from quadriga.bridges.postures import (
-    SINKING,
-    damped,
-    lie_down,
-    passive,
-    press_by_diagonals,
-    stand_up,
-    stay,
-    towards,
-)
+from quadriga.bridges.postures import SINKING, damped, lie_down, passive, stand_up, stay, towards
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
 from quadriga.shared.robot.motions import Motion, posture_at
@@ -51,7 +42,7 @@ class SupervisorState:
     """What a supervisor remembers.
 
     Attributes:
-        mode: which of the ten.
+        mode: which of the nine.
         reason: why it is stopped; "" otherwise.
         since: when the mode began, ms.
         motion: that the bridge makes itself.
@@ -183,8 +174,6 @@ class Supervisor:
             return stand_up(q, self._robot, self._config)
         if mode is BridgeMode.LYING_DOWN:
             return lie_down(q, self._robot, self._config)
-        if mode is BridgeMode.WEIGHING:
-            return press_by_diagonals(self._robot, self._config)
         if mode is BridgeMode.TESTING:
             return joint_motion(q, self._robot)
         return stay(q, _LETTING_GO) if mode is BridgeMode.LETTING_GO else None

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from quadriga.bridges.bridge import build_bridge
-from quadriga.bridges.foot_calibration import FootScales
 from quadriga.bridges.guard import Guard
 from quadriga.bridges.modes import BridgeMode, Wish
 from quadriga.bridges.open_driver import open_driver
@@ -198,13 +197,6 @@ def test_at_a_sample_without_anything_new_the_last_report_counts_unless_it_is_ol
     assert ticks_of(last_at_six) == [6, 10]
     last_at_four = [k == 3 for k in range(25)]
     assert ticks_of(last_at_four) == [4]
-
-
-def test_calibrated_feet_give_newtons_and_others_what_they_say() -> None:
-    report = standing(config_of(), foot=np.array([100.0, -20.0, 7.0, 0.0]))
-    np.testing.assert_array_equal(to_state(report, 4, 0.0).foot_force, report.foot)
-    scales = FootScales(np.array([40.0, -50.0, 0.0, 0.0]), np.array([2.0, 1.5, 0.0, 0.0]))
-    np.testing.assert_allclose(to_state(report, 4, 0.0, scales).foot_force, [30.0, 20.0, 0.0, 0.0])
 
 
 def test_how_often_the_counts_of_a_real_go1_change_is_reported() -> None:
