@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
+import pinocchio
 
 from quadriga.bridges.limits import temperature_limits
-from quadriga.bridges.statics import Statics
 from quadriga.bridges.supervisor import tilt_of
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import CheckError
-from quadriga.shared.robot.conventions import GRAVITY, JOINT_NAMES, Array
+from quadriga.shared.robot.conventions import FOOT_FRAMES, GRAVITY, JOINT_NAMES, Array
+from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.unitree.packets import PROTECTED, RobotReport
 
@@ -24,6 +25,8 @@ _TOUCHES: Final = 0.05  # m above the lowest point of a robot, that may touch th
 _BESIDE: Final = 0.03  # m, of the centre of mass beside what bears it
 _DIRECTIONS: Final = 72
 _BEYOND: Final = 0.25  # rad beyond its range: a Go2 that lies has its calves 0.09 beyond it
+_LIMB_RADIUS: Final = 0.02  # m, of knees
+_HIP_RADIUS: Final = 0.04  # m, of the motors at hips
 
 
 class Finding(NamedTuple):
@@ -234,7 +237,7 @@ def _check_legs(report: RobotReport, robot: RobotSpec) -> Finding:
     A leg in another place, of another sign or with another zero would reach into the ground, and
     alone be lowest: then the centre of mass is not above what bears it.
     """
-    places, heights = Statics(robot).lowest_points(report)
+    places, heights = _lowest_points(report, robot)
     off = _outside(places[heights <= _TOUCHES])
     return Finding(
         "legs",
@@ -243,6 +246,31 @@ def _check_legs(report: RobotReport, robot: RobotSpec) -> Finding:
         off <= _BESIDE,
         "legs in another order, a sign or a zero that is wrong, or it is held",
     )
+
+
+def _lowest_points(report: RobotReport, robot: RobotSpec) -> tuple[Array, Array]:
+    """Where the robot is lowest: feet, knees, hips and the corners of its trunk.
+
+    Returns:
+        Their places from the centre of mass, horizontally, (20, 2), and their heights over the
+        lowest of them, (20,), m; world axes.
+    """
+    model = build_pinocchio_model(robot)
+    data = model.createData()
+    w, x, y, z = report.quat_wxyz / np.linalg.norm(report.quat_wxyz)
+    q = np.array([0.0, 0.0, 0.0, x, y, z, w, *report.q])
+    com = pinocchio.centerOfMass(model, data, q)
+    pinocchio.updateFramePlacements(model, data)
+    box = np.array(np.meshgrid(*([-half, half] for half in np.array(robot.trunk_box) / 2)))
+    feet = [data.oMf[model.getFrameId(foot)].translation for foot in FOOT_FRAMES]
+    points = [
+        *(foot - [0.0, 0.0, robot.geometry.foot_radius] for foot in feet),
+        *(data.oMi[k].translation - [0.0, 0.0, _LIMB_RADIUS] for k in range(4, 14, 3)),
+        *(data.oMi[k].translation - [0.0, 0.0, _HIP_RADIUS] for k in range(3, 14, 3)),
+        *(box.reshape(3, 8).T @ data.oMi[1].rotation.T),
+    ]
+    places = np.array(points) - com
+    return places[:, :2], places[:, 2] - places[:, 2].min()
 
 
 def _outside(places: Array) -> float:

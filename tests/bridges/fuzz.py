@@ -16,11 +16,16 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from quadriga.bridges.drivers import UdpDriver
 from quadriga.bridges.limits import joint_limits, shares_of_speed
-from quadriga.bridges.modes import BridgeMode, Wish
-from quadriga.bridges.robot_plant import to_state
-from quadriga.bridges.supervisor import Supervisor, SupervisorInputs, SupervisorState
-from quadriga.bridges.udp_driver import UdpDriver
+from quadriga.bridges.plant import to_state
+from quadriga.bridges.supervisor import (
+    BridgeMode,
+    Request,
+    Supervisor,
+    SupervisorInputs,
+    SupervisorState,
+)
 from quadriga.plant.command_limits import MOST_KD, MOST_KP
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
@@ -36,8 +41,8 @@ from tests.bridges.robots import config_of, standing
 from tests.bridges.test_udp_driver import HOST, free_port
 
 KINDS: Final = ("a1", "go1", "go2")
-_BEGINNINGS: Final = (BridgeMode.LIMP, BridgeMode.STANDING, BridgeMode.WALKING)
-_WISHES: Final = (*Wish, *20 * (Wish.WALK,))
+_BEGINNINGS: Final = (BridgeMode.PASSIVE, BridgeMode.STANDING, BridgeMode.WALKING)
+_REQUESTS: Final = (*Request, *20 * (Request.WALK,))
 _ANEW: Final = 0.3  # share of steps of a stopped robot after which it is in some other state
 _EXTREMES: Final = np.array(
     [np.nan, np.inf, -np.inf, 3e38, -3e38, 1e30, 1e5, -1e3, 1e-40, 0.0], np.float32
@@ -180,11 +185,13 @@ class Fuzz:
         self.counts: Counter[str] = Counter()
 
     def _begin(self, now: int) -> SupervisorState:
-        """A state that a bridge may be in, and what follows it by some wish."""
-        limp = self._supervisor.initial(now, armed=True)
-        state = replace(limp, mode=_BEGINNINGS[self._random.integers(len(_BEGINNINGS))])
-        wish = list(Wish)[self._random.integers(len(Wish))]
-        return self._supervisor.step(state, SupervisorInputs(now, self._good, 0, wish=wish))[0]
+        """A state that a bridge may be in, and what follows it by some request."""
+        passive = self._supervisor.initial(now, armed=True)
+        state = replace(passive, mode=_BEGINNINGS[self._random.integers(len(_BEGINNINGS))])
+        request = list(Request)[self._random.integers(len(Request))]
+        return self._supervisor.step(state, SupervisorInputs(now, self._good, 0, request=request))[
+            0
+        ]
 
     def run(self, packets: int) -> None:
         """Send packets.
@@ -214,7 +221,7 @@ class Fuzz:
             report_age=self._age,
             command=self._command,
             command_age=int(self._random.integers(0, 60)),
-            wish=_WISHES[self._random.integers(len(_WISHES))],
+            request=_REQUESTS[self._random.integers(len(_REQUESTS))],
         )
         self._state, supervised = self._supervisor.step(self._state, inputs)
         self.counts[str(self._state.mode)] += 1

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from quadriga.bridges.go2_driver import Go2Driver
-from quadriga.bridges.robot_loop import RobotLoop
+from quadriga.bridges.drivers import Go2Driver
+from quadriga.bridges.plant import RobotLoop
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import BridgeError, ConfigError
 from quadriga.shared.runtime.clock import sleep
@@ -69,7 +69,7 @@ def test_the_robots_own_controller_lies_down_once_lets_go_and_commands_arrive(
 def test_a_controller_that_the_robot_does_not_have_is_named(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("quadriga.bridges.go2_driver._LETTING_GO", 0.5)
+    monkeypatch.setattr("quadriga.bridges.drivers._LETTING_GO", 0.5)
     expected = r"own controller: got 'normal', expected 'dance', which it is asked for"
     with pytest.raises(BridgeError, match=expected):
         bench.driver.give_back("dance")
@@ -98,7 +98,7 @@ def test_of_a_takeover_that_fails_later_the_operator_learns_whom_to_give_the_mot
 
     monkeypatch.setattr(bench.driver, "_await_mode", intrude)
     said = list[str]()
-    loop = RobotLoop(config_of("go2"), "r1", bench.driver, guard=None, say=said.append)
+    loop = RobotLoop(config_of("go2"), "r1", bench.driver, watchdog=None, say=said.append)
     with pytest.raises(BridgeError, match="rt/lowcmd: got 1 others who write it, expected nobody"):
         loop.take_charge()
     assert ["--restore normal" in line for line in said] == [True]
@@ -109,7 +109,7 @@ def test_a_controller_that_does_not_lie_down_or_let_go_is_named(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, lies_down: bool
 ) -> None:
     wait_until(lambda: bench.driver.receive() is not None)
-    monkeypatch.setattr("quadriga.bridges.go2_driver._LETTING_GO", 0.5)
+    monkeypatch.setattr("quadriga.bridges.drivers._LETTING_GO", 0.5)
     if not lies_down:
         monkeypatch.setattr("quadriga.sim_server.emulator.board._MOTION_MS", 60_000)
     bench.robot.lets_go = False

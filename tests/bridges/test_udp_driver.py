@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quadriga.bridges.robot_loop import RobotLoop
-from quadriga.bridges.udp_driver import UdpDriver
+from quadriga.bridges.drivers import UdpDriver
+from quadriga.bridges.plant import RobotLoop
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import BridgeError, CheckError, ConfigError
 from quadriga.shared.unitree.packets import OFF, SERVO, RobotReport
@@ -83,8 +83,8 @@ def test_a_robot_whose_packets_are_all_malformed_is_refused_with_their_reason(
     link: Link, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("_FIND_MS", "_LOOK_MS"):
-        monkeypatch.setattr(f"quadriga.bridges.robot_loop.{name}", 20)
-    loop = RobotLoop(config_of(), "r1", link.driver, guard=None, say=list[str]().append)
+        monkeypatch.setattr(f"quadriga.bridges.plant.{name}", 20)
+    loop = RobotLoop(config_of(), "r1", link.driver, watchdog=None, say=list[str]().append)
     for _ in range(3):
         link.robot.send(b"garbage")
     expected = r"reports: got 0 .*\(3 malformed, the last one report of the A1: size: got 7 bytes"

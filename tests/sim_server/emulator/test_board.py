@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quadriga.bridges.bridge import bridge_of
-from quadriga.bridges.udp_driver import UdpDriver
+from quadriga.bridges.drivers import UdpDriver
+from quadriga.bridges.plant import bridge_of
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import BridgeError, ConfigError

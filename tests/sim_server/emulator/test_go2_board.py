@@ -10,7 +10,7 @@ from queue import SimpleQueue
 import numpy as np
 import pytest
 
-from quadriga.bridges.go2_driver import Go2Driver
+from quadriga.bridges.drivers import Go2Driver
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.load import load
 from quadriga.shared.runtime.clock import monotonic, sleep
@@ -75,7 +75,7 @@ def wait_until(happens: Callable[[], bool]) -> None:
 
 def hasten(patch: pytest.MonkeyPatch) -> None:
     """Have robots and drivers take less time than real ones need."""
-    for name in ("bridges.go2_driver._STILL_S", "bridges.go2_driver._WATCHED"):
+    for name in ("bridges.drivers._STILL_S", "bridges.drivers._WATCHED"):
         patch.setattr(f"quadriga.{name}", 0.1)
     patch.setattr("quadriga.sim_server.emulator.board._MOTION_MS", 10)
 

@@ -1,6 +1,6 @@
 """SHELL beside a bridge: it damps the robot's motors when the bridge dies or hangs.
 
-A robot goes on with the last command for ever, so the last one must be harmless. The guard is a
+A robot goes on with the last command for ever, so the last one must be harmless. The watchdog is a
 process of its own with a way of its own to the robot. It hears from the bridge all the time; when
 it does not, it damps the motors, switches them off and ends.
 """
@@ -18,8 +18,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.bridges.driver import RobotDriver
-from quadriga.bridges.open_driver import open_driver
+from quadriga.bridges.drivers import RobotDriver, open_driver
 from quadriga.bridges.postures import damped, passive
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import BridgeError
@@ -35,19 +34,19 @@ _READY: Final = b"ready\n"
 _OFF_MS: Final = 500  # of packets that switch the motors off
 
 
-class Guard:
-    """The bridge's end: it starts the guard, and tells it all the time that it is alive.
+class Watchdog:
+    """The bridge's end: it starts the watchdog, and tells it all the time that it is alive.
 
     Args:
         kind: of robot.
         config: where it is, and how long it is damped.
 
     Raises:
-        BridgeError: the guard did not start.
+        BridgeError: the watchdog did not start.
     """
 
     def __init__(self, kind: str, config: BridgeConfig) -> None:
-        command = [*PYTHON, "-m", "quadriga.bridges.guard", kind, json.dumps(asdict(config))]
+        command = [*PYTHON, "-m", "quadriga.bridges.watchdog", kind, json.dumps(asdict(config))]
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
         )
@@ -55,14 +54,14 @@ class Guard:
             raise ValueError("pipes are asked for above")
         self._pipe = self._process.stdin
         if self._process.stdout.readline() != _READY:
-            raise BridgeError("the bridge's guard", "an end", "a process that waits")
+            raise BridgeError("the bridge's watchdog", "an end", "a process that waits")
 
     def beat(self) -> bool:
-        """A sign of life; False if the guard is not there any more."""
+        """A sign of life; False if the watchdog is not there any more."""
         return self._say(ALIVE)
 
     def dismiss(self) -> None:
-        """End the guard: the robot is safe, or nobody was in charge of it."""
+        """End the watchdog: the robot is safe, or nobody was in charge of it."""
         self._say(GOODBYE)
         self._pipe.close()
         self._process.wait()
@@ -96,7 +95,7 @@ def watch(driver: RobotDriver, config: BridgeConfig, pipe: int) -> None:
             return
         if not heard:  # its end is closed: it has died
             break
-    os.close(pipe)  # a bridge that is there again learns that its guard has acted
+    os.close(pipe)  # a bridge that is there again learns that its watchdog has acted
     nowhere = np.zeros(N_JOINTS)
     rate = Rate(0.001 * driver.period_ms)
     for targets, ms in (
@@ -109,12 +108,12 @@ def watch(driver: RobotDriver, config: BridgeConfig, pipe: int) -> None:
 
 
 def main(kind: str, text: str) -> None:
-    """Be the guard; its standard input comes from the bridge."""
-    # Whoever interrupts the bridge does not mean its guard, which ends by itself.
+    """Be the watchdog; its standard input comes from the bridge."""
+    # Whoever interrupts the bridge does not mean its watchdog, which ends by itself.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     config = BridgeConfig(**json.loads(text))
-    driver = open_driver(kind, config, guards=True)
+    driver = open_driver(kind, config, sends_only=True)
     take_priority("realtime")
     os.write(sys.stdout.fileno(), _READY)
     try:

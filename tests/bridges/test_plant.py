@@ -13,12 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.bridges.bridge import build_bridge
-from quadriga.bridges.guard import Guard
-from quadriga.bridges.modes import BridgeMode, Wish
-from quadriga.bridges.open_driver import open_driver
-from quadriga.bridges.robot_loop import RobotLoop
-from quadriga.bridges.robot_plant import RobotPlant, to_state, yaw_of
+from quadriga.bridges.drivers import open_driver
+from quadriga.bridges.plant import RobotLoop, RobotPlant, build_bridge, to_state, yaw_of
+from quadriga.bridges.supervisor import BridgeMode, Request
+from quadriga.bridges.watchdog import Watchdog
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError
@@ -79,8 +77,8 @@ def board() -> Iterator[Board]:
 def bridge_to(board: Board, said: list[str], *, armed: bool = False) -> Iterator[RobotPlant]:
     config = load(overrides=board.keys)
     driver = open_driver("a1", config.bridge)
-    guard = Guard("a1", config.bridge) if armed else None
-    plant = RobotPlant(config, "r1", driver, guard=guard, say=said.append)
+    watchdog = Watchdog("a1", config.bridge) if armed else None
+    plant = RobotPlant(config, "r1", driver, watchdog=watchdog, say=said.append)
     try:
         yield plant
     finally:
@@ -110,9 +108,9 @@ def test_a_hot_motor_is_told_of_once_a_minute_and_recorded() -> None:
     driver: Any = SimpleNamespace(
         servo=SERVO, period_ms=1, receive=lambda: report, other_writers=lambda: 0
     )
-    loop = RobotLoop(config, "r1", driver, guard=None, say=said.append)
+    loop = RobotLoop(config, "r1", driver, watchdog=None, say=said.append)
     for _ in range(3000):
-        loop.turn(None, Wish.REST)
+        loop.turn(None, Request.REST)
     assert said == ["r1: dry hot:FL_calf_joint 82 °C, 88 °C stop it"]
     assert [reason for _, _, reason in loop.untold] == ["hot:FL_calf_joint 82 °C, 88 °C stop it"]
 
@@ -129,13 +127,13 @@ def test_a_robot_that_is_not_as_it_must_be_gets_no_command() -> None:
     assert [set(command.mode.tolist()) for command in board.commands] == [{OFF}]
 
 
-def test_a_bridge_that_was_silent_learns_at_once_that_its_guard_has_acted() -> None:
-    guard = Guard("a1", replace(config_of().bridge, damp_ms=20, passive_s=0.5))
-    assert guard.beat()
+def test_a_bridge_that_was_silent_learns_at_once_that_its_watchdog_has_acted() -> None:
+    watchdog = Watchdog("a1", replace(config_of().bridge, damp_ms=20, passive_s=0.5))
+    assert watchdog.beat()
     sleep(0.2)
-    assert not guard.beat()
-    assert guard._process.poll() is None, "it damps the motors"
-    guard.dismiss()
+    assert not watchdog.beat()
+    assert watchdog._process.poll() is None, "it damps the motors"
+    watchdog.dismiss()
 
 
 class Script:
@@ -176,7 +174,7 @@ class Script:
 def ticks_of(speaks: Iterable[bool]) -> list[int]:
     """Ticks of the states of a robot that speaks so."""
     script = Script(iter(speaks))
-    plant = RobotPlant(config_of(), "r1", script, guard=None, say=list[str]().append)
+    plant = RobotPlant(config_of(), "r1", script, watchdog=None, say=list[str]().append)
     ticks = []
     with suppress(StopIteration):
         while True:
@@ -209,7 +207,7 @@ def test_how_often_the_counts_of_a_real_go1_change_is_reported() -> None:
 
     script = Go1(iter([True, False] * 1100))
     plant = RobotPlant(
-        config_of("go1"), "r1", script, guard=None, say=print, now=lambda: script.ms * 1e-3
+        config_of("go1"), "r1", script, watchdog=None, say=print, now=lambda: script.ms * 1e-3
     )
     with suppress(StopIteration):
         while True:

@@ -1,16 +1,22 @@
-"""What the small motions of a hanging robot's joints tell: right joint, way and numbers."""
+"""SHELL of the test of a hanging robot's joints, and the verdicts on them; it joins no team."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.bridges.joint_motion import WAY
+from quadriga.bridges.drivers import RobotDriver, open_driver
+from quadriga.bridges.plant import TICK, RobotLoop, bridge_of, say
+from quadriga.bridges.postures import WAY, moving_joint
+from quadriga.bridges.supervisor import TRACKING_ERROR, BridgeMode, Request, Supervised
+from quadriga.bridges.watchdog import Watchdog
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError
 from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
 from quadriga.shared.robot.motions import Motion
+from quadriga.shared.runtime.clock import Rate
 
 _MOVED: Final = 0.5  # of the way that is asked for: with less a joint has not moved
 _STILL: Final = 0.25  # likewise, that another joint may move
@@ -21,6 +27,86 @@ _SPAN: Final = 0.02  # s, over which that derivative is taken
 _TORQUE_OFF: Final = (1.5, 0.6)  # N·m, and share of the torque asked for, that is measured else
 _TORQUE_ASKED: Final = 0.4  # N·m at most, from which on the measured torque is judged
 _CALM: Final = 1.0  # rad/s that the trunk may turn
+
+
+class JointTester:
+    """One hanging robot whose joints move, one after the other.
+
+    Args:
+        config: the team's configuration.
+        name: of the robot.
+        driver: the way to it.
+        watchdog: brings the robot to rest when this process dies or hangs.
+    """
+
+    def __init__(self, config: Config, name: str, driver: RobotDriver, watchdog: Watchdog) -> None:
+        self._name = name
+        self._loop = RobotLoop(config, name, driver, watchdog=watchdog, say=say)
+        self._motion: Motion | None = None
+        self._samples: list[JointSample] = []
+        self._sampled_at = -1  # ms
+        self._joint: int | None = None  # that moves now
+
+    def run(self, stopped: Callable[[], bool]) -> list[JointVerdict]:
+        """Test all joints, damp them, and leave; the verdicts, fewer if `stopped()` came first.
+
+        Raises:
+            CheckError: the robot is not as it must be.
+            BridgeError: its own controller does not let go of the motors.
+        """
+        loop = self._loop
+        try:
+            if loop.look(stopped, hung=True):
+                loop.take_charge()
+                rate = Rate(TICK, slack=3.0)
+                while not stopped() and loop.mode in (BridgeMode.PASSIVE, BridgeMode.TESTING):
+                    if supervised := loop.turn(None, Request.TEST):
+                        self._note(supervised)
+                    rate.wait()
+        finally:
+            loop.leave()
+        return [] if self._motion is None else judge_joints(self._samples, self._motion)
+
+    def _note(self, supervised: Supervised) -> None:
+        """Keep what is asked and measured, and say which joint moves."""
+        state, report, asked = self._loop.state, self._loop.report, supervised.targets
+        if state.motion is None or report is None or asked is None:
+            return
+        self._motion, seconds = state.motion, (self._loop.now - state.since) / 1000.0
+        if self._loop.report_at > self._sampled_at:
+            self._sampled_at, r = self._loop.report_at, report
+            self._samples.append(
+                JointSample(seconds, asked.q, state.torque, r.q, r.dq, r.tau, r.gyro)
+            )
+        before, self._joint = self._joint, moving_joint(state.motion, seconds)
+        if self._joint is not None and self._joint != before:
+            say(f"{self._name}: {JOINT_NAMES[self._joint]} moves")
+
+    def refuse_stopped(self) -> None:
+        """Name what the robot has stopped for.
+
+        Raises:
+            CheckError: it has stopped.
+        """
+        if not (reason := self._loop.state.reason):
+            return
+        cause, expected = "", "joints that stay where they are"
+        if reason.startswith(TRACKING_ERROR):
+            cause = "order of legs or joints, or the sign or the zero of its angle"
+        if self._joint is not None:
+            expected = f"{JOINT_NAMES[self._joint]} alone to move"
+        raise CheckError(f"robot {self._name}: test of joints", reason, expected, cause)
+
+
+def build_joint_tester(config: Config, name: str) -> JointTester:
+    """The test of the joints of the robot of this name.
+
+    Raises:
+        ConfigError: no address or interface that can be used.
+        BridgeError: the way to the robot cannot be opened.
+    """
+    kind, bridge = config.team.robot, bridge_of(config, name)
+    return JointTester(config, name, open_driver(kind, bridge), Watchdog(kind, bridge))
 
 
 class JointSample(NamedTuple):

@@ -1,22 +1,29 @@
-"""Go2: structs over DDS, once the robot's own motion controller has been asked to let go."""
+"""How bridges reach their robots: UDP packets of A1 and Go1, and structs over DDS of the Go2."""
 
 from __future__ import annotations
 
 import json
 from collections import Counter
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 
-from quadriga.bridges.driver import count_malformed
+from quadriga.bridges.postures import passive
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import BridgeError, ConfigError
+from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
 from quadriga.shared.unitree import go2, rpc
 from quadriga.shared.unitree.dds import DdsParticipant, StructReader, StructWriter
-from quadriga.shared.unitree.packets import ON, MotorTargets, PacketError, RobotReport
+from quadriga.shared.unitree.packets import ON, SERVO, MotorTargets, PacketError, RobotReport
 from quadriga.shared.unitree.rpc import RpcEnd, RpcMessage
+from quadriga.shared.unitree.udp import CODECS, UdpCodec
+from quadriga.shared.unitree.udp_port import Address, UdpPort, parse_address
 
+_ROBOT: Final = Address("192.168.123.10", 8007)
+_LISTEN: Final = {"a1": Address("", 8080), "go1": Address("", 8090)}
+_HALF: Final = 1 << 31  # of the counter's range: a tick is behind another if it is less than this
+_RESTARTED: Final = 100  # reports in a row with older ticks: the robot has been started again
 _ANSWER: Final = 4.0  # s, for the robot to be found and to answer a query
 _LETTING_GO: Final = 15.0  # s, for its controller to do what it is asked to
 _LOOK: Final = 0.01  # s
@@ -25,12 +32,141 @@ _WATCHED: Final = 0.3  # s, for which nobody else may write commands
 _STILL_S, _STILL = 1.0, 0.2  # s for which joints are slower, rad/s, when a robot has lain down
 
 
+def count_malformed(counters: Counter[str], error: PacketError) -> str:
+    """Count a packet as malformed, and by its reason; what is wrong with it."""
+    counters.update(("malformed", f"malformed_{error.reason}"))
+    return str(error)
+
+
+class RobotDriver(Protocol):
+    """One robot on its own network.
+
+    Attributes:
+        servo: the motors' mode in which they follow commands.
+        packets_ms: between two packets of the robot.
+        period_ms: between two of its states that are used, and two commands.
+        counters: packets by what became of them; "received" those that are good and new.
+        malformed: what was wrong with the last packet that was no report; "" before the first.
+        released: the robot's own controller that was asked to let go of the motors; "" if none.
+    """
+
+    servo: int
+    packets_ms: int
+    period_ms: int
+    counters: Counter[str]
+    malformed: str
+    released: str
+
+    def receive(self) -> RobotReport | None:
+        """The newest report that has come since the last call; None if there is none."""
+        ...
+
+    def introduce(self) -> None:
+        """Send one packet that enables no motor, if the robot reports to none but who sent one."""
+        ...
+
+    def send(self, targets: MotorTargets) -> None:
+        """Send a command. A packet that cannot be sent is counted, not an error."""
+        ...
+
+    def other_writers(self) -> int:
+        """How many others have commanded the motors since the last call, as far as is known."""
+        ...
+
+    def take_over(self) -> None:
+        """Have the robot's own controller let go of the motors.
+
+        Raises:
+            BridgeError: it does not.
+        """
+        ...
+
+    def close(self) -> None:
+        """Leave the robot's network."""
+        ...
+
+
+class UdpDriver:
+    """See `RobotDriver`. Who else sends to the robot cannot be known over UDP.
+
+    Args:
+        kind: "a1" or "go1".
+        config: where the robot is, and where its packets arrive.
+        sends_only: whether it only ever sends, from any port.
+
+    Raises:
+        ConfigError: an address does not parse or resolve.
+        BridgeError: the port is taken, or the address is not of this machine.
+    """
+
+    servo, packets_ms = SERVO, 1
+
+    def __init__(self, kind: str, config: BridgeConfig, *, sends_only: bool = False) -> None:
+        robot = parse_address(config.endpoint, "bridge.endpoint", _ROBOT)
+        listen = parse_address(config.listen, "bridge.listen", _LISTEN[kind])
+        self._codec: UdpCodec = CODECS[kind]
+        self._port = UdpPort(Address(listen.host, 0) if sends_only else listen, robot)
+        self._tick: int | None = None
+        self._older = 0
+        self.period_ms = config.period_ms or self.packets_ms
+        self.malformed = self.released = ""
+        self.counters: Counter[str] = Counter()
+
+    def receive(self) -> RobotReport | None:
+        """The newest report; damaged, foreign, repeated and older ones are counted."""
+        newest = None
+        for packet, _ in self._port.drain():
+            try:
+                report = self._codec.decode_report(packet)
+            except PacketError as error:
+                self.malformed = count_malformed(self.counters, error)
+                continue
+            if self._is_newer(report.tick):
+                newest = report
+                self.counters["received"] += 1
+        return newest
+
+    def _is_newer(self, tick: int) -> bool:
+        if self._tick is not None:
+            ahead = (tick - self._tick) & 0xFFFFFFFF
+            if ahead == 0:
+                self.counters["repeated"] += 1
+                return False
+            if ahead >= _HALF:
+                self.counters["older"] += 1
+                self._older += 1
+                if self._older < _RESTARTED:
+                    return False
+        self._tick, self._older = tick, 0
+        return True
+
+    def introduce(self) -> None:
+        """See `RobotDriver`: these robots may learn from it where to send reports."""
+        self.send(passive(np.zeros(N_JOINTS)))
+
+    def send(self, targets: MotorTargets) -> None:
+        """See `RobotDriver`."""
+        sent = self._port.send(self._codec.encode_command(targets))
+        self.counters["sent" if sent else "unsent"] += 1
+
+    def other_writers(self) -> int:
+        """Always 0: nobody tells."""
+        return 0
+
+    def take_over(self) -> None:
+        """Nothing to do: the operator has put the robot into its low-level mode."""
+
+    def close(self) -> None:
+        """See `RobotDriver`."""
+        self._port.close()
+
+
 class Go2Driver:
     """See `RobotDriver`.
 
     Args:
         config: interface and domain.
-        guards: whether it only ever sends, and has the right to from the start.
+        sends_only: whether it only ever sends, and has the right to from the start.
 
     Raises:
         ConfigError: no interface is given, or CycloneDDS is not installed.
@@ -39,7 +175,7 @@ class Go2Driver:
 
     servo, packets_ms = ON, 2
 
-    def __init__(self, config: BridgeConfig, *, guards: bool = False) -> None:
+    def __init__(self, config: BridgeConfig, *, sends_only: bool = False) -> None:
         if not config.interface:
             raise ConfigError(
                 "bridge.interface", "nothing", "the one the robot hangs on, e.g. eth0"
@@ -56,7 +192,7 @@ class Go2Driver:
         self._commands: StructWriter | None = None
         self.period_ms = config.period_ms or self.packets_ms
         self.malformed = self.released = ""
-        if guards:
+        if sends_only:
             self._open_commands()
         self._switcher = RpcEnd(self._participant, rpc.MOTION_SWITCHER, serves=False)
         self._sport = RpcEnd(self._participant, rpc.SPORT, serves=False)
@@ -229,3 +365,20 @@ class Go2Driver:
     def close(self) -> None:
         """Leave the network, and have the robot know it."""
         self._participant.close()
+
+
+def open_driver(kind: str, config: BridgeConfig, *, sends_only: bool = False) -> RobotDriver:
+    """Open it.
+
+    Args:
+        kind: "a1", "go1" or "go2".
+        config: where the robot is.
+        sends_only: whether this is the watchdog's way: it only ever sends.
+
+    Raises:
+        ConfigError: no interface, or an address that does not parse.
+        BridgeError: the way cannot be opened.
+    """
+    if kind == "go2":
+        return Go2Driver(config, sends_only=sends_only)
+    return UdpDriver(kind, config, sends_only=sends_only)

@@ -12,16 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.bridges.joint_motion import TORQUE, WAY, joint_motion, moving_joint
-from quadriga.bridges.joint_verdicts import (
-    JointSample,
-    JointVerdict,
-    judge_joints,
-    refuse_wrong,
-    table,
-)
-from quadriga.bridges.modes import BridgeMode, Wish
-from quadriga.bridges.supervisor import Supervisor, SupervisorInputs
+from quadriga.bridges.joint_test import JointSample, JointVerdict, judge_joints, refuse_wrong, table
+from quadriga.bridges.postures import TORQUE, WAY, joint_motion, moving_joint
+from quadriga.bridges.supervisor import BridgeMode, Request, Supervisor, SupervisorInputs
 from quadriga.shared.errors import CheckError
 from quadriga.shared.robot.conventions import JOINT_NAMES, Array
 from quadriga.shared.robot.robots import ROBOTS
@@ -72,8 +65,8 @@ def outcome_of(commands: Commands = lambda t: t, reports: Reports = lambda r: r)
     samples, motion, torque = list[JointSample](), joint_motion(HANGING, CONFIG.robot), 0.0
     for now in range(0, round(1000 * motion.seconds) + 1200, STEP):
         report = robot.report(now)
-        inputs = SupervisorInputs(now=now, report=report, report_age=0, wish=Wish.TEST)
-        if samples and state.mode is BridgeMode.LIMP:
+        inputs = SupervisorInputs(now=now, report=report, report_age=0, request=Request.TEST)
+        if samples and state.mode is BridgeMode.PASSIVE:
             break
         state, supervised = SUPERVISOR.step(state, inputs)
         assert supervised.targets is not None
@@ -120,7 +113,7 @@ def off(values: Array) -> Array:
 def test_a_sound_robot_passes_and_is_limp_at_the_end() -> None:
     sound = outcome_of()
     refuse_wrong("r1", sound.verdicts)
-    assert (sound.mode, sound.reason) == (BridgeMode.LIMP, "")
+    assert (sound.mode, sound.reason) == (BridgeMode.PASSIVE, "")
     assert [v.joint for v in sound.verdicts] == list(JOINT_NAMES)
     assert all(abs(v.moved - v.asked) < 0.3 * WAY for v in sound.verdicts)
     assert sound.torque <= TORQUE
@@ -166,7 +159,7 @@ def test_a_joint_whose_sign_is_turned_stops_the_test_before_it_is_far() -> None:
     """While the motors come on, softly, it leaves the angle at which it shall stay."""
     found = outcome_of(change(turned, "q", "dq", "tau"))
     assert found.mode is BridgeMode.STOPPED
-    assert found.reason.startswith("joint-strays:FR_thigh_joint -0.4")
+    assert found.reason.startswith("tracking-error:FR_thigh_joint -0.4")
     with pytest.raises(CheckError, match="robot r1: test: got 0 joints, expected all 12"):
         refuse_wrong("r1", found.verdicts)
 
@@ -191,11 +184,11 @@ def test_each_joint_has_room_wherever_it_hangs(kind: str, share: float) -> None:
 def test_a_test_that_is_not_wished_any_more_lets_go_and_the_remote_stops_it() -> None:
     state = SUPERVISOR.initial(0, armed=True)
     hanging = standing(CONFIG, q=HANGING)
-    inputs = SupervisorInputs(now=1, report=hanging, report_age=0, wish=Wish.TEST)
+    inputs = SupervisorInputs(now=1, report=hanging, report_age=0, request=Request.TEST)
     state, _ = SUPERVISOR.step(state, inputs)
     assert state.mode is BridgeMode.TESTING
-    ended, supervised = SUPERVISOR.step(state, replace(inputs, now=2, wish=Wish.LIE))
-    assert ended.mode is BridgeMode.LETTING_GO
+    ended, supervised = SUPERVISOR.step(state, replace(inputs, now=2, request=Request.LIE))
+    assert ended.mode is BridgeMode.RELEASING
     assert supervised.targets is not None
     np.testing.assert_array_equal(supervised.targets.kp, 0.0)
     pressed = replace(hanging, remote=pressing("L2", "B"))
