@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.bridges.drivers import RobotDriver, open_driver
-from quadriga.bridges.plant import TICK, RobotLoop, bridge_of, say
+from quadriga.bridges.plant import TICK, RobotPlant, bridge_of, say
 from quadriga.bridges.postures import WAY, moving_joint
 from quadriga.bridges.supervisor import TRACKING_ERROR, BridgeMode, Request, Supervised
 from quadriga.bridges.watchdog import Watchdog
@@ -41,7 +41,7 @@ class JointTester:
 
     def __init__(self, config: Config, name: str, driver: RobotDriver, watchdog: Watchdog) -> None:
         self._name = name
-        self._loop = RobotLoop(config, name, driver, watchdog=watchdog, say=say)
+        self._plant = RobotPlant(config, name, driver, watchdog=watchdog, say=say)
         self._motion: Motion | None = None
         self._samples: list[JointSample] = []
         self._sampled_at = -1  # ms
@@ -54,27 +54,27 @@ class JointTester:
             CheckError: the robot is not as it must be.
             BridgeError: its own controller does not let go of the motors.
         """
-        loop = self._loop
+        plant = self._plant
         try:
-            if loop.look(stopped, hung=True):
-                loop.take_charge()
+            if plant.look(stopped, hung=True):
+                plant.take_charge()
                 rate = Rate(TICK, slack=3.0)
-                while not stopped() and loop.mode in (BridgeMode.PASSIVE, BridgeMode.TESTING):
-                    if supervised := loop.turn(None, Request.TEST):
+                while not stopped() and plant.mode in (BridgeMode.PASSIVE, BridgeMode.TESTING):
+                    if supervised := plant.turn(Request.TEST):
                         self._note(supervised)
                     rate.wait()
         finally:
-            loop.leave()
+            plant.finish()
         return [] if self._motion is None else judge_joints(self._samples, self._motion)
 
     def _note(self, supervised: Supervised) -> None:
         """Keep what is asked and measured, and say which joint moves."""
-        state, report, asked = self._loop.state, self._loop.report, supervised.targets
+        state, report, asked = self._plant.supervision, self._plant.report, supervised.targets
         if state.motion is None or report is None or asked is None:
             return
-        self._motion, seconds = state.motion, (self._loop.now - state.since) / 1000.0
-        if self._loop.report_at > self._sampled_at:
-            self._sampled_at, r = self._loop.report_at, report
+        self._motion, seconds = state.motion, (self._plant.now - state.since) / 1000.0
+        if self._plant.report_at > self._sampled_at:
+            self._sampled_at, r = self._plant.report_at, report
             self._samples.append(
                 JointSample(seconds, asked.q, state.torque, r.q, r.dq, r.tau, r.gyro)
             )
@@ -88,7 +88,7 @@ class JointTester:
         Raises:
             CheckError: it has stopped.
         """
-        if not (reason := self._loop.state.reason):
+        if not (reason := self._plant.supervision.reason):
             return
         cause, expected = "", "joints that stay where they are"
         if reason.startswith(TRACKING_ERROR):

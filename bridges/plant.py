@@ -7,7 +7,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -36,7 +36,7 @@ from quadriga.shared.wire.messages import Command, Event, State, Status
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 TICK: Final = 1e-3  # s
-SLACK_MS: Final = 3000  # beyond what a motion takes
+_SLACK_MS: Final = 3000  # beyond what a motion takes
 _LOOK_MS: Final = 1000  # of reports that are checked before the robot is commanded
 _FIND_MS: Final = 3000  # for the first of them to come
 _INTRODUCE_MS: Final = 500  # between two packets to a robot that is silent
@@ -48,22 +48,8 @@ _REMEMBERED: Final = 64  # ticks, for which the arrival of their reports is know
 _NOTHING: Final = (-1, 0.0)
 
 
-class Answer(NamedTuple):
-    """An agent's command.
-
-    Attributes:
-        command: the newest.
-        age: of the state that it answers, ms.
-        arrived: when the report of that state came, s; None: it has been sent before.
-    """
-
-    command: Command
-    age: int
-    arrived: float | None = None
-
-
-class RobotLoop:
-    """One robot, and who decides what it does. No motor is enabled before `take_charge`.
+class RobotPlant(Plant):
+    """See `Plant`. No motor is enabled before `take_charge`, and never unless it is armed.
 
     Args:
         config: the team's configuration.
@@ -75,19 +61,16 @@ class RobotLoop:
         clock: one that never goes back, s.
 
     Attributes:
-        state: what the supervisor remembers.
+        supervision: what the supervisor remembers.
         now: ms since this was made.
-        report: the newest; None before the first.
+        report: the robot's newest; None before the first.
         report_at: when it came, ms.
-        arrived: the same by `clock`, s.
-        estops: tells why the team's emergency stop was pressed; "" if it was not.
-        untold: changes that nobody has taken yet: when, ms, the mode and its reason.
-        foot_refresh: how often feet's counts changed in the second in which they did most, Hz.
-        answers: times from a report's arrival to the command that was made of it, ms.
 
     Raises:
         ConfigError: `bridge.stop_buttons` names no buttons.
     """
+
+    is_robot = True
 
     def __init__(
         self,
@@ -99,35 +82,33 @@ class RobotLoop:
         say: Callable[[str], None],
         clock: Callable[[], float] = monotonic,
     ) -> None:
-        self._config, self._name = config, name
+        self.names, self.tick = (name,), 0  # ticks begin with the walk
+        self._config, self._name, self.period_ms = config, name, driver.period_ms
         self._driver, self._watchdog, self._say = driver, watchdog, say
         self._clock, self._turned_at = clock, clock()
+        self._idle_rate = Rate(TICK, now=clock, slack=3.0)
         self._supervisor = Supervisor(config.robot, config.bridge, driver.servo)
-        self.state: SupervisorState = self._supervisor.initial(0, armed=watchdog is not None)
+        self.supervision: SupervisorState = self._supervisor.initial(0, armed=watchdog is not None)
         self.now = 0
         self.report: RobotReport | None = None
-        self.report_at, self.arrived = -1, 0.0
+        self.report_at, self._arrived = -1, 0.0  # the same by the clock, s
         self._sent_at, self._warn_at = 0, 0
-        self.foot_refresh = self._foot_changes = 0
+        self._foot_refresh = self._foot_changes = 0  # Hz in the busiest second; in this one
         self._foot_second = clock()
-        self.estops: Callable[[], str] = str
-        self.untold = list[tuple[int, BridgeMode, str]]()
-        self.answers = Histogram(_ANSWER_BIN)
+        self._estops: Callable[[], str] = str  # why the team's was pressed, "" if it was not
+        self._untold = list[tuple[int, BridgeMode, str]]()  # when a mode began, ms, and why
+        self._answers = Histogram(_ANSWER_BIN)  # from reports to the commands made of them, ms
         self._in_charge = False  # of the robot's motors
         self._watchdog_gone = False
         self._cut: Counter[str] = Counter()
+        self._published_at = -1
+        self._arrivals = [_NOTHING] * _REMEMBERED  # tick of a state, and when its report came
+        self._yaw: float | None = None
 
     @property
     def mode(self) -> BridgeMode:
         """What the supervisor lets the robot do now."""
-        return self.state.mode
-
-    @property
-    def left_ms(self) -> int:
-        """How long the motion that is made now may take, ms."""
-        motion = self.state.motion
-        seconds = self._config.bridge.stand_s if motion is None else motion.seconds
-        return round(1000.0 * seconds) + SLACK_MS
+        return self.supervision.mode
 
     def look(self, stopped: Callable[[], bool], *, hung: bool = False, tells: bool = True) -> bool:
         """Check a second of reports; False if `stopped()` came first.
@@ -146,19 +127,19 @@ class RobotLoop:
             if stopped():
                 return False
             self._begin_turn()
-            if self.receive():
+            if self._receive():
                 break
             if ms % _INTRODUCE_MS == 0:
                 driver.introduce()
             rate.wait()
-        while self.receive():  # what came before this second
+        while self._receive():  # what came before this second
             pass
         before = driver.counters["received"]
         for _ in range(_LOOK_MS):
             if stopped():
                 return False
             self._begin_turn()
-            if self.receive():
+            if self._receive():
                 reports += [] if self.report is None else [self.report]
             rate.wait()
         malformed = driver.counters["malformed"] - malformed
@@ -175,6 +156,42 @@ class RobotLoop:
         for finding in findings if tells else ():
             self._say(f"{finding.name}: {finding.got}{'' if finding.ok else '  <- not right'}")
         refuse_failed(self._name, findings)
+        return True
+
+    def prepare(self, stopped: Callable[[], bool]) -> bool:
+        """Look at the robot's reports, and get it to stand if it may be commanded.
+
+        Raises:
+            CheckError: the robot is not as it must be, or it stopped while it stood up.
+            BridgeError: its own controller does not let go of the motors.
+        """
+        if not self.look(stopped, tells=False):
+            return False
+        if self._watchdog is None:
+            self._say(f"{self._name}: dry run, no motor is enabled; --armed commands the robot")
+            return True
+        self.take_charge()
+        return self._stand_up(stopped)
+
+    def _stand_up(self, stopped: Callable[[], bool]) -> bool:
+        """Stand up; False if `stopped()` came first.
+
+        Raises:
+            CheckError: it stopped, or does not stand when it should.
+        """
+        before, left = self.mode, self._left_ms
+        while self.mode is not BridgeMode.STANDING:
+            if stopped():
+                return False
+            left -= 1
+            if self.mode is BridgeMode.STOPPED or left < 0:
+                what = f"robot {self._name}: {BridgeMode.STANDING_UP}"
+                got = self.supervision.reason or f"{self.mode} for too long"
+                raise CheckError(what, got, "a robot that stands")
+            self.turn(Request.STAND)
+            if self.mode is not before:
+                before, left = self.mode, self._left_ms
+            self._idle_rate.wait()
         return True
 
     def take_charge(self) -> None:
@@ -194,48 +211,83 @@ class RobotLoop:
         self._in_charge = True
         self._stall()
 
-    def turn(self, answer: Answer | None, request: Request) -> Supervised | None:
+    def listen(self, estops: Callable[[], str]) -> None:
+        self._estops = estops
+
+    def states(self) -> Mapping[str, State]:
+        """What the robot measures; nothing at ticks at which it has not said anything new.
+
+        States have even ticks at 500 Hz. At each sample there is one, the newest, unless even that
+        is old.
+        """
+        tick = self.tick
+        if tick % self.period_ms:
+            return {}
+        self._receive()
+        if (report := self.report) is None:
+            return {}
+        is_new, age = self.report_at > self._published_at, self.now - self.report_at
+        if not (is_new or (tick % SAMPLE_MS == 0 and age <= _SAMPLE_AGE)):
+            return {}
+        self._published_at = self.report_at
+        self._arrivals[tick % _REMEMBERED] = tick, self._arrived
+        if self._yaw is None:
+            self._yaw = yaw_of(report.quat_wxyz)
+        return {self._name: to_state(report, tick, self._yaw)}
+
+    def step(self, commands: Mapping[str, Command]) -> Sequence[Event]:
+        """One millisecond of the walk; its first tells of the time before it, too."""
+        before = self._take_changes()
+        self.turn(Request.WALK, commands.get(self._name))
+        events = before + self._take_changes()
+        self.tick += 1
+        return events
+
+    def idle(self) -> None:
+        """A millisecond of standing, while the others are waited for."""
+        self.turn(Request.STAND)
+        self._idle_rate.wait()
+
+    def turn(self, request: Request, command: Command | None = None) -> Supervised | None:
         """A millisecond: receive, decide, send.
 
         An agent's new command is sent at once, and some command once in a period at least. In the
         milliseconds between two commands there is nothing to decide.
 
         Args:
-            answer: the agent's newest command; None before the first, and before the walk.
             request: what the robot is to do.
+            command: the agent's newest; None before the first, and before the walk.
 
         Returns:
             What was decided; None between two commands, and before the first report.
         """
         self._begin_turn()
-        period, is_new = self._driver.period_ms, answer is not None and answer.arrived is not None
-        is_due = is_new or self.now - self._sent_at >= period
-        if not is_due:
+        arrived = None if command is None else self._take_arrival(command.tick)
+        if arrived is None and self.now - self._sent_at < self.period_ms:
             return None
-        if self.now - self.report_at >= period:
-            self.receive()
-        report = self.report
-        if report is None:
+        if self.now - self.report_at >= self.period_ms:
+            self._receive()
+        if (report := self.report) is None:
             return None
         inputs = SupervisorInputs(
             now=self.now,
             report=report,
             report_age=self.now - self.report_at,
-            command=None if answer is None else answer.command,
-            command_age=0 if answer is None else answer.age,
+            command=command,
+            command_age=0 if command is None else self.tick - command.tick,
             request=request,
             writers=self._driver.other_writers(),
             stall=self._stall(),
             watched=not self._watchdog_gone,
-            estop=self.estops(),
+            estop=self._estops(),
         )
-        self.state, supervised = self._supervisor.step(self.state, inputs)
+        self.supervision, supervised = self._supervisor.step(self.supervision, inputs)
         self._cut.update(supervised.cut)
         self._sent_at = self.now
         if supervised.targets is not None:
             self._driver.send(supervised.targets)
-            if answer is not None and answer.arrived is not None:
-                self.answers.add(1e3 * (self._clock() - answer.arrived))
+            if arrived is not None:
+                self._answers.add(1e3 * (self._clock() - arrived))
         changes = [*supervised.changes]
         if self.now >= self._warn_at and self.mode is not BridgeMode.STOPPED:
             warning = self._supervisor.warning(report)
@@ -243,10 +295,18 @@ class RobotLoop:
             changes += [(self.mode, warning)] if warning else []
         for mode, reason in changes:
             self._say(f"{self._name}: {mode} {reason}".rstrip())
-            self.untold.append((self.now, mode, reason))
+            self._untold.append((self.now, mode, reason))
         return supervised
 
-    def leave(self) -> None:
+    def _take_arrival(self, tick: int) -> float | None:
+        """When the report of a state came, s; None if its command has been sent already."""
+        state_tick, arrived = self._arrivals[tick % _REMEMBERED]
+        if state_tick != tick:
+            return None
+        self._arrivals[tick % _REMEMBERED] = _NOTHING
+        return arrived
+
+    def finish(self) -> None:
         """Have the robot lie down, switch its motors off, and leave."""
         if self._in_charge:
             self._come_to_rest()
@@ -256,17 +316,24 @@ class RobotLoop:
 
     def _come_to_rest(self) -> None:
         resting = (BridgeMode.DRY, BridgeMode.PASSIVE, BridgeMode.STOPPED)
-        rate, before, left = Rate(TICK), self.mode, self.left_ms
+        rate, before, left = Rate(TICK), self.mode, self._left_ms
         while self.mode not in resting and left > 0:
-            self.turn(None, Request.LIE)
+            self.turn(Request.LIE)
             rate.wait()
             if self.mode is not before:
-                before, left = self.mode, self.left_ms
+                before, left = self.mode, self._left_ms
             left -= 1
         passive = round(1000 * self._config.bridge.passive_s)
         for _ in range(_LEAVE_MS + (passive if self.mode is BridgeMode.STOPPED else 0)):
-            self.turn(None, Request.REST)
+            self.turn(Request.REST)
             rate.wait()
+
+    @property
+    def _left_ms(self) -> int:
+        """How long the motion that is made now may take, ms."""
+        motion = self.supervision.motion
+        seconds = self._config.bridge.stand_s if motion is None else motion.seconds
+        return round(1000.0 * seconds) + _SLACK_MS
 
     def describe(self, status: Status) -> Status:
         """With the bridge's mode and reason, and counters of the robot and of its packets.
@@ -274,17 +341,17 @@ class RobotLoop:
         `<robot>.answer` of `ages_ms` is the time from the arrival of a report to the command that
         the agent made of it.
         """
-        ages = {**status.ages_ms, **self.answers.quantiles(f"{self._name}.answer")}
+        ages = {**status.ages_ms, **self._answers.quantiles(f"{self._name}.answer")}
         counters = {**status.counters, **self._driver.counters}
         counters |= {f"limited_{name}": count for name, count in self._cut.items()}
         report = self.report
         if report is not None:
-            counters["foot_refresh_hz"] = self.foot_refresh
+            counters["foot_refresh_hz"] = self._foot_refresh
             counters["hottest_c"] = int(np.max(report.temperature))
             counters["motors_lost"] = int(np.sum(report.lost))
             if report.battery is not None:
                 counters["battery_percent"] = report.battery.charge
-        mode, reason = str(self.mode), self.state.reason
+        mode, reason = str(self.mode), self.supervision.reason
         return replace(status, mode=mode, reason=reason, ages_ms=ages, counters=counters)
 
     def _begin_turn(self) -> None:
@@ -293,20 +360,20 @@ class RobotLoop:
         if self._in_charge and self._watchdog is not None and self.now % BEAT_MS == 0:
             self._watchdog_gone = not self._watchdog.beat()
 
-    def receive(self) -> bool:
+    def _receive(self) -> bool:
         """Take the newest report; whether one has come."""
         report = self._driver.receive()
         if report is None:
             return False
         self._count_foot_changes(report)
-        self.report, self.report_at, self.arrived = report, self.now, self._clock()
+        self.report, self.report_at, self._arrived = report, self.now, self._clock()
         return True
 
     def _count_foot_changes(self, report: RobotReport) -> None:
         now = self._clock()
         if now - self._foot_second >= 1.0:
             rate = round(self._foot_changes / (now - self._foot_second))
-            self.foot_refresh = max(self.foot_refresh, rate)
+            self._foot_refresh = max(self._foot_refresh, rate)
             self._foot_second, self._foot_changes = now, 0
         before = report if self.report is None else self.report
         self._foot_changes += not np.array_equal(report.foot, before.foot)
@@ -316,163 +383,16 @@ class RobotLoop:
         before, self._turned_at = self._turned_at, self._clock()
         return round(1000.0 * (self._turned_at - before))
 
-
-class RobotPlant(Plant):
-    """See `Plant`. No motor is enabled before `prepare`, and never unless it is armed.
-
-    Args:
-        config: the team's configuration.
-        name: of the robot.
-        driver: the way to it.
-        watchdog: brings the robot to rest when this process dies or hangs; None: a dry run, in
-            which no motor is ever enabled.
-        say: tells the operator what happens.
-        now: a clock that never goes back, s.
-
-    Raises:
-        ConfigError: `bridge.stop_buttons` names no buttons.
-    """
-
-    is_robot = True
-
-    def __init__(
-        self,
-        config: Config,
-        name: str,
-        driver: RobotDriver,
-        *,
-        watchdog: Watchdog | None,
-        say: Callable[[str], None],
-        now: Callable[[], float] = monotonic,
-    ) -> None:
-        self.names, self.tick = (name,), 0  # ticks begin with the walk
-        self._config, self.period_ms, self._say = config, driver.period_ms, say
-        self._armed = watchdog is not None
-        self._loop = RobotLoop(config, name, driver, watchdog=watchdog, say=say, clock=now)
-        self._idle_rate = Rate(TICK, now=now, slack=3.0)
-        self._published_at = -1
-        self._arrivals = [_NOTHING] * _REMEMBERED  # tick of a state, and when its report came
-        self._yaw: float | None = None
-
-    @property
-    def mode(self) -> BridgeMode:
-        """What the supervisor lets the robot do now."""
-        return self._loop.mode
-
-    def look(self, stopped: Callable[[], bool]) -> None:
-        """Check the robot's reports before the team is there, and tell the operator.
-
-        Raises:
-            CheckError: the robot is not as it must be.
-        """
-        self._loop.look(stopped)
-
-    def prepare(self, stopped: Callable[[], bool]) -> bool:
-        """Look at the robot's reports, and get it to stand if it may be commanded.
-
-        Raises:
-            CheckError: the robot is not as it must be, or it stopped while it stood up.
-            BridgeError: its own controller does not let go of the motors.
-        """
-        name = self.names[0]
-        if not self._loop.look(stopped, tells=False):
-            return False
-        if not self._armed:
-            self._say(f"{name}: dry run, no motor is enabled; --armed commands the robot")
-            return True
-        self._loop.take_charge()
-        return self._stand_up(stopped)
-
-    def _stand_up(self, stopped: Callable[[], bool]) -> bool:
-        """Stand up; False if `stopped()` came first.
-
-        Raises:
-            CheckError: it stopped, or does not stand when it should.
-        """
-        loop = self._loop
-        before, left = loop.mode, loop.left_ms
-        while loop.mode is not BridgeMode.STANDING:
-            if stopped():
-                return False
-            left -= 1
-            if loop.mode is BridgeMode.STOPPED or left < 0:
-                got = loop.state.reason or f"{loop.mode} for too long"
-                name, stood = self.names[0], "a robot that stands"
-                raise CheckError(f"robot {name}: {BridgeMode.STANDING_UP}", got, stood)
-            loop.turn(None, Request.STAND)
-            if loop.mode is not before:
-                before, left = loop.mode, loop.left_ms
-            self._idle_rate.wait()
-        return True
-
-    def listen(self, estops: Callable[[], str]) -> None:
-        self._loop.estops = estops
-
-    def states(self) -> Mapping[str, State]:
-        """What the robot measures; nothing at ticks at which it has not said anything new.
-
-        States have even ticks at 500 Hz. At each sample there is one, the newest, unless even that
-        is old.
-        """
-        loop, tick = self._loop, self.tick
-        if tick % self.period_ms:
-            return {}
-        loop.receive()
-        report = loop.report
-        if report is None:
-            return {}
-        is_new = loop.report_at > self._published_at
-        age = loop.now - loop.report_at
-        if not (is_new or (tick % SAMPLE_MS == 0 and age <= _SAMPLE_AGE)):
-            return {}
-        self._published_at = loop.report_at
-        self._arrivals[tick % _REMEMBERED] = tick, loop.arrived
-        if self._yaw is None:
-            self._yaw = yaw_of(report.quat_wxyz)
-        return {self.names[0]: to_state(report, tick, self._yaw)}
-
-    def step(self, commands: Mapping[str, Command]) -> Sequence[Event]:
-        """One millisecond of the walk; its first tells of the time before it, too."""
-        before = self._take_changes()
-        command = commands.get(self.names[0])
-        self._loop.turn(self._answer(command), Request.WALK)
-        events = before + self._take_changes()
-        self.tick += 1
-        return events
-
-    def _answer(self, command: Command | None) -> Answer | None:
-        if command is None:
-            return None
-        place, age = command.tick % _REMEMBERED, self.tick - command.tick
-        tick, arrived = self._arrivals[place]
-        if tick != command.tick:
-            return Answer(command, age)
-        self._arrivals[place] = _NOTHING  # sent again, it is no answer
-        return Answer(command, age, arrived)
-
-    def idle(self) -> None:
-        """A millisecond of standing, while the others are waited for."""
-        self._loop.turn(None, Request.STAND)
-        self._idle_rate.wait()
-
-    def finish(self) -> None:
-        """Have the robot lie down, switch its motors off, and leave."""
-        self._loop.leave()
-
-    def describe(self, status: Status) -> Status:
-        """With the bridge's mode and reason, and counters of the robot and of its packets."""
-        return self._loop.describe(status)
-
     def _take_changes(self) -> list[Event]:
         """What the bridge has changed since the last call."""
-        changes, self._loop.untold = self._loop.untold, []
+        changes, self._untold = self._untold, []
         return [self._event(*change) for change in changes]
 
     def _event(self, at: int, mode: BridgeMode, reason: str) -> Event:
-        ms_ago, text = self._loop.now - at, f"{mode} {reason}".rstrip()
+        ms_ago, text = self.now - at, f"{mode} {reason}".rstrip()
         text += f", {ms_ago / 1000:.1f} s before the walk" if ms_ago else ""
         code = codes.ROBOT_STOPPED if mode is BridgeMode.STOPPED else codes.BRIDGE_MODE
-        return Event.of(self.tick, code, self.names[0], text)
+        return Event.of(self.tick, code, self._name, text)
 
 
 def yaw_of(quat_wxyz: Array) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from quadriga.bridges.drivers import Go2Driver
-from quadriga.bridges.plant import RobotLoop
+from quadriga.bridges.plant import RobotPlant
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import BridgeError, ConfigError
 from quadriga.shared.runtime.clock import sleep
@@ -98,9 +98,9 @@ def test_of_a_takeover_that_fails_later_the_operator_learns_whom_to_give_the_mot
 
     monkeypatch.setattr(bench.driver, "_await_mode", intrude)
     said = list[str]()
-    loop = RobotLoop(config_of("go2"), "r1", bench.driver, watchdog=None, say=said.append)
+    plant = RobotPlant(config_of("go2"), "r1", bench.driver, watchdog=None, say=said.append)
     with pytest.raises(BridgeError, match="rt/lowcmd: got 1 others who write it, expected nobody"):
-        loop.take_charge()
+        plant.take_charge()
     assert ["--restore normal" in line for line in said] == [True]
 
 

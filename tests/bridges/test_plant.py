@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from quadriga.bridges.drivers import open_driver
-from quadriga.bridges.plant import RobotLoop, RobotPlant, build_bridge, to_state, yaw_of
+from quadriga.bridges.plant import RobotPlant, build_bridge, to_state, yaw_of
 from quadriga.bridges.supervisor import BridgeMode, Request
 from quadriga.bridges.watchdog import Watchdog
 from quadriga.shared.config.load import load
@@ -108,11 +108,11 @@ def test_a_hot_motor_is_told_of_once_a_minute_and_recorded() -> None:
     driver: Any = SimpleNamespace(
         servo=SERVO, period_ms=1, receive=lambda: report, other_writers=lambda: 0
     )
-    loop = RobotLoop(config, "r1", driver, watchdog=None, say=said.append)
+    plant = RobotPlant(config, "r1", driver, watchdog=None, say=said.append)
     for _ in range(3000):
-        loop.turn(None, Request.REST)
+        plant.turn(Request.REST)
     assert said == ["r1: dry hot:FL_calf_joint 82 °C, 88 °C stop it"]
-    assert [reason for _, _, reason in loop.untold] == ["hot:FL_calf_joint 82 °C, 88 °C stop it"]
+    assert [reason for _, _, reason in plant._untold] == ["hot:FL_calf_joint 82 °C, 88 °C stop it"]
 
 
 def test_a_robot_that_is_not_as_it_must_be_gets_no_command() -> None:
@@ -207,7 +207,7 @@ def test_how_often_the_counts_of_a_real_go1_change_is_reported() -> None:
 
     script = Go1(iter([True, False] * 1100))
     plant = RobotPlant(
-        config_of("go1"), "r1", script, watchdog=None, say=print, now=lambda: script.ms * 1e-3
+        config_of("go1"), "r1", script, watchdog=None, say=print, clock=lambda: script.ms * 1e-3
     )
     with suppress(StopIteration):
         while True:
