@@ -22,8 +22,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.places import SOURCE
-from quadriga.sim_server.world.faults.components import build_components
-from quadriga.sim_server.world.faults.fault import parse_faults, with_time
+from quadriga.sim_server.world.faults import build_components, parse_faults, with_time
 from quadriga.stop_times.ways import WAYS
 from quadriga.team import scenarios
 
